@@ -1,0 +1,19 @@
+"""Where work runs: in processes that can be stopped, killed and replaced.
+
+``Engine`` is what the service sees; ``LocalEngine`` keeps worker processes on this machine.
+"""
+
+from app.engine.interface import Engine
+from app.engine.local import LocalEngine
+from app.engine.work import Answering, Done, MeshFromFile, MeshFromSample, StoredMesh, Work
+
+__all__ = [
+    "Answering",
+    "Done",
+    "Engine",
+    "LocalEngine",
+    "MeshFromFile",
+    "MeshFromSample",
+    "StoredMesh",
+    "Work",
+]

@@ -1,0 +1,132 @@
+"""One place for one worker process: a pebble pool of a single worker, replaced when it breaks."""
+
+import asyncio
+import logging
+import multiprocessing
+from collections import deque
+from concurrent.futures import Future
+from itertools import count
+from typing import Any
+
+from pebble import ProcessPool
+
+from app.engine import worker
+from app.engine.work import Done, Work
+from app.errors import Problem
+
+logger = logging.getLogger(__name__)
+
+_SPAWN = multiprocessing.get_context("spawn")  # fork would copy threads' locks, held or not
+_LOOK_S = 0.1  # how often an idle worker is looked after; pebble looks as often
+_KNOWN_MESHES = 32
+
+
+class WorkerLostError(Exception):
+    """The worker died, or was killed; ``had_begun`` tells whether it had taken up the work."""
+
+    def __init__(self, *, had_begun: bool) -> None:
+        super().__init__("the worker died")
+        self.had_begun = had_begun
+
+
+class Slot:
+    """A place that has a living worker between ``open`` and ``close``, and can be opened again.
+
+    A pool whose worker dies is given up as a whole: pebble replaces a worker that dies at work, but
+    one that dies idle breaks its pool for good, and one that is killed while it writes to the
+    pool's pipe leaves a lock behind.
+    """
+
+    def __init__(self, config: worker.WorkerConfig) -> None:
+        self._config = config
+        self._numbers = count(1)
+        self._number = 0
+        self._outcome: asyncio.Future[Done | Problem] | None = None
+        self._begun: Future[Any] | None = None
+        self._given_up = asyncio.Event()
+        self._pool: ProcessPool | None = None
+        # Shared with the worker: the number of the work to stop, and the worker's process id.
+        self._stop_number = _SPAWN.RawValue("q", 0)
+        self._pid = _SPAWN.RawValue("q", 0)
+        self.known_meshes: deque[str] = deque(maxlen=_KNOWN_MESHES)
+
+    async def open(self) -> None:
+        """Start a worker and warm its kernels; raises ``WorkerLostError`` when it cannot."""
+        self._given_up.clear()
+        self.known_meshes.clear()
+        self._stop_number.value = self._pid.value = 0
+        self._pool = ProcessPool(
+            max_workers=1,
+            initializer=worker.initialize,
+            initargs=(self._config, self._stop_number, self._pid),
+            context=_SPAWN,
+        )
+        started = await asyncio.to_thread(self._pool.schedule, worker.warm_up)
+        try:
+            await asyncio.wrap_future(started)
+        except Exception as error:
+            raise WorkerLostError(had_begun=False) from error
+
+    @property
+    def is_alive(self) -> bool:
+        """Whether work given to the slot now would be done."""
+        return self._pool is not None and self._pool.active and not self._given_up.is_set()
+
+    async def until_dead(self) -> None:
+        """Wait until the worker is gone or given up."""
+        while self.is_alive:
+            try:
+                await asyncio.wait_for(self._given_up.wait(), _LOOK_S)
+            except TimeoutError:
+                continue
+
+    def give_up(self) -> None:
+        """Say that this worker is not to be used again, so that its keeper replaces it."""
+        self._given_up.set()
+
+    def begin(self, work: Work) -> "asyncio.Future[Done | Problem]":
+        """Hand ``work`` to the worker; the future fails with ``WorkerLostError`` if that dies."""
+        loop = asyncio.get_running_loop()
+        outcome: asyncio.Future[Done | Problem] = loop.create_future()
+        self._number, self._outcome = next(self._numbers), outcome
+        assert self._pool is not None, "only open slots are given work"  # noqa: S101
+        try:
+            begun = self._pool.schedule(worker.do, args=(self._number, work))
+        except RuntimeError:  # the pool broke since it was looked at
+            _settle(outcome, None, had_begun=False)
+            return outcome
+        self._begun = begun
+        begun.add_done_callback(lambda done: loop.call_soon_threadsafe(_settle, outcome, done))
+        return outcome
+
+    def ask_to_stop(self) -> None:
+        """Ask the work that is under way to stop; the sweep looks between its slices."""
+        self._stop_number.value = self._number
+
+    async def close(self) -> None:
+        """Kill the worker, whatever it does."""
+        self.give_up()
+        await asyncio.to_thread(self._kill)
+        if self._outcome is not None:
+            had_begun = self._begun is not None and self._begun.running()
+            _settle(self._outcome, None, had_begun=had_begun)
+
+    def _kill(self) -> None:
+        for child in multiprocessing.active_children():
+            if child.pid == self._pid.value:
+                child.kill()  # it holds nothing that would need a farewell
+        if self._pool is not None:
+            self._pool.stop()  # type: ignore[no-untyped-call]
+            self._pool.join()
+
+
+def _settle(
+    outcome: "asyncio.Future[Done | Problem]", done: Future[Any] | None, *, had_begun: bool = True
+) -> None:
+    if outcome.done():
+        return
+    error = done.exception() if done is not None else None
+    if done is not None and error is None:
+        outcome.set_result(done.result())
+    else:
+        outcome.set_exception(WorkerLostError(had_begun=had_begun))

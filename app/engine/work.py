@@ -1,0 +1,61 @@
+"""What a worker can be asked to do, and what it says when it has done it: small values only."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from app.queries import Query
+from app.schemas import Merge
+
+
+@dataclass(frozen=True)
+class MeshFromFile:
+    """Read, check and store the mesh of an upload."""
+
+    path: Path
+    file_type: str
+    merge: Merge
+
+    stops_when_asked: ClassVar[bool] = False
+
+
+@dataclass(frozen=True)
+class MeshFromSample:
+    """Make, check and store a sample."""
+
+    name: str
+    faces: int
+    merge: Merge
+
+    stops_when_asked: ClassVar[bool] = False
+
+
+@dataclass(frozen=True)
+class Answering:
+    """Answer ``query`` into the result ``result_name``."""
+
+    query: Query
+    media_type: str
+    result_name: str
+
+    stops_when_asked: ClassVar[bool] = True
+
+
+Work = MeshFromFile | MeshFromSample | Answering
+
+
+@dataclass(frozen=True)
+class StoredMesh:
+    """A mesh that is in the store, and whether it is new there."""
+
+    mesh_id: str
+    is_new: bool
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a worker reports: the seconds of each phase, and the mesh where one was stored."""
+
+    seconds: Mapping[str, float]
+    mesh: StoredMesh | None = None

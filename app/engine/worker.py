@@ -1,0 +1,151 @@
+"""What runs inside a worker process."""
+
+import os
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from ctypes import c_longlong
+from dataclasses import dataclass, field
+from multiprocessing import connection, parent_process
+from pathlib import Path
+from time import perf_counter
+
+from setproctitle import setproctitle
+
+import geodesic_core as gc
+from app.answers import answer
+from app.encoding import encode
+from app.engine.work import Answering, Done, MeshFromFile, MeshFromSample, StoredMesh, Work
+from app.errors import Problem, over_limit, problem_of
+from app.json_mesh import read_json_mesh
+from app.mesh_store import MeshStore, OpenMesh
+from app.result_store import write_result
+from app.settings import Settings
+
+TITLE = "geodesic-worker"
+
+
+@dataclass(frozen=True)
+class WorkerConfig:
+    """What a worker is told when it starts."""
+
+    settings: Settings
+    results: Path
+
+
+@dataclass
+class Worker:
+    """The state of a worker process: its meshes, kept open while they fit."""
+
+    config: WorkerConfig
+    stop_number: c_longlong
+    meshes: OrderedDict[str, OpenMesh] = field(default_factory=OrderedDict)
+
+    def __post_init__(self) -> None:
+        self.settings = self.config.settings
+        self.store = MeshStore(self.settings.store)
+
+    def do(self, number: int, work: Work) -> Done:
+        """Do ``work``, unless the number of the work to stop reaches ``number``."""
+        clock = Clock()
+        match work:
+            case MeshFromFile() | MeshFromSample():
+                return self._add_mesh(work, clock)
+            case Answering():
+                return self._answer(work, clock, lambda: self.stop_number.value >= number)
+
+    def _add_mesh(self, work: MeshFromFile | MeshFromSample, clock: "Clock") -> Done:
+        with clock.phase("load"):
+            mesh = _make_mesh(work)
+        faces, limit = mesh.report.faces, self.settings.max_faces
+        if faces > limit:
+            raise over_limit("limit_exceeded", "faces", faces, limit, "max_faces")
+        with clock.phase("store"):
+            mesh_id, is_new = self.store.add(mesh)
+        return Done(clock.seconds, StoredMesh(mesh_id, is_new))
+
+    def _answer(self, work: Answering, clock: "Clock", cancel: Callable[[], bool]) -> Done:
+        with clock.phase("load"):
+            opened = self._open(work.query.mesh_id)
+        with clock.phase("compute"):
+            found = answer(
+                work.query, opened, cancel=cancel, memory_limit=self.settings.query_memory_bytes
+            )
+        with clock.phase("encode"):
+            encoded = encode(found, work.media_type)
+            write_result(self.config.results, work.result_name, encoded.parts, encoded.headers)
+        return Done(clock.seconds)
+
+    def _open(self, mesh_id: str) -> OpenMesh:
+        if mesh_id not in self.meshes:
+            self.meshes[mesh_id] = self.store.open(mesh_id)
+        self.meshes.move_to_end(mesh_id)
+        while len(self.meshes) > 1 and self._open_bytes() > self.settings.worker_mesh_bytes:
+            self.meshes.popitem(last=False)
+        return self.meshes[mesh_id]
+
+    def _open_bytes(self) -> int:
+        return sum(opened.mesh.nbytes for opened in self.meshes.values())
+
+
+class Clock:
+    """Seconds by phase."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Measure what runs inside."""
+        start = perf_counter()
+        yield
+        self.seconds[name] = perf_counter() - start
+
+
+def _make_mesh(work: MeshFromFile | MeshFromSample) -> gc.TriangleMesh:
+    match work:
+        case MeshFromSample(name, faces, merge):
+            return gc.TriangleMesh(*SAMPLES[name](faces), merge=merge)
+        case MeshFromFile(path, "json", merge):
+            return gc.TriangleMesh(*read_json_mesh(path.read_bytes()), merge=merge)
+        case MeshFromFile(path, file_type, merge):
+            return gc.load_mesh(path, file_type=file_type, merge=merge)
+
+
+SAMPLES = {"knot": gc.samples.knot, "sphere": gc.samples.sphere, "plane": gc.samples.plane}
+
+# pebble calls module functions: the state of the process has to live beside them.
+_worker: Worker | None = None
+
+
+def initialize(config: WorkerConfig, stop_number: c_longlong, pid: c_longlong) -> None:
+    """Make this process a worker; called once, by its pool."""
+    global _worker  # noqa: PLW0603
+    setproctitle(TITLE)
+    threading.Thread(target=_die_with_parent, daemon=True).start()
+    _worker = Worker(config, stop_number)
+    pid.value = os.getpid()
+
+
+def warm_up() -> None:
+    """Compile the kernels, or load them."""
+    gc.warm_up()
+
+
+def do(number: int, work: Work) -> Done | Problem:
+    """Do ``work``; what goes wrong is a value, since not every exception survives a pipe."""
+    assert _worker is not None, "the pool calls initialize first"  # noqa: S101
+    try:
+        return _worker.do(number, work)
+    except Exception as error:  # noqa: BLE001 - whatever it is, the client is to be told
+        return problem_of(error)
+
+
+def _die_with_parent() -> None:
+    # The sentinel is the read end of a pipe whose other end closes with the parent, however that
+    # ends; PR_SET_PDEATHSIG would fire already when the parent's *thread* that started us ends.
+    parent = parent_process()
+    assert parent is not None, "workers are spawned"  # noqa: S101
+    connection.wait([parent.sentinel])
+    os._exit(1)

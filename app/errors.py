@@ -1,0 +1,222 @@
+"""Every error the service answers with, and the one table from exceptions to them."""
+
+import errno
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from app.settings import variable_of
+from geodesic_core import errors as core
+
+PROBLEM_JSON = "application/problem+json"
+
+
+@dataclass(frozen=True)
+class Code:
+    """One row of the error table: what ``GET /problems/{code}`` explains."""
+
+    status: int
+    title: str
+    meaning: str
+
+
+CODES: Mapping[str, Code] = {
+    "malformed_body": Code(
+        400, "Malformed body", "The body is not what its media type promises, such as broken JSON."
+    ),
+    "unauthorized": Code(401, "Unauthorized", "The request needs an API key, or has a wrong one."),
+    "forbidden": Code(403, "Forbidden", "The API key does not allow this request."),
+    "not_found": Code(404, "Not found", "There is nothing at this address."),
+    "mesh_not_found": Code(404, "Mesh not found", "No mesh with this id is in the store."),
+    "job_not_found": Code(404, "Job not found", "No job with this id is known."),
+    "method_not_allowed": Code(
+        405, "Method not allowed", "The address exists, but not for this method; see `Allow`."
+    ),
+    "not_acceptable": Code(
+        406, "Not acceptable", "None of the formats asked for is one this answer comes in."
+    ),
+    "job_not_finished": Code(409, "Job not finished", "The job has no result yet; try again."),
+    "job_dismissed": Code(410, "Job dismissed", "The job was cancelled and has no result."),
+    "upload_too_large": Code(
+        413, "Body too large", "The body of the request is larger than the service accepts."
+    ),
+    "result_too_large": Code(
+        413, "Result too large", "The answer is too large for this format; a binary one has room."
+    ),
+    "unsupported_media_type": Code(
+        415, "Unsupported media type", "The body comes in a format that cannot be read here."
+    ),
+    "range_not_satisfiable": Code(
+        416, "Range not satisfiable", "The range asked for lies outside the content."
+    ),
+    "invalid_request": Code(
+        422, "Invalid request", "A field is missing, unknown, or outside its domain; see `errors`."
+    ),
+    "invalid_mesh": Code(
+        422, "Invalid mesh", "The mesh cannot be used; `errors` names elements at fault."
+    ),
+    "invalid_point": Code(422, "Invalid point", "A source or target is not a point of the mesh."),
+    "limit_exceeded": Code(
+        422, "Limit exceeded", "The request exceeds a limit of this service; see `setting`."
+    ),
+    "memory_limit": Code(
+        422, "Memory limit", "The query needs more memory than the service grants to one query."
+    ),
+    "rate_limited": Code(429, "Rate limited", "Too many requests; see `Retry-After`."),
+    "internal_error": Code(
+        500, "Internal error", "A defect of the service; please report it with the request id."
+    ),
+    "worker_died": Code(
+        500, "Worker died", "The process that computed the answer died; it has been replaced."
+    ),
+    "mesh_damaged": Code(
+        500, "Mesh damaged", "What the store holds of this mesh is not what was written."
+    ),
+    "queue_full": Code(
+        503, "Queue full", "Too many requests wait for a worker; see `Retry-After`."
+    ),
+    "engine_unavailable": Code(
+        503, "Engine unavailable", "No worker process can be started at the moment."
+    ),
+    "draining": Code(503, "Draining", "The service is shutting down."),
+    "deadline_exceeded": Code(
+        504, "Deadline exceeded", "The answer was not ready in the time granted."
+    ),
+    "storage_full": Code(507, "Storage full", "The store has no room left."),
+}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One element of the request, by JSON pointer, and what is wrong with it."""
+
+    pointer: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Problem:
+    """An error as a value, so that it can leave a worker process."""
+
+    code: str
+    detail: str
+    errors: tuple[Fault, ...] = ()
+    limit: float | None = None
+    actual: float | None = None
+    setting: str | None = None
+    hint: str | None = None
+    headers: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def status(self) -> int:
+        """HTTP status of the code."""
+        return CODES[self.code].status
+
+    def document(self, instance: str, request_id: str) -> dict[str, Any]:
+        """Return the body of the answer (RFC 9457), members without a value left out."""
+        members = {
+            "type": f"/problems/{self.code}",
+            "title": CODES[self.code].title,
+            "status": self.status,
+            "detail": self.detail,
+            "instance": instance,
+            "code": self.code,
+            "request_id": request_id,
+            "errors": [vars(fault) for fault in self.errors] or None,
+            "limit": self.limit,
+            "actual": self.actual,
+            "setting": self.setting,
+            "hint": self.hint,
+        }
+        return {name: value for name, value in members.items() if value is not None}
+
+
+class ProblemError(Exception):
+    """A problem on its way to the client."""
+
+    def __init__(self, problem: Problem) -> None:
+        super().__init__(problem.detail)
+        self.problem = problem
+
+
+def refuse(code: str, detail: str, **members: Any) -> ProblemError:
+    """Return the exception for a problem with these members."""
+    return ProblemError(Problem(code, detail, **members))
+
+
+def over_limit(
+    code: str, what: str, actual: int, limit: int, setting: str, **members: Any
+) -> ProblemError:
+    """Return the exception for ``actual`` of something where ``setting`` allows ``limit``."""
+    detail = f"{actual} {what}, where at most {limit} are allowed"
+    variable = variable_of(setting)
+    return refuse(code, detail, limit=limit, actual=actual, setting=variable, **members)
+
+
+def pointer(*parts: str | int) -> str:
+    """Return the JSON pointer (RFC 6901) of a place in the body."""
+    return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in parts)
+
+
+_ARRAY_OF = {"vertex": "vertices", "face": "faces", "edge": "edges"}
+
+
+def _mesh_faults(error: core.InvalidMesh) -> Sequence[Fault]:
+    array = _ARRAY_OF.get(error.kind)
+    if array is None:
+        return ()
+    faults = []
+    for element in error.elements:
+        place = "-".join(map(str, element)) if isinstance(element, tuple) else element
+        faults.append(Fault(pointer(array, place), f"{error.kind} {place} is at fault"))
+    return faults
+
+
+def _invalid_mesh(error: core.InvalidMesh) -> Problem:
+    return Problem("invalid_mesh", str(error), errors=tuple(_mesh_faults(error)))
+
+
+def _system_error(error: OSError) -> Problem:
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return Problem("storage_full", "the store has no room left on its disk")
+    return _internal_error(error)
+
+
+def _internal_error(error: BaseException) -> Problem:
+    return Problem("internal_error", f"unexpected {type(error).__name__}")
+
+
+# The first row whose type fits is taken.
+EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
+    (ProblemError, lambda error: error.problem),
+    (core.InvalidMesh, _invalid_mesh),
+    (core.InvalidPoint, lambda error: Problem("invalid_point", str(error))),
+    (core.InvalidArgument, lambda error: Problem("invalid_request", str(error))),
+    (core.DeadlineExceeded, lambda error: Problem("deadline_exceeded", str(error))),
+    (core.MemoryLimitExceeded, lambda error: Problem("memory_limit", str(error))),
+    (MemoryError, lambda _: Problem("memory_limit", "the worker ran out of memory")),
+    (OSError, _system_error),
+    (BaseException, _internal_error),
+)
+
+
+def problem_of(error: BaseException) -> Problem:
+    """Return the problem that answers ``error``."""
+    return next(make(error) for kind, make in EXCEPTIONS if isinstance(error, kind))
+
+
+_CODE_OF_STATUS = {
+    404: "not_found",
+    405: "method_not_allowed",
+    413: "upload_too_large",
+    416: "range_not_satisfiable",
+    500: "internal_error",
+}
+
+
+def problem_of_status(
+    status: int, detail: str, headers: Mapping[str, str] | None = None
+) -> Problem:
+    """Return the problem for an error that the framework found by itself."""
+    code = _CODE_OF_STATUS.get(status, "malformed_body")
+    return Problem(code, detail or CODES[code].meaning, headers=headers or {})

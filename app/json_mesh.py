@@ -1,0 +1,55 @@
+"""A mesh written as JSON: ``{"vertices": [[x, y, z], …], "faces": [[i, j, k], …]}``."""
+
+from typing import Any
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+
+from app.errors import Fault, ProblemError, pointer, refuse
+
+_MEMBERS = ("vertices", "faces")
+
+
+def read_json_mesh(body: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices and faces; whether they make a mesh is for ``TriangleMesh`` to say."""
+    try:
+        document = orjson.loads(body)
+    except orjson.JSONDecodeError as error:
+        raise refuse("malformed_body", f"the body is not JSON: {error}") from error
+    if not isinstance(document, dict):
+        raise _invalid("", "an object with vertices and faces is expected")
+    for name in document:
+        if name not in _MEMBERS:
+            raise _invalid(pointer(name), f"unknown field {name!r}")
+    for name in _MEMBERS:
+        if name not in document:
+            raise _invalid(pointer(name), f"{name} is missing")
+    vertices = _rows(document, "vertices", "iuf", "three finite numbers")
+    faces = _rows(document, "faces", "iu", "three vertex indices")
+    return vertices.astype(np.float64), faces.astype(np.int64)
+
+
+def _rows(document: dict[str, Any], name: str, kinds: str, what: str) -> NDArray[Any]:
+    rows = document[name]
+    if not isinstance(rows, list):
+        raise _invalid(pointer(name), f"{name} is not a list")
+    array = _as_array(rows)
+    if array.dtype.kind in kinds and array.ndim == 2 and array.shape[1] == 3:
+        return array
+    for i, row in enumerate(rows):
+        one = _as_array(row)
+        if one.dtype.kind not in kinds or one.shape != (3,):
+            raise _invalid(pointer(name, i), f"{name}[{i}] is not {what}")
+    raise _invalid(pointer(name), f"{name} is not a list of {what} each")
+
+
+def _as_array(rows: Any) -> NDArray[Any]:
+    try:
+        return np.array(rows)
+    except (ValueError, OverflowError):  # ragged
+        return np.array(None)
+
+
+def _invalid(place: str, message: str) -> ProblemError:
+    return refuse("invalid_request", message, errors=(Fault(place, message),))

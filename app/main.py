@@ -1,0 +1,54 @@
+"""The application, built when asked for."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+from fastapi import FastAPI
+
+from app import __version__, handlers
+from app.errors import PROBLEM_JSON
+from app.middleware import RequestMiddleware
+from app.routes import about, meshes, queries
+from app.service import Service
+from app.settings import Settings
+
+
+def create_app(settings: Settings) -> FastAPI:
+    """Build the service; nothing runs, and nothing is on disk, before its lifespan begins."""
+    service = Service(settings)
+
+    @asynccontextmanager
+    async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
+        async with service.running():
+            yield
+
+    app = _Application(
+        title="Geodesic",
+        version=__version__,
+        summary="Exact geodesic distances and paths on triangle meshes",
+        lifespan=lifespan,
+        docs_url=None,  # its page loads scripts from elsewhere
+        redoc_url=None,
+    )
+    app.state.service = service
+    app.add_middleware(RequestMiddleware, settings=settings)
+    handlers.install(app, settings)
+    app.include_router(about.router, max_body_size=settings.max_query_bytes)
+    app.include_router(meshes.router, prefix="/v1", max_body_size=settings.max_upload_bytes)
+    app.include_router(queries.router, prefix="/v1", max_body_size=settings.max_query_bytes)
+    return app
+
+
+class _Application(FastAPI):
+    def openapi(self) -> dict[str, Any]:
+        schema = super().openapi()
+        # FastAPI writes the media type of the answer to the errors as well.
+        for path in schema["paths"].values():
+            for operation in path.values():
+                for status, response in operation["responses"].items():
+                    if status >= "400":
+                        content = response.setdefault("content", {})
+                        model = content.pop("application/json", content.get(PROBLEM_JSON))
+                        response["content"] = {PROBLEM_JSON: model}
+        return schema

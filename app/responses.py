@@ -1,0 +1,106 @@
+"""Problems and results as HTTP responses."""
+
+import re
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import orjson
+from starlette.datastructures import Headers
+from starlette.requests import Request
+from starlette.responses import FileResponse, Response
+from starlette.types import Receive, Scope, Send
+
+from app.errors import CODES, PROBLEM_JSON, Problem
+from app.result_store import ResultStore
+from app.schemas import ProblemDocument
+from app.service import Answered
+
+CACHED = {"Cache-Control": "private, max-age=3600", "Vary": "Accept, Accept-Encoding, Prefer"}
+IMMUTABLE = {"Cache-Control": "private, max-age=31536000, immutable"}
+REVALIDATED = {"Cache-Control": "private, no-cache"}
+
+
+def problem_response(problem: Problem, instance: str, request_id: str) -> Response:
+    """Return ``problem`` as ``application/problem+json``."""
+    body = orjson.dumps(problem.document(instance, request_id))
+    headers = {"Cache-Control": "no-store", **problem.headers}
+    return Response(body, problem.status, headers, PROBLEM_JSON)
+
+
+def problems(*codes: str) -> dict[int | str, dict[str, Any]]:
+    """Describe the problems that an operation can answer with, for OpenAPI."""
+    by_status: dict[int | str, list[str]] = {}
+    for code in codes:
+        by_status.setdefault(CODES[code].status, []).append(code)
+    return {
+        status: {"model": ProblemDocument, "description": ", ".join(names)}
+        for status, names in by_status.items()
+    }
+
+
+def server_timing(seconds: Mapping[str, float]) -> dict[str, str]:
+    """Return the phases as a ``Server-Timing`` header, in milliseconds."""
+    if not seconds:
+        return {"Server-Timing": "kept"}
+    return {"Server-Timing": ", ".join(f"{k};dur={1e3 * s:.1f}" for k, s in seconds.items())}
+
+
+def etag_of(name: str) -> str:
+    """Return the entity tag for content that its name defines."""
+    return f'"{name}"'
+
+
+def not_modified(request: Request, etag: str, headers: Mapping[str, str]) -> Response | None:
+    """Return the 304 for a ``GET`` whose client has what ``etag`` stands for, else ``None``."""
+    known = request.headers.get("if-none-match", "")
+    tags = [tag.strip().removeprefix("W/") for tag in known.split(",")]
+    if request.method == "GET" and (etag in tags or known.strip() == "*"):
+        return Response(status_code=304, headers={"ETag": etag, **headers})
+    return None
+
+
+class StoredFileResponse(FileResponse):
+    """A file of the store, or a range of it."""
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send the file."""
+        asked = Headers(scope=scope).get("range")
+        if asked is not None and not _makes_sense(asked):
+            # RFC 9110 has such a header ignored, where Starlette answers 400.
+            kept = [(name, value) for name, value in scope["headers"] if name != b"range"]
+            scope = {**scope, "headers": kept}
+        await super().__call__(scope, receive, send)
+
+
+class ResultResponse(StoredFileResponse):
+    """A result of the store, which stays there until it has been sent."""
+
+    def __init__(
+        self, answered: Answered, media_type: str, store: ResultStore, headers: Mapping[str, str]
+    ) -> None:
+        result = answered.result
+        own = {"ETag": etag_of(result.key), **server_timing(answered.seconds)}
+        super().__init__(
+            result.path, headers={**result.headers, **own, **headers}, media_type=media_type
+        )
+        self._give_back = partial(store.give_back, result)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send the result, and give it back to the store."""
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._give_back()
+
+
+def _makes_sense(ranges: str) -> bool:
+    unit, _, specs = ranges.partition("=")
+    matches = [re.fullmatch(r"\s*(\d*)-(\d*)\s*", spec) for spec in specs.split(",")]
+    return unit.strip().lower() == "bytes" and all(
+        match and _is_forward(*match.groups()) for match in matches
+    )
+
+
+def _is_forward(first: str, last: str) -> bool:
+    return int(first) <= int(last) if first and last else bool(first or last)

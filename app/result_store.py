@@ -1,0 +1,174 @@
+"""Finished answers as files, written by workers and sent by the API process.
+
+``results/{mesh id}/{key}.body`` is what goes out; ``{key}.json`` beside it, written last, says that
+it is complete: its headers, its size and its checksum.
+"""
+
+import os
+import tempfile
+import zlib
+from collections import Counter, OrderedDict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from anyio import to_thread
+from pydantic import BaseModel, ValidationError
+
+Buffer = bytes | memoryview
+
+
+class _Seal(BaseModel):
+    headers: dict[str, str]
+    size: int
+    crc32: int
+
+
+@dataclass(frozen=True)
+class Result:
+    """An answer that is complete on disk."""
+
+    name: str
+    path: Path
+    headers: Mapping[str, str]
+
+    @property
+    def key(self) -> str:
+        """The hash that names the answer, without its mesh."""
+        return self.name.rpartition("/")[2]
+
+
+def write_result(
+    root: Path, name: str, parts: Sequence[Buffer], headers: Mapping[str, str]
+) -> None:
+    """Write the result ``name`` under ``root``, body first and seal last, each atomically."""
+    checksum = 0
+    for part in parts:
+        checksum = zlib.crc32(part, checksum)
+    size = sum(memoryview(part).nbytes for part in parts)
+    seal = _Seal(headers=dict(headers), size=size, crc32=checksum)
+    _write_atomically(_body(root, name), parts)
+    _write_atomically(_seal(root, name), [seal.model_dump_json().encode()])
+
+
+class ResultStore:
+    """The results under ``root``, at most ``capacity`` bytes; the least recently used go first.
+
+    One process keeps the books. A result taken is not removed before it is given back.
+    """
+
+    def __init__(self, root: Path, capacity: int) -> None:
+        self._root = root
+        self._capacity = capacity
+        self._sizes: OrderedDict[str, int] = OrderedDict()
+        self._taken: Counter[str] = Counter()
+
+    def prepare(self) -> None:
+        """Count what a former service left, the oldest first, and remove what has no seal."""
+        self._root.mkdir(parents=True, exist_ok=True)
+        bodies = sorted(self._root.glob("*/*.body"), key=lambda path: path.stat().st_mtime)
+        for path in bodies:
+            name = path.relative_to(self._root).with_suffix("").as_posix()
+            if _seal(self._root, name).exists():
+                self._sizes[name] = path.stat().st_size
+            else:
+                path.unlink()
+        for half_written in self._root.glob("*/tmp*"):
+            half_written.unlink()
+        self._evict()
+
+    async def find(self, name: str) -> Result | None:
+        """Take the result ``name``, if it is there and whole."""
+        if name not in self._sizes:
+            return None
+        self._taken[name] += 1  # held while it is read, off the event loop
+        try:
+            seal = await to_thread.run_sync(_read_seal, self._root, name)
+            if seal is not None:
+                return self._take(name, seal)
+        finally:
+            self._let_go(name)
+        self._remove(name)
+        return None
+
+    def take_new(self, name: str) -> Result:
+        """Take the result that a worker has just written."""
+        return self._take(name, _Seal.model_validate_json(_seal(self._root, name).read_bytes()))
+
+    def give_back(self, result: Result) -> None:
+        """Say that ``result`` has been sent."""
+        self._let_go(result.name)
+        self._evict()
+
+    def forget_mesh(self, mesh_id: str) -> None:
+        """Remove all results of a mesh that nobody is being sent."""
+        for name in [name for name in self._sizes if name.startswith(f"{mesh_id}/")]:
+            if name not in self._taken:
+                self._remove(name)
+
+    def _take(self, name: str, seal: _Seal) -> Result:
+        self._sizes[name] = seal.size
+        self._sizes.move_to_end(name)
+        self._taken[name] += 1
+        path = _body(self._root, name)
+        os.utime(path)  # the order of use, for the next start
+        return Result(name, path, seal.headers)
+
+    def _let_go(self, name: str) -> None:
+        self._taken[name] -= 1
+        if not self._taken[name]:
+            del self._taken[name]
+
+    def _evict(self) -> None:
+        excess = sum(self._sizes.values()) - self._capacity
+        for name, size in list(self._sizes.items()):
+            if excess <= 0:
+                return
+            if name not in self._taken:
+                self._remove(name)
+                excess -= size
+
+    def _remove(self, name: str) -> None:
+        _seal(self._root, name).unlink(missing_ok=True)
+        _body(self._root, name).unlink(missing_ok=True)
+        self._sizes.pop(name, None)
+
+
+def result_name(mesh_id: str, key: str) -> str:
+    """Return the name under which the result ``key`` of a mesh is stored."""
+    return f"{mesh_id}/{key}"
+
+
+def _body(root: Path, name: str) -> Path:
+    return root / f"{name}.body"
+
+
+def _seal(root: Path, name: str) -> Path:
+    return root / f"{name}.json"
+
+
+def _write_atomically(path: Path, parts: Sequence[Buffer]) -> None:
+    path.parent.mkdir(exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=path.parent, prefix="tmp", delete=False) as file:
+        try:
+            for part in parts:
+                file.write(part)
+            file.close()
+            Path(file.name).rename(path)
+        except BaseException:
+            Path(file.name).unlink(missing_ok=True)
+            raise
+
+
+def _read_seal(root: Path, name: str) -> _Seal | None:
+    """Return the seal of a result, if it is whole."""
+    checksum = size = 0
+    try:
+        seal = _Seal.model_validate_json(_seal(root, name).read_bytes())
+        with _body(root, name).open("rb") as file:
+            while chunk := file.read(2**20):
+                checksum = zlib.crc32(chunk, checksum)
+                size += len(chunk)
+    except (FileNotFoundError, ValidationError):
+        return None
+    return seal if (size, checksum) == (seal.size, seal.crc32) else None

@@ -1,0 +1,81 @@
+"""The service itself: index, health, limits, and the meaning of its errors."""
+
+from fastapi import APIRouter, Response
+
+from app import __version__
+from app.dependencies import ServiceDep
+from app.encoding import FORMATS
+from app.errors import CODES, refuse
+from app.responses import problems
+from app.schemas import About, Health, Index, ProblemCode
+from app.settings import variable_of
+from app.uploads import FORMATS as MESH_FORMATS
+
+router = APIRouter(tags=["service"])
+
+_LIMITS = (
+    "max_upload_bytes",
+    "max_query_bytes",
+    "max_faces",
+    "max_sources",
+    "max_json_values",
+    "query_memory_bytes",
+    "queue_size",
+    "deadline_s",
+)
+
+
+@router.get("/", operation_id="getIndex", summary="Where to find what", response_model=Index)
+async def get_index() -> Index:
+    """Return the addresses to begin with."""
+    links = {"about": "/v1", "meshes": "/v1/meshes", "openapi": "/openapi.json"}
+    return Index(service="geodesic", version=__version__, links=links)
+
+
+@router.get("/livez", operation_id="getLiveness", summary="Is the process alive?")
+async def get_liveness() -> Health:
+    """Return 200 as soon as the service listens."""
+    return Health(status="ok")
+
+
+@router.get(
+    "/readyz",
+    operation_id="getReadiness",
+    summary="Can it compute?",
+    response_model=Health,
+    responses=problems("engine_unavailable"),
+)
+async def get_readiness(service: ServiceDep) -> Health:
+    """Return 200 once a worker has its kernels compiled, 503 before."""
+    if not service.engine.is_ready:
+        detail = "no worker is ready yet: kernels are being compiled or loaded"
+        raise refuse("engine_unavailable", detail, headers={"Retry-After": "1"})
+    return Health(status="ok")
+
+
+@router.get("/v1", operation_id="getAbout", summary="Version, formats and limits in force")
+async def get_about(service: ServiceDep) -> About:
+    """Return what this service can do, and how much of it."""
+    return About(
+        version=__version__,
+        methods=["exact"],
+        mesh_formats=[*MESH_FORMATS, "json"],
+        answer_formats=dict(FORMATS),
+        samples=["knot", "sphere", "plane"],
+        limits={variable_of(name): getattr(service.settings, name) for name in _LIMITS},
+    )
+
+
+@router.get(
+    "/problems/{code}",
+    operation_id="getProblem",
+    summary="What an error code means",
+    response_model=ProblemCode,
+    responses=problems("not_found"),
+)
+async def get_problem(code: str, response: Response) -> ProblemCode:
+    """Return the row of the error table; the `type` of a problem leads here."""
+    if code not in CODES:
+        raise refuse("not_found", f"there is no code {code!r}; there are {', '.join(CODES)}")
+    response.headers["Cache-Control"] = "public, max-age=86400"
+    return ProblemCode(code=code, **vars(CODES[code]))

@@ -1,0 +1,204 @@
+"""Meshes: upload, list, describe, read arrays, delete."""
+
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from app.dependencies import Deadline, ServiceDep, while_connected
+from app.encoding import NPY
+from app.engine import MeshFromFile, MeshFromSample, StoredMesh
+from app.errors import Fault, over_limit, refuse
+from app.responses import (
+    IMMUTABLE,
+    REVALIDATED,
+    StoredFileResponse,
+    etag_of,
+    not_modified,
+    problems,
+    server_timing,
+)
+from app.schemas import ListParameters, MeshDocument, MeshList, UploadParameters
+from app.service import Seconds, Service
+from app.uploads import spool
+
+router = APIRouter(prefix="/meshes", tags=["meshes"])
+
+_DEFAULT_SAMPLE_FACES = 20_000
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
+_BODIES = {
+    "requestBody": {
+        "content": {
+            "application/octet-stream": _BINARY,
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "properties": {"file": {"type": "string", "format": "binary"}},
+                }
+            },
+            "application/json": {
+                "schema": {
+                    "type": "object",
+                    "additionalProperties": False,
+                    "required": ["vertices", "faces"],
+                    "properties": {
+                        "vertices": {
+                            "type": "array",
+                            "items": {
+                                "type": "array",
+                                "items": {"type": "number"},
+                                "minItems": 3,
+                                "maxItems": 3,
+                            },
+                        },
+                        "faces": {
+                            "type": "array",
+                            "items": {
+                                "type": "array",
+                                "items": {"type": "integer", "minimum": 0},
+                                "minItems": 3,
+                                "maxItems": 3,
+                            },
+                        },
+                    },
+                },
+                "example": {
+                    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
+                    "faces": [[0, 1, 2]],
+                },
+            },
+        }
+    }
+}
+
+
+@router.post(
+    "",
+    operation_id="createMesh",
+    summary="Upload a mesh, or make a sample",
+    status_code=201,
+    response_model=MeshDocument,
+    responses={
+        200: {"model": MeshDocument, "description": "The mesh was in the store already"},
+        **problems(
+            "malformed_body",
+            "upload_too_large",
+            "unsupported_media_type",
+            "invalid_request",
+            "invalid_mesh",
+            "limit_exceeded",
+            "memory_limit",
+            "worker_died",
+            "queue_full",
+            "engine_unavailable",
+            "deadline_exceeded",
+            "storage_full",
+        ),
+    },
+    openapi_extra=_BODIES,
+)
+async def create_mesh(
+    parameters: Annotated[UploadParameters, Query()],
+    request: Request,
+    response: Response,
+    service: ServiceDep,
+    deadline: Deadline,
+) -> dict[str, object]:
+    """Read, check and store a mesh; the id is a hash of its content.
+
+    The body is the file itself (with its format in `Content-Type` or `?format=`), a form with one
+    file, or JSON. Vertices keep the numbers they have in the file.
+    """
+    if parameters.sample is None:
+        stored, seconds = await _add_upload(service, parameters, request, deadline)
+    else:
+        stored, seconds = await service.add_mesh(_sample(service, parameters), deadline)
+    response.status_code = 201 if stored.is_new else 200
+    response.headers.update(server_timing(seconds))
+    response.headers["Location"] = f"/v1/meshes/{stored.mesh_id}"
+    return service.describe(stored.mesh_id)
+
+
+@router.get(
+    "",
+    operation_id="listMeshes",
+    summary="List the meshes in the store",
+    response_model=MeshList,
+    responses=problems("invalid_request"),
+)
+async def list_meshes(
+    parameters: Annotated[ListParameters, Query()], service: ServiceDep
+) -> dict[str, object]:
+    """List the reports of the meshes by id, `limit` at a time."""
+    meshes, more = await service.list_meshes(parameters.limit, parameters.cursor or "")
+    return {"meshes": meshes, "next_cursor": meshes[-1]["id"] if more else None}
+
+
+@router.get(
+    "/{mesh_id}",
+    operation_id="getMesh",
+    summary="Describe a mesh",
+    response_model=MeshDocument,
+    responses=problems("mesh_not_found", "mesh_damaged"),
+)
+async def get_mesh(
+    mesh_id: str, request: Request, response: Response, service: ServiceDep
+) -> Response | dict[str, object]:
+    """Return the report that the upload was answered with."""
+    described = service.describe(mesh_id)
+    headers = {**REVALIDATED, "ETag": etag_of(mesh_id)}
+    response.headers.update(headers)
+    return not_modified(request, etag_of(mesh_id), headers) or described
+
+
+@router.delete(
+    "/{mesh_id}",
+    operation_id="deleteMesh",
+    summary="Remove a mesh and its results",
+    status_code=204,
+    responses=problems("mesh_not_found"),
+)
+async def delete_mesh(mesh_id: str, service: ServiceDep) -> None:
+    """Remove a mesh; queries that run on it end as if it were there."""
+    await service.delete_mesh(mesh_id)
+
+
+@router.get(
+    "/{mesh_id}/arrays/{name}",
+    operation_id="getMeshArray",
+    summary="Read an array of a mesh",
+    response_class=Response,
+    responses={
+        200: {"content": {NPY: _BINARY}, "description": "The array in numpy's own format"},
+        206: {"content": {NPY: _BINARY}, "description": "The range asked for"},
+        **problems("mesh_not_found", "not_found", "range_not_satisfiable"),
+    },
+)
+async def get_mesh_array(
+    mesh_id: str, name: str, request: Request, service: ServiceDep
+) -> Response:
+    """Send `vertices`, `faces`, `vertex_map` or `components`; ranges are served."""
+    path = service.meshes.array_file(mesh_id, name)
+    etag = etag_of(f"{mesh_id}-{name}")
+    return not_modified(request, etag, IMMUTABLE) or StoredFileResponse(
+        path, headers={"ETag": etag, **IMMUTABLE}, media_type=NPY
+    )
+
+
+async def _add_upload(
+    service: Service, parameters: UploadParameters, request: Request, deadline: float
+) -> tuple[StoredMesh, Seconds]:
+    if parameters.faces is not None:
+        fault = Fault("/query/faces", "only a sample can be asked for with so many faces")
+        raise refuse("invalid_request", fault.message, errors=(fault,))
+    with service.meshes.scratch_file() as path:
+        file_format = await spool(request, path, parameters.format)
+        work = MeshFromFile(path, file_format, parameters.merge)
+        return await while_connected(request, service.add_mesh(work, deadline))
+
+
+def _sample(service: Service, parameters: UploadParameters) -> MeshFromSample:
+    faces = parameters.faces or _DEFAULT_SAMPLE_FACES
+    if faces > service.settings.max_faces:
+        limit = service.settings.max_faces
+        raise over_limit("limit_exceeded", "faces", faces, limit, "max_faces")
+    return MeshFromSample(str(parameters.sample), faces, parameters.merge)

@@ -1,0 +1,127 @@
+"""Queries on a mesh: distances and paths."""
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query, Request, Response
+
+from app.dependencies import (
+    Deadline,
+    ServiceDep,
+    media_type_of,
+    require_json,
+    while_connected,
+)
+from app.encoding import NPY, OCTETS
+from app.queries import Query as ValidQuery
+from app.queries import distances_query, path_query, result_key, written_path_query
+from app.responses import CACHED, ResultResponse, etag_of, not_modified, problems
+from app.schemas import (
+    AnswerParameters,
+    DistancesAnswer,
+    DistancesRequest,
+    PathAnswer,
+    PathParameters,
+    PathRequest,
+)
+from app.service import Service
+
+router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"])
+
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
+_PROBLEMS = problems(
+    "mesh_not_found",
+    "not_acceptable",
+    "result_too_large",
+    "invalid_request",
+    "invalid_point",
+    "limit_exceeded",
+    "memory_limit",
+    "worker_died",
+    "mesh_damaged",
+    "queue_full",
+    "engine_unavailable",
+    "deadline_exceeded",
+    "storage_full",
+)
+_BODY_PROBLEMS = problems("malformed_body", "upload_too_large", "unsupported_media_type")
+_UNSTORED = {"Cache-Control": "no-store"}
+
+
+def _answers(model: type, array: str) -> dict[int | str, dict[str, Any]]:
+    binary = {NPY: _BINARY, OCTETS: _BINARY}
+    description = f"The answer; in binary the {array}, the rest as `Geodesic-…` headers"
+    return {200: {"model": model, "content": binary, "description": description}}
+
+
+@router.post(
+    "/distances",
+    operation_id="computeDistances",
+    summary="Exact distances from sources to all vertices",
+    response_class=Response,
+    responses={**_answers(DistancesAnswer, "distances"), **_BODY_PROBLEMS, **_PROBLEMS},
+    dependencies=[Depends(require_json)],
+)
+async def compute_distances(
+    mesh_id: str,
+    body: DistancesRequest,
+    parameters: Annotated[AnswerParameters, Query()],
+    request: Request,
+    service: ServiceDep,
+    deadline: Deadline,
+) -> Response:
+    """Return the distance along the surface from the nearest source to each vertex."""
+    query = distances_query(mesh_id, service.vertex_count(mesh_id), body, service.settings)
+    media_type = media_type_of(request, parameters.format)
+    return await _respond(service, request, query, media_type, deadline)
+
+
+@router.post(
+    "/path",
+    operation_id="computePath",
+    summary="The exact shortest path between two points",
+    response_class=Response,
+    responses={**_answers(PathAnswer, "points"), **_BODY_PROBLEMS, **_PROBLEMS},
+    dependencies=[Depends(require_json)],
+)
+async def compute_path(
+    mesh_id: str,
+    body: PathRequest,
+    parameters: Annotated[AnswerParameters, Query()],
+    request: Request,
+    service: ServiceDep,
+    deadline: Deadline,
+) -> Response:
+    """Return the points of the path, from source to target, and the faces it crosses."""
+    query = path_query(mesh_id, service.vertex_count(mesh_id), body)
+    media_type = media_type_of(request, parameters.format)
+    return await _respond(service, request, query, media_type, deadline)
+
+
+@router.get(
+    "/path",
+    operation_id="getPath",
+    summary="The exact shortest path between two points, cacheable",
+    response_class=Response,
+    responses={**_answers(PathAnswer, "points"), **_PROBLEMS},
+)
+async def get_path(
+    mesh_id: str,
+    parameters: Annotated[PathParameters, Query()],
+    request: Request,
+    service: ServiceDep,
+    deadline: Deadline,
+) -> Response:
+    """Return the same as `POST`, for ends written as `v0`."""
+    query = written_path_query(mesh_id, service.vertex_count(mesh_id), parameters)
+    media_type = media_type_of(request, parameters.format)
+    unchanged = not_modified(request, etag_of(result_key(query, media_type)), CACHED)
+    return unchanged or await _respond(service, request, query, media_type, deadline)
+
+
+async def _respond(
+    service: Service, request: Request, query: ValidQuery, media_type: str, deadline: float
+) -> Response:
+    answering = service.answer(query, media_type, deadline)
+    answered = await while_connected(request, answering)
+    headers = CACHED if request.method == "GET" else _UNSTORED
+    return ResultResponse(answered, media_type, service.results, headers)

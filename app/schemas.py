@@ -1,0 +1,240 @@
+"""What goes over the wire: bodies, parameters and answers. Wire models only, no logic."""
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveInt, StrictInt
+
+Merge = Literal["none", "exact"]
+MeshFormat = Literal["obj", "off", "ply", "stl", "glb"]
+SampleName = Literal["knot", "sphere", "plane"]
+NonNegative = Annotated[FiniteFloat, Field(ge=0)]
+
+
+class Wire(BaseModel):
+    """A model that refuses fields it does not know."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+# Requests
+
+
+class Point(Wire):
+    """A point of the mesh, written as one of its vertices."""
+
+    vertex: StrictInt = Field(description="Index of a vertex, from 0", examples=[0])
+
+
+class Source(Point):
+    """A point where distances start, at ``start_distance``."""
+
+    start_distance: NonNegative = 0.0
+
+
+class DistancesRequest(Wire):
+    """Distances from the nearest of ``sources`` to all vertices, or to ``targets`` only."""
+
+    model_config = ConfigDict(json_schema_extra={"examples": [{"sources": [{"vertex": 0}]}]})
+
+    sources: list[Source] = Field(min_length=1)
+    targets: list[Point] | None = Field(default=None, min_length=1)
+    method: Literal["exact", "approximate"] = "exact"
+    max_distance: NonNegative | None = Field(
+        default=None, description="Vertices farther than this are left unreached"
+    )
+    include: list[Literal["nearest_source"]] = []
+
+
+class PathRequest(Wire):
+    """The shortest path from ``source`` to ``target``."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"source": {"vertex": 0}, "target": {"vertex": 99}}]}
+    )
+
+    source: Point
+    target: Point
+    method: Literal["exact", "approximate"] = "exact"
+
+
+AnswerFormat = Literal["json", "npy", "octets"]
+
+
+class AnswerParameters(Wire):
+    """How the answer is to be written."""
+
+    format: AnswerFormat | None = Field(default=None, description="Overrides `Accept`")
+
+
+class PathParameters(AnswerParameters):
+    """The ends of a path, each a vertex as ``v`` and its index."""
+
+    source: str = Field(alias="from", examples=["v0"])
+    target: str = Field(alias="to", examples=["v99"])
+
+
+class UploadParameters(Wire):
+    """How the mesh of an upload is to be read, or which sample to make."""
+
+    format: MeshFormat | None = Field(default=None, description="Overrides `Content-Type`")
+    merge: Merge = Field(default="none", description="`exact` joins vertices at the same position")
+    sample: SampleName | None = Field(default=None, description="Make this instead of reading one")
+    faces: PositiveInt | None = Field(default=None, description="Faces of the sample, about; 20000")
+
+
+class ListParameters(Wire):
+    """Which part of a list to answer with."""
+
+    limit: int = Field(default=50, ge=1, le=1000)
+    cursor: str | None = Field(default=None, description="`next_cursor` of the previous part")
+
+
+# Answers
+
+
+class MeshDocument(BaseModel):
+    """The report of a mesh in the store."""
+
+    model_config = ConfigDict(extra="allow")
+
+    id: str
+    vertices: int
+    faces: int
+    warnings: list[str]
+    created: str = Field(description="When it was stored, RFC 3339")
+    arrays: dict[str, str] = Field(description="Where its arrays can be read, by name")
+
+
+class MeshList(BaseModel):
+    """A part of the meshes in the store, in the order of their ids."""
+
+    meshes: list[MeshDocument]
+    next_cursor: str | None = None
+
+
+class ErrorBound(BaseModel):
+    """How far an answer can be from the exact one."""
+
+    type: str
+    value: float
+    kind: Literal["guaranteed", "estimated"]
+
+
+class ResolvedPoint(BaseModel):
+    """A point as it was understood."""
+
+    vertex: int
+    position: tuple[float, float, float]
+
+
+class ResolvedSource(ResolvedPoint):
+    """A source as it was understood."""
+
+    start_distance: float
+
+
+class Unreachable(BaseModel):
+    """How many of the distances are ``null``, by reason."""
+
+    disconnected: int
+    beyond_max_distance: int
+
+
+class DistancesAnswer(BaseModel):
+    """Distances in mesh units, ``null`` where unreachable."""
+
+    mesh_id: str
+    method: str
+    exact: bool
+    error_bound: ErrorBound
+    sources: list[ResolvedSource]
+    distances: list[float | None]
+    nearest_source: list[int | None] | None = Field(
+        default=None, description="Index into `sources` for each distance, where asked for"
+    )
+    unreachable: Unreachable
+    stats: dict[str, Any]
+    warnings: list[str]
+
+
+class Location(BaseModel):
+    """A point of the surface in a face."""
+
+    face: int
+    barycentric: tuple[float, float, float]
+
+
+class PathAnswer(BaseModel):
+    """A path from source to target, or the reason why there is none."""
+
+    mesh_id: str
+    method: str
+    exact: bool
+    status: Literal["ok", "no_path"]
+    reason: str | None = None
+    source: ResolvedPoint
+    target: ResolvedPoint
+    length: float | None = None
+    points: list[tuple[float, float, float]]
+    locations: list[Location] = []
+    faces: list[int] = Field(default=[], description="The face that each piece of the path crosses")
+    error_bound: ErrorBound
+    warnings: list[str]
+
+
+class Health(BaseModel):
+    """Whether the service lives, or is ready."""
+
+    status: Literal["ok", "starting"]
+
+
+class Index(BaseModel):
+    """Where to find what."""
+
+    service: str
+    version: str
+    links: dict[str, str]
+
+
+class About(BaseModel):
+    """Version, formats and the limits in force."""
+
+    version: str
+    methods: list[str]
+    mesh_formats: list[str]
+    answer_formats: dict[str, str]
+    samples: list[str]
+    limits: dict[str, float] = Field(description="By the environment variable that sets it")
+
+
+class ProblemCode(BaseModel):
+    """What an error code means."""
+
+    code: str
+    status: int
+    title: str
+    meaning: str
+
+
+class FaultDocument(BaseModel):
+    """One element of the request that is wrong."""
+
+    pointer: str = Field(description="JSON pointer into the body, or `/query/…`, `/header/…`")
+    message: str
+
+
+class ProblemDocument(BaseModel):
+    """An error, as RFC 9457 has it."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    instance: str
+    code: str
+    request_id: str
+    errors: list[FaultDocument] | None = None
+    limit: float | None = None
+    actual: float | None = None
+    setting: str | None = None
+    hint: str | None = None

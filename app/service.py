@@ -1,0 +1,120 @@
+"""What the routes ask for: meshes in the store, and answers to queries, computed or kept."""
+
+import asyncio
+from collections.abc import AsyncIterator, Mapping, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from anyio import to_thread
+
+from app.encoding import JSON
+from app.engine import (
+    Answering,
+    Done,
+    Engine,
+    LocalEngine,
+    MeshFromFile,
+    MeshFromSample,
+    StoredMesh,
+)
+from app.errors import Fault, refuse
+from app.mesh_store import PUBLIC_ARRAYS, MeshStore
+from app.queries import DistancesQuery, Query, refuse_large_json, result_key
+from app.result_store import Result, ResultStore, result_name
+from app.settings import Settings, variable_of
+
+Seconds = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Answered:
+    """A result that is ready to be sent, and what it took."""
+
+    result: Result
+    seconds: Seconds
+
+
+class Service:
+    """The parts of a running service, and what they do together."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        results = settings.store / "results"
+        self.meshes = MeshStore(settings.store)
+        self.results = ResultStore(results, settings.results_bytes)
+        self.engine: Engine = LocalEngine(settings, results)
+
+    @asynccontextmanager
+    async def running(self) -> AsyncIterator[None]:
+        """Sweep the store and keep workers while inside."""
+        self.meshes.prepare()
+        self.results.prepare()
+        await self.engine.start()
+        try:
+            yield
+        finally:
+            await self.engine.stop()
+
+    async def add_mesh(
+        self, work: MeshFromFile | MeshFromSample, deadline_s: float
+    ) -> tuple[StoredMesh, Seconds]:
+        """Have a worker read or make a mesh and store it."""
+        done = await self._run(work, deadline_s)
+        assert done.mesh is not None, "this kind of work stores a mesh"  # noqa: S101
+        return done.mesh, done.seconds
+
+    def describe(self, mesh_id: str) -> dict[str, Any]:
+        """Return the report of a mesh, as clients see it."""
+        manifest = self.meshes.manifest(mesh_id)
+        names = [name for name, kept in PUBLIC_ARRAYS.items() if kept in manifest["crc32"]]
+        return {
+            "id": mesh_id,
+            **manifest["report"],
+            "warnings": manifest["warnings"],
+            "created": manifest["created"],
+            "arrays": {name: f"/v1/meshes/{mesh_id}/arrays/{name}" for name in names},
+        }
+
+    def vertex_count(self, mesh_id: str) -> int:
+        """Return the number of vertices of a mesh."""
+        return int(self.meshes.manifest(mesh_id)["report"]["vertices"])
+
+    async def list_meshes(self, limit: int, after: str) -> tuple[Sequence[dict[str, Any]], bool]:
+        """Return the reports of the ``limit`` meshes after an id, and whether there are more."""
+        ids, more = await to_thread.run_sync(self.meshes.page, after, limit)
+        return await to_thread.run_sync(lambda: [self.describe(mesh_id) for mesh_id in ids]), more
+
+    async def delete_mesh(self, mesh_id: str) -> None:
+        """Remove a mesh and its results."""
+        await to_thread.run_sync(self.meshes.delete, mesh_id)
+        self.results.forget_mesh(mesh_id)
+
+    async def answer(self, query: Query, media_type: str, deadline_s: float) -> Answered:
+        """Answer ``query``: from a kept result, or by a worker."""
+        self._refuse_format(query, media_type)
+        name = result_name(query.mesh_id, result_key(query, media_type))
+        kept = await self.results.find(name)
+        if kept is not None:
+            return Answered(kept, {})
+        done = await self._run(Answering(query, media_type, name), deadline_s, query.mesh_id)
+        return Answered(self.results.take_new(name), done.seconds)
+
+    def _refuse_format(self, query: Query, media_type: str) -> None:
+        if media_type == JSON:
+            refuse_large_json(query, self.vertex_count(query.mesh_id), self.settings)
+        elif isinstance(query, DistancesQuery) and query.nearest_source:
+            fault = Fault("/include", "nearest_source comes with JSON only")
+            raise refuse("invalid_request", f"{media_type} holds one array", errors=(fault,))
+
+    async def _run(
+        self, work: MeshFromFile | MeshFromSample | Answering, deadline_s: float, mesh_id: str = ""
+    ) -> Done:
+        try:
+            async with asyncio.timeout(deadline_s):
+                return await self.engine.run(work, mesh_id or None)
+        except TimeoutError:
+            own = deadline_s >= self.settings.deadline_s
+            setting = variable_of("deadline_s") if own else None
+            detail = f"not finished within {deadline_s:g} s"
+            raise refuse("deadline_exceeded", detail, limit=deadline_s, setting=setting) from None

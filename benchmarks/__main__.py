@@ -1,0 +1,37 @@
+"""Run benchmarks, print their tables and keep them in ``RESULTS.md``."""
+
+import argparse
+from pathlib import Path
+
+from benchmarks import exact, service, topology
+from benchmarks.inputs import Inputs
+from benchmarks.tables import keep
+
+BENCHMARKS = {"topology": topology.run, "exact": exact.run, "service": service.run}
+ROOT = Path(__file__).parents[1]
+
+
+def main() -> None:
+    """Parse the arguments and run what they name: everything, by default."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="name", help=f"any of {', '.join(BENCHMARKS)}")
+    parser.add_argument("--runs", type=int, default=5, help="runs of which the median counts")
+    parser.add_argument(
+        "--meshes",
+        type=Path,
+        default=ROOT / "../shared/meshes",
+        help="folder of real meshes; those it lacks are left out",
+    )
+    arguments = parser.parse_args()
+    unknown = set(arguments.names) - set(BENCHMARKS)
+    if unknown:
+        parser.error(f"unknown benchmark: {', '.join(sorted(unknown))}")
+    inputs = Inputs(arguments.meshes)
+    for name in arguments.names or BENCHMARKS:
+        section = BENCHMARKS[name](inputs, arguments.runs)
+        print(section.text())
+        keep(section, Path(__file__).with_name("RESULTS.md"))
+
+
+if __name__ == "__main__":
+    main()

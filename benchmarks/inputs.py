@@ -1,0 +1,56 @@
+"""The meshes that are measured: made here, or found in a folder."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import geodesic_core as gc
+from geodesic_core.arrays import Floats, Ints
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Meshes by name; files that the folder lacks are left out, with a word on the screen."""
+
+    folder: Path
+
+    def arrays(self, names: Iterable[str]) -> Iterator[tuple[str, Floats, Ints]]:
+        """Yield name, vertices and faces; ``icosphere N`` is made, other names are files."""
+        for name in names:
+            if name.startswith("icosphere "):
+                yield name, *icosphere(int(name.split()[1]))
+            elif (path := self.folder / name).exists():
+                mesh = gc.load_mesh(path)
+                yield name, mesh.vertices, mesh.faces
+            else:
+                print(f"{name}: not in the meshes folder, left out")
+
+
+def icosphere(level: int) -> tuple[Floats, Ints]:
+    """Return a unit icosahedron whose faces are split in four and pushed to the sphere."""
+    phi = (1 + 5**0.5) / 2
+    corners = [(a, b * phi) for a in (-1, 1) for b in (-1, 1)]
+    vertices = np.array([p for a, b in corners for p in ((0.0, a, b), (a, b, 0.0), (b, 0.0, a))])
+    gaps = np.linalg.norm(vertices[:, None] - vertices[None], axis=2)
+    near = np.isclose(gaps, 2)
+    faces = np.array(
+        [
+            (a, b, c) if np.linalg.det(vertices[[a, b, c]]) > 0 else (a, c, b)
+            for a in range(12)
+            for b in range(a)
+            for c in range(b)
+            if near[a, b] and near[b, c] and near[c, a]
+        ]
+    )
+    for _ in range(level):
+        edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2))
+        edges, places = np.unique(edges, axis=0, return_inverse=True)
+        middles = (len(vertices) + places).reshape(-1, 3)
+        vertices = np.vstack([vertices, vertices[edges].mean(axis=1)])
+        (a, b, c), (ab, bc, ca) = faces.T, middles.T
+        quarters = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        faces = np.concatenate([np.stack(quarter, axis=1) for quarter in quarters])
+        vertices /= np.linalg.norm(vertices, axis=1)[:, None]
+    return vertices / np.linalg.norm(vertices, axis=1)[:, None], faces.astype(np.int32)

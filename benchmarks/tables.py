@@ -1,0 +1,76 @@
+"""Sections of ``RESULTS.md``: a title, the machine, a table and notes."""
+
+import datetime
+import os
+import platform
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+HEADING = "# Benchmarks\n\nWritten by `python -m benchmarks`; each section says where it ran.\n"
+
+
+@dataclass(frozen=True)
+class Section:
+    """One table of results."""
+
+    title: str
+    about: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+
+    def text(self) -> str:
+        """Return the section as Markdown."""
+        lines = [f"## {self.title}", "", self.about, "", f"_{machine()}_", ""]
+        lines += [_row(self.columns), _row(["---"] + ["---:"] * (len(self.columns) - 1))]
+        lines += [_row(row) for row in self.rows]
+        return "\n".join([*lines, ""])
+
+
+def keep(section: Section, path: Path) -> None:
+    """Put the section into the file, in the place of the one of the same title if there is one."""
+    text = path.read_text(encoding="utf-8") if path.exists() else HEADING
+    heading, *sections = text.split("\n## ")
+    kept = {part.split("\n", 1)[0]: part.rstrip() for part in sections}
+    kept[section.title] = section.text().removeprefix("## ").rstrip()
+    path.write_text("\n\n## ".join([heading.rstrip(), *kept.values()]) + "\n", encoding="utf-8")
+
+
+def machine() -> str:
+    """Return the processor, its cores, and the versions that matter."""
+    packages = [f"{name} {_version(name)}" for name in ("numpy", "numba", "pygeodesic")]
+    today = datetime.datetime.now(datetime.UTC).date().isoformat()
+    parts = [
+        today,
+        f"{_processor()}, {os.cpu_count()} cores",
+        f"Python {platform.python_version()}",
+        *packages,
+    ]
+    return ", ".join(parts)
+
+
+def verdict(value: float, target: float, *, at_least: bool) -> str:
+    """Return the target and whether it is met, for a table's last column."""
+    met = value >= target if at_least else value <= target
+    return f"{'≥' if at_least else '≤'} {target:g} {'met' if met else '**missed**'}"
+
+
+def _row(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "absent"
+
+
+def _processor() -> str:
+    cpuinfo = Path("/proc/cpuinfo")
+    if cpuinfo.exists():
+        for line in cpuinfo.read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()

@@ -1,0 +1,32 @@
+"""Geodesic distances and shortest paths on triangle meshes, exact.
+
+The methods of Surazhsky, Surazhsky, Kirsanov, Gortler and Hoppe, *Fast Exact and Approximate
+Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then `exact_distance`.
+"""
+
+from geodesic_core import errors, samples
+from geodesic_core.errors import GeodesicError
+from geodesic_core.mesh import MeshReport, Sample, TriangleMesh
+from geodesic_core.mesh_io import load_mesh
+from geodesic_core.result import DistanceField, ErrorBound, GeodesicPath, Source, SweepStats
+from geodesic_core.solvers import exact_distance, shortest_path, warm_up
+from geodesic_core.surface_point import SurfacePoint
+
+__all__ = [
+    "DistanceField",
+    "ErrorBound",
+    "GeodesicError",
+    "GeodesicPath",
+    "MeshReport",
+    "Sample",
+    "Source",
+    "SurfacePoint",
+    "SweepStats",
+    "TriangleMesh",
+    "errors",
+    "exact_distance",
+    "load_mesh",
+    "samples",
+    "shortest_path",
+    "warm_up",
+]

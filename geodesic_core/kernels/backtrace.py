@@ -1,0 +1,119 @@
+"""Shortest paths from a finished sweep (section 3.5).
+
+Each vertex keeps its winning window: the half-edge it came over, the unfolded pseudosource and the
+pseudosource's id. A path is walked from vertex to pseudosource by unfolding the faces on the line
+between them; at a pseudosource it turns toward that vertex's own winner. This copy replaces the
+paper's walk around the pseudosource in search of a window, and with it every window list
+(section 7).
+"""
+
+from typing import Any
+
+from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.topology import (
+    APEX,
+    COS_LEFT,
+    COS_RIGHT,
+    HEAD,
+    LENGTH,
+    LENGTH_LEFT,
+    LENGTH_RIGHT,
+    OPPOSITE,
+    OUT_LEFT,
+    OUT_RIGHT,
+    SIN_LEFT,
+    SIN_RIGHT,
+    TAIL,
+)
+from geodesic_core.kernels.wavefront import FROM, VIA
+
+# Outcomes
+TRACED = 0
+NO_ROOM = 1  # the path has more points than the arrays hold: grow, and call again
+LOST = 2  # the line left the surface: a defect
+
+
+@kernel
+def cross_edge(
+    x: float, sx: float, sy: float, length: float, cosine: float, sine: float
+) -> tuple[float, float, float]:
+    """Walk from (x, 0) toward s and out over the left edge of a face.
+
+    Returns the exit's distance from the tail and s in the frame of that edge, whose own face is
+    ahead again (y > 0).
+    """
+    along, ahead = sx * cosine + sy * sine, sy * cosine - sx * sine
+    ex, ey = x * cosine, -x * sine
+    if ahead <= ey:  # parallel within rounding: s lies on the edge's line
+        return min(max(along, 0.0), length), along, ahead
+    u = ex - (along - ex) * ey / (ahead - ey)
+    return min(max(u, 0.0), length), along, ahead
+
+
+@kernel
+def trace_path(
+    topology: Any,
+    winner: Floats,
+    winner_ints: Ints,
+    target: int,
+    nodes: Ints,
+    parameters: Floats,
+    faces: Ints,
+) -> tuple[int, int]:
+    """Trace the path from vertex ``target`` to its source; return (outcome, number of nodes).
+
+    A node is a half-edge h, crossed at ``parameters`` of its length, or -1 - v for a vertex v.
+    ``faces[i]`` is crossed between the nodes i and i + 1. O(faces crossed).
+    """
+    links, geometry = topology.links, topology.geometry
+    room = len(nodes)
+    nodes[0], parameters[0] = -1 - target, 0.0
+    count = 1
+    v = target
+    while winner_ints[v, VIA] >= 0:
+        h, root = winner_ints[v, VIA], winner_ints[v, FROM]
+        sx, sy = winner[v, 0], winner[v, 1]
+        length = geometry[h, LENGTH]
+        arrived = root in (links[h, TAIL], links[h, HEAD])
+        if not arrived:
+            # From the apex back over h itself, to the face behind it
+            ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
+            ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
+            x = sx if ay <= sy else (sx * ay - ax * sy) / (ay - sy)
+            x = min(max(x, 0.0), length)
+            if count >= room:
+                return NO_ROOM, count
+            faces[count - 1], nodes[count], parameters[count] = h // 3, h, x / length
+            count += 1
+            h = links[h, OPPOSITE] >> 1
+            x, sx, sy = length - x, length - sx, -sy
+            arrived = links[h, APEX] == root
+        while not arrived:
+            ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
+            ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
+            if count >= room:
+                return NO_ROOM, count
+            faces[count - 1] = h // 3
+            if (ax - x) * sy - ay * (sx - x) >= 0.0:  # s is left of the apex
+                reach = geometry[h, LENGTH_LEFT]
+                x, sx, sy = cross_edge(x, sx, sy, reach, geometry[h, COS_LEFT], geometry[h, SIN_LEFT])
+                h = links[h, OUT_LEFT]
+            else:  # the same, in the mirror
+                length, reach = geometry[h, LENGTH], geometry[h, LENGTH_RIGHT]
+                x, sx, sy = cross_edge(
+                    length - x, length - sx, sy, reach, geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT]
+                )
+                x, sx = reach - x, reach - sx
+                h = links[h, OUT_RIGHT]
+            if h < 0:
+                return LOST, count
+            nodes[count], parameters[count] = h, x / reach
+            count += 1
+            arrived = links[h, APEX] == root
+        if count >= room:
+            return NO_ROOM, count
+        faces[count - 1], nodes[count], parameters[count] = h // 3, -1 - root, 0.0
+        count += 1
+        v = root
+    return TRACED, count

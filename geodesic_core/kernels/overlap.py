@@ -1,0 +1,81 @@
+"""Two windows that overlap on one edge: who keeps what (sections 3.3 and 3.4)."""
+
+from geodesic_core.kernels.jit import inlined
+from geodesic_core.kernels.planar import bisector
+from geodesic_core.kernels.window import distance_at
+
+
+@inlined
+def wins_throughout(
+    lo: float,
+    hi: float,
+    wx: float,
+    wy: float,
+    w_sigma: float,
+    lx: float,
+    ly: float,
+    l_sigma: float,
+) -> bool:
+    """Whether a window that wins at both ends of [lo, hi] wins between them too.
+
+    The loser's lead is stationary only where the point and both sources are collinear. There is one
+    such point; if it lies outside, or the winner leads there as well, the winner leads throughout.
+    """
+    if w_sigma >= l_sigma or wy == ly:
+        return True
+    x = (wx * ly - lx * wy) / (ly - wy)
+    if x <= lo or x >= hi:
+        return True
+    return distance_at(x, wx, wy, w_sigma) <= distance_at(x, lx, ly, l_sigma)
+
+
+@inlined
+def without(b0: float, b1: float, lo: float, hi: float) -> tuple[float, float]:
+    """Return the interval [b0, b1] less [lo, hi]; as it was where two pieces would remain."""
+    if b0 >= lo:
+        return min(hi, b1), b1
+    if b1 <= hi:
+        return b0, lo
+    return b0, b1
+
+
+@inlined
+def trim(
+    p0: float,
+    p1: float,
+    px: float,
+    py: float,
+    p_sigma: float,
+    c0: float,
+    c1: float,
+    cx: float,
+    cy: float,
+    c_sigma: float,
+    tolerance: float,
+) -> tuple[float, float, float, float]:
+    """Trim the windows p and c of one edge to where each is nearest; return p0, p1, c0, c1.
+
+    A window that loses everything comes back empty (its ends equal). Overlaps of at most
+    ``tolerance`` stay. Equal windows: p wins.
+    """
+    lo, hi = max(p0, c0), min(p1, c1)
+    if hi - lo <= tolerance:
+        return p0, p1, c0, c1
+    lead_lo = distance_at(lo, cx, cy, c_sigma) - distance_at(lo, px, py, p_sigma)
+    lead_hi = distance_at(hi, cx, cy, c_sigma) - distance_at(hi, px, py, p_sigma)
+    if lead_lo >= 0.0 and lead_hi >= 0.0:
+        if wins_throughout(lo, hi, px, py, p_sigma, cx, cy, c_sigma):
+            c0, c1 = without(c0, c1, lo, hi)
+    elif lead_lo <= 0.0 and lead_hi <= 0.0:
+        if wins_throughout(lo, hi, cx, cy, c_sigma, px, py, p_sigma):
+            p0, p1 = without(p0, p1, lo, hi)
+    else:
+        guess = lo + (hi - lo) * lead_lo / (lead_lo - lead_hi)
+        x = bisector(lo, hi, px, py, p_sigma, cx, cy, c_sigma, guess)
+        if lead_lo > 0.0:  # p wins below x
+            c0, c1 = without(c0, c1, lo, x)
+            p0, p1 = without(p0, p1, x, hi)
+        else:
+            c0, c1 = without(c0, c1, x, hi)
+            p0, p1 = without(p0, p1, lo, x)
+    return p0, p1, c0, c1

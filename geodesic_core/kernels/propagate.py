@@ -1,0 +1,479 @@
+"""Push the windows of one half-edge across its face; spawn windows at pseudosources (3.2)."""
+
+import math
+from typing import Any
+
+from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.overlap import trim
+from geodesic_core.kernels.planar import hit_left
+from geodesic_core.kernels.queue import push_or_raise, ring_push
+from geodesic_core.kernels.topology import (
+    APEX,
+    BOUNDARY,
+    COS_LEFT,
+    COS_RIGHT,
+    FAN_ANGLE,
+    FANS,
+    HEAD,
+    LENGTH,
+    LENGTH_LEFT,
+    LENGTH_RIGHT,
+    NEXT_CORNER,
+    OPPOSITE,
+    OUT_LEFT,
+    OUT_RIGHT,
+    ROW,
+    SADDLE,
+    SIN_LEFT,
+    SIN_RIGHT,
+    TAIL,
+    following,
+    previous,
+)
+from geodesic_core.kernels.wavefront import (
+    CREATED,
+    DONE,
+    FIRST,
+    FREE_SIZE,
+    FRESH,
+    FROM,
+    IN_RING,
+    KEPT,
+    LAST,
+    LIST,
+    ORIGIN,
+    PEAK,
+    SIZE,
+    STATUS,
+    VIA,
+    WINNER,
+    WORK,
+    free_windows,
+    release_list,
+    take_window,
+)
+from geodesic_core.kernels.window import B0, B1, INTS, NEXT, ROOT, SIGMA, SX, SY, WIDTH, reaches
+from geodesic_core.tolerances import GAP, OVERLAP, SECTOR_MARGIN, SLACK
+
+# Outcomes of propagating a list
+PROPAGATED = 0
+POOL_FULL = 1
+SCRATCH_FULL = 2
+
+
+@kernel
+def collect(wave: Any, h: int) -> int:
+    """Copy the list of h to scratch, trimmed against each other; return how many are left.
+
+    The filters of Xin and Wang (2009) take away what a path along the edge beats: only at both
+    ends of the list, where nearly all of what they would find lies.
+    """
+    row = ROW * h
+    length = wave.geometry[row + LENGTH]
+    from_tail = wave.distance[wave.links[row + TAIL]] * (1.0 + SLACK)
+    from_head = wave.distance[wave.links[row + HEAD]] * (1.0 + SLACK) + length
+    overlap, gap = OVERLAP * length, GAP * length
+    limited = wave.max_distance < math.inf
+    count = 0
+    slot = wave.lists[LIST * h + FIRST]
+    while slot >= 0:
+        w = WIDTH * slot
+        b0, b1 = wave.windows[w + B0], wave.windows[w + B1]
+        sx, sy, sigma = wave.windows[w + SX], wave.windows[w + SY], wave.windows[w + SIGMA]
+        root = wave.window_ints[INTS * slot + ROOT]
+        slot = wave.window_ints[INTS * slot + NEXT]
+        if limited and not reaches(b0, b1, sx, sy, sigma, wave.max_distance):
+            continue
+        while count > 0:
+            p = WIDTH * (count - 1)
+            p0, p1 = wave.scratch[p + B0], wave.scratch[p + B1]
+            if p1 < b0:
+                if b0 - p1 <= gap:
+                    b0 = p1
+                break
+            p0, p1, b0, b1 = trim(
+                p0,
+                p1,
+                wave.scratch[p + SX],
+                wave.scratch[p + SY],
+                wave.scratch[p + SIGMA],
+                b0,
+                b1,
+                sx,
+                sy,
+                sigma,
+                overlap,
+            )
+            if p1 > p0:
+                wave.scratch[p + B0], wave.scratch[p + B1] = p0, p1
+                break
+            count -= 1
+        if b1 <= b0:
+            continue
+        if count == 0:
+            room = from_tail + b1 - sigma
+            if room <= 0.0 or room * room < (sx - b1) * (sx - b1) + sy * sy:
+                continue
+        p = WIDTH * count
+        wave.scratch[p + B0], wave.scratch[p + B1] = b0, b1
+        wave.scratch[p + SX], wave.scratch[p + SY] = sx, sy
+        wave.scratch[p + SIGMA] = sigma
+        wave.scratch_ints[INTS * count + ROOT] = root
+        count += 1
+    while count > 0:
+        p = WIDTH * (count - 1)
+        b0, sx, sy = wave.scratch[p + B0], wave.scratch[p + SX], wave.scratch[p + SY]
+        room = from_head - b0 - wave.scratch[p + SIGMA]
+        if room > 0.0 and room * room >= (sx - b0) * (sx - b0) + sy * sy:
+            break
+        count -= 1
+    return count
+
+
+@kernel
+def improve_vertex(
+    wave: Any, v: int, distance: float, via: int, sx: float, sy: float, root: int
+) -> None:
+    """Note a shorter distance to v, and the window that gives it; queue v."""
+    if distance > wave.max_distance:
+        return
+    wave.distance[v] = distance
+    wave.winner[2 * v] = sx
+    wave.winner[2 * v + 1] = sy
+    wave.winner_ints[WINNER * v + VIA] = via
+    wave.winner_ints[WINNER * v + FROM] = root
+    push_or_raise(wave, v)
+
+
+@kernel
+def reach_apex(
+    wave: Any, h: int, count: int, ax: float, ay: float
+) -> tuple[int, float, float]:
+    """Find the window of scratch nearest to the apex; return its index, crossing and distance.
+
+    The crossing is where the window's shortest path to the apex passes the half-edge. Windows whose
+    rays cover the apex are asked first; only where none does, the paths that bend at a window's end.
+    """
+    best, nearest, crossing = math.inf, -1, 0.0
+    for i in range(count):
+        w = WIDTH * i
+        sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
+        rise = ay - sy
+        x = sx * ay - ax * sy  # times rise: where the ray to the apex crosses
+        if wave.scratch[w + B0] * rise <= x <= wave.scratch[w + B1] * rise:
+            d = math.sqrt((ax - sx) * (ax - sx) + rise * rise) + wave.scratch[w + SIGMA]
+            if d < best:
+                best, nearest = d, i
+                crossing = x / rise if rise > 0.0 else sx
+    if nearest < 0:
+        for i in range(count):
+            w = WIDTH * i
+            d, b = bent_distance(wave, w, ax, ay)
+            if d < best:
+                best, nearest, crossing = d, i, b
+    apex = wave.links[ROW * h + APEX]
+    if best < wave.distance[apex]:
+        w = WIDTH * nearest
+        improve_vertex(
+            wave,
+            apex,
+            best,
+            h,
+            wave.scratch[w + SX],
+            wave.scratch[w + SY],
+            wave.scratch_ints[INTS * nearest + ROOT],
+        )
+    return nearest, crossing, best
+
+
+@kernel
+def bent_distance(wave: Any, w: int, ax: float, ay: float) -> tuple[float, float]:
+    """Distance to the apex through the end of a window that does not cover it, and that end."""
+    sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
+    b = wave.scratch[w + B0]
+    if b * (ay - sy) <= sx * ay - ax * sy:
+        b = wave.scratch[w + B1]
+    there = math.sqrt((sx - b) * (sx - b) + sy * sy)
+    onward = math.sqrt((ax - b) * (ax - b) + ay * ay)
+    return there + onward + wave.scratch[w + SIGMA], b
+
+
+@kernel
+def put_window(
+    wave: Any, b0: float, b1: float, sx: float, sy: float, sigma: float, root: int
+) -> int:
+    """Take a slot of the pool and fill it."""
+    slot = take_window(wave)
+    w = WIDTH * slot
+    wave.windows[w + B0], wave.windows[w + B1] = b0, b1
+    wave.windows[w + SX], wave.windows[w + SY] = sx, sy
+    wave.windows[w + SIGMA] = sigma
+    wave.window_ints[INTS * slot + ROOT] = root
+    return slot
+
+
+@kernel
+def spread(
+    wave: Any, h: int, count: int, nearest: int, crossing: float, least: float
+) -> None:
+    """Send the windows of scratch on to the two other edges of the face.
+
+    Shortest paths do not cross: what lies left of the path to the apex goes left, what lies right
+    of it goes right, and only the window nearest to the apex goes both ways.
+    """
+    row = ROW * h
+    length = wave.geometry[row + LENGTH]
+    cos_left, sin_left = wave.geometry[row + COS_LEFT], wave.geometry[row + SIN_LEFT]
+    cos_right, sin_right = wave.geometry[row + COS_RIGHT], wave.geometry[row + SIN_RIGHT]
+    length_left = wave.geometry[row + LENGTH_LEFT]
+    length_right = wave.geometry[row + LENGTH_RIGHT]
+    ax, ay = cos_left * length_left, sin_left * length_left
+    left, right = wave.links[row + OUT_LEFT], wave.links[row + OUT_RIGHT]
+    left_first, left_last, left_size = -1, -1, 0
+    right_first, right_last, right_size = -1, -1, 0
+    for i in range(count):
+        w = WIDTH * i
+        b0, b1 = wave.scratch[w + B0], wave.scratch[w + B1]
+        sx, sy, sigma = wave.scratch[w + SX], wave.scratch[w + SY], wave.scratch[w + SIGMA]
+        rise, x = ay - sy, sx * ay - ax * sy
+        goes_left = x > b0 * rise
+        goes_right = x < b1 * rise
+        ends_at_apex = goes_left and goes_right
+        if i != nearest:
+            if ends_at_apex:
+                if x <= crossing * rise:
+                    goes_right = False
+                else:
+                    goes_left = False
+            elif goes_left:
+                if b0 >= crossing and bent_distance(wave, w, ax, ay)[0] >= least:
+                    continue
+            elif b1 <= crossing and bent_distance(wave, w, ax, ay)[0] >= least:
+                continue
+        if goes_left and left >= 0:
+            s_left = sy * cos_left - sx * sin_left
+            u0 = hit_left(b0, sy, s_left, sin_left, length_left)
+            u1 = length_left
+            if not ends_at_apex:
+                u1 = hit_left(b1, sy, s_left, sin_left, length_left)
+            if u1 > u0:
+                along = sx * cos_left + sy * sin_left
+                root = wave.scratch_ints[INTS * i + ROOT]
+                slot = put_window(wave, u0, u1, along, s_left, sigma, root)
+                wave.window_ints[INTS * slot + NEXT] = -1
+                if left_last >= 0:
+                    wave.window_ints[INTS * left_last + NEXT] = slot
+                else:
+                    left_first = slot
+                left_last = slot
+                left_size += 1
+        if goes_right and right >= 0:
+            s_right = (sx - length) * sin_right + sy * cos_right
+            u0 = hit_left(length - b1, sy, s_right, sin_right, length_right)
+            u1 = length_right
+            if not ends_at_apex:
+                u1 = hit_left(length - b0, sy, s_right, sin_right, length_right)
+            if u1 > u0:
+                along = length_right + (sx - length) * cos_right - sy * sin_right
+                root = wave.scratch_ints[INTS * i + ROOT]
+                slot = put_window(
+                    wave, length_right - u1, length_right - u0, along, s_right, sigma, root
+                )
+                wave.window_ints[INTS * slot + NEXT] = -1
+                if right_last >= 0:
+                    wave.window_ints[INTS * right_last + NEXT] = slot
+                else:
+                    right_first = slot
+                right_last = slot
+                right_size += 1
+    wave.counters[CREATED] += left_size + right_size
+    if left_size > 0:  # they come in at the tail: before what is there
+        r = LIST * left
+        wave.window_ints[INTS * left_last + NEXT] = wave.lists[r + FIRST]
+        if wave.lists[r + FIRST] < 0:
+            wave.lists[r + LAST] = left_last
+        wave.lists[r + FIRST] = left_first
+        wave.lists[r + SIZE] += left_size
+        queue_if_due(wave, left)
+    if right_size > 0:  # they come in at the head: after what is there
+        r = LIST * right
+        if wave.lists[r + FIRST] < 0:
+            wave.lists[r + FIRST] = right_first
+        else:
+            wave.window_ints[INTS * wave.lists[r + LAST] + NEXT] = right_first
+        wave.lists[r + LAST] = right_last
+        wave.lists[r + SIZE] += right_size
+        queue_if_due(wave, right)
+
+
+@kernel
+def queue_list(wave: Any, h: int) -> None:
+    """Put h into the ring, unless it has no windows or is there already."""
+    if wave.lists[LIST * h + SIZE] > 0 and not wave.lists[LIST * h + IN_RING]:
+        wave.lists[LIST * h + IN_RING] = 1
+        ring_push(wave, h)
+
+
+@kernel
+def queue_if_due(wave: Any, h: int) -> None:
+    """Queue the list of h if an end of its edge is done; else it waits for more windows."""
+    tail, head = wave.links[ROW * h + TAIL], wave.links[ROW * h + HEAD]
+    if (
+        wave.winner_ints[WINNER * tail + STATUS] == DONE
+        or wave.winner_ints[WINNER * head + STATUS] == DONE
+    ):
+        queue_list(wave, h)
+
+
+@kernel
+def propagate_list(wave: Any, h: int) -> int:
+    """Propagate the windows of h across its face (section 3.2)."""
+    size = wave.lists[LIST * h + SIZE]
+    if 2 * size > free_windows(wave):
+        return POOL_FULL
+    if size > wave.scratch_size:
+        return SCRATCH_FULL
+    count = collect(wave, h)
+    release_list(wave, h)
+    wave.counters[KEPT] += count
+    wave.counters[WORK] += 4 * size + 20
+    if count > 0:
+        row = ROW * h
+        ax = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
+        ay = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
+        nearest, crossing, least = reach_apex(wave, h, count, ax, ay)
+        spread(wave, h, count, nearest, crossing, least)
+        alive = wave.counters[FRESH] - wave.counters[FREE_SIZE]
+        wave.counters[PEAK] = max(wave.counters[PEAK], alive)
+    return PROPAGATED
+
+
+@kernel
+def insert_sorted(wave: Any, h: int, slot: int) -> None:
+    """Insert a window into the list of h by its left end."""
+    row = LIST * h
+    before, after = -1, wave.lists[row + FIRST]
+    left_end = wave.windows[WIDTH * slot + B0]
+    while after >= 0 and wave.windows[WIDTH * after + B0] < left_end:
+        before, after = after, wave.window_ints[INTS * after + NEXT]
+    wave.window_ints[INTS * slot + NEXT] = after
+    if before < 0:
+        wave.lists[row + FIRST] = slot
+    else:
+        wave.window_ints[INTS * before + NEXT] = slot
+    if after < 0:
+        wave.lists[row + LAST] = slot
+    wave.lists[row + SIZE] += 1
+
+
+@kernel
+def is_pseudosource(wave: Any, v: int) -> bool:
+    """Whether shortest paths may bend at v (or start there)."""
+    return wave.flags[v] != 0 or wave.winner_ints[WINNER * v + VIA] < 0
+
+
+@kernel
+def incoming_angle(wave: Any, v: int) -> float:
+    """Angle, in the unfolded fan of v, at which v sees the pseudosource it was reached from."""
+    via = wave.winner_ints[WINNER * v + VIA]
+    row = ROW * via
+    # From the apex: toward the tail, and toward the pseudosource
+    ex = -wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
+    ey = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
+    dx, dy = wave.winner[2 * v] + ex, wave.winner[2 * v + 1] + ey
+    turn = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
+    corner = ROW * previous(via)
+    widest = math.atan2(wave.geometry[corner + SIN_LEFT], wave.geometry[corner + COS_LEFT])
+    return wave.geometry[corner + FAN_ANGLE] + min(max(turn, 0.0), widest)
+
+
+@kernel
+def emit_pseudosource(wave: Any, v: int) -> None:
+    """Emit windows from v (section 3.2): all around a source, else into the shadow behind v.
+
+    At a saddle the shadow is what no straight path through a neighbourhood of v reaches: directions
+    that make an angle of π or more with the incoming one on both sides. At a boundary either side
+    will do. Where several fans meet, v emits all around.
+    """
+    everywhere = wave.winner_ints[WINNER * v + VIA] < 0 or (wave.flags[v] & FANS) != 0
+    boundary = (wave.flags[v] & BOUNDARY) != 0
+    total = wave.total_angle[v]
+    lo0, hi0, lo1, hi1 = 0.0, total, 1.0, 0.0  # two sectors; the second is empty
+    if not everywhere:
+        incoming = incoming_angle(wave, v)
+        lo0, hi0 = incoming + math.pi - SECTOR_MARGIN, incoming - math.pi + total + SECTOR_MARGIN
+        lo1, hi1 = lo0 - total, hi0 - total
+        if boundary:
+            hi0, lo1 = total, 0.0
+    distance = wave.distance[v]
+    h = wave.first_corner[v]
+    while h >= 0:
+        row = ROW * h
+        start = wave.geometry[row + FAN_ANGLE]
+        widest = math.atan2(wave.geometry[row + SIN_LEFT], wave.geometry[row + COS_LEFT])
+        if everywhere:
+            emit_sector(wave, v, h, 0.0, widest, widest)
+        else:
+            emit_sector(wave, v, h, lo0 - start, hi0 - start, widest)
+            emit_sector(wave, v, h, lo1 - start, hi1 - start, widest)
+        # The edges at v are paths too, straight ones: v is the tail of h and the head of the
+        # half-edge before it.
+        length = wave.geometry[row + LENGTH]
+        head = wave.links[row + HEAD]
+        if distance + length < wave.distance[head]:
+            improve_vertex(wave, head, distance + length, previous(h), length_of(wave, previous(h)), 0.0, v)
+        apex = wave.links[row + APEX]
+        length = wave.geometry[row + LENGTH_LEFT]
+        if distance + length < wave.distance[apex]:
+            improve_vertex(wave, apex, distance + length, h, 0.0, 0.0, v)
+        h = wave.links[row + NEXT_CORNER]
+
+
+@kernel
+def length_of(wave: Any, h: int) -> float:
+    """Length of the edge of h."""
+    return wave.geometry[ROW * h + LENGTH]
+
+
+@kernel
+def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) -> None:
+    """Emit the window of v that crosses the face of h, its corner at v, between two angles.
+
+    The angles are measured from h; what lies outside of the corner is cut off.
+    """
+    if hi <= 0.0 or lo >= widest or hi <= lo:
+        return
+    link = following(h)  # from the head of h to its apex; v is its own apex
+    across = wave.links[ROW * link + OPPOSITE]
+    if across < 0:
+        return
+    across >>= 1
+    row = ROW * link
+    length = wave.geometry[row + LENGTH]
+    b0, b1 = 0.0, length
+    # The frame of the opposite half-edge starts at the apex: distances count from its far end.
+    if lo > 0.0:
+        b1 = length - along_link(wave, h, lo)
+    if hi < widest:
+        b0 = length - along_link(wave, h, hi)
+    if b1 <= b0:
+        return
+    sx = length - wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
+    sy = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
+    insert_sorted(wave, across, put_window(wave, b0, b1, sx, sy, wave.distance[v], v))
+    wave.counters[CREATED] += 1
+    queue_if_due(wave, across)
+
+
+@kernel
+def along_link(wave: Any, h: int, angle: float) -> float:
+    """Where the ray from the tail of h at ``angle`` meets the far edge, from the head of h."""
+    row = ROW * h
+    sine, cosine = math.sin(angle), math.cos(angle)
+    far = sine * wave.geometry[row + COS_RIGHT] + cosine * wave.geometry[row + SIN_RIGHT]
+    reach = wave.geometry[ROW * following(h) + LENGTH]
+    if far <= 0.0:
+        return reach
+    return min(wave.geometry[row + LENGTH] * sine / far, reach)
+
+

@@ -1,0 +1,90 @@
+"""The two queues of the sweep: a heap of vertices by distance, a ring of half-edges to propagate.
+
+Both live in arrays of the caller. The heap is 4-ary and indexed: ``heap_place[v]`` is the place of
+vertex v, or -1. Ties go to the lower vertex, so that the order never depends on history.
+"""
+
+from typing import Any
+
+from geodesic_core.kernels.jit import kernel
+
+HEAP_SIZE = 0  # counters, shared with the sweep
+RING_HEAD = 1
+RING_SIZE = 2
+
+_ARITY = 4
+
+
+@kernel
+def precedes(wave: Any, u: int, v: int) -> bool:
+    """Whether vertex u leaves the heap before vertex v."""
+    return wave.distance[u] < wave.distance[v] or (wave.distance[u] == wave.distance[v] and u < v)
+
+
+@kernel
+def push_or_raise(wave: Any, v: int) -> None:
+    """Put v into the heap, or move it up after its distance has decreased."""
+    i = wave.heap_place[v]
+    if i < 0:
+        i = wave.counters[HEAP_SIZE]
+        wave.counters[HEAP_SIZE] = i + 1
+    while i > 0:
+        parent = (i - 1) // _ARITY
+        u = wave.heap[parent]
+        if not precedes(wave, v, u):
+            break
+        wave.heap[i] = u
+        wave.heap_place[u] = i
+        i = parent
+    wave.heap[i] = v
+    wave.heap_place[v] = i
+
+
+@kernel
+def pop_nearest(wave: Any) -> int:
+    """Remove and return the nearest vertex; the heap must not be empty."""
+    nearest = wave.heap[0]
+    wave.heap_place[nearest] = -1
+    size = wave.counters[HEAP_SIZE] - 1
+    wave.counters[HEAP_SIZE] = size
+    if size > 0:
+        v = wave.heap[size]
+        i = 0
+        while True:
+            first = _ARITY * i + 1
+            if first >= size:
+                break
+            child = first
+            for c in range(first + 1, min(first + _ARITY, size)):
+                if precedes(wave, wave.heap[c], wave.heap[child]):
+                    child = c
+            u = wave.heap[child]
+            if not precedes(wave, u, v):
+                break
+            wave.heap[i] = u
+            wave.heap_place[u] = i
+            i = child
+        wave.heap[i] = v
+        wave.heap_place[v] = i
+    return nearest
+
+
+@kernel
+def ring_push(wave: Any, h: int) -> None:
+    """Append half-edge h; the ring has room for every half-edge once."""
+    i = wave.counters[RING_HEAD] + wave.counters[RING_SIZE]
+    if i >= wave.ring_capacity:
+        i -= wave.ring_capacity
+    wave.ring[i] = h
+    wave.counters[RING_SIZE] += 1
+
+
+@kernel
+def ring_pop(wave: Any) -> int:
+    """Remove and return the oldest half-edge; the ring must not be empty."""
+    head = wave.counters[RING_HEAD]
+    h = wave.ring[head]
+    head += 1
+    wave.counters[RING_HEAD] = head if head < wave.ring_capacity else 0
+    wave.counters[RING_SIZE] -= 1
+    return h

@@ -1,0 +1,152 @@
+"""The continuous-Dijkstra loop (section 3.4), resumable in slices."""
+
+import math
+from typing import Any
+
+from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.propagate import (
+    PROPAGATED,
+    emit_pseudosource,
+    improve_vertex,
+    is_pseudosource,
+    propagate_list,
+    queue_list,
+)
+from geodesic_core.kernels.queue import (
+    HEAP_SIZE,
+    RING_HEAD,
+    RING_SIZE,
+    pop_nearest,
+    ring_pop,
+)
+from geodesic_core.kernels.topology import (
+    APEX,
+    CORNER_COUNT,
+    HEAD,
+    NEXT_CORNER,
+    OPPOSITE,
+    ROW,
+    following,
+    previous,
+)
+from geodesic_core.kernels.wavefront import (
+    DONE,
+    DONE_VERTICES,
+    FAR,
+    FROM,
+    FRONT,
+    IN_RING,
+    LIST,
+    STATUS,
+    WINNER,
+    WORK,
+    free_windows,
+    view_of,
+)
+
+# Outcomes of a slice
+FINISHED = 3
+RUNNING = 4  # POOL_FULL and SCRATCH_FULL of `propagate` are the others: grow, and call again
+
+
+@kernel
+def start_sweep(
+    topology: Any, wavefront: Any, sources: Longs, start_distances: Floats, max_distance: float
+) -> None:
+    """Reach the source vertices at their start distances."""
+    wave = view_of(topology, wavefront, max_distance)
+    for i in range(len(sources)):
+        v = sources[i]
+        if start_distances[i] < wave.distance[v]:
+            improve_vertex(wave, v, start_distances[i], -1, 0.0, 0.0, v)
+
+
+@kernel
+def advance(topology: Any, wavefront: Any, max_distance: float, budget: int) -> int:
+    """Run the sweep for a slice of about ``budget`` units of 10 ns; return its outcome."""
+    wave = view_of(topology, wavefront, max_distance)
+    wave.counters[WORK] = 0
+    outcome = drain(wave, budget)
+    while outcome == FINISHED and wave.counters[HEAP_SIZE] > 0:
+        if wave.counters[WORK] >= budget:
+            return RUNNING
+        outcome = settle_nearest(wave)
+        if outcome == FINISHED:
+            outcome = drain(wave, budget)
+    return outcome
+
+
+@kernel
+def settle_nearest(wave: Any) -> int:
+    """Take the nearest vertex: emit its windows, wake the lists around it."""
+    v = wave.heap[0]
+    emits = is_pseudosource(wave, v)
+    first = wave.first_corner[v]
+    if emits and first >= 0:
+        if 2 * wave.links[ROW * first + CORNER_COUNT] > free_windows(wave):
+            return 1
+    pop_nearest(wave)
+    if wave.winner_ints[WINNER * v + STATUS] != DONE:
+        wave.winner_ints[WINNER * v + STATUS] = DONE
+        wave.counters[DONE_VERTICES] += 1
+    wave.counters[WORK] += 30
+    if emits:
+        emit_pseudosource(wave, v)
+    h = first
+    while h >= 0:
+        mark_front(wave, wave.links[ROW * h + HEAD])
+        mark_front(wave, wave.links[ROW * h + APEX])
+        h = wave.links[ROW * h + NEXT_CORNER]
+    h = first
+    while h >= 0:
+        queue_list(wave, h)
+        queue_list(wave, previous(h))
+        across = wave.links[ROW * following(h) + OPPOSITE]
+        if across >= 0:
+            far = wave.links[ROW * (across >> 1) + APEX]
+            if wave.winner_ints[WINNER * far + STATUS] != FAR:
+                queue_list(wave, across >> 1)
+        h = wave.links[ROW * h + NEXT_CORNER]
+    return FINISHED
+
+
+@kernel
+def mark_front(wave: Any, v: int) -> None:
+    """Mark a neighbour of a vertex that is done."""
+    if wave.winner_ints[WINNER * v + STATUS] == FAR:
+        wave.winner_ints[WINNER * v + STATUS] = FRONT
+
+
+@kernel
+def drain(wave: Any, budget: int) -> int:
+    """Propagate the lists in the ring, and what they wake, until it is empty."""
+    while wave.counters[RING_SIZE] > 0:
+        if wave.counters[WORK] >= budget:
+            return RUNNING
+        h = wave.ring[wave.counters[RING_HEAD]]
+        outcome = propagate_list(wave, h)
+        if outcome != PROPAGATED:
+            return outcome
+        ring_pop(wave)
+        wave.lists[LIST * h + IN_RING] = 0
+    return FINISHED
+
+
+@kernel
+def nearest_sources(distance: Floats, winner_ints: Ints, source_of: Ints) -> Ints:
+    """Return for each vertex the index of its source: that of its pseudosource, and so on."""
+    result = source_of.copy()
+    for start in range(len(distance)):
+        if distance[start] == math.inf:
+            result[start] = -1
+            continue
+        v = start
+        while result[v] < 0:
+            v = winner_ints[v, FROM]
+        found = result[v]
+        v = start
+        while result[v] < 0:
+            result[v] = found
+            v = winner_ints[v, FROM]
+    return result

@@ -1,0 +1,381 @@
+"""Half-edge topology of a triangle mesh and the flat geometry of its faces, in one pass.
+
+Half-edge ``h = 3 f + i`` runs along face f from its corner i, the *tail*, to the next corner, the
+*head*; the third vertex is its *apex*. Its frame has the tail at the origin, the head on the
+positive x axis and the face on y > 0::
+
+                  apex
+                  /  \\
+       length_left    length_right
+                /      \\
+          tail +--------+ head
+                 length
+
+Two half-edges of one edge that belong to neighbouring faces are opposite each other. All
+half-edges of an edge form a cycle of any length, so that a non-manifold edge needs no second
+layout; a bit tells whether the next one runs the same way (a misoriented neighbour).
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.kernels.jit import kernel
+from geodesic_core.tolerances import SADDLE_EXCESS
+
+# Columns of Topology.geometry, a row per half-edge: the triangle as seen from the half-edge
+LENGTH = 0  # |tail head|, mesh units
+COS_LEFT = 1  # of the angle at the tail
+SIN_LEFT = 2
+LENGTH_LEFT = 3  # |tail apex|
+COS_RIGHT = 4  # of the angle at the head
+SIN_RIGHT = 5
+LENGTH_RIGHT = 6  # |head apex|
+FAN_ANGLE = 7  # where this half-edge leaves its tail, in the tail's unfolded fan; radians
+
+# Columns of Topology.links, a row per half-edge
+OUT_LEFT = 0  # the half-edge across (tail, apex), in the neighbour; -1 at a boundary
+OUT_RIGHT = 1  # the half-edge across (apex, head)
+APEX = 2
+TAIL = 3
+HEAD = 4
+OPPOSITE = 5  # next half-edge around this edge, 2 h + 1 if it runs the same way, else 2 h; or -1
+NEXT_CORNER = 6  # the next corner around the tail, counter-clockwise; -1 after the last
+CORNER_COUNT = 7  # number of corners at the tail
+
+ROW = 8  # columns of both
+
+# Vertex flags
+BOUNDARY = 1
+SADDLE = 2  # the total angle exceeds 2π
+FANS = 4  # the link is neither one circle nor one path: several fans of faces meet
+
+# Outcomes
+SOUND = 0
+NOT_FINITE = 1
+OUT_OF_RANGE = 2
+REPEATED_VERTEX = 3
+ZERO_LENGTH = 4
+NON_MANIFOLD = 5
+MISORIENTED = 6
+TOO_LARGE = 7
+
+LARGEST_COORDINATE = 1e150
+"""Mesh units; the squares of lengths must stay finite."""
+
+
+class Topology(NamedTuple):
+    """What the sweep needs to know of a mesh; read-only once built."""
+
+    geometry: Floats
+    """(3F, 8): LENGTH … FAN_ANGLE"""
+    links: Ints
+    """(3F, 8): OUT_LEFT … CORNER_COUNT"""
+    first_corner: Ints
+    """(V,): a half-edge that leaves the vertex, first of its fan; -1 at an isolated vertex"""
+    total_angle: Floats
+    """(V,): sum of the angles at the vertex, radians"""
+    flags: Flags
+    """(V,): BOUNDARY | SADDLE | FANS"""
+    component: Ints
+    """(V,): connected component; isolated vertices have one each"""
+
+
+@kernel
+def previous(h: int) -> int:
+    """Half-edge before h in its face."""
+    return h + 2 if h % 3 == 0 else h - 1
+
+
+@kernel
+def following(h: int) -> int:
+    """Half-edge after h in its face."""
+    return h - 2 if h % 3 == 2 else h + 1
+
+
+@kernel
+def check_arrays(vertices: Floats, faces: Ints | Longs) -> tuple[int, int]:
+    """Return (outcome, id of the first element at fault)."""
+    for v in range(vertices.shape[0]):
+        for axis in range(3):
+            if not math.isfinite(vertices[v, axis]):
+                return NOT_FINITE, v
+            if abs(vertices[v, axis]) > LARGEST_COORDINATE:
+                return TOO_LARGE, v
+    count = vertices.shape[0]
+    for f in range(faces.shape[0]):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        if a < 0 or a >= count or b < 0 or b >= count or c < 0 or c >= count:
+            return OUT_OF_RANGE, f
+        if a in (b, c) or b == c:
+            return REPEATED_VERTEX, f
+    return SOUND, 0
+
+
+@kernel
+def half_edges_by_edge(faces: Ints, vertex_count: int) -> Ints:
+    """Sort all half-edges by (lower vertex, higher vertex) in O(V + F).
+
+    Two counting sorts, the less significant key first: unlike a search in the bucket of one vertex
+    this stays linear on a fan of a hundred thousand faces.
+    """
+    count = 3 * faces.shape[0]
+    flat = faces.reshape(-1)
+    order = np.empty(count, np.int32)
+    by_higher = np.empty(count, np.int32)
+    for key in range(2):
+        start = np.zeros(vertex_count + 1, np.int32)
+        for h in range(count):
+            a, b = flat[h], flat[following(h)]
+            start[(max(a, b) if key == 0 else min(a, b)) + 1] += 1
+        for v in range(vertex_count):
+            start[v + 1] += start[v]
+        for i in range(count):
+            h = i if key == 0 else by_higher[i]
+            a, b = flat[h], flat[following(h)]
+            v = max(a, b) if key == 0 else min(a, b)
+            if key == 0:
+                by_higher[start[v]] = h
+            else:
+                order[start[v]] = h
+            start[v] += 1
+    return order
+
+
+@kernel
+def link_opposites(faces: Ints, vertex_count: int, links: Ints) -> None:
+    """Fill OPPOSITE: the cycle of half-edges around each edge."""
+    flat = faces.reshape(-1)
+    order = half_edges_by_edge(faces, vertex_count)
+    count = len(order)
+    begin = 0
+    while begin < count:
+        h = order[begin]
+        tail, head = flat[h], flat[following(h)]
+        end = begin + 1
+        while end < count:
+            g = order[end]
+            a, b = flat[g], flat[following(g)]
+            if min(a, b) != min(tail, head) or max(a, b) != max(tail, head):
+                break
+            end += 1
+        if end - begin == 1:
+            links[h, OPPOSITE] = -1
+        else:
+            for i in range(begin, end):
+                h, g = order[i], order[i + 1 if i + 1 < end else begin]
+                links[h, OPPOSITE] = 2 * g + (flat[h] == flat[g])
+        begin = end
+
+
+@kernel
+def find_bad_edges(links: Ints, limit: int) -> tuple[int, int, Ints]:
+    """Return (outcome, count, up to ``limit`` half-edges) of edges that the sweep cannot cross.
+
+    Non-manifold edges (three faces or more) are reported before misoriented ones.
+    """
+    found = np.empty(limit, np.int32)
+    for outcome in (NON_MANIFOLD, MISORIENTED):
+        count = 0
+        for h in range(links.shape[0]):
+            code = links[h, OPPOSITE]
+            if code < 0:
+                continue
+            g, lowest, size = code >> 1, h, 1
+            same_way = code & 1
+            while g != h:
+                lowest = min(lowest, g)
+                size += 1
+                g = links[g, OPPOSITE] >> 1
+            bad = size > 2 if outcome == NON_MANIFOLD else (size == 2 and same_way == 1)
+            if bad and lowest == h:
+                if count < limit:
+                    found[count] = h
+                count += 1
+        if count > 0:
+            return outcome, count, found[: min(count, limit)]
+    return SOUND, 0, found[:0]
+
+
+@kernel
+def fill_rows(vertices: Floats, faces: Ints, links: Ints, geometry: Floats) -> int:
+    """Fill the geometry and the vertex columns of links; return a face with a zero edge, or -1."""
+    for f in range(faces.shape[0]):
+        for i in range(3):
+            h = 3 * f + i
+            tail, head, apex = faces[f, i], faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
+            links[h, TAIL], links[h, HEAD], links[h, APEX] = tail, head, apex
+            ux = vertices[head, 0] - vertices[tail, 0]
+            uy = vertices[head, 1] - vertices[tail, 1]
+            uz = vertices[head, 2] - vertices[tail, 2]
+            wx = vertices[apex, 0] - vertices[tail, 0]
+            wy = vertices[apex, 1] - vertices[tail, 1]
+            wz = vertices[apex, 2] - vertices[tail, 2]
+            length = math.sqrt(ux * ux + uy * uy + uz * uz)
+            length_left = math.sqrt(wx * wx + wy * wy + wz * wz)
+            if length == 0.0 or length_left == 0.0:
+                return f
+            cx, cy, cz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+            # Cosine and sine from products, not from the law of cosines, which loses all digits on
+            # slivers; normalised to each other so that a rotation stays one.
+            dot = ux * wx + uy * wy + uz * wz
+            cross = math.sqrt(cx * cx + cy * cy + cz * cz)
+            norm = math.sqrt(dot * dot + cross * cross)
+            geometry[h, LENGTH] = length
+            geometry[h, LENGTH_LEFT] = length_left
+            geometry[h, COS_LEFT] = dot / norm
+            geometry[h, SIN_LEFT] = cross / norm
+        for i in range(3):
+            h, n, p = 3 * f + i, 3 * f + (i + 1) % 3, 3 * f + (i + 2) % 3
+            geometry[h, LENGTH_RIGHT] = geometry[n, LENGTH]
+            geometry[h, COS_RIGHT] = geometry[n, COS_LEFT]
+            geometry[h, SIN_RIGHT] = geometry[n, SIN_LEFT]
+            links[h, OUT_LEFT] = links[p, OPPOSITE] >> 1
+            links[h, OUT_RIGHT] = links[n, OPPOSITE] >> 1
+    return -1
+
+
+@kernel
+def corner_angle(geometry: Floats, h: int) -> float:
+    """Angle of the face at the tail of h, radians."""
+    return math.atan2(geometry[h, SIN_LEFT], geometry[h, COS_LEFT])
+
+
+@kernel
+def unfold_fans(
+    links: Ints,
+    geometry: Floats,
+    first_corner: Ints,
+    total_angle: Floats,
+    flags: Flags,
+) -> None:
+    """Order the corners around each vertex, lay their angles out and classify the vertex.
+
+    A fan starts at its clockwise boundary where it has one. The corners of several fans at one
+    vertex follow each other in one chain.
+    """
+    count = links.shape[0]
+    last_corner = np.full(len(first_corner), -1, np.int32)
+    seen = np.zeros(count, np.uint8)
+    for at_boundary in (True, False):  # open fans first: a walk must not start in their middle
+        for start in range(count):
+            v = links[start, TAIL]
+            if seen[start] or (at_boundary and links[start, OPPOSITE] >= 0):
+                continue
+            if last_corner[v] < 0:
+                first_corner[v] = start
+            else:
+                flags[v] |= FANS
+                links[last_corner[v], NEXT_CORNER] = start
+            angle = total_angle[v]
+            corner = start
+            while True:
+                seen[corner] = 1
+                last_corner[v] = corner
+                geometry[corner, FAN_ANGLE] = angle
+                angle += corner_angle(geometry, corner)
+                links[first_corner[v], CORNER_COUNT] += 1
+                across = links[corner, OUT_LEFT]
+                if across < 0 or seen[across]:
+                    if across < 0:
+                        flags[v] |= BOUNDARY
+                    break
+                links[corner, NEXT_CORNER] = across
+                corner = across
+            total_angle[v] = angle
+    for v in range(len(first_corner)):
+        if first_corner[v] < 0:
+            continue
+        if not flags[v] & BOUNDARY and total_angle[v] > 2.0 * math.pi + SADDLE_EXCESS:
+            flags[v] |= SADDLE
+        corner = first_corner[v]
+        corners = links[corner, CORNER_COUNT]
+        while corner >= 0:
+            links[corner, CORNER_COUNT] = corners
+            corner = links[corner, NEXT_CORNER]
+
+
+@kernel
+def label_components(faces: Ints, vertex_count: int) -> Ints:
+    """Label the vertices by connected component, numbered by first appearance; O(V + F)."""
+    parent = np.arange(vertex_count).astype(np.int32)
+    for f in range(faces.shape[0]):
+        root = faces[f, 0]
+        while parent[root] != root:
+            parent[root] = parent[parent[root]]
+            root = parent[root]
+        for i in range(1, 3):
+            other = faces[f, i]
+            while parent[other] != other:
+                parent[other] = parent[parent[other]]
+                other = parent[other]
+            if other != root:
+                low, high = min(root, other), max(root, other)
+                parent[high] = low
+                root = low
+    label = np.empty(vertex_count, np.int32)
+    count = 0
+    for v in range(vertex_count):
+        # A parent is never a higher vertex than its child: its label is there already.
+        if parent[v] == v:
+            label[v] = count
+            count += 1
+        else:
+            label[v] = label[parent[v]]
+    return label
+
+
+@kernel
+def count_boundary_loops(links: Ints) -> int:
+    """Count the closed loops of boundary half-edges."""
+    seen = np.zeros(links.shape[0], np.uint8)
+    loops = 0
+    for start in range(links.shape[0]):
+        if links[start, OPPOSITE] >= 0 or seen[start]:
+            continue
+        loops += 1
+        h = start
+        while not seen[h]:
+            seen[h] = 1
+            # Around the head, clockwise, to the boundary on the other side of the same fan
+            h = following(h)
+            while links[h, OPPOSITE] >= 0:
+                h = following(links[h, OPPOSITE] >> 1)
+    return loops
+
+
+@kernel
+def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[int, int, Ints]:
+    """Fill the arrays of a Topology in O(V + F); return (outcome, count, elements at fault)."""
+    link_opposites(faces, len(vertices), topology.links)
+    outcome, count, bad = find_bad_edges(topology.links, 10)
+    if outcome != SOUND:
+        return outcome, count, bad
+    face = fill_rows(vertices, faces, topology.links, topology.geometry)
+    if face >= 0:
+        return ZERO_LENGTH, 1, np.full(1, face, np.int32)
+    unfold_fans(
+        topology.links,
+        topology.geometry,
+        topology.first_corner,
+        topology.total_angle,
+        topology.flags,
+    )
+    topology.component[:] = label_components(faces, len(vertices))
+    return SOUND, 0, bad
+
+
+def empty_topology(vertex_count: int, face_count: int) -> Topology:
+    """Allocate the arrays that `build_topology` fills."""
+    links = np.full((3 * face_count, ROW), -1, np.int32)
+    links[:, CORNER_COUNT] = 0
+    return Topology(
+        geometry=np.empty((3 * face_count, ROW), np.float64),
+        links=links,
+        first_corner=np.full(vertex_count, -1, np.int32),
+        total_angle=np.zeros(vertex_count, np.float64),
+        flags=np.zeros(vertex_count, np.uint8),
+        component=np.empty(vertex_count, np.int32),
+    )

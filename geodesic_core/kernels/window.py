@@ -1,0 +1,48 @@
+"""The window: a stretch of an edge to which one pseudosource sends straight rays (section 3.1).
+
+A window is a row of eight float64 in a pool, addressed by its slot. It lies on a half-edge and is
+about to cross that half-edge's face; its rays come from y < 0 in the half-edge's frame.
+
+=========  ==========================  =======================================================
+column     paper                       meaning, unit
+=========  ==========================  =======================================================
+B0, B1     b0, b1                      ends on the half-edge, mesh units from its tail
+SX, SY     d0, d1 and τ, in one        the unfolded pseudosource s in the half-edge's frame
+SIGMA      σ                           distance from s back to the source, mesh units
+=========  ==========================  =======================================================
+
+The unfolded position replaces the two distances d0, d1, whose every use would cost a square root,
+and its side of the edge replaces the direction τ. The last eight bytes of a row hold two int32:
+
+NEXT       slot of the next window of the same list (or of the next free slot), -1 at the end
+ROOT       vertex of the pseudosource
+"""
+
+import math
+
+from geodesic_core.kernels.jit import inlined
+
+B0 = 0
+B1 = 1
+SX = 2
+SY = 3
+SIGMA = 4
+
+WIDTH = 8  # float64 columns of a row
+NEXT = 14  # int32 columns of a row
+ROOT = 15
+INTS = 16
+
+
+@inlined
+def distance_at(x: float, sx: float, sy: float, sigma: float) -> float:
+    """Distance function D of a window at (x, 0)."""
+    return math.sqrt((x - sx) * (x - sx) + sy * sy) + sigma
+
+
+@inlined
+def reaches(b0: float, b1: float, sx: float, sy: float, sigma: float, limit: float) -> bool:
+    """Whether the least distance over the window is within ``limit``."""
+    x = min(max(sx, b0), b1) - sx
+    room = limit - sigma
+    return room >= 0.0 and x * x + sy * sy <= room * room

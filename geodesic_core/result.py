@@ -1,0 +1,194 @@
+"""What the solvers give back."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints
+from geodesic_core.errors import InternalError, InvalidPoint, NoPath
+from geodesic_core.kernels import backtrace
+from geodesic_core.mesh import TriangleMesh
+from geodesic_core.surface_point import SurfacePoint
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A source, and the distance at which it starts (mesh units, 0 or more)."""
+
+    point: int | SurfacePoint
+    start_distance: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorBound:
+    """How far an answer may be from the exact one."""
+
+    type: Literal["relative", "absolute"]
+    value: float
+    kind: Literal["guaranteed", "estimated"]
+
+
+EXACT = ErrorBound("relative", 0.0, "guaranteed")
+"""The bound of exact answers: floating-point rounding aside, there is no error."""
+
+
+@dataclass(frozen=True, slots=True)
+class SweepStats:
+    """What a sweep did."""
+
+    windows_created: int
+    windows_kept: int
+    """Windows left after trimming: those that were propagated."""
+    windows_peak: int
+    """Windows alive at once, at most."""
+    windows_per_edge_created: float
+    windows_per_edge_kept: float
+    peak_bytes: int
+    """Memory of the sweep's state at its largest, the mesh itself not counted."""
+    seconds: float
+    """Time of the solve, with the allocation of its state."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the statistics as what JSON can hold."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class GeodesicPath:
+    """A shortest path over the surface, from its source to its target."""
+
+    points: Floats
+    """(K, 3) positions, mesh units."""
+    locations: tuple[SurfacePoint, ...]
+    """The K points on the surface, canonical."""
+    faces: Ints
+    """(K - 1,) int32: the face that each piece crosses."""
+    length: float
+    """Sum of the pieces, mesh units."""
+    error_bound: ErrorBound
+
+
+@dataclass(frozen=True)
+class DistanceField:
+    """Geodesic distances from the sources to all vertices."""
+
+    mesh: TriangleMesh
+    sources: tuple[Source, ...]
+    max_distance: float
+    """Mesh units; infinite where no limit was given."""
+    distances: Floats
+    """(V,) float64, mesh units; infinite where unreachable or beyond ``max_distance``."""
+    nearest_source: Ints
+    """(V,) int32 index into ``sources``; -1 where unreachable; ties to the lowest."""
+    error_bound: ErrorBound
+    stats: SweepStats
+    _winner: Floats
+    _winner_ints: Ints
+
+    def path_to(self, target: int | SurfacePoint) -> GeodesicPath:
+        """Return a shortest path from the nearest source to a vertex (section 3.5).
+
+        Its length is the vertex's distance less the start distance of its source. O(faces crossed).
+
+        Raises
+        ------
+        InvalidPoint
+            The target is not a vertex of the mesh.
+        NoPath
+            The vertex is not connected to a source, or lies beyond ``max_distance``.
+        """
+        vertex = vertex_of(self.mesh, target, "target")
+        if self.nearest_source[vertex] < 0:
+            raise self._no_path(vertex)
+        nodes, parameters, faces = self._trace(vertex)
+        locations: list[SurfacePoint] = []
+        crossed: list[int] = []
+        for i in range(len(nodes) - 1, -1, -1):
+            here = self._location(int(nodes[i]), float(parameters[i]))
+            if locations and here == locations[-1]:
+                continue  # a path through a vertex meets several edges there
+            if locations:
+                crossed.append(int(faces[i]))
+            locations.append(here)
+        points = np.array([location.position(self.mesh) for location in locations])
+        pieces = np.diff(points, axis=0)
+        return GeodesicPath(
+            points=points,
+            locations=tuple(locations),
+            faces=np.array(crossed, np.int32),
+            length=float(np.sqrt((pieces * pieces).sum(axis=1)).sum()),
+            error_bound=self.error_bound,
+        )
+
+    def _location(self, node: int, parameter: float) -> SurfacePoint:
+        if node < 0:
+            vertex = -1 - node
+            if self.mesh.topology.first_corner[vertex] < 0:  # a source that belongs to no face
+                return SurfacePoint.vertex(vertex)
+            return SurfacePoint.at_vertex(self.mesh, vertex)
+        return SurfacePoint.on_half_edge(self.mesh, node, parameter)
+
+    def _trace(self, vertex: int) -> tuple[Ints, Floats, Ints]:
+        room = 256
+        while True:
+            nodes, parameters = np.empty(room, np.int32), np.empty(room)
+            faces = np.empty(room, np.int32)
+            outcome, count = backtrace.trace_path(
+                self.mesh.topology,
+                self._winner,
+                self._winner_ints,
+                vertex,
+                nodes,
+                parameters,
+                faces,
+            )
+            if outcome == backtrace.TRACED:
+                return nodes[:count], parameters[:count], faces[: count - 1]
+            # A shortest path crosses a face at most once: a longer walk is lost as well.
+            if outcome == backtrace.LOST or room > 4 * len(self.mesh.faces) + 256:
+                raise InternalError(
+                    f"the path to vertex {vertex} left the surface after {count} points; "
+                    f"please report this mesh"
+                )
+            room *= 4
+
+    def _no_path(self, vertex: int) -> NoPath:
+        components = self.mesh.components
+        mine = {int(components[vertex_of(self.mesh, s.point, "source")]) for s in self.sources}
+        if int(components[vertex]) in mine:
+            return NoPath(
+                f"vertex {vertex} is farther than max_distance = {self.max_distance:g} from every "
+                f"source",
+                "beyond_max_distance",
+            )
+        return NoPath(
+            f"vertex {vertex} is in another connected component than every source", "disconnected"
+        )
+
+
+def vertex_of(mesh: TriangleMesh, point: int | SurfacePoint, name: str) -> int:
+    """Return the vertex that a point is.
+
+    Raises
+    ------
+    InvalidPoint
+        The point is no vertex, or the index is out of range; negative indices count as such.
+    """
+    index: Any = point.vertex_index if isinstance(point, SurfacePoint) else point
+    if index is None:
+        raise InvalidPoint(
+            f"the {name} lies inside face {point.face}: only vertices can be asked for yet"  # type: ignore[union-attr]
+        )
+    if isinstance(index, bool) or not isinstance(index, int | np.integer):
+        raise InvalidPoint(f"the {name} is {point!r}; it must be a vertex index or a SurfacePoint")
+    if not 0 <= index < len(mesh.vertices):
+        raise InvalidPoint(
+            f"the {name} is vertex {index}, but vertices are numbered 0 to "
+            f"{len(mesh.vertices) - 1}"
+        )
+    return int(index)
+
+
+Sources = int | SurfacePoint | Source | Sequence[int | SurfacePoint | Source]

@@ -1,0 +1,270 @@
+"""The solvers: arguments in, sweep, results out; status codes become exceptions here."""
+
+import math
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geodesic_core.errors import (
+    Cancelled,
+    DeadlineExceeded,
+    InvalidArgument,
+    InvalidPoint,
+    MemoryLimitExceeded,
+)
+from geodesic_core.kernels import sweep, wavefront
+from geodesic_core.kernels.propagate import POOL_FULL, SCRATCH_FULL
+from geodesic_core.kernels.topology import Topology
+from geodesic_core.kernels.wavefront import Wavefront
+from geodesic_core.mesh import TriangleMesh
+from geodesic_core.result import (
+    EXACT,
+    DistanceField,
+    GeodesicPath,
+    Source,
+    Sources,
+    SweepStats,
+    vertex_of,
+)
+from geodesic_core.surface_point import SurfacePoint
+
+SLICE_SECONDS = 0.05
+"""About how long the sweep runs before it looks up: what cancelling takes, at most."""
+
+_FIRST_BUDGET = 1_000_000
+
+
+@dataclass(frozen=True)
+class Control:
+    """How a caller watches a sweep and stops it."""
+
+    progress: Callable[[float], None] | None = None
+    """Called about every 50 ms with the share that is done, from 0 to 1, never decreasing."""
+    cancel: Callable[[], bool] | None = None
+    """Asked about every 50 ms; the sweep stops once it answers true."""
+    deadline_s: float | None = None
+    """Seconds granted, from the call."""
+    memory_limit: int | None = None
+    """Bytes granted for the state of the sweep, the mesh itself not counted."""
+
+
+def exact_distance(
+    mesh: TriangleMesh,
+    sources: Sources,
+    max_distance: float | None = None,
+    *,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> DistanceField:
+    """Return the exact geodesic distance from the nearest source to every vertex (section 3).
+
+    Parameters
+    ----------
+    mesh
+        The surface.
+    sources
+        A vertex index, a `SurfacePoint`, a `Source` with a start distance, or several of these.
+    max_distance
+        Vertices farther than this (mesh units) are not looked for; they count as unreachable.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Raises
+    ------
+    InvalidPoint, InvalidArgument
+        A source that is not on the mesh; a limit out of its domain.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        The sweep was stopped; the mesh is as good as before.
+
+    Notes
+    -----
+    O(F^1.5 log F) in practice and O(F² log F) at worst. Memory: about a third of the mesh's own
+    arrays, since windows are given back as soon as they are propagated.
+    """
+    began = time.perf_counter()
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    _check_control(control)
+    limit = _as_limit(max_distance)
+    starts = _as_sources(mesh, sources)
+    vertices = np.array([vertex_of(mesh, start.point, "source") for start in starts], np.int64)
+    distances = np.array([start.start_distance for start in starts])
+    wave = wavefront.new_wavefront(mesh.topology)
+    _check_memory(wave, control)
+    sweep.start_sweep(mesh.topology, wave, vertices, distances, limit)
+    wave = _run(mesh, wave, limit, vertices, control, began)
+    nearest = sweep.nearest_sources(
+        wave.distance, wave.winner_ints, _source_of(len(mesh.vertices), vertices, distances)
+    )
+    return DistanceField(
+        mesh=mesh,
+        sources=starts,
+        max_distance=limit,
+        distances=wave.distance,
+        nearest_source=nearest,
+        error_bound=EXACT,
+        stats=_stats(mesh, wave, time.perf_counter() - began),
+        _winner=wave.winner,
+        _winner_ints=wave.winner_ints,
+    )
+
+
+def shortest_path(
+    mesh: TriangleMesh,
+    source: int | SurfacePoint,
+    target: int | SurfacePoint,
+    *,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> GeodesicPath:
+    """Return an exact shortest path between two vertices (sections 3 and 3.5).
+
+    Raises
+    ------
+    NoPath
+        The two are not connected.
+    InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`, whose parameters these are.
+    """
+    vertex_of(mesh, target, "target")
+    field = exact_distance(
+        mesh,
+        source,
+        progress=progress,
+        cancel=cancel,
+        deadline_s=deadline_s,
+        memory_limit=memory_limit,
+    )
+    return field.path_to(target)
+
+
+def warm_up() -> None:
+    """Compile all kernels, or load them from the cache on disk (about 10 s, or 0.1 s)."""
+    corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    mesh = TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    exact_distance(mesh, 0).path_to(3)
+    mesh.report  # noqa: B018 - computed on access
+
+
+def _run(
+    mesh: TriangleMesh,
+    wave: Wavefront,
+    limit: float,
+    vertices: Any,
+    control: Control,
+    began: float,
+) -> Wavefront:
+    """Run the sweep to its end, slice by slice."""
+    topology: Topology = mesh.topology
+    reachable = int(np.isin(mesh.components, mesh.components[vertices]).sum())
+    budget, shown = _FIRST_BUDGET, 0.0
+    while True:
+        slice_began = time.perf_counter()
+        outcome = sweep.advance(topology, wave, limit, budget)
+        took = time.perf_counter() - slice_began
+        if outcome == sweep.FINISHED:
+            break
+        if outcome == POOL_FULL:
+            wave = wavefront.with_larger_pool(wave)
+            _check_memory(wave, control)
+        elif outcome == SCRATCH_FULL:
+            wave = wavefront.with_larger_scratch(wave)
+            _check_memory(wave, control)
+        else:
+            budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
+        if control.progress is not None:
+            shown = max(shown, _share_done(wave, reachable, limit))
+            control.progress(shown)
+        if control.cancel is not None and control.cancel():
+            raise Cancelled(f"cancelled with {_share_done(wave, reachable, limit):.0%} done")
+        if control.deadline_s is not None and time.perf_counter() - began > control.deadline_s:
+            raise DeadlineExceeded(
+                f"not finished within {control.deadline_s:g} s: "
+                f"{_share_done(wave, reachable, limit):.0%} done"
+            )
+    if control.progress is not None:
+        control.progress(1.0)
+    return wave
+
+
+def _share_done(wave: Wavefront, reachable: int, limit: float) -> float:
+    """Return the share of the sweep that is done: vertices, or distance where it is limited."""
+    share = float(wave.counters[wavefront.DONE_VERTICES]) / reachable
+    if math.isfinite(limit) and wave.counters[0] > 0:
+        share = max(share, float(wave.distance[wave.heap[0]]) / limit if limit else 1.0)
+    return min(share, 1.0)
+
+
+def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
+    created = int(wave.counters[wavefront.CREATED])
+    kept = int(wave.counters[wavefront.KEPT])
+    return SweepStats(
+        windows_created=created,
+        windows_kept=kept,
+        windows_peak=int(wave.counters[wavefront.PEAK]),
+        windows_per_edge_created=created / mesh.edge_count,
+        windows_per_edge_kept=kept / mesh.edge_count,
+        peak_bytes=wavefront.bytes_of(wave),
+        seconds=seconds,
+    )
+
+
+def _source_of(vertex_count: int, vertices: Any, distances: Any) -> Any:
+    """Return for each vertex the index of the source that it is, or -1."""
+    result = np.full(vertex_count, -1, np.int32)
+    for i in np.lexsort((np.arange(len(vertices)), distances))[::-1]:
+        result[vertices[i]] = i  # the nearest last, and of equal ones the lowest
+    return result
+
+
+def _as_limit(max_distance: float | None) -> float:
+    if max_distance is None:
+        return math.inf
+    try:
+        limit = float(max_distance)
+    except (TypeError, ValueError) as error:
+        raise InvalidArgument(f"max_distance is {max_distance!r}; it must be a number") from error
+    if not limit >= 0.0:
+        raise InvalidArgument(f"max_distance is {limit}; it must be 0 or more")
+    return limit
+
+
+def _as_sources(mesh: TriangleMesh, sources: Any) -> tuple[Source, ...]:
+    if isinstance(sources, str | bytes):
+        raise InvalidPoint(f"the source is {sources!r}; it must be a vertex index or a Source")
+    if isinstance(sources, Source | SurfacePoint) or not isinstance(sources, Iterable):
+        sources = [sources]
+    found = []
+    for i, item in enumerate(sources):
+        source = item if isinstance(item, Source) else Source(item)
+        vertex_of(mesh, source.point, f"source {i}")
+        start = source.start_distance
+        if isinstance(start, bool) or not isinstance(start, int | float | np.number):
+            raise InvalidArgument(f"source {i} starts at {start!r}; it must be a number")
+        if not (math.isfinite(start) and start >= 0.0):
+            raise InvalidArgument(f"source {i} starts at {start}; it must be finite and 0 or more")
+        found.append(source)
+    if not found:
+        raise InvalidPoint("there are no sources: give at least one")
+    return tuple(found)
+
+
+def _check_control(control: Control) -> None:
+    if control.deadline_s is not None and not control.deadline_s > 0.0:
+        raise InvalidArgument(f"deadline_s is {control.deadline_s}; it must be more than 0")
+    if control.memory_limit is not None and not control.memory_limit > 0:
+        raise InvalidArgument(f"memory_limit is {control.memory_limit}; it must be more than 0")
+
+
+def _check_memory(wave: Wavefront, control: Control) -> None:
+    needed = wavefront.bytes_of(wave)
+    if control.memory_limit is not None and needed > control.memory_limit:
+        raise MemoryLimitExceeded(
+            f"the sweep needs {needed} bytes or more; memory_limit is {control.memory_limit}"
+        )

@@ -1,0 +1,44 @@
+"""Every numeric bound of the library: its name, its unit and its reason.
+
+Each is tested as a bound in ``tests/core/test_tolerances.py``.
+"""
+
+SADDLE_EXCESS = 1e-7
+"""Radians by which a vertex's total angle must exceed 2π for it to be a pseudosource.
+
+A flatter saddle hides a sector of at most this angle behind it, in which the nearest ray is longer
+than the path through the vertex by a factor of at most 1 + SADDLE_EXCESS² / 8: below rounding.
+"""
+
+SECTOR_MARGIN = 1e-6
+"""Radians by which a pseudosource's shadow sector is widened on both sides.
+
+Closes the gap that rounding may leave between its windows and those that pass beside it (section
+3.4). A wider sector is never wrong: every window stands for real paths.
+"""
+
+OVERLAP = 1e-10
+"""Share of an edge's length up to which two windows may overlap untrimmed.
+
+Comparing distances at the ends of a shorter overlap would compare rounding errors. Untrimmed
+windows cost time, not accuracy.
+"""
+
+GAP = 1e-12
+"""Share of an edge's length up to which a gap between two windows is rounding and is closed.
+
+A ray through the closed gap is off its true course by at most this much, which bounds its error.
+"""
+
+SLACK = 1e-12
+"""Relative slack of the vertex filter, in favour of the window.
+
+Distances at vertices are rounded differently from those along windows; a window that ties with the
+path through the vertex must live, for the vertex may have its distance from that very window.
+"""
+
+TIE = 1e-13
+"""Relative difference up to which the distances to two sources count as equal.
+
+Symmetric meshes make equal distances that rounding tells apart; the lower index wins them.
+"""

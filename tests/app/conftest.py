@@ -1,0 +1,79 @@
+"""A running service: real worker processes, a real store."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.main import create_app
+from app.settings import Settings
+
+MESHES = Path(__file__).parents[3] / "shared" / "meshes"
+
+Serve = Callable[..., AbstractContextManager[TestClient]]
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
+    """Wait for something that happens in another thread or process."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.02)
+
+
+def is_ready(client: Any) -> bool:
+    return bool(client.get("/readyz").status_code == 200)
+
+
+@contextmanager
+def serving(store: Path, **settings: Any) -> Iterator[TestClient]:
+    """Run the service in this process, with workers of its own."""
+    app = create_app(Settings(store=store, **{"workers": 1} | settings))
+    with TestClient(app, raise_server_exceptions=False) as client:
+        wait_until(lambda: is_ready(client))
+        yield client
+
+
+@pytest.fixture(scope="session")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    """A service that many tests share; they leave it as they found it, but for meshes."""
+    with serving(tmp_path_factory.mktemp("store")) as client:
+        yield client
+
+
+@pytest.fixture(scope="session")
+def plane(client: TestClient) -> str:
+    """The id of a small flat mesh."""
+    return upload_sample(client, "plane", 200)
+
+
+def upload_sample(client: TestClient, name: str, faces: int) -> str:
+    response = client.post("/v1/meshes", params={"sample": name, "faces": faces})
+    assert response.status_code in (200, 201), response.text
+    return str(response.json()["id"])
+
+
+@pytest.fixture
+def horse() -> bytes:
+    path = MESHES / "horse97k.ply"
+    if not path.is_file():
+        pytest.skip(f"{path} is not there")
+    return path.read_bytes()
+
+
+def check_problem(response: Any, status: int, code: str) -> dict[str, Any]:
+    """Check that a response is the problem it should be, with all that every problem has."""
+    assert response.status_code == status, response.text
+    assert response.headers["content-type"] == "application/problem+json"
+    problem: dict[str, Any] = response.json()
+    assert problem["code"] == code
+    assert problem["status"] == status
+    assert problem["type"] == f"/problems/{code}"
+    assert problem["instance"] == response.url.path
+    assert problem["request_id"] == response.headers["x-request-id"]
+    assert problem["detail"]
+    return problem

@@ -1,0 +1,42 @@
+import numpy as np
+import pytest
+
+from app.errors import ProblemError
+from app.json_mesh import read_json_mesh
+
+
+def test_reads_vertices_and_faces() -> None:
+    vertices, faces = read_json_mesh(
+        b'{"vertices": [[0, 0, 0], [1.5, 0, 0]], "faces": [[0, 1, 1]]}'
+    )
+
+    np.testing.assert_array_equal(vertices, [[0, 0, 0], [1.5, 0, 0]])
+    np.testing.assert_array_equal(faces, [[0, 1, 1]])
+
+
+@pytest.mark.parametrize(
+    ("body", "code", "place"),
+    [
+        (b"{", "malformed_body", None),
+        (b'{"vertices": [[NaN, 0, 0]], "faces": [[0, 0, 0]]}', "malformed_body", None),
+        (b"[]", "invalid_request", ""),
+        (b'{"faces": [[0, 1, 2]]}', "invalid_request", "/vertices"),
+        (b'{"vertices": [[0, 0, 0]], "faces": [], "x/y": 1}', "invalid_request", "/x~1y"),
+        (b'{"vertices": 7, "faces": [[0, 1, 2]]}', "invalid_request", "/vertices"),
+        (b'{"vertices": [[0, 0, 0], [0, 0]], "faces": []}', "invalid_request", "/vertices/1"),
+        (b'{"vertices": [[0, 0, 0], ["1", 0, 0]], "faces": []}', "invalid_request", "/vertices/1"),
+        (b'{"vertices": [[0, 0, null]], "faces": []}', "invalid_request", "/vertices/0"),
+        (b'{"vertices": [[true, false, true]], "faces": []}', "invalid_request", "/vertices/0"),
+        (b'{"vertices": [], "faces": []}', "invalid_request", "/vertices"),
+        (b'{"vertices": [[0, 0, 0]], "faces": [[0, 1.5, 2]]}', "invalid_request", "/faces/0"),
+        (b'{"vertices": [[0, 0, 0]], "faces": [[0, 1, 2, 3]]}', "invalid_request", "/faces/0"),
+    ],
+)
+def test_says_what_is_wrong_where(body: bytes, code: str, place: str | None) -> None:
+    with pytest.raises(ProblemError) as caught:
+        read_json_mesh(body)
+
+    assert caught.value.problem.code == code
+    assert [fault.pointer for fault in caught.value.problem.errors] == (
+        [] if place is None else [place]
+    )

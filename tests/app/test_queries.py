@@ -1,0 +1,347 @@
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+import geodesic_core as gc
+from app.queries import DistancesQuery, Source, result_key
+
+from .conftest import check_problem, serving, upload_sample
+
+NPY = {"Accept": "application/x-npy"}
+TWO_TRIANGLES = {
+    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [9, 0, 0], [8, 0, 0], [9, 1, 0]],
+    "faces": [[0, 1, 2], [3, 4, 5]],
+}
+
+
+def distances(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
+    body.setdefault("sources", [{"vertex": 0}])
+    return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
+
+
+def mesh_of(client: TestClient, mesh_id: str) -> gc.TriangleMesh:
+    load = lambda name: np.load(  # noqa: E731
+        BytesIO(client.get(f"/v1/meshes/{mesh_id}/arrays/{name}").content)
+    )
+    return gc.TriangleMesh(load("vertices"), load("faces"))
+
+
+@pytest.fixture(scope="module")
+def apart(client: TestClient) -> str:
+    """The id of a mesh of two components."""
+    return str(client.post("/v1/meshes", json=TWO_TRIANGLES).json()["id"])
+
+
+def test_distances_are_the_library_s(client: TestClient, plane: str) -> None:
+    field = gc.exact_distance(mesh_of(client, plane), gc.Source(5))
+
+    response = distances(client, plane, sources=[{"vertex": 5}])
+
+    assert response.status_code == 200
+    answer = response.json()
+    np.testing.assert_array_equal(answer["distances"], field.distances)
+    assert answer["mesh_id"] == plane
+    assert (answer["method"], answer["exact"]) == ("exact", True)
+    assert answer["error_bound"] == {"type": "relative", "value": 0.0, "kind": "guaranteed"}
+    assert answer["sources"][0]["vertex"] == 5
+    assert answer["sources"][0]["start_distance"] == 0
+    assert answer["unreachable"] == {"disconnected": 0, "beyond_max_distance": 0}
+    assert answer["stats"]["windows_created"] > 0
+    assert answer["warnings"] == []
+    for phase in ("queue", "load", "compute", "encode"):
+        assert f"{phase};dur=" in response.headers["server-timing"]
+
+
+def test_binary_formats_hold_the_same(client: TestClient, plane: str) -> None:
+    answer = distances(client, plane).json()
+    npy = distances(client, plane, NPY)
+    octets = client.post(
+        f"/v1/meshes/{plane}/distances?format=octets", json={"sources": [{"vertex": 0}]}
+    )
+
+    np.testing.assert_array_equal(np.load(BytesIO(npy.content)), answer["distances"])
+    np.testing.assert_array_equal(np.frombuffer(octets.content, "<f8"), answer["distances"])
+    for response in (npy, octets):
+        assert response.headers["geodesic-dtype"] == "<f8"
+        assert response.headers["geodesic-shape"] == str(len(answer["distances"]))
+        assert response.headers["geodesic-mesh-id"] == plane
+        assert response.headers["geodesic-error-bound"].startswith('{"type":"relative"')
+    assert npy.headers["content-type"] == "application/x-npy"
+
+
+def test_targets_sources_and_starts(client: TestClient, plane: str) -> None:
+    mesh = mesh_of(client, plane)
+    field = gc.exact_distance(mesh, [gc.Source(0, 0.5), gc.Source(9, 0.0)])
+
+    answer = distances(
+        client,
+        plane,
+        sources=[{"vertex": 0, "start_distance": 0.5}, {"vertex": 9}],
+        targets=[{"vertex": 3}, {"vertex": 7}, {"vertex": 3}],
+        include=["nearest_source"],
+    ).json()
+
+    np.testing.assert_array_equal(answer["distances"], field.distances[[3, 7, 3]])
+    np.testing.assert_array_equal(answer["nearest_source"], field.nearest_source[[3, 7, 3]])
+
+
+def test_what_is_out_of_reach(client: TestClient, apart: str) -> None:
+    answer = distances(client, apart, max_distance=0.5, include=["nearest_source"]).json()
+    binary = np.load(BytesIO(distances(client, apart, NPY, max_distance=0.5).content))
+
+    assert answer["distances"] == [0, None, None, None, None, None]
+    assert answer["nearest_source"] == [0, None, None, None, None, None]
+    assert answer["unreachable"] == {"disconnected": 3, "beyond_max_distance": 2}
+    assert "components" in answer["warnings"][0]
+    np.testing.assert_array_equal(binary, [0, *[np.inf] * 5])
+
+
+def test_the_same_query_is_not_solved_again(client: TestClient, plane: str) -> None:
+    first, again = (distances(client, plane, sources=[{"vertex": 11}]) for _ in range(2))
+
+    assert again.content == first.content
+    assert again.headers["etag"] == first.headers["etag"]
+    assert again.headers["server-timing"] == "kept"
+    other = distances(client, plane, sources=[{"vertex": 12}])
+    assert other.headers["etag"] != first.headers["etag"]
+    assert distances(client, plane, NPY, sources=[{"vertex": 11}]).headers["etag"] not in (
+        first.headers["etag"],
+        other.headers["etag"],
+    )
+
+
+def test_the_hash_of_a_query_is_stable(monkeypatch: pytest.MonkeyPatch) -> None:
+    query = DistancesQuery("m", (Source(1, 0.0),), (2,), None, nearest_source=False)
+    twin = DistancesQuery("m", (Source(1, 0.0),), (2,), None, nearest_source=False)
+    other = DistancesQuery("m", (Source(1, 0.0),), None, None, nearest_source=False)
+    key = result_key(query, "a/b")
+
+    assert key == result_key(twin, "a/b")
+    assert len({key, result_key(other, "a/b"), result_key(query, "a/c")}) == 3
+    monkeypatch.setattr("app.queries.code_version", lambda: "another")
+    assert result_key(query, "a/b") != key
+
+
+@pytest.mark.parametrize(
+    ("body", "code", "places"),
+    [
+        ({"sources": [{"vertex": -1}]}, "invalid_point", ["/sources/0/vertex"]),
+        (
+            {"sources": [{"vertex": 0}, {"vertex": 10**6}], "targets": [{"vertex": -3}]},
+            "invalid_point",
+            ["/sources/1/vertex", "/targets/0/vertex"],
+        ),
+        ({"sources": [{"vertex": 10**30}]}, "invalid_point", ["/sources/0/vertex"]),
+        ({"sources": []}, "invalid_request", ["/sources"]),
+        ({"sources": [{"vertex": 0}], "targets": []}, "invalid_request", ["/targets"]),
+        ({}, "invalid_request", ["/sources"]),
+        ({"sources": [{"vertex": 1.5}]}, "invalid_request", ["/sources/0/vertex"]),
+        ({"sources": [{"vertex": True}]}, "invalid_request", ["/sources/0/vertex"]),
+        ({"sources": [{"vertex": "0"}]}, "invalid_request", ["/sources/0/vertex"]),
+        ({"sources": [{"vertx": 0}]}, "invalid_request", None),
+        ({"sources": [{"vertex": 0}], "source": 1}, "invalid_request", ["/source"]),
+        (
+            {"sources": [{"vertex": 0, "start_distance": -1}]},
+            "invalid_request",
+            ["/sources/0/start_distance"],
+        ),
+        ({"sources": [{"vertex": 0}], "max_distance": -1}, "invalid_request", ["/max_distance"]),
+        ({"sources": [{"vertex": 0}], "method": "approximate"}, "invalid_request", ["/method"]),
+        ({"sources": [{"vertex": 0}], "method": "heat"}, "invalid_request", ["/method"]),
+        ({"sources": [{"vertex": 0}], "include": ["paths"]}, "invalid_request", ["/include/0"]),
+    ],
+)
+def test_refused_distances(
+    client: TestClient, plane: str, body: dict, code: str, places: list[str] | None
+) -> None:
+    response = client.post(f"/v1/meshes/{plane}/distances", json=body)
+
+    problem = check_problem(response, 422, code)
+    assert places is None or [fault["pointer"] for fault in problem["errors"]] == places
+
+
+def test_the_approximate_method_says_that_it_is_to_come(client: TestClient, plane: str) -> None:
+    problem = distances(client, plane, method="approximate").json()
+
+    assert "not available yet" in problem["detail"]
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
+def test_numbers_that_are_not_finite(client: TestClient, plane: str, number: str) -> None:
+    for body in (
+        f'{{"sources": [{{"vertex": 0, "start_distance": {number}}}]}}',
+        f'{{"sources": [{{"vertex": 0}}], "max_distance": {number}}}',
+        f'{{"sources": [{{"vertex": {number}}}]}}',
+    ):
+        response = client.post(
+            f"/v1/meshes/{plane}/distances",
+            content=body,
+            headers={"Content-Type": "application/json"},
+        )
+        check_problem(response, 422, "invalid_request")
+
+
+@pytest.mark.parametrize(
+    ("content", "media_type", "status", "code"),
+    [
+        (b"{", "application/json", 400, "malformed_body"),
+        (b'"\xff"', "application/json", 400, "malformed_body"),
+        (b"[" * 100_000, "application/json", 400, "malformed_body"),
+        (b"9" * 10_000, "application/json", 400, "malformed_body"),
+        (b"", "application/json", 422, "invalid_request"),
+        (b"[]", "application/json", 422, "invalid_request"),
+        (b"{}", "application/x-www-form-urlencoded", 415, "unsupported_media_type"),
+        (b"{}", None, 415, "unsupported_media_type"),
+    ],
+)
+def test_bodies_that_are_no_query(
+    client: TestClient, plane: str, content: bytes, media_type: str | None, status: int, code: str
+) -> None:
+    headers = {} if media_type is None else {"Content-Type": media_type}
+    response = client.post(f"/v1/meshes/{plane}/distances", content=content, headers=headers)
+
+    check_problem(response, status, code)
+
+
+def test_formats_that_there_are_not(client: TestClient, plane: str) -> None:
+    response = distances(client, plane, {"Accept": "text/html"})
+    check_problem(response, 406, "not_acceptable")
+
+    response = client.post(
+        f"/v1/meshes/{plane}/distances?format=xml", json={"sources": [{"vertex": 0}]}
+    )
+    check_problem(response, 422, "invalid_request")
+
+    response = distances(client, plane, NPY, include=["nearest_source"])
+    problem = check_problem(response, 422, "invalid_request")
+    assert problem["errors"][0]["pointer"] == "/include"
+
+
+def test_limits_of_queries(tmp_path: Path) -> None:
+    limits = {"max_sources": 2, "max_json_values": 50, "query_memory_bytes": 100}
+    with serving(tmp_path, **limits) as client:
+        mesh_id = upload_sample(client, "plane", 100)
+
+        many = check_problem(
+            distances(client, mesh_id, sources=[{"vertex": 0}] * 3), 422, "limit_exceeded"
+        )
+        assert (many["limit"], many["actual"]) == (2, 3)
+        assert many["setting"] == "GEODESIC_MAX_SOURCES"
+
+        large = check_problem(distances(client, mesh_id), 413, "result_too_large")
+        assert large["setting"] == "GEODESIC_MAX_JSON_VALUES"
+        assert "application/x-npy" in large["hint"]
+        twice = {"targets": [{"vertex": 0}] * 26, "include": ["nearest_source"]}
+        large = check_problem(distances(client, mesh_id, **twice), 413, "result_too_large")
+        assert large["actual"] == 52
+
+        check_problem(distances(client, mesh_id, NPY), 422, "memory_limit")
+
+
+# Paths
+
+
+def test_paths_are_the_library_s(client: TestClient, plane: str) -> None:
+    path = gc.shortest_path(mesh_of(client, plane), 0, 60)
+
+    body = {"source": {"vertex": 0}, "target": {"vertex": 60}}
+    answer = client.post(f"/v1/meshes/{plane}/path", json=body).json()
+
+    assert answer["status"] == "ok"
+    assert answer["length"] == path.length
+    np.testing.assert_array_equal(answer["points"], path.points)
+    np.testing.assert_array_equal(answer["faces"], path.faces)
+    assert [tuple(place["barycentric"]) for place in answer["locations"]] == [
+        location.barycentric for location in path.locations
+    ]
+    assert answer["points"][0] == answer["source"]["position"]
+    assert answer["points"][-1] == answer["target"]["position"]
+    assert answer["error_bound"]["value"] == 0
+
+
+def test_get_answers_as_post_and_is_cached(client: TestClient, plane: str) -> None:
+    link = f"/v1/meshes/{plane}/path?from=v0&to=v60"
+    body = {"source": {"vertex": 0}, "target": {"vertex": 60}}
+
+    got = client.get(link)
+
+    assert got.json() == client.post(f"/v1/meshes/{plane}/path", json=body).json()
+    assert "max-age" in got.headers["cache-control"]
+    assert "Accept" in got.headers["vary"]
+    again = client.get(link, headers={"If-None-Match": got.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+    npy = client.get(link, headers=NPY | {"If-None-Match": got.headers["etag"]})
+    assert npy.status_code == 200
+    np.testing.assert_array_equal(np.load(BytesIO(npy.content)), got.json()["points"])
+
+
+def test_part_of_a_result(client: TestClient, plane: str) -> None:
+    link = f"/v1/meshes/{plane}/path?from=v0&to=v60&format=npy"
+    whole = client.get(link)
+
+    part = client.get(link, headers={"Range": "bytes=-24", "If-Range": whole.headers["etag"]})
+
+    assert part.status_code == 206
+    assert part.content == whole.content[-24:]
+
+
+def test_no_path_is_an_answer(client: TestClient, apart: str) -> None:
+    link = f"/v1/meshes/{apart}/path?from=v0&to=v4"
+
+    answer = client.get(link).json()
+    npy = client.get(link, headers=NPY)
+
+    assert (answer["status"], answer["reason"]) == ("no_path", "disconnected")
+    assert answer["points"] == []
+    assert "length" not in answer
+    assert np.load(BytesIO(npy.content)).shape == (0, 3)
+    assert npy.headers["geodesic-status"] == "no_path"
+    assert npy.headers["geodesic-reason"] == "disconnected"
+
+
+@pytest.mark.parametrize(
+    ("query", "code", "place"),
+    [
+        ("from=v0&to=v-1", "invalid_point", "/query/to"),
+        ("from=v99999999&to=v1", "invalid_point", "/query/from"),
+        ("from=0&to=v1", "invalid_point", "/query/from"),
+        ("from=v0&to=f7:0.2,0.3,0.5", "invalid_point", "/query/to"),
+        ("from=v0&to=v" + "9" * 5000, "invalid_point", "/query/to"),
+        ("from=v0", "invalid_request", "/query/to"),
+        ("from=v0&to=v1&via=v3", "invalid_request", "/query/via"),
+        ("from=v0&to=v1&format=xml", "invalid_request", "/query/format"),
+    ],
+)
+def test_refused_gets(client: TestClient, plane: str, query: str, code: str, place: str) -> None:
+    problem = check_problem(client.get(f"/v1/meshes/{plane}/path?{query}"), 422, code)
+
+    assert [fault["pointer"] for fault in problem["errors"]] == [place]
+
+
+@pytest.mark.parametrize(
+    ("body", "code", "places"),
+    [
+        (
+            {"source": {"vertex": -1}, "target": {"vertex": 10**6}},
+            "invalid_point",
+            ["/source/vertex", "/target/vertex"],
+        ),
+        ({"source": {"vertex": 0}}, "invalid_request", ["/target"]),
+        ({"source": 0, "target": 1}, "invalid_request", ["/source", "/target"]),
+        (
+            {"source": {"vertex": 0}, "target": {"vertex": 1}, "method": "approximate"},
+            "invalid_request",
+            ["/method"],
+        ),
+    ],
+)
+def test_refused_posts(
+    client: TestClient, plane: str, body: dict, code: str, places: list[str]
+) -> None:
+    problem = check_problem(client.post(f"/v1/meshes/{plane}/path", json=body), 422, code)
+
+    assert [fault["pointer"] for fault in problem["errors"]] == places

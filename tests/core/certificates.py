@@ -1,0 +1,41 @@
+"""What must hold of every path, whatever the mesh: checked on the path itself."""
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+
+LENGTH = 1e-10
+"""Relative difference allowed between a path's length and the distance it stands for."""
+
+
+def check_path(mesh: gc.TriangleMesh, path: gc.GeodesicPath, source: int, target: int, distance):
+    """A path from source to target, over the surface, of the given length."""
+    points, locations, faces = path.points, path.locations, path.faces
+    assert points.shape == (len(locations), 3)
+    assert len(faces) == len(locations) - 1
+    assert tuple(points[0]) == tuple(mesh.vertices[source])
+    assert tuple(points[-1]) == tuple(mesh.vertices[target])
+    assert path.length == pytest.approx(distance, rel=LENGTH, abs=0)
+    pieces = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert pieces.sum() == pytest.approx(path.length, rel=LENGTH, abs=0)
+    carriers = [_check_location(mesh, *pair) for pair in zip(points, locations, strict=True)]
+    assert carriers[0] == {source}
+    assert carriers[-1] == {target}
+    for face, start, end in zip(faces, carriers, carriers[1:], strict=False):
+        # Both ends lie on the closed face: the piece between them does, a face is convex.
+        assert start | end <= set(mesh.faces[face].tolist())
+
+
+def _check_location(mesh, point, location) -> set[int]:
+    """Check one surface point; return the vertices of the vertex, edge or face that carries it."""
+    weights = np.array(location.barycentric)
+    assert (weights >= 0).all()
+    assert weights.sum() == pytest.approx(1, abs=1e-15)
+    corners = mesh.faces[location.face]
+    scale = np.abs(mesh.vertices[corners]).max()
+    np.testing.assert_allclose(weights @ mesh.vertices[corners], point, rtol=0, atol=1e-14 * scale)
+    carrier = corners[weights > 0]
+    holders = np.isin(mesh.faces, carrier).sum(axis=1) == len(carrier)
+    assert location.face == np.flatnonzero(holders)[0], "the lowest face that holds the point"
+    return set(carrier.tolist())

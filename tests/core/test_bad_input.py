@@ -1,0 +1,238 @@
+"""Whatever is wrong is refused, by type, and the message names the element."""
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from tests import zoo
+
+POINTS = np.array([(0.0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)])
+FACES = np.array([(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)])
+
+
+def with_value(array, place, value):
+    changed = array.copy()
+    changed[place] = value
+    return changed
+
+
+@pytest.fixture
+def mesh():
+    return gc.TriangleMesh(POINTS, FACES)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("place", [(0, 0), (3, 2)])
+def test_coordinates_must_be_finite(value, place):
+    with pytest.raises(gc.errors.InvalidMesh, match=rf"vertex {place[0]}\b") as caught:
+        gc.TriangleMesh(with_value(POINTS, place, value), FACES)
+    assert caught.value.kind == "vertex"
+    assert caught.value.elements == (place[0],)
+
+
+def test_unused_vertices_must_be_finite_too():
+    with pytest.raises(gc.errors.InvalidMesh, match=r"vertex 4\b"):
+        gc.TriangleMesh(np.vstack([POINTS, (0, np.nan, 0)]), FACES)
+
+
+@pytest.mark.parametrize("index", [-1, 4, 2**31, -(2**31), 2**40])
+def test_indices_must_be_in_range(index):
+    with pytest.raises(gc.errors.InvalidMesh, match=r"face 2\b") as caught:
+        gc.TriangleMesh(POINTS, with_value(FACES.astype(np.int64), (2, 1), index))
+    assert caught.value.kind == "face"
+    assert caught.value.elements == (2,)
+    assert str(index) in str(caught.value)
+
+
+def test_unsigned_indices_must_be_in_range():
+    with pytest.raises(gc.errors.InvalidMesh, match=r"face 0\b"):
+        gc.TriangleMesh(POINTS, with_value(FACES.astype(np.uint64), (0, 0), 2**64 - 1))
+
+
+@pytest.mark.parametrize("face", [(1, 1, 2), (1, 2, 1), (2, 1, 1), (3, 3, 3)])
+def test_a_face_must_not_repeat_a_vertex(face):
+    with pytest.raises(gc.errors.InvalidMesh, match=r"face 1\b.*repeats") as caught:
+        gc.TriangleMesh(POINTS, with_value(FACES, 1, face))
+    assert caught.value.kind == "face"
+    assert caught.value.elements == (1,)
+
+
+def test_the_first_ten_faults_are_named():
+    faces = np.tile(np.array([(0, 0, 1)]), (25, 1))
+    with pytest.raises(gc.errors.InvalidMesh) as caught:
+        gc.TriangleMesh(POINTS, faces)
+    assert caught.value.elements == tuple(range(10))
+
+
+@pytest.mark.parametrize(
+    "faces", [np.zeros((0, 3), int), np.zeros(0, int), [], np.zeros((0, 4), int)]
+)
+def test_a_mesh_has_faces(faces):
+    with pytest.raises(gc.errors.InvalidMesh, match="no faces"):
+        gc.TriangleMesh(POINTS, faces)
+
+
+def test_a_mesh_has_vertices():
+    with pytest.raises(gc.errors.InvalidMesh):
+        gc.TriangleMesh(np.zeros((0, 3)), FACES)
+    with pytest.raises(gc.errors.InvalidMesh):
+        gc.TriangleMesh(np.zeros((0, 3)), np.zeros((0, 3), int))
+
+
+@pytest.mark.parametrize(
+    "vertices",
+    [
+        POINTS[:, :2], POINTS.reshape(-1), POINTS[None], [[0, 0, 0], [1, 0]], None, "mesh",
+        [["a", "b", "c"]] * 4, POINTS + 1j, POINTS.astype(object), [[None] * 3] * 4,
+    ],
+    ids=[
+        "two columns", "flat", "three dimensions", "ragged", "None", "text", "letters", "complex",
+        "objects", "nones",
+    ],
+)  # fmt: skip
+def test_vertices_are_rows_of_three_numbers(vertices):
+    if isinstance(vertices, np.ndarray) and vertices.dtype == object:
+        assert len(gc.TriangleMesh(vertices, FACES).vertices) == 4  # floats all the same
+        return
+    with pytest.raises(gc.errors.InvalidMesh) as caught:
+        gc.TriangleMesh(vertices, FACES)
+    assert caught.value.kind == "vertex"
+
+
+@pytest.mark.parametrize(
+    "faces",
+    [
+        FACES[:, :2], np.hstack([FACES, FACES]), FACES.reshape(-1), FACES[None],
+        FACES.astype(float), FACES.astype(bool), [[0, 1, 2], [0, 1]], None, "mesh", FACES.astype(str), FACES + 0j,
+    ],
+    ids=[
+        "two columns", "six columns", "flat", "three dimensions", "floats", "booleans", "ragged",
+        "None", "text", "digits", "complex",
+    ],
+)  # fmt: skip
+def test_faces_are_rows_of_three_integers(faces):
+    with pytest.raises(gc.errors.InvalidMesh) as caught:
+        gc.TriangleMesh(POINTS, faces)
+    assert caught.value.kind == "face"
+
+
+@zoo.each(zoo.REFUSED)
+def test_edges_that_cannot_be_crossed_are_named(case):
+    with pytest.raises(gc.errors.InvalidMesh) as caught:
+        gc.TriangleMesh(case.vertices, case.faces)
+    assert caught.value.kind == "edge"
+    assert {tuple(sorted(edge)) for edge in caught.value.elements} == set(case.edges)
+    assert any(str(a) in str(caught.value) and str(b) in str(caught.value) for a, b in case.edges)
+
+
+def test_misoriented_and_non_manifold_are_told_apart():
+    messages = {}
+    for name in ("misoriented", "three_faces_at_an_edge"):
+        case = zoo.REFUSED[name]
+        with pytest.raises(gc.errors.InvalidMesh) as caught:
+            gc.TriangleMesh(case.vertices, case.faces)
+        messages[name] = str(caught.value)
+    assert "non-manifold" in messages["three_faces_at_an_edge"]
+    assert "winding" in messages["misoriented"]
+
+
+def test_an_edge_of_no_length_is_refused():
+    with pytest.raises(gc.errors.InvalidMesh, match=r"face 0\b"):
+        gc.TriangleMesh(with_value(POINTS, 1, POINTS[0]), FACES)
+
+
+def test_merge_is_one_of_two():
+    with pytest.raises(gc.errors.InvalidArgument, match="merge"):
+        gc.TriangleMesh(POINTS, FACES, merge="sometimes")
+
+
+BAD_INDICES = [
+    -1,
+    4,
+    2**31,
+    2**70,
+    np.int64(-1),
+    True,
+    np.True_,
+    1.0,
+    1.5,
+    np.float64(1),
+    "1",
+    None,
+]
+
+
+@pytest.mark.parametrize("index", BAD_INDICES, ids=repr)
+@pytest.mark.parametrize(
+    "spelling", [lambda i: i, lambda i: [0, i], gc.SurfacePoint.vertex, gc.Source]
+)
+def test_sources_are_vertices(mesh, index, spelling):
+    with pytest.raises((gc.errors.InvalidPoint, gc.errors.InvalidArgument)) as caught:
+        gc.exact_distance(mesh, spelling(index))
+    assert str(index) in str(caught.value) or repr(index) in str(caught.value)
+
+
+@pytest.mark.parametrize("index", BAD_INDICES, ids=repr)
+def test_targets_are_vertices(mesh, index):
+    field = gc.exact_distance(mesh, 0)
+    with pytest.raises((gc.errors.InvalidPoint, gc.errors.InvalidArgument)):
+        field.path_to(index)
+    with pytest.raises((gc.errors.InvalidPoint, gc.errors.InvalidArgument)):
+        gc.shortest_path(mesh, 0, index)
+
+
+def test_an_index_out_of_range_is_an_invalid_point(mesh):
+    for index in (-1, 4):
+        with pytest.raises(gc.errors.InvalidPoint, match=str(index)):
+            gc.exact_distance(mesh, index)
+        with pytest.raises(gc.errors.InvalidPoint, match=str(index)):
+            gc.exact_distance(mesh, 0).path_to(index)
+
+
+@pytest.mark.parametrize("sources", [[], (), np.array([], dtype=int)], ids=repr)
+def test_there_is_a_source(mesh, sources):
+    with pytest.raises(gc.errors.InvalidArgument, match="source"):
+        gc.exact_distance(mesh, sources)
+
+
+@pytest.mark.parametrize(
+    "sources", [np.array([[0, 1]]), np.array([0.0, 1.0]), {"vertex": 0}, [[0]]]
+)
+def test_sources_of_another_kind(mesh, sources):
+    with pytest.raises((gc.errors.InvalidPoint, gc.errors.InvalidArgument)):
+        gc.exact_distance(mesh, sources)
+
+
+@pytest.mark.parametrize("start", [-1.0, -1e-300, np.nan, np.inf, -np.inf, "0", None, 1j], ids=repr)
+def test_start_distances_are_finite_and_not_negative(mesh, start):
+    with pytest.raises(gc.errors.InvalidArgument, match="start"):
+        gc.exact_distance(mesh, [0, gc.Source(1, start)])
+
+
+@pytest.mark.parametrize("limit", [-1.0, -1e-300, np.nan, -np.inf, "1", 1j], ids=repr)
+def test_max_distance_is_a_distance(mesh, limit):
+    with pytest.raises(gc.errors.InvalidArgument, match="max_distance"):
+        gc.exact_distance(mesh, 0, max_distance=limit)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("deadline_s", np.nan), ("deadline_s", "1"), ("memory_limit", -1)]
+)
+def test_limits_are_numbers(mesh, name, value):
+    with pytest.raises(gc.errors.InvalidArgument, match=name):
+        gc.exact_distance(mesh, 0, **{name: value})
+
+
+def test_every_refusal_is_a_geodesic_error():
+    for error in (gc.errors.InvalidMesh, gc.errors.InvalidPoint, gc.errors.InvalidArgument):
+        assert issubclass(error, gc.errors.GeodesicError)
+
+
+@pytest.mark.parametrize("scale", [1e150, 1e-150, 1e-300])
+def test_extreme_coordinates_are_right_or_refused(scale):
+    try:
+        mesh = gc.TriangleMesh(POINTS * scale, FACES)
+    except gc.errors.InvalidMesh:
+        return
+    distances = gc.exact_distance(mesh, 0).distances
+    np.testing.assert_allclose(distances / scale, [0, 1, 1, 1], rtol=1e-12)

@@ -1,0 +1,72 @@
+"""Random meshes of every kind, small enough for the oracle."""
+
+import itertools
+
+import numpy as np
+from hypothesis import strategies as st
+
+from tests import zoo
+from tests.oracles.graph import edge_lengths
+
+
+def terrain(rng, *, holes=0):
+    columns, rows = rng.integers(2, 6, 2).tolist()
+    points, faces = zoo.grid(columns, rows, seed=int(rng.integers(2**31)), jitter=0.22)
+    points[:, 2] = rng.choice([0, 0.2, 1, 3]) * rng.normal(size=len(points))
+    cells = list(itertools.product(range(columns), range(rows)))
+    gone = [cells[k] for k in rng.choice(len(cells), min(holes, len(cells) - 1), replace=False)]
+    return zoo.drop_unused(points, zoo.without_cells(faces, columns, gone))
+
+
+def holed_terrain(rng):
+    return terrain(rng, holes=int(rng.integers(1, 5)))
+
+
+def thin_terrain(rng):
+    """Slivers, down to an aspect of some 1e-4, not flat."""
+    points, faces = terrain(rng)
+    return points * (1, 10.0 ** -rng.uniform(1, 3.5), 0.1), faces
+
+
+def ball(rng):
+    vertices, faces = (zoo.tetrahedron, zoo.octahedron, zoo.icosahedron)[rng.integers(3)]()
+    if len(faces) < 20:
+        vertices, faces = zoo.subdivide(vertices, faces)
+    return zoo.crumpled(vertices, rng.choice([0, 0.1, 0.5, 1]), int(rng.integers(2**31))), faces
+
+
+def ring(rng):
+    vertices, faces = zoo.torus(*rng.integers(3, 7, 2).tolist())
+    return zoo.crumpled(vertices, rng.choice([0, 0.3, 1]), int(rng.integers(2**31))), faces
+
+
+def cubes(rng):
+    """A random polycube: flat angles, saddles and ties; cubes may touch at a corner."""
+    cells = [(0, 0, 0)]
+    for _ in range(int(rng.integers(1, 7))):
+        start = cells[rng.integers(len(cells))]
+        cell = tuple(int(x) for x in np.array(start) + rng.permutation([0, 0, rng.choice([-1, 1])]))
+        if cell not in cells and _is_manifold(*zoo.voxels([*cells, cell])):
+            cells.append(cell)
+    return zoo.voxels(cells)
+
+
+def cone(rng):
+    sides = 2 * int(rng.integers(2, 7))
+    vertices, faces, _, _ = zoo.cone(sides, rng.uniform(0, 1.4), zigzag=bool(rng.integers(2)))
+    return zoo.crumpled(vertices, rng.choice([0, 0.2]), int(rng.integers(2**31))), faces
+
+
+def _is_manifold(vertices, faces) -> bool:
+    return 2 * len(edge_lengths(vertices, faces)) == 3 * len(faces)
+
+
+KINDS = (terrain, holed_terrain, thin_terrain, ball, ring, cubes, cone)
+
+
+@st.composite
+def cases(draw) -> zoo.Case:
+    kind = draw(st.sampled_from(KINDS))
+    seed = draw(st.integers(0, 2**31 - 1))
+    vertices, faces = kind(np.random.default_rng(seed))
+    return zoo.Case(f"{kind.__name__}({seed})", vertices, faces)
