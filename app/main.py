@@ -42,13 +42,25 @@ def create_app(settings: Settings) -> FastAPI:
 
 class _Application(FastAPI):
     def openapi(self) -> dict[str, Any]:
+        """Return FastAPI's document, with errors as they are here."""
         schema = super().openapi()
-        # FastAPI writes the media type of the answer to the errors as well.
         for path in schema["paths"].values():
             for operation in path.values():
-                for status, response in operation["responses"].items():
-                    if status >= "400":
-                        content = response.setdefault("content", {})
-                        model = content.pop("application/json", content.get(PROBLEM_JSON))
-                        response["content"] = {PROBLEM_JSON: model}
+                operation["responses"] = {
+                    status: _as_problem(response) if status >= "400" else response
+                    for status, response in operation["responses"].items()
+                    if response["description"] != _FASTAPI_S_OWN
+                }
+        for name in ("HTTPValidationError", "ValidationError"):
+            schema["components"]["schemas"].pop(name, None)
         return schema
+
+
+_FASTAPI_S_OWN = "Validation Error"  # what it supposes of each operation with parameters
+
+
+def _as_problem(response: dict[str, Any]) -> dict[str, Any]:
+    # FastAPI writes the media type of the answer to the errors as well.
+    content = response["content"]
+    model = content.get("application/json") or content[PROBLEM_JSON]
+    return {**response, "content": {PROBLEM_JSON: model}}

@@ -61,6 +61,7 @@ class ResultStore:
         self._root = root
         self._capacity = capacity
         self._sizes: OrderedDict[str, int] = OrderedDict()
+        self._total = 0
         self._taken: Counter[str] = Counter()
 
     def prepare(self) -> None:
@@ -70,7 +71,7 @@ class ResultStore:
         for path in bodies:
             name = path.relative_to(self._root).with_suffix("").as_posix()
             if _seal(self._root, name).exists():
-                self._sizes[name] = path.stat().st_size
+                self._count(name, path.stat().st_size)
             else:
                 path.unlink()
         for half_written in self._root.glob("*/tmp*"):
@@ -107,12 +108,15 @@ class ResultStore:
                 self._remove(name)
 
     def _take(self, name: str, seal: _Seal) -> Result:
-        self._sizes[name] = seal.size
-        self._sizes.move_to_end(name)
+        self._count(name, seal.size)
         self._taken[name] += 1
         path = _body(self._root, name)
         os.utime(path)  # the order of use, for the next start
         return Result(name, path, seal.headers)
+
+    def _count(self, name: str, size: int) -> None:
+        self._total += size - self._sizes.pop(name, 0)
+        self._sizes[name] = size
 
     def _let_go(self, name: str) -> None:
         self._taken[name] -= 1
@@ -120,18 +124,18 @@ class ResultStore:
             del self._taken[name]
 
     def _evict(self) -> None:
-        excess = sum(self._sizes.values()) - self._capacity
-        for name, size in list(self._sizes.items()):
-            if excess <= 0:
-                return
+        if self._total <= self._capacity:
+            return
+        for name in list(self._sizes):
             if name not in self._taken:
                 self._remove(name)
-                excess -= size
+            if self._total <= self._capacity:
+                return
 
     def _remove(self, name: str) -> None:
         _seal(self._root, name).unlink(missing_ok=True)
         _body(self._root, name).unlink(missing_ok=True)
-        self._sizes.pop(name, None)
+        self._total -= self._sizes.pop(name, 0)
 
 
 def result_name(mesh_id: str, key: str) -> str:

@@ -1,8 +1,8 @@
 """What the routes ask for: meshes in the store, and answers to queries, computed or kept."""
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping, Sequence
-from contextlib import asynccontextmanager
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ from app.engine import (
     MeshFromSample,
     StoredMesh,
 )
-from app.errors import Fault, refuse
+from app.errors import Fault, ProblemError, refuse
 from app.mesh_store import PUBLIC_ARRAYS, MeshStore
 from app.queries import DistancesQuery, Query, refuse_large_json, result_key
 from app.result_store import Result, ResultStore, result_name
@@ -80,10 +80,18 @@ class Service:
         """Return the number of vertices of a mesh."""
         return int(self.meshes.manifest(mesh_id)["report"]["vertices"])
 
-    async def list_meshes(self, limit: int, after: str) -> tuple[Sequence[dict[str, Any]], bool]:
-        """Return the reports of the ``limit`` meshes after an id, and whether there are more."""
-        ids, more = await to_thread.run_sync(self.meshes.page, after, limit)
-        return await to_thread.run_sync(lambda: [self.describe(mesh_id) for mesh_id in ids]), more
+    async def list_meshes(self, limit: int, after: str) -> tuple[list[dict[str, Any]], str | None]:
+        """Return the reports of ``limit`` meshes after an id, and where to go on, if anywhere."""
+        return await to_thread.run_sync(self._list_meshes, limit, after)
+
+    def _list_meshes(self, limit: int, after: str) -> tuple[list[dict[str, Any]], str | None]:
+        ids, more = self.meshes.page(after, limit)
+        described = []
+        for mesh_id in ids:
+            # Left out: what is deleted just now, or damaged, which it says when asked itself.
+            with suppress(ProblemError):
+                described.append(self.describe(mesh_id))
+        return described, ids[-1] if more else None
 
     async def delete_mesh(self, mesh_id: str) -> None:
         """Remove a mesh and its results."""

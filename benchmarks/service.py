@@ -38,8 +38,7 @@ def run(inputs: Inputs, runs: int) -> Section:
             target = verdict(upload_s, UPLOAD_S, at_least=False)
             rows.append([f"upload of {NAME}", f"{upload_s:.3f}", "", "", f"{target} s"])
             query = f"/v1/meshes/{json.loads(created)['id']}/distances"
-            for media_type in OVERHEAD:
-                rows.append(_overhead(connection, query, media_type, mesh, runs))
+            rows += [_overhead(connection, query, kind, mesh, runs) for kind in OVERHEAD]
     else:
         print(f"{NAME}: not in the meshes folder, left out")
     return Section(

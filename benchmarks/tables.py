@@ -1,6 +1,6 @@
 """Sections of ``RESULTS.md``: a title, the machine, a table and notes."""
 
-import datetime
+import datetime as dt
 import os
 import platform
 from collections.abc import Sequence
@@ -40,7 +40,7 @@ def keep(section: Section, path: Path) -> None:
 def machine() -> str:
     """Return the processor, its cores, and the versions that matter."""
     packages = [f"{name} {_version(name)}" for name in ("numpy", "numba", "pygeodesic")]
-    today = datetime.datetime.now(datetime.UTC).date().isoformat()
+    today = dt.datetime.now(dt.UTC).date().isoformat()
     parts = [
         today,
         f"{_processor()}, {os.cpu_count()} cores",

@@ -50,7 +50,7 @@ class InvalidArgument(GeodesicError):  # noqa: N818
 
 
 class NoPath(GeodesicError):  # noqa: N818
-    """No path joins the two points; ``reason`` is ``"disconnected"`` or ``"beyond_max_distance"``."""
+    """No path joins the points: ``reason`` is ``"disconnected"`` or ``"beyond_max_distance"``."""
 
     def __init__(self, message: str, reason: str) -> None:
         super().__init__(message)

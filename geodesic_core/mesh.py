@@ -86,8 +86,9 @@ class TriangleMesh:
 
     Notes
     -----
-    The arrays are copied once, and read-only. Vertices and faces keep the caller's order. Preparing
-    costs O(V + F) time, and memory of about 310 bytes a face.
+    The arrays are copied once, and read-only. Vertices and faces keep the caller's order: the
+    topology's own, nearer in memory, shows nowhere. Preparing costs O(V + F) time, and memory of
+    about 330 bytes a face.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, merge: Merge = "none") -> None:
@@ -185,10 +186,13 @@ class TriangleMesh:
     def report(self) -> MeshReport:
         """Counts and defects; O(V + F), computed once."""
         topology = self.topology
-        used = topology.first_corner >= 0
+        inner = topology.inner_vertex
+        used = (topology.first_corner >= 0)[inner]
+        flags = topology.flags[inner]
         edges = self.edge_count
         lengths = topology.geometry[:, kernels.LENGTH]
-        inner = topology.links[:, kernels.OPPOSITE] >= 0
+        shared = topology.links[:, kernels.OPPOSITE] >= 0
+        flat = topology.geometry[::3, kernels.SIN_LEFT] == 0.0
         return MeshReport(
             vertices=len(self.vertices),
             faces=len(self.faces),
@@ -196,20 +200,18 @@ class TriangleMesh:
             components=len(np.unique(topology.component[used])),
             boundary_loops=int(kernels.count_boundary_loops(topology.links)),
             euler_characteristic=int(np.count_nonzero(used)) - edges + len(self.faces),
-            saddle_vertices=int(np.count_nonzero(topology.flags & kernels.SADDLE)),
-            boundary_vertices=int(np.count_nonzero(topology.flags & kernels.BOUNDARY)),
-            bow_tie_vertices=Sample.of(np.flatnonzero(topology.flags & kernels.FANS)),
+            saddle_vertices=int(np.count_nonzero(flags & kernels.SADDLE)),
+            boundary_vertices=int(np.count_nonzero(flags & kernels.BOUNDARY)),
+            bow_tie_vertices=Sample.of(np.flatnonzero(flags & kernels.FANS)),
             isolated_vertices=Sample.of(np.flatnonzero(~used)),
-            degenerate_faces=Sample.of(
-                np.flatnonzero(topology.geometry[::3, kernels.SIN_LEFT] == 0.0)
-            ),
+            degenerate_faces=Sample.of(np.sort(topology.outer_face[flat])),
             non_manifold_edges=Sample(0, ()),  # refused, until the sweep can cross them
             inconsistent_orientation=False,  # likewise
             bounds=(
                 tuple(self.vertices.min(axis=0).tolist()),
                 tuple(self.vertices.max(axis=0).tolist()),
             ),
-            mean_edge_length=float((lengths.sum() - 0.5 * lengths[inner].sum()) / edges),
+            mean_edge_length=float((lengths.sum() - 0.5 * lengths[shared].sum()) / edges),
         )
 
     def __repr__(self) -> str:
@@ -229,9 +231,7 @@ def _as_vertices(vertices: ArrayLike) -> Floats:
     except (TypeError, ValueError) as error:
         raise InvalidMesh(f"vertices are not numbers: {error}", kind="vertex") from error
     if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidMesh(
-            f"vertices have shape {array.shape}; it must be (V, 3)", kind="vertex"
-        )
+        raise InvalidMesh(f"vertices have shape {array.shape}; it must be (V, 3)", kind="vertex")
     return array
 
 
@@ -293,14 +293,15 @@ def _prepare(vertices: Floats, faces: Longs) -> Topology:
     if outcome == kernels.SOUND:
         return topology
     if outcome == kernels.ZERO_LENGTH:
-        face = int(bad[0])
+        face = int(topology.outer_face[bad[0]])
         raise InvalidMesh(
             f"face {face} is {faces[face].tolist()} and has an edge of length zero: two of its "
             f"vertices lie at one position; merge='exact' joins such vertices, the face must go",
             kind="face",
             elements=[face],
         )
-    edges = _edges_of(triangles, bad)
+    outer = [kernels.outer_half_edge(topology.outer_face, int(h)) for h in bad]
+    edges = _edges_of(triangles, outer)
     if outcome == kernels.NON_MANIFOLD:
         what = "belongs to three or more faces (a non-manifold edge)"
     else:
@@ -313,10 +314,10 @@ def _prepare(vertices: Floats, faces: Longs) -> Topology:
     )
 
 
-def _edges_of(faces: Ints, half_edges: Ints) -> list[tuple[int, int]]:
+def _edges_of(faces: Ints, half_edges: list[int]) -> list[tuple[int, int]]:
     flat = faces.reshape(-1)
-    ends = [(int(flat[h]), int(flat[kernels.following(int(h))])) for h in half_edges]
-    return [(min(pair), max(pair)) for pair in ends]
+    ends = [(int(flat[h]), int(flat[kernels.following(h)])) for h in half_edges]
+    return sorted((min(pair), max(pair)) for pair in ends)
 
 
 def _and_more(bad: Sequence[Any] | NDArray[Any]) -> str:

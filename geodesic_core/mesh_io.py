@@ -15,9 +15,9 @@ It never sees a path, nor gets a resolver: a file cannot make it read another on
 import io
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
@@ -61,17 +61,11 @@ def load_mesh(
         mesh that `TriangleMesh` refuses.
     """
     if isinstance(source, str | Path):
-        file_type = file_type or Path(source).suffix
+        kind = _known_kind(file_type or Path(source).suffix)
         data = _bytes_of(Path(source))
     else:
+        kind = _known_kind(file_type or "")
         data = bytes(source)
-    kind = (file_type or "").lower().removeprefix(".")
-    if kind not in _READERS:
-        raise InvalidMesh(
-            f"unknown mesh file type {kind!r}; known are {', '.join(_READERS)}"
-            if kind
-            else f"the file type is missing; say which of {', '.join(_READERS)} it is"
-        )
     if not data:
         raise InvalidMesh(f"the {kind.upper()} file is empty")
     try:
@@ -79,12 +73,20 @@ def load_mesh(
     except InvalidMesh:
         raise
     except Exception as error:  # trimesh raises whatever its parsing stumbles over
-        raise InvalidMesh(
-            f"the {kind.upper()} file is damaged: {str(error) or type(error).__name__}"
-        ) from error
+        what = " ".join(str(error).split())[:200] or type(error).__name__
+        raise InvalidMesh(f"the {kind.upper()} file is damaged: {what}") from error
     if len(faces) == 0:
         raise InvalidMesh(f"the {kind.upper()} file holds no faces", kind="face")
     return TriangleMesh(vertices, faces, merge="exact" if kind == "stl" else merge)
+
+
+def _known_kind(file_type: str) -> str:
+    kind, known = file_type.lower().removeprefix("."), ", ".join(_READERS)
+    if not kind:
+        raise InvalidMesh(f"the file type is missing; say which of {known} it is")
+    if kind not in _READERS:
+        raise InvalidMesh(f"unknown mesh file type {kind!r}; known are {known}")
+    return kind
 
 
 def _bytes_of(path: Path) -> bytes:
@@ -118,12 +120,13 @@ def _read_obj(data: bytes) -> Arrays:
         face_rows = _absolute(rows)
     face_rows = _NOT_POSITION.sub(b"", b"\n".join(face_rows)).split(b"\n")
     _refuse_out_of_range(face_rows, 1, len(vertex_rows))
+    triangles = _fans([row.split() for row in face_rows])
     text = b"".join(
-        [b"v %b\n" % row for row in vertex_rows] + [b"f %b\n" % row for row in face_rows]
+        [b"v %b\n" % row for row in vertex_rows] + [b"f %b\n" % row for row in triangles]
     )
     read = load_obj(io.BytesIO(text), skip_materials=True, maintain_order=True)
     (geometry,) = read["geometry"].values()
-    return geometry["vertices"], _fans(geometry["faces"])
+    return geometry["vertices"], geometry["faces"]
 
 
 def _refuse_row(rows: list[bytes], pattern: re.Pattern[bytes], kind: str, rule: str) -> None:
@@ -193,122 +196,149 @@ def _read_off(data: bytes) -> Arrays:
     _refuse_row(vertex_rows, _VERTEX_ROW, "vertex", "it must have three numbers")
     polygons = _polygons(rows[vertex_count : vertex_count + face_count])
     _refuse_out_of_range([b" ".join(polygon) for polygon in polygons], 0, vertex_count)
-    faces = [  # trimesh would put all triangles first, then the quads' halves, then the rest
-        b"3 %b %b %b" % (corners[0], corners[i], corners[i + 1])
-        for corners in polygons
-        for i in range(1, len(corners) - 1)
-    ]
-    text = b"\n".join([b"OFF", b"%d %d 0" % (vertex_count, len(faces)), *vertex_rows, *faces])
-    read = load_off(io.BytesIO(text))
+    triangles = [b"3 " + triangle for triangle in _fans(polygons)]
+    counts = b"%d %d 0" % (vertex_count, len(triangles))
+    read = load_off(io.BytesIO(b"\n".join([b"OFF", counts, *vertex_rows, *triangles])))
     return read["vertices"], read["faces"]
 
 
-def _polygons(rows: Sequence[bytes]) -> list[list[bytes]]:
-    """Return the corners of rows that each read: count, that many indices, anything."""
+def _polygons(rows: list[bytes], skipped: int = 0) -> list[list[bytes]]:
+    """Return the corners of face rows: ``skipped`` words, a count, that many indices, anything."""
     polygons = []
     for face, row in enumerate(rows):
-        count, *rest = row.split()
-        if not count.isdigit() or not 3 <= int(count) <= len(rest):
+        words = row.split()[skipped:]
+        if not words or not words[0].isdigit() or not 3 <= int(words[0]) < len(words):
             raise InvalidMesh(
                 f"face {face} reads {_clip(row)}; it must have a count of three or more, then as "
                 f"many vertices",
                 kind="face",
                 elements=[face],
             )
-        polygons.append(rest[: int(count)])
+        polygons.append(words[1 : int(words[0]) + 1])
     return polygons
+
+
+def _fans(polygons: list[list[bytes]]) -> list[bytes]:
+    """Return the rows of the polygons' triangles, each polygon a fan from its first corner."""
+    return [
+        b"%b %b %b" % (corners[0], corners[i], corners[i + 1])
+        for corners in polygons
+        for i in range(1, len(corners) - 1)
+    ]
 
 
 def _refuse_missing_rows(counts: dict[str, int], rows: int) -> None:
     if sum(counts.values()) != rows or min(counts.values()) < 0:
-        claim = " and ".join(f"{count} {name} rows" for name, count in counts.items())
-        raise InvalidMesh(f"the header declares {claim}, but {rows} rows follow")
+        raise InvalidMesh(f"the header declares {_claim(counts)}, but {rows} rows follow")
+
+
+def _claim(counts: dict[str, int]) -> str:
+    return " and ".join(f"{count} {name} elements" for name, count in counts.items())
 
 
 # PLY ---------------------------------------------------------------------------------------------
 
 _PLY_HEADER = re.compile(rb"ply[ \t]*\r?\n(.*?)^end_header[ \t]*\r?\n", re.DOTALL | re.MULTILINE)
-_PLY_WANTED = {
-    b"vertex": {b"x", b"y", b"z"},
-    b"face": {b"vertex_index", b"vertex_indices"},
+_PLY_FORMATS = (b"ascii", b"binary_little_endian", b"binary_big_endian")
+_PLY_NAMES = {
+    "vertex": (b"x", b"y", b"z"),
+    "face": (b"vertex_indices", b"vertex_index"),
 }
 
 
+class _Element(NamedTuple):
+    size: int
+    properties: list[list[bytes]]
+
+
 def _read_ply(data: bytes) -> Arrays:
-    found = _PLY_HEADER.match(data)
-    if found is None:
+    header = _PLY_HEADER.match(data)
+    if header is None:
         raise InvalidMesh("the PLY file has no header from 'ply' to 'end_header'")
-    header, counts = _geometry_only(found[1])
-    body = data[found.end() :]
-    for element in ("vertex", "face"):
-        if not counts.get(element):
-            raise InvalidMesh(f"the PLY file holds no {element} element", kind="face")
-    if b"format ascii" in header:
-        rows = [row for row in body.splitlines() if row.strip()]
-        _refuse_missing_rows(counts, len(rows))
-        _refuse_bad_rows(rows, header, counts)
-        body = b"\n".join(rows)
+    form, elements = _ply_elements(header[1])
+    counts = {name: element.size for name, element in elements.items()}
+    for name in _PLY_NAMES:
+        if not counts.get(name):
+            raise InvalidMesh(f"the PLY file holds no {name} elements", kind="face")
+    _place_of_corners(elements["face"])
+    body = data[header.end() :]
+    if form == b"ascii":
+        elements, body = _plain_triangles(elements, counts, body)
     elif sum(counts.values()) > len(body):
-        claim = " and ".join(f"{count} {name} elements" for name, count in counts.items())
-        raise InvalidMesh(f"the header declares {claim}, but {len(body)} bytes follow")
-    read = load_ply(io.BytesIO(header + body))
-    polygons = read["faces"]
-    raw = read["metadata"]["_ply_raw"]["face"]["data"]
-    if isinstance(raw, dict):  # an ASCII file: here mixed polygons are still in the file's order
-        polygons = next(raw[name.decode()] for name in _PLY_WANTED[b"face"] if name.decode() in raw)
-    return read["vertices"], _fans(polygons)
+        raise InvalidMesh(f"the header declares {_claim(counts)}, but {len(body)} bytes follow")
+    read = load_ply(io.BytesIO(_ply_header(form, elements) + body))
+    faces = read["faces"].astype(np.int64)
+    if faces.ndim != 2 or faces.shape[1] < 3:
+        raise InvalidMesh("the PLY file's faces have fewer than three corners", kind="face")
+    fans = np.stack([faces[:, [0, i, i + 1]] for i in range(1, faces.shape[1] - 1)], axis=1)
+    return read["vertices"], fans.reshape(-1, 3)
 
 
-def _geometry_only(header: bytes) -> tuple[bytes, dict[str, int]]:
-    """Return the header with all that is not geometry under a name of no meaning, and the counts.
+def _ply_elements(header: bytes) -> tuple[bytes, dict[str, _Element]]:
+    """Return the format and the elements; what is no geometry gets a name of no meaning.
 
     trimesh would act on texture coordinates, colours and edges; this way it only steps over them.
     """
-    lines, counts, element = [b"ply"], dict[str, int](), b""
+    form = b""
+    elements: dict[str, _Element] = {}
     for number, line in enumerate(header.splitlines()):
-        words = line.split()
-        match words:
-            case [b"format", b"ascii" | b"binary_little_endian" | b"binary_big_endian", _]:
-                lines.insert(1, line)
-            case [b"element", name, count] if count.isdigit():
-                element = name if name in _PLY_WANTED else b"other%d" % number
-                if element.decode() in counts:
-                    raise InvalidMesh(f"the PLY header declares {_clip(line)} twice")
-                counts[element.decode()] = int(count)
-                lines.append(b"element %b %b" % (element, count))
-            case [b"property", *kind, name] if element:
-                if name not in _PLY_WANTED.get(element, ()):
-                    name = b"other%d" % number
-                lines.append(b" ".join([b"property", *kind, name]))
+        match line.split():
+            case [b"format", form, _] if form in _PLY_FORMATS:
+                pass
+            case [b"element", word, count] if count.isdigit():
+                name = word.decode() if word in (b"vertex", b"face") else f"other{number}"
+                if name in elements:
+                    raise InvalidMesh(f"the PLY header says {_clip(line)} twice")
+                elements[name] = _Element(int(count), [])
+            case [b"property", *kind, word] if elements:
+                known = word in _PLY_NAMES.get(name, ())
+                elements[name].properties.append([*kind, word if known else b"other%d" % number])
             case [] | [b"comment" | b"obj_info", *_]:
                 pass
             case _:
                 raise InvalidMesh(f"the PLY header has an unknown line, {_clip(line)}")
-    if len(lines) < 2 or not lines[1].startswith(b"format"):
-        raise InvalidMesh("the PLY header names no known format")
-    return b"\n".join([*lines, b"end_header\n"]), counts
+    if not form:
+        raise InvalidMesh("the PLY header names no format")
+    return form, elements
 
 
-def _refuse_bad_rows(rows: list[bytes], header: bytes, counts: dict[str, int]) -> None:
-    start = 0
-    for element, count in counts.items():
-        block = rows[start : start + count]
+def _place_of_corners(face: _Element) -> int:
+    for place, words in enumerate(face.properties):
+        if words[0] == b"list" and len(words) == 4 and words[-1] in _PLY_NAMES["face"]:
+            return place
+    raise InvalidMesh("the PLY faces have no property 'list … vertex_indices'", kind="face")
+
+
+def _ply_header(form: bytes, elements: dict[str, _Element]) -> bytes:
+    lines = [b"ply", b"format %b 1.0" % form]
+    for name, element in elements.items():
+        lines.append(b"element %b %d" % (name.encode(), element.size))
+        lines += [b" ".join([b"property", *words]) for words in element.properties]
+    return b"\n".join([*lines, b"end_header\n"])
+
+
+def _plain_triangles(
+    elements: dict[str, _Element], counts: dict[str, int], body: bytes
+) -> tuple[dict[str, _Element], bytes]:
+    """Return the elements and rows of an ASCII body with nothing but vertices and triangles."""
+    rows = [row for row in body.splitlines() if row.strip()]
+    _refuse_missing_rows(counts, len(rows))
+    blocks, start = {}, 0
+    for name, count in counts.items():
+        blocks[name] = rows[start : start + count]
         start += count
-        if element == "vertex":
-            _refuse_row(block, _VERTEX_ROW, "vertex", "it must have three numbers")
-        elif element == "face" and re.search(rb"element face \d+\nproperty list", header):
-            _polygons(block)
-
-
-def _fans(polygons: Any) -> Longs:
-    """Return (F, 3) triangles: each polygon in its place, as a fan from its first corner."""
-    if isinstance(polygons, np.ndarray) and polygons.dtype != object:
-        if polygons.ndim != 2 or polygons.shape[1] < 3:
-            raise InvalidMesh("the faces have fewer than three corners", kind="face")
-        polygons = polygons.astype(np.int64)
-        steps = range(1, polygons.shape[1] - 1)
-        return np.stack([polygons[:, [0, i, i + 1]] for i in steps], axis=1).reshape(-1, 3)
-    return np.concatenate([_fans(np.asarray(polygon)[None, :]) for polygon in polygons])
+    _refuse_row(blocks["vertex"], _VERTEX_ROW, "vertex", "it must have three numbers")
+    at = _place_of_corners(elements["face"])
+    if any(words[0] == b"list" for words in elements["face"].properties[:at]):
+        raise InvalidMesh("the PLY faces have another list before their vertex_indices")
+    polygons = _polygons(blocks["face"], skipped=at)
+    _refuse_out_of_range([b" ".join(polygon) for polygon in polygons], 0, counts["vertex"])
+    triangles = [b"3 " + triangle for triangle in _fans(polygons)]
+    plain = {
+        "vertex": elements["vertex"],
+        "face": _Element(len(triangles), [[b"list", b"uchar", b"int", b"vertex_indices"]]),
+    }
+    return plain, b"\n".join([*blocks["vertex"], *triangles])
 
 
 # STL ---------------------------------------------------------------------------------------------
@@ -330,6 +360,8 @@ def _read_stl(data: bytes) -> Arrays:
             )
         corners = _STL_VERTEX.findall(data)
         _refuse_row(corners, _VERTEX_ROW, "vertex", "it must have three numbers")
+        if len(corners) != 3 * facets:
+            raise InvalidMesh(f"the STL file has {facets} facets, but {len(corners)} corners")
         triangles = facets
     read = load_stl(io.BytesIO(data))
     parts = read["geometry"].values() if "geometry" in read else [read]
@@ -363,7 +395,8 @@ def _read_glb(data: bytes) -> Arrays:
         part = scene.geometry[name]
         if not isinstance(part, trimesh.Trimesh):
             continue  # points and lines are no surface
-        vertices.append(part.vertices @ transform[:3, :3].T + transform[:3, 3])
+        with np.errstate(invalid="ignore", over="ignore"):  # the mesh refuses what is not finite
+            vertices.append(part.vertices @ transform[:3, :3].T + transform[:3, 3])
         mirrored = np.linalg.det(transform[:3, :3]) < 0.0
         faces.append(part.faces[:, ::-1] + count if mirrored else part.faces + count)
         count += len(part.vertices)

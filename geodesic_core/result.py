@@ -84,7 +84,7 @@ class DistanceField:
     """(V,) int32 index into ``sources``; -1 where unreachable; ties to the lowest."""
     error_bound: ErrorBound
     stats: SweepStats
-    _winner: Floats
+    _winner: Floats  # by inner vertex
     _winner_ints: Ints
 
     def path_to(self, target: int | SurfacePoint) -> GeodesicPath:
@@ -110,7 +110,7 @@ class DistanceField:
             if locations and here == locations[-1]:
                 continue  # a path through a vertex meets several edges there
             if locations:
-                crossed.append(int(faces[i]))
+                crossed.append(int(self.mesh.topology.outer_face[faces[i]]))
             locations.append(here)
         points = np.array([location.position(self.mesh) for location in locations])
         pieces = np.diff(points, axis=0)
@@ -124,8 +124,9 @@ class DistanceField:
 
     def _location(self, node: int, parameter: float) -> SurfacePoint:
         if node < 0:
-            vertex = -1 - node
-            if self.mesh.topology.first_corner[vertex] < 0:  # a source that belongs to no face
+            topology = self.mesh.topology
+            vertex = int(topology.outer_vertex[-1 - node])
+            if topology.first_corner[-1 - node] < 0:  # a source that belongs to no face
                 return SurfacePoint.vertex(vertex)
             return SurfacePoint.at_vertex(self.mesh, vertex)
         return SurfacePoint.on_half_edge(self.mesh, node, parameter)
@@ -139,7 +140,7 @@ class DistanceField:
                 self.mesh.topology,
                 self._winner,
                 self._winner_ints,
-                vertex,
+                self.mesh.topology.inner_vertex[vertex],
                 nodes,
                 parameters,
                 faces,
@@ -185,8 +186,7 @@ def vertex_of(mesh: TriangleMesh, point: int | SurfacePoint, name: str) -> int:
         raise InvalidPoint(f"the {name} is {point!r}; it must be a vertex index or a SurfacePoint")
     if not 0 <= index < len(mesh.vertices):
         raise InvalidPoint(
-            f"the {name} is vertex {index}, but vertices are numbered 0 to "
-            f"{len(mesh.vertices) - 1}"
+            f"the {name} is vertex {index}, but vertices are numbered 0 to {len(mesh.vertices) - 1}"
         )
     return int(index)
 

@@ -41,11 +41,11 @@ def knot(faces: int) -> Sample:
         [np.cos(3 * t) * np.cos(2 * t), np.cos(3 * t) * np.sin(2 * t), np.sin(3 * t)]
     )
     angle = (np.arange(around) * (2.0 * pi / around))[None, :, None]
-    across = np.cos(angle) * normal[:, None] + np.sin(angle) * np.cross(normal, tangent)[:, None]
+    across = np.cos(angle) * normal[:, None] + np.sin(angle) * np.cross(tangent, normal)[:, None]
     vertices = (centre[:, None] + _TUBE_RADIUS * across).reshape(-1, 3)
     ids: Longs = np.arange(along * around, dtype=np.int64).reshape(along, around)
     ids = np.pad(ids, ((0, 1), (0, 1)), mode="wrap")
-    return vertices, _split_quads(ids)
+    return vertices, _split_quads(ids.T)
 
 
 def sphere(faces: int) -> Sample:

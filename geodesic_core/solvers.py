@@ -93,19 +93,18 @@ def exact_distance(
     starts = _as_sources(mesh, sources)
     vertices = np.array([vertex_of(mesh, start.point, "source") for start in starts], np.int64)
     distances = np.array([start.start_distance for start in starts])
+    inner = mesh.topology.inner_vertex
     wave = wavefront.new_wavefront(mesh.topology)
     _check_memory(wave, control)
-    sweep.start_sweep(mesh.topology, wave, vertices, distances, limit)
+    sweep.start_sweep(mesh.topology, wave, inner[vertices], distances, limit)
     wave = _run(mesh, wave, limit, vertices, control, began)
-    nearest = sweep.nearest_sources(
-        wave.distance, wave.winner_ints, _source_of(len(mesh.vertices), vertices, distances)
-    )
+    nearest = sweep.nearest_sources(wave.distance, wave.winner_ints, wave.origin)
     return DistanceField(
         mesh=mesh,
         sources=starts,
         max_distance=limit,
-        distances=wave.distance,
-        nearest_source=nearest,
+        distances=wave.distance[inner],
+        nearest_source=nearest[inner],
         error_bound=EXACT,
         stats=_stats(mesh, wave, time.perf_counter() - began),
         _winner=wave.winner,
@@ -213,14 +212,6 @@ def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
         peak_bytes=wavefront.bytes_of(wave),
         seconds=seconds,
     )
-
-
-def _source_of(vertex_count: int, vertices: Any, distances: Any) -> Any:
-    """Return for each vertex the index of the source that it is, or -1."""
-    result = np.full(vertex_count, -1, np.int32)
-    for i in np.lexsort((np.arange(len(vertices)), distances))[::-1]:
-        result[vertices[i]] = i  # the nearest last, and of equal ones the lowest
-    return result
 
 
 def _as_limit(max_distance: float | None) -> float:

@@ -5,11 +5,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from geodesic_core.arrays import Floats
-from geodesic_core.kernels.topology import HEAD, NEXT_CORNER, OPPOSITE, TAIL
+from geodesic_core.kernels.topology import (
+    HEAD,
+    NEXT_CORNER,
+    OPPOSITE,
+    TAIL,
+    outer_half_edge,
+)
 from geodesic_core.mesh import TriangleMesh
 
 UNPLACED = -1
 """The face of a vertex that was named without a mesh."""
+
+_CORNERS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,34 +43,38 @@ class SurfacePoint:
     @classmethod
     def at_vertex(cls, mesh: TriangleMesh, index: int) -> "SurfacePoint":
         """Return the canonical point at a vertex that belongs to a face."""
-        links = mesh.topology.links
-        corner = int(mesh.topology.first_corner[index])
-        lowest = corner
+        topology = mesh.topology
+        corner = int(topology.first_corner[topology.inner_vertex[index]])
+        corners = []
         while corner >= 0:
-            lowest = min(lowest, corner)
-            corner = int(links[corner, NEXT_CORNER])
-        weights = [0.0, 0.0, 0.0]
-        weights[lowest % 3] = 1.0
-        return cls(lowest // 3, (weights[0], weights[1], weights[2]), index)
+            corners.append(outer_half_edge(topology.outer_face, corner))
+            corner = int(topology.links[corner, NEXT_CORNER])
+        face, place = divmod(int(min(corners)), 3)
+        return cls(face, _CORNERS[place], index)
 
     @classmethod
     def on_half_edge(cls, mesh: TriangleMesh, half_edge: int, t: float) -> "SurfacePoint":
-        """Return the canonical point at ``t`` in [0, 1] from the tail to the head of a half-edge."""
-        links = mesh.topology.links
+        """Return the canonical point at ``t`` in [0, 1] along a half-edge of the topology."""
+        topology = mesh.topology
         if t == 0.0 or 1.0 - t in (0.0, 1.0):  # also a t too small to be told from a vertex
-            return cls.at_vertex(mesh, int(links[half_edge, TAIL if t < 0.5 else HEAD]))
-        opposite = int(links[half_edge, OPPOSITE]) >> 1
-        if 0 <= opposite < half_edge:
-            half_edge, t = opposite, 1.0 - t
+            end = topology.links[half_edge, TAIL if t < 0.5 else HEAD]
+            return cls.at_vertex(mesh, int(topology.outer_vertex[end]))
+        outer = outer_half_edge(topology.outer_face, half_edge)
+        opposite = int(topology.links[half_edge, OPPOSITE]) >> 1
+        if opposite >= 0:
+            other = outer_half_edge(topology.outer_face, opposite)
+            if other < outer:
+                outer, t = other, 1.0 - t
         weights = [0.0, 0.0, 0.0]
-        weights[half_edge % 3] = 1.0 - t
-        weights[(half_edge + 1) % 3] = t
-        return cls(half_edge // 3, (weights[0], weights[1], weights[2]))
+        weights[outer % 3] = 1.0 - t
+        weights[(outer + 1) % 3] = t
+        return cls(int(outer // 3), (weights[0], weights[1], weights[2]))
 
     def position(self, mesh: TriangleMesh) -> Floats:
         """Return the (3,) position, mesh units; of a vertex exactly the mesh's own."""
+        position: Floats
         if self.vertex_index is not None:
-            return mesh.vertices[self.vertex_index]
-        weights = np.array(self.barycentric)
-        position: Floats = weights @ mesh.vertices[mesh.faces[self.face]]
+            position = mesh.vertices[self.vertex_index]
+        else:
+            position = np.array(self.barycentric) @ mesh.vertices[mesh.faces[self.face]]
         return position

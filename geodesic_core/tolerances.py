@@ -3,14 +3,15 @@
 Each is tested as a bound in ``tests/core/test_tolerances.py``.
 """
 
-SADDLE_EXCESS = 1e-7
+SADDLE_EXCESS = 1e-11
 """Radians by which a vertex's total angle must exceed 2π for it to be a pseudosource.
 
-A flatter saddle hides a sector of at most this angle behind it, in which the nearest ray is longer
-than the path through the vertex by a factor of at most 1 + SADDLE_EXCESS² / 8: below rounding.
+A flatter saddle hides a sector of at most this angle behind it; paths into it are straight but for
+this angle, which bounds their relative error. Less would take the rounding of flat vertices for
+saddles, which costs time only.
 """
 
-SECTOR_MARGIN = 1e-6
+SECTOR_MARGIN = 1e-8
 """Radians by which a pseudosource's shadow sector is widened on both sides.
 
 Closes the gap that rounding may leave between its windows and those that pass beside it (section
@@ -37,7 +38,15 @@ Distances at vertices are rounded differently from those along windows; a window
 path through the vertex must live, for the vertex may have its distance from that very window.
 """
 
-TIE = 1e-13
+BEND = 1e-13
+"""Relative surcharge on a path that bends at a window's end.
+
+Such a path is no geodesic: it stands in where rounding left a gap between windows at a vertex. A
+path of the same length that is straight, or bends at a pseudosource, must take precedence: only it
+can be traced back.
+"""
+
+TIE = 1e-12
 """Relative difference up to which the distances to two sources count as equal.
 
 Symmetric meshes make equal distances that rounding tells apart; the lower index wins them.

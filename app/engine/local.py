@@ -53,13 +53,13 @@ class LocalEngine:
     async def run(self, work: Work, mesh_id: str | None = None) -> Done:
         """Do ``work`` in the next free worker, see ``Engine``."""
         start = perf_counter()
-        for is_last_try in (False, True):
+        for dead_ones_left in reversed(range(len(self._slots) + 1)):
             slot = await self._take(mesh_id)
             queued = perf_counter() - start
             try:
                 outcome = await self._run_in(slot, work)
             except WorkerLostError as error:
-                if error.had_begun or is_last_try:
+                if error.had_begun or not dead_ones_left:
                     raise refuse("worker_died", "the worker process of this request died") from None
                 continue  # it had died idle, unnoticed: nothing was tried yet
             if isinstance(outcome, Problem):

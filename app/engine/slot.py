@@ -3,8 +3,10 @@
 import asyncio
 import logging
 import multiprocessing
+import threading
 from collections import deque
 from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from itertools import count
 from typing import Any
 
@@ -45,6 +47,7 @@ class Slot:
         self._begun: Future[Any] | None = None
         self._given_up = asyncio.Event()
         self._pool: ProcessPool | None = None
+        self._closing = threading.Lock()  # close() can be called again while it is at work
         # Shared with the worker: the number of the work to stop, and the worker's process id.
         self._stop_number = _SPAWN.RawValue("q", 0)
         self._pid = _SPAWN.RawValue("q", 0)
@@ -61,8 +64,8 @@ class Slot:
             initargs=(self._config, self._stop_number, self._pid),
             context=_SPAWN,
         )
-        started = await asyncio.to_thread(self._pool.schedule, worker.warm_up)
         try:
+            started = await asyncio.to_thread(self._pool.schedule, worker.warm_up)
             await asyncio.wrap_future(started)
         except Exception as error:
             raise WorkerLostError(had_begun=False) from error
@@ -93,7 +96,7 @@ class Slot:
         try:
             begun = self._pool.schedule(worker.do, args=(self._number, work))
         except RuntimeError:  # the pool broke since it was looked at
-            _settle(outcome, None, had_begun=False)
+            outcome.set_exception(WorkerLostError(had_begun=False))
             return outcome
         self._begun = begun
         begun.add_done_callback(lambda done: loop.call_soon_threadsafe(_settle, outcome, done))
@@ -107,26 +110,29 @@ class Slot:
         """Kill the worker, whatever it does."""
         self.give_up()
         await asyncio.to_thread(self._kill)
-        if self._outcome is not None:
+        if self._outcome is not None and not self._outcome.done():
             had_begun = self._begun is not None and self._begun.running()
-            _settle(self._outcome, None, had_begun=had_begun)
+            self._outcome.set_exception(WorkerLostError(had_begun=had_begun))
 
     def _kill(self) -> None:
-        for child in multiprocessing.active_children():
-            if child.pid == self._pid.value:
-                child.kill()  # it holds nothing that would need a farewell
-        if self._pool is not None:
-            self._pool.stop()  # type: ignore[no-untyped-call]
-            self._pool.join()
+        with self._closing:
+            pool, self._pool = self._pool, None
+            if pool is None:
+                return
+            for child in multiprocessing.active_children():
+                if child.pid == self._pid.value:
+                    child.kill()  # it holds nothing that would need a farewell
+            pool.stop()  # type: ignore[no-untyped-call]
+            pool.join()
 
 
-def _settle(
-    outcome: "asyncio.Future[Done | Problem]", done: Future[Any] | None, *, had_begun: bool = True
-) -> None:
+def _settle(outcome: "asyncio.Future[Done | Problem]", done: Future[Any]) -> None:
     if outcome.done():
         return
-    error = done.exception() if done is not None else None
-    if done is not None and error is None:
+    error = done.exception()
+    if error is None:
         outcome.set_result(done.result())
     else:
+        # A pool breaks when its worker dies idle; of one that dies at work it says that it expired.
+        had_begun = not isinstance(error, BrokenProcessPool)
         outcome.set_exception(WorkerLostError(had_begun=had_begun))

@@ -1,5 +1,6 @@
 """What runs inside a worker process."""
 
+import logging
 import os
 import threading
 from collections import OrderedDict
@@ -22,6 +23,8 @@ from app.json_mesh import read_json_mesh
 from app.mesh_store import MeshStore, OpenMesh
 from app.result_store import write_result
 from app.settings import Settings
+
+logger = logging.getLogger(__name__)
 
 TITLE = "geodesic-worker"
 
@@ -138,8 +141,13 @@ def do(number: int, work: Work) -> Done | Problem:
     assert _worker is not None, "the pool calls initialize first"  # noqa: S101
     try:
         return _worker.do(number, work)
-    except Exception as error:  # noqa: BLE001 - whatever it is, the client is to be told
-        return problem_of(error)
+    except gc.errors.Cancelled:
+        return Done({})  # who asked for it has gone
+    except Exception as error:
+        problem = problem_of(error)
+        if problem.code == "internal_error":
+            logger.exception("a worker failed at %s", work)
+        return problem
 
 
 def _die_with_parent() -> None:

@@ -111,7 +111,8 @@ async def create_mesh(
     if parameters.sample is None:
         stored, seconds = await _add_upload(service, parameters, request, deadline)
     else:
-        stored, seconds = await service.add_mesh(_sample(service, parameters), deadline)
+        making = service.add_mesh(_sample(service, parameters), deadline)
+        stored, seconds = await while_connected(request, making)
     response.status_code = 201 if stored.is_new else 200
     response.headers.update(server_timing(seconds))
     response.headers["Location"] = f"/v1/meshes/{stored.mesh_id}"
@@ -129,8 +130,8 @@ async def list_meshes(
     parameters: Annotated[ListParameters, Query()], service: ServiceDep
 ) -> dict[str, object]:
     """List the reports of the meshes by id, `limit` at a time."""
-    meshes, more = await service.list_meshes(parameters.limit, parameters.cursor or "")
-    return {"meshes": meshes, "next_cursor": meshes[-1]["id"] if more else None}
+    meshes, cursor = await service.list_meshes(parameters.limit, parameters.cursor or "")
+    return {"meshes": meshes, "next_cursor": cursor}
 
 
 @router.get(

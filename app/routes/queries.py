@@ -28,7 +28,7 @@ from app.service import Service
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"])
 
 _BINARY = {"schema": {"type": "string", "format": "binary"}}
-_PROBLEMS = problems(
+_CODES = (
     "mesh_not_found",
     "not_acceptable",
     "result_too_large",
@@ -43,7 +43,8 @@ _PROBLEMS = problems(
     "deadline_exceeded",
     "storage_full",
 )
-_BODY_PROBLEMS = problems("malformed_body", "upload_too_large", "unsupported_media_type")
+_PROBLEMS = problems(*_CODES)
+_BODY_PROBLEMS = problems("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
 _UNSTORED = {"Cache-Control": "no-store"}
 
 
@@ -58,7 +59,7 @@ def _answers(model: type, array: str) -> dict[int | str, dict[str, Any]]:
     operation_id="computeDistances",
     summary="Exact distances from sources to all vertices",
     response_class=Response,
-    responses={**_answers(DistancesAnswer, "distances"), **_BODY_PROBLEMS, **_PROBLEMS},
+    responses={**_answers(DistancesAnswer, "distances"), **_BODY_PROBLEMS},
     dependencies=[Depends(require_json)],
 )
 async def compute_distances(
@@ -80,7 +81,7 @@ async def compute_distances(
     operation_id="computePath",
     summary="The exact shortest path between two points",
     response_class=Response,
-    responses={**_answers(PathAnswer, "points"), **_BODY_PROBLEMS, **_PROBLEMS},
+    responses={**_answers(PathAnswer, "points"), **_BODY_PROBLEMS},
     dependencies=[Depends(require_json)],
 )
 async def compute_path(

@@ -97,12 +97,19 @@ def trace_path(
             faces[count - 1] = h // 3
             if (ax - x) * sy - ay * (sx - x) >= 0.0:  # s is left of the apex
                 reach = geometry[h, LENGTH_LEFT]
-                x, sx, sy = cross_edge(x, sx, sy, reach, geometry[h, COS_LEFT], geometry[h, SIN_LEFT])
+                x, sx, sy = cross_edge(
+                    x, sx, sy, reach, geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
+                )
                 h = links[h, OUT_LEFT]
             else:  # the same, in the mirror
                 length, reach = geometry[h, LENGTH], geometry[h, LENGTH_RIGHT]
                 x, sx, sy = cross_edge(
-                    length - x, length - sx, sy, reach, geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT]
+                    length - x,
+                    length - sx,
+                    sy,
+                    reach,
+                    geometry[h, COS_RIGHT],
+                    geometry[h, SIN_RIGHT],
                 )
                 x, sx = reach - x, reach - sx
                 h = links[h, OUT_RIGHT]

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-import numpy as np
 from numba.core import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
@@ -39,18 +38,19 @@ def _cache_directory() -> str:
 
 
 _CACHE_DIRECTORY = _cache_directory()
-_OPTIONS = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": False}
+_OPTIONS: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "fastmath": False}
 
 
 def _compile(function: Function, **options: Any) -> Function:
     # Numba reads its cache directory while it decorates: it is lent ours for that moment only, so
     # that other numba code in the same process keeps its own.
-    theirs = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _CACHE_DIRECTORY
+    config: Any = numba.config
+    theirs = config.CACHE_DIR
+    config.CACHE_DIR = _CACHE_DIRECTORY
     try:
         compiled: Function = numba.njit(**_OPTIONS, **options)(function)
     finally:
-        numba.config.CACHE_DIR = theirs
+        config.CACHE_DIR = theirs
     return compiled
 
 
@@ -77,12 +77,11 @@ def _compiled_pointer(typingcontext: Any, array: Any) -> Any:  # noqa: ARG001 - 
         (array_type,) = signature.args
         return context.make_array(array_type)(context, builder, arguments[0]).data
 
-    return types.CPointer(array.dtype)(array), codegen
+    return types.CPointer(array.dtype)(array), codegen  # type: ignore[no-untyped-call]
 
 
-pointer: Callable[[NDArray[Any]], Any] = (
-    _interpreted_pointer if numba.config.DISABLE_JIT else _compiled_pointer
-)
+_interpreted: bool = getattr(numba.config, "DISABLE_JIT", False)
+pointer: Any = _interpreted_pointer if _interpreted else _compiled_pointer
 """A C-contiguous array as a flat typed pointer, valid while the caller holds the array.
 
 Passing an array from kernel to kernel costs two atomic reference counts that numba does not prune:

@@ -1,11 +1,11 @@
-"""Plane geometry of one unfolded triangle: scalars in, scalars out.
+r"""Plane geometry of one unfolded triangle: scalars in, scalars out.
 
 The frame of a half-edge has its tail at the origin, its head at (length, 0) and its face on y > 0.
 The unfolded source of a window lies at (sx, sy) with sy <= 0::
 
                  apex
-                 /|\\
-                / | \\
+                 /|\
+                / | \
           tail +--x--+ head        y = 0
                   |
                 s (sx, sy)

@@ -3,9 +3,12 @@
 import math
 from typing import Any
 
-from geodesic_core.arrays import Floats, Ints, Longs
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.propagate import (
+    POOL_FULL,
     PROPAGATED,
     emit_pseudosource,
     improve_vertex,
@@ -38,8 +41,7 @@ from geodesic_core.kernels.wavefront import (
     FRONT,
     IN_RING,
     LIST,
-    STATUS,
-    WINNER,
+    VIA,
     WORK,
     free_windows,
     view_of,
@@ -52,13 +54,14 @@ RUNNING = 4  # POOL_FULL and SCRATCH_FULL of `propagate` are the others: grow, a
 
 @kernel
 def start_sweep(
-    topology: Any, wavefront: Any, sources: Longs, start_distances: Floats, max_distance: float
+    topology: Any, wavefront: Any, sources: Ints, start_distances: Floats, max_distance: float
 ) -> None:
     """Reach the source vertices at their start distances."""
     wave = view_of(topology, wavefront, max_distance)
     for i in range(len(sources)):
         v = sources[i]
         if start_distances[i] < wave.distance[v]:
+            wave.origin[v] = i
             improve_vertex(wave, v, start_distances[i], -1, 0.0, 0.0, v)
 
 
@@ -83,12 +86,11 @@ def settle_nearest(wave: Any) -> int:
     v = wave.heap[0]
     emits = is_pseudosource(wave, v)
     first = wave.first_corner[v]
-    if emits and first >= 0:
-        if 2 * wave.links[ROW * first + CORNER_COUNT] > free_windows(wave):
-            return 1
+    if emits and first >= 0 and 2 * wave.links[ROW * first + CORNER_COUNT] > free_windows(wave):
+        return POOL_FULL
     pop_nearest(wave)
-    if wave.winner_ints[WINNER * v + STATUS] != DONE:
-        wave.winner_ints[WINNER * v + STATUS] = DONE
+    if wave.status[v] != DONE:
+        wave.status[v] = DONE
         wave.counters[DONE_VERTICES] += 1
     wave.counters[WORK] += 30
     if emits:
@@ -105,7 +107,7 @@ def settle_nearest(wave: Any) -> int:
         across = wave.links[ROW * following(h) + OPPOSITE]
         if across >= 0:
             far = wave.links[ROW * (across >> 1) + APEX]
-            if wave.winner_ints[WINNER * far + STATUS] != FAR:
+            if wave.status[far] != FAR:
                 queue_list(wave, across >> 1)
         h = wave.links[ROW * h + NEXT_CORNER]
     return FINISHED
@@ -114,8 +116,8 @@ def settle_nearest(wave: Any) -> int:
 @kernel
 def mark_front(wave: Any, v: int) -> None:
     """Mark a neighbour of a vertex that is done."""
-    if wave.winner_ints[WINNER * v + STATUS] == FAR:
-        wave.winner_ints[WINNER * v + STATUS] = FRONT
+    if wave.status[v] == FAR:
+        wave.status[v] = FRONT
 
 
 @kernel
@@ -134,17 +136,19 @@ def drain(wave: Any, budget: int) -> int:
 
 
 @kernel
-def nearest_sources(distance: Floats, winner_ints: Ints, source_of: Ints) -> Ints:
-    """Return for each vertex the index of its source: that of its pseudosource, and so on."""
-    result = source_of.copy()
+def nearest_sources(distance: Floats, winner_ints: Ints, origin: Ints) -> Ints:
+    """Return for each vertex the index of its source: that of its pseudosource, and so on.
+
+    Asked at the end: a pseudosource may have changed its own source after it emitted.
+    """
+    result = np.full(len(distance), -1, np.int32)
     for start in range(len(distance)):
         if distance[start] == math.inf:
-            result[start] = -1
             continue
         v = start
-        while result[v] < 0:
+        while result[v] < 0 and winner_ints[v, VIA] >= 0:
             v = winner_ints[v, FROM]
-        found = result[v]
+        found = result[v] if result[v] >= 0 else origin[v]
         v = start
         while result[v] < 0:
             result[v] = found

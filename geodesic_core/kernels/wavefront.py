@@ -9,24 +9,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.arrays import Flags, Floats, Ints, Longs
 from geodesic_core.kernels.jit import kernel, pointer
 from geodesic_core.kernels.topology import Topology
 from geodesic_core.kernels.window import INTS, NEXT, WIDTH
 
 # Columns of Wavefront.lists, a row per half-edge
-FIRST = 0  # slot of the first window, -1 where the list is empty
-LAST = 1
-SIZE = 2
+SIZE = 0  # number of windows
+FIRST = 1  # slot of the first window; without meaning in an empty list
+LAST = 2
 IN_RING = 3  # whether the half-edge is in the ring
 LIST = 4
 
 # Columns of Wavefront.winner_ints, a row per vertex
 VIA = 0  # half-edge whose apex the vertex is and whose window reached it; -1 at a source
 FROM = 1  # vertex of that window's pseudosource; -1 where unreached, itself at a source
-ORIGIN = 2  # index of the source, while the sweep runs; -1 where unreached
-STATUS = 3
-WINNER = 4
+WINNER = 2
 
 # Status of a vertex
 FAR = 0
@@ -53,12 +51,16 @@ class Wavefront(NamedTuple):
     winner: Floats
     """(V, 2): unfolded pseudosource of the winning window, in the frame of its VIA"""
     winner_ints: Ints
-    """(V, 4): VIA, FROM, ORIGIN, STATUS"""
+    """(V, 2): VIA, FROM"""
+    status: Flags
+    """(V,): FAR, FRONT or DONE"""
+    origin: Ints
+    """(V,): index of the source that the vertex had its distance from when it was last improved"""
     heap: Ints
     heap_place: Ints
     ring: Ints
     lists: Ints
-    """(3F, 4): FIRST, LAST, SIZE, IN_RING"""
+    """(3F, 4): SIZE, FIRST, LAST, IN_RING"""
     windows: Floats
     """(P, 8): the pool, see `window`"""
     scratch: Floats
@@ -77,6 +79,8 @@ class View(NamedTuple):
     distance: Any
     winner: Any
     winner_ints: Any
+    status: Any
+    origin: Any
     heap: Any
     heap_place: Any
     ring: Any
@@ -104,6 +108,8 @@ def view_of(topology: Any, wave: Any, max_distance: float) -> Any:
         pointer(wave.distance),
         pointer(wave.winner),
         pointer(wave.winner_ints),
+        pointer(wave.status),
+        pointer(wave.origin),
         pointer(wave.heap),
         pointer(wave.heap_place),
         pointer(wave.ring),
@@ -123,20 +129,18 @@ def view_of(topology: Any, wave: Any, max_distance: float) -> Any:
 def new_wavefront(topology: Topology) -> Wavefront:
     """Allocate the state of one sweep: O(V + F), nothing reached yet."""
     vertices, half_edges = len(topology.first_corner), len(topology.links)
-    winner_ints = np.full((vertices, WINNER), -1, np.int32)
-    winner_ints[:, STATUS] = FAR
-    lists = np.full((half_edges, LIST), -1, np.int32)
-    lists[:, SIZE:] = 0
     counters = np.zeros(COUNTERS, np.int64)
     counters[FREE_FIRST] = -1
     return Wavefront(
         distance=np.full(vertices, np.inf),
         winner=np.empty((vertices, 2)),
-        winner_ints=winner_ints,
+        winner_ints=np.full((vertices, WINNER), -1, np.int32),
+        status=np.zeros(vertices, np.uint8),
+        origin=np.zeros(vertices, np.int32),
         heap=np.empty(vertices, np.int32),
         heap_place=np.full(vertices, -1, np.int32),
         ring=np.empty(half_edges, np.int32),
-        lists=lists,
+        lists=np.zeros((half_edges, LIST), np.int32),
         windows=np.empty((1024, WIDTH)),
         scratch=np.empty((256, WIDTH)),
         counters=counters,
@@ -186,8 +190,4 @@ def release_list(wave: Any, h: int) -> None:
     wave.window_ints[INTS * wave.lists[row + LAST] + NEXT] = wave.counters[FREE_FIRST]
     wave.counters[FREE_FIRST] = wave.lists[row + FIRST]
     wave.counters[FREE_SIZE] += wave.lists[row + SIZE]
-    wave.lists[row + FIRST] = -1
-    wave.lists[row + LAST] = -1
     wave.lists[row + SIZE] = 0
-
-

@@ -29,3 +29,14 @@ def test_errors_are_problems(client) -> None:
             for status, response in operation["responses"].items():
                 if status >= "400":
                     assert list(response["content"]) == [PROBLEM_JSON]
+
+
+def test_no_error_of_the_framework_is_left(client) -> None:
+    assert "HTTPValidationError" not in client.get("/openapi.json").text
+
+
+def test_both_codes_of_a_status_are_named(client) -> None:
+    paths = client.get("/openapi.json").json()["paths"]
+    responses = paths["/v1/meshes/{mesh_id}/distances"]["post"]["responses"]
+
+    assert responses["413"]["description"] == "upload_too_large, result_too_large"

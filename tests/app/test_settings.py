@@ -7,7 +7,7 @@ from app.settings import Settings, variable_of
 
 
 def test_every_setting_is_an_environment_variable(monkeypatch: pytest.MonkeyPatch) -> None:
-    given = {name: "7" for name in Settings.model_fields}
+    given = dict.fromkeys(Settings.model_fields, "7")
     for name, value in given.items():
         monkeypatch.setenv(variable_of(name), value)
 

@@ -230,8 +230,8 @@ def test_results_of_a_mesh_are_forgotten(results: ResultStore, tmp_path: Path) -
     assert find(results, "n/a") is not None
 
 
-def test_a_failed_result_leaves_nothing(tmp_path: Path, results: ResultStore) -> None:
-
+@pytest.mark.usefixtures("results")
+def test_a_failed_result_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(TypeError):
         write_result(tmp_path / "results", "m/a", [b"x", None], {})  # type: ignore[list-item]
     assert not list((tmp_path / "results").glob("m/*"))

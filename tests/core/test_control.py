@@ -108,7 +108,7 @@ def test_a_false_cancel_changes_nothing(mesh, distances):
     )
 
 
-@pytest.mark.parametrize("seconds", [0, 1e-9, 0.05])
+@pytest.mark.parametrize("seconds", [1e-9, 0.05])
 def test_deadline(mesh, distances, seconds):
     start = time.perf_counter()
     with pytest.raises(gc.errors.DeadlineExceeded):
@@ -117,7 +117,7 @@ def test_deadline(mesh, distances, seconds):
     check_usable(mesh, distances)
 
 
-@pytest.mark.parametrize("limit", [0, 1, 1000, 1_000_000])
+@pytest.mark.parametrize("limit", [1, 1000, 1_000_000])
 def test_memory_limit(mesh, distances, limit):
     with pytest.raises(gc.errors.MemoryLimitExceeded, match=r"\d"):
         gc.exact_distance(mesh, 0, memory_limit=limit)
@@ -150,7 +150,7 @@ def test_an_exception_in_a_callback_comes_out_as_it_is(mesh, distances, stop):
     ("arguments", "error"),
     [
         ({"cancel": lambda: True}, gc.errors.Cancelled),
-        ({"deadline_s": 0}, gc.errors.DeadlineExceeded),
+        ({"deadline_s": 1e-9}, gc.errors.DeadlineExceeded),
         ({"memory_limit": 1}, gc.errors.MemoryLimitExceeded),
     ],
 )

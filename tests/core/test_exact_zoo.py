@@ -69,7 +69,7 @@ def test_field_has_the_documented_arrays():
     assert field.distances.dtype == np.float64
     assert field.nearest_source.dtype == np.int32
     assert field.mesh is mesh
-    assert field.max_distance is None
+    assert field.max_distance == np.inf
     assert [source.start_distance for source in field.sources] == [0.0]
     assert (field.error_bound.type, field.error_bound.value) == ("relative", 0.0)
     assert field.error_bound.kind == "guaranteed"

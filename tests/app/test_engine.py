@@ -1,0 +1,336 @@
+"""What becomes of requests when workers are busy, slow or killed."""
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from ctypes import c_longlong
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.engine import Answering, Done, MeshFromSample, worker
+from app.engine.worker import Clock, Worker, WorkerConfig
+from app.errors import Problem
+from app.main import create_app
+from app.mesh_store import MeshStore
+from app.queries import PathQuery
+from app.settings import Settings
+from geodesic_core import TriangleMesh, samples
+
+from .conftest import check_problem, is_ready, serving, upload_sample, wait_until
+
+SLOW_FACES = 300_000
+"""Distances on a sphere of so many faces take seconds."""
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    """A service of two workers, with places for two to wait."""
+    store = tmp_path_factory.mktemp("two")
+    with serving(store, workers=2, queue_size=2, cancel_grace_s=5) as client:
+        wait_until(lambda: len(workers(client)) == 2)
+        yield client
+
+
+@pytest.fixture(scope="module")
+def small(two: TestClient) -> str:
+    return upload_sample(two, "plane", 200)
+
+
+@pytest.fixture(scope="module")
+def slow(two: TestClient) -> str:
+    return upload_sample(two, "sphere", SLOW_FACES)
+
+
+@pytest.fixture
+def threads() -> Iterator[ThreadPoolExecutor]:
+    with ThreadPoolExecutor(16) as pool:
+        yield pool
+
+
+_starts = count()
+
+
+def ask(client: TestClient, mesh_id: str, **headers: str) -> Any:
+    """Ask for distances that nobody has asked for before."""
+    body = {"sources": [{"vertex": 0, "start_distance": next(_starts)}], "targets": [{"vertex": 1}]}
+    return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
+
+
+def engine_of(client: TestClient) -> Any:
+    return client.app.state.service.engine
+
+
+def workers(client: TestClient) -> set[int]:
+    return {slot._pid.value for slot in engine_of(client)._open}
+
+
+def wait_until_busy(client: TestClient, running: int = 2, waiting: int = 0) -> None:
+    engine = engine_of(client)
+    wait_until(
+        lambda: len(engine._open) - len(engine._idle) == running and len(engine._waiting) == waiting
+    )
+
+
+def wait_until_whole(client: TestClient) -> None:
+    wait_until(lambda: len(engine_of(client)._idle) == 2)
+
+
+@pytest.fixture(autouse=True)
+def whole(request: pytest.FixtureRequest) -> None:
+    if "two" in request.fixturenames:
+        wait_until_whole(request.getfixturevalue("two"))
+
+
+def start_slow(
+    two: TestClient, slow: str, pool: ThreadPoolExecutor, timeout_ms: int = 60_000
+) -> list[Future]:
+    """Keep both workers busy, for the time of the query or for ``timeout_ms``."""
+    futures = [pool.submit(ask, two, slow, **{"X-Timeout-Ms": str(timeout_ms)}) for _ in range(2)]
+    wait_until_busy(two)
+    return futures
+
+
+def test_workers_can_be_told_apart(two: TestClient) -> None:
+    titles = {Path(f"/proc/{pid}/cmdline").read_text().strip("\0") for pid in workers(two)}
+
+    assert titles == {"geodesic-worker"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "how_many"), [(signal.SIGKILL, 1), (signal.SIGTERM, 2), (signal.SIGSEGV, 2)]
+)
+def test_idle_workers_killed(
+    two: TestClient, small: str, kind: signal.Signals, how_many: int
+) -> None:
+    before = workers(two)
+    for pid in sorted(before)[:how_many]:
+        os.kill(pid, kind)
+
+    assert ask(two, small).status_code == 200
+    wait_until(lambda: len(workers(two) - before) == how_many)
+
+
+def test_a_query_right_after_the_kill_is_not_lost(two: TestClient, small: str) -> None:
+    for _ in range(2):
+        for pid in workers(two):
+            os.kill(pid, signal.SIGKILL)
+        assert ask(two, small).status_code == 200
+        wait_until_whole(two)
+
+
+def test_a_busy_worker_killed(
+    two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
+) -> None:
+    running = start_slow(two, slow, threads)
+    time.sleep(0.2)
+    os.kill(min(workers(two)), signal.SIGKILL)
+    responses = sorted((future.result() for future in running), key=lambda r: r.status_code)
+
+    assert responses[0].status_code == 200
+    check_problem(responses[1], 500, "worker_died")
+    assert ask(two, small).status_code == 200
+
+
+def test_all_killed_while_others_wait(
+    two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
+) -> None:
+    running = start_slow(two, slow, threads)
+    waiting = [threads.submit(ask, two, small) for _ in range(2)]
+    wait_until_busy(two, 2, 2)
+    time.sleep(0.2)
+    for pid in workers(two):
+        os.kill(pid, signal.SIGKILL)
+
+    for future in running:
+        check_problem(future.result(), 500, "worker_died")
+    assert [future.result().status_code for future in waiting] == [200, 200]
+
+
+def test_a_full_queue_refuses_at_once(
+    two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
+) -> None:
+    start_slow(two, slow, threads, timeout_ms=1000)
+    waiting = [threads.submit(ask, two, small) for _ in range(2)]
+    wait_until_busy(two, 2, 2)
+
+    start = time.monotonic()
+    response = ask(two, small)
+
+    assert time.monotonic() - start < 0.2
+    problem = check_problem(response, 503, "queue_full")
+    assert response.headers["retry-after"] == "1"
+    assert (problem["limit"], problem["setting"]) == (2, "GEODESIC_QUEUE_SIZE")
+    assert {future.result().status_code for future in waiting} == {200}
+
+
+def test_other_requests_are_served_meanwhile(
+    two: TestClient, slow: str, threads: ThreadPoolExecutor
+) -> None:
+    start_slow(two, slow, threads, timeout_ms=1000)
+    times = []
+    for _ in range(20):
+        start = time.monotonic()
+        assert two.get("/v1").status_code == 200
+        times.append(time.monotonic() - start)
+
+    assert sorted(times)[10] < 0.05
+
+
+def test_a_deadline_stops_the_query_and_spares_the_worker(two: TestClient, slow: str) -> None:
+    before = workers(two)
+    start = time.monotonic()
+
+    response = ask(two, slow, **{"X-Timeout-Ms": "300"})
+
+    assert time.monotonic() - start < 0.6
+    assert check_problem(response, 504, "deadline_exceeded")["limit"] == 0.3
+    wait_until(lambda: len(engine_of(two)._idle) == 2, seconds=1)
+    assert workers(two) == before
+
+
+def test_a_deadline_counts_in_the_queue(
+    two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
+) -> None:
+    start_slow(two, slow, threads, timeout_ms=1000)
+
+    response = ask(two, small, **{"X-Timeout-Ms": "100"})
+
+    check_problem(response, 504, "deadline_exceeded")
+    assert len(engine_of(two)._waiting) == 0
+
+
+def test_reading_a_mesh_is_killed_at_its_deadline(two: TestClient, small: str) -> None:
+    before = workers(two)
+
+    response = two.post(
+        "/v1/meshes",
+        params={"sample": "sphere", "faces": 2_000_000},
+        headers={"X-Timeout-Ms": "200"},
+    )
+
+    check_problem(response, 504, "deadline_exceeded")
+    wait_until_whole(two)
+    assert len(workers(two) & before) == 1
+    assert ask(two, small).status_code == 200
+
+
+def test_a_query_goes_where_its_mesh_is_open(two: TestClient, small: str) -> None:
+    other = upload_sample(two, "plane", 300)
+    for mesh_id in (small, other):
+        for _ in range(3):
+            assert ask(two, mesh_id).status_code == 200
+    known = [slot.known_meshes for slot in engine_of(two)._slots]
+
+    assert all(sum(mesh_id in slot for slot in known) >= 1 for mesh_id in (small, other))
+    for _ in range(4):
+        for mesh_id in (small, other):
+            load = ask(two, mesh_id).headers["server-timing"].split("load;dur=")[1]
+            assert float(load.split(",")[0]) < 1
+
+
+def test_many_at_once(two: TestClient, small: str) -> None:
+    with ThreadPoolExecutor(4) as pool:
+        responses = list(pool.map(lambda _: ask(two, small), range(100)))
+
+    assert {response.status_code for response in responses} == {200}
+
+
+def test_the_server_s_own_deadline_names_its_setting(tmp_path: Path) -> None:
+    with serving(tmp_path, deadline_s=0.2) as client:
+        params = {"sample": "sphere", "faces": 2_000_000}
+        problem = check_problem(client.post("/v1/meshes", params=params), 504, "deadline_exceeded")
+
+        assert problem["setting"] == "GEODESIC_DEADLINE_S"
+
+
+def test_a_query_that_does_not_stop_is_killed(tmp_path: Path) -> None:
+    with serving(tmp_path, cancel_grace_s=1e-6) as client:
+        mesh_id = upload_sample(client, "sphere", SLOW_FACES)
+        before = workers(client)
+
+        check_problem(ask(client, mesh_id, **{"X-Timeout-Ms": "300"}), 504, "deadline_exceeded")
+
+        wait_until(lambda: workers(client) - before)
+        small = upload_sample(client, "plane", 50)
+        assert ask(client, small).status_code == 200
+
+
+def die() -> None:
+    os._exit(3)
+
+
+def test_workers_that_cannot_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("app.engine.worker.warm_up", die)
+    sample = {"sample": "plane", "faces": 10}
+    with TestClient(create_app(Settings(store=tmp_path, workers=1))) as client:
+        # The first asks before it is known that none can start, the second after.
+        for _ in range(2):
+            response = client.post("/v1/meshes", params=sample)
+            check_problem(response, 503, "engine_unavailable")
+            assert response.headers["retry-after"] == "1"
+        check_problem(client.get("/readyz"), 503, "engine_unavailable")
+        assert client.get("/livez").status_code == 200
+
+        monkeypatch.undo()
+        wait_until(lambda: is_ready(client))
+        assert client.post("/v1/meshes", params=sample).status_code == 201
+
+
+def config(store: Path, **settings: Any) -> WorkerConfig:
+    return WorkerConfig(Settings(store=store, **settings), store / "results")
+
+
+def test_a_worker_closes_meshes_that_do_not_fit(tmp_path: Path) -> None:
+    store = MeshStore(tmp_path)
+    store.prepare()
+    meshes = [TriangleMesh(*samples.plane(faces)) for faces in (100, 200, 300)]
+    ids = [store.add(mesh)[0] for mesh in meshes]
+    room = meshes[1].nbytes + meshes[2].nbytes
+    state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0))
+
+    for mesh_id in ids:
+        state._open(mesh_id)
+
+    assert list(state.meshes) == ids[1:]
+
+
+def test_the_clock_measures_each_phase() -> None:
+    clock = Clock()
+    with clock.phase("load"):
+        time.sleep(0.01)
+
+    assert 0.01 <= clock.seconds["load"] < 0.1
+
+
+def test_a_defect_in_a_worker_is_logged_there_and_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(worker, "_worker", Worker(config(tmp_path), c_longlong(0)))
+    monkeypatch.setattr(worker, "_make_mesh", lambda _: 1 / 0)
+
+    outcome = worker.do(1, MeshFromSample("plane", 10, "none"))
+
+    assert isinstance(outcome, Problem)
+    assert outcome.code == "internal_error"
+    assert "ZeroDivisionError" in caplog.text
+
+
+def test_work_that_was_asked_to_stop_stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = c_longlong(0)
+    state = Worker(config(tmp_path), asked)
+    state.store.prepare()
+    mesh_id, _ = state.store.add(TriangleMesh(*samples.sphere(100_000)))
+    monkeypatch.setattr(worker, "_worker", state)
+    work = Answering(PathQuery(mesh_id, 0, 1), "application/json", f"{mesh_id}/key")
+    (tmp_path / "results").mkdir()
+
+    asked.value = 2
+    assert worker.do(2, work) == Done({})
+    assert not list((tmp_path / "results").rglob("*"))
+    assert "encode" in worker.do(3, work).seconds

@@ -1,0 +1,153 @@
+"""The service as a process of its own: how it ends, and what becomes of clients that leave."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from .conftest import is_ready, upload_sample, wait_until
+from .test_engine import SLOW_FACES
+
+SERVE = """
+import sys, uvicorn
+from app.main import create_app
+from app.settings import Settings
+uvicorn.run(create_app(Settings()), port=int(sys.argv[1]), log_level="warning")
+"""
+
+
+class Server:
+    def __init__(self, store: Path) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        environment = os.environ | {"GEODESIC_STORE": str(store), "GEODESIC_WORKERS": "1"}
+        self.process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
+            [sys.executable, "-c", SERVE, str(port)],
+            env=environment,
+            cwd=Path(__file__).parents[2],
+        )
+        self.address = ("127.0.0.1", port)
+        self.client = httpx2.Client(base_url=f"http://127.0.0.1:{port}", timeout=60)
+        wait_until(self.listens)
+        wait_until(lambda: is_ready(self.client))
+
+    def listens(self) -> bool:
+        try:
+            return bool(self.client.get("/livez").status_code == 200)
+        except httpx2.TransportError:
+            return False
+
+    def workers(self) -> set[int]:
+        """Ids of the worker processes, also once their parent is gone."""
+        found = set()
+        for entry in Path("/proc").iterdir():
+            if entry.name.isdigit():
+                try:
+                    is_worker = (entry / "cmdline").read_bytes().startswith(b"geodesic-worker")
+                    parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+                except (FileNotFoundError, ProcessLookupError):
+                    continue
+                if is_worker and parent == self.process.pid:
+                    found.add(int(entry.name))
+        return found
+
+    def begin_slow_query(self, mesh_id: str) -> socket.socket:
+        body = b'{"sources": [{"vertex": 0}], "targets": [{"vertex": 1}]}'
+        head = (
+            f"POST /v1/meshes/{mesh_id}/distances HTTP/1.1\r\nHost: x\r\n"
+            f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
+        )
+        connection = socket.create_connection(self.address)
+        connection.sendall(head.encode() + body)
+        time.sleep(0.5)
+        return connection
+
+    def close(self) -> None:
+        self.client.close()
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+
+
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    server = Server(tmp_path)
+    yield server
+    server.close()
+
+
+def are_gone(pids: set[int]) -> bool:
+    return not any(is_running(pid) for pid in pids)
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def test_workers_die_with_their_parent_however_busy(server: Server) -> None:
+    mesh_id = upload_sample(server.client, "sphere", SLOW_FACES)
+    workers = server.workers()
+    assert len(workers) == 1
+
+    with server.begin_slow_query(mesh_id):
+        server.process.kill()
+        wait_until(lambda: are_gone(workers), seconds=2)
+
+
+def test_a_client_that_hangs_up_stops_its_query(server: Server) -> None:
+    mesh_id = upload_sample(server.client, "sphere", SLOW_FACES)
+    workers = server.workers()
+
+    server.begin_slow_query(mesh_id).close()
+    start = time.monotonic()
+    sample = {"sample": "plane", "faces": 10}
+    assert server.client.post("/v1/meshes", params=sample).status_code == 201
+
+    assert time.monotonic() - start < 0.5
+    assert server.workers() == workers
+
+
+def test_a_client_that_hangs_up_while_it_uploads(server: Server, tmp_path: Path) -> None:
+    with socket.create_connection(server.address) as connection:
+        connection.sendall(
+            b"POST /v1/meshes?format=obj HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\nv 0 0 0"
+        )
+        wait_until(lambda: any((tmp_path / "tmp").iterdir()))
+
+    wait_until(lambda: not any((tmp_path / "tmp").iterdir()))
+    assert server.listens()
+
+
+def test_ends_in_good_order(server: Server) -> None:
+    workers = server.workers()
+
+    server.process.send_signal(signal.SIGTERM)
+
+    assert server.process.wait(5) in (0, -signal.SIGTERM)
+    assert are_gone(workers)
+
+
+def test_exact_distances_of_a_real_mesh(server: Server, horse: bytes) -> None:
+    start = time.monotonic()
+    report = server.client.post("/v1/meshes", params={"format": "ply"}, content=horse).json()
+    assert time.monotonic() - start < 2
+    assert (report["vertices"], report["faces"]) == (48485, 96966)
+
+    query = {"sources": [{"vertex": 0}]}
+    answer = server.client.post(f"/v1/meshes/{report['id']}/distances", json=query).json()
+
+    assert len(answer["distances"]) == 48485
+    assert answer["unreachable"] == {"disconnected": 0, "beyond_max_distance": 0}
+    path = server.client.get(f"/v1/meshes/{report['id']}/path?from=v0&to=v99").json()
+    assert path["length"] == pytest.approx(answer["distances"][99], rel=1e-10)

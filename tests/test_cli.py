@@ -1,0 +1,333 @@
+"""The command line, as its users meet it: what it prints, what it writes, how it fails."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import uvicorn
+from fastapi import FastAPI
+
+import geodesic_core as gc
+from app import __version__
+from app.cli import main
+from app.settings import Settings, variable_of
+
+
+class Ran:
+    """Exit code and output of a command."""
+
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code, self.out, self.err = code, out, err
+
+    def figure(self, name: str) -> str:
+        """Return what is printed after a name at the start of a line."""
+        return next(
+            row.removeprefix(name).strip() for row in self.out.splitlines() if row.startswith(name)
+        )
+
+
+Run = Callable[..., Ran]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Run ``geodesic`` with arguments, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> Ran:
+        monkeypatch.setattr(sys, "argv", ["geodesic", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = capsys.readouterr()
+        return Ran(int(ended.value.code or 0), printed.out, printed.err)
+
+    return run
+
+
+@pytest.fixture
+def plane(run: Run) -> Path:
+    ran = run("sample", "plane", "--faces", 200, "plane.ply")
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("mesh") == "121 vertices, 200 faces"
+    return Path("plane.ply")
+
+
+def error_line(ran: Ran) -> str:
+    assert ran.out == ""
+    assert ran.err.startswith("error: ")
+    assert ran.err.count("\n") == 1
+    return ran.err
+
+
+@pytest.mark.parametrize("name", ["knot", "sphere", "plane"])
+def test_a_sample_is_written_as_it_is(run: Run, name: str) -> None:
+    assert run("sample", name, "--faces", 600, "mesh.ply").code == 0
+    mesh = gc.load_mesh("mesh.ply")
+    vertices, faces = gc.samples.SAMPLES[name](600)
+    assert mesh.vertices.tolist() == vertices.tolist()
+    assert mesh.faces.tolist() == faces.tolist()
+
+
+def test_info_tells_what_is_in_a_mesh(run: Run, plane: Path) -> None:
+    ran = run("info", plane)
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("vertices") == "121"
+    assert ran.figure("faces") == "200"
+    assert ran.figure("boundary loops") == "1"
+    assert ran.figure("euler characteristic") == "1"
+    assert ran.figure("bounds") == "(0.0, 0.0, 0.0) to (1.0, 1.0, 0.0)"
+    assert ran.figure("inconsistent orientation") == "no"
+    assert ran.figure("read in").endswith(" s")
+    assert "warning" not in ran.out
+
+
+def test_info_names_elements_and_warns(run: Run) -> None:
+    rows = ["v 0 0 0", "v 1 0 0", "v 0 1 0"] + ["v 5 5 5"] * 12 + ["f 1 2 3"]
+    Path("lonely.obj").write_text("\n".join(rows))
+    ran = run("info", "lonely.obj")
+    assert ran.figure("isolated vertices") == "12 (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, …)"
+    assert "unreachable" in ran.figure("warning:")
+
+
+def test_distance_writes_npy_csv_and_json(run: Run, plane: Path) -> None:
+    expected = gc.exact_distance(gc.load_mesh(plane), [0, 120])
+    for name in ("d.npy", "d.csv", "d.json"):
+        ran = run("distance", plane, "--source", 0, "--source", 120, "--out", name)
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.figure("reached") == "121 of 121 vertices"
+        assert ran.figure("written") == name
+    assert np.load("d.npy").tolist() == expected.distances.tolist()
+    table = np.loadtxt("d.csv", delimiter=",", skiprows=1)
+    assert table[:, 0].tolist() == list(range(121))
+    assert table[:, 1].tolist() == expected.distances.tolist()
+    assert table[:, 2].tolist() == expected.nearest_source.tolist()
+    answer = json.loads(Path("d.json").read_text())
+    assert answer["sources"] == [0, 120]
+    assert answer["distances"] == expected.distances.tolist()
+    assert answer["nearest_source"] == expected.nearest_source.tolist()
+    farthest = int(np.argmax(expected.distances))
+    assert ran.figure("farthest") == f"vertex {farthest} at {float(expected.distances.max())!r}"
+
+
+def test_distance_stops_at_max_distance(run: Run, plane: Path) -> None:
+    ran = run("distance", plane, "--source", 0, "--max-distance", 0.35, "--out", "d.json")
+    expected = gc.exact_distance(gc.load_mesh(plane), 0, 0.35).distances
+    reached = np.isfinite(expected)
+    assert 0 < reached.sum() < 121
+    assert ran.figure("reached") == f"{reached.sum()} of 121 vertices"
+    answer = json.loads(Path("d.json").read_text())["distances"]
+    assert answer == [d if np.isfinite(d) else None for d in expected.tolist()]
+
+
+def test_path_writes_a_polyline_and_json(run: Run, plane: Path) -> None:
+    expected = gc.shortest_path(gc.load_mesh(plane), 0, 115)
+    for name in ("p.obj", "p.json"):
+        ran = run("path", plane, "--source", 0, "--target", 115, "--out", name)
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.figure("length") == repr(expected.length)
+    rows = [row.split() for row in Path("p.obj").read_text().splitlines()]
+    points = [[float(x) for x in row[1:]] for row in rows if row[0] == "v"]
+    assert points == expected.points.tolist()
+    assert rows[-1] == ["l", *map(str, range(1, len(points) + 1))]
+    answer = json.loads(Path("p.json").read_text())
+    assert answer["points"] == points
+    assert answer["length"] == expected.length
+    assert answer["faces"] == expected.faces.tolist()
+    assert len(answer["locations"]) == len(points)
+
+
+def test_a_path_to_its_own_source_is_a_point(run: Run, plane: Path) -> None:
+    assert run("path", plane, "--source", 7, "--target", 7, "--out", "p.obj").code == 0
+    assert Path("p.obj").read_text().splitlines()[-1] == "p 1"
+
+
+def test_merge_joins_a_cut_mesh(run: Run) -> None:
+    rows = ["v 0 0 0", "v 1 0 0", "v 1 1 0", "v 0 0 0", "v 1 1 0", "v 0 1 0", "f 1 2 3", "f 4 5 6"]
+    Path("cut.obj").write_text("\n".join(rows))
+    assert run("info", "cut.obj").figure("components") == "2"
+    assert run("info", "cut.obj", "--merge", "exact").figure("components") == "1"
+    apart = run("path", "cut.obj", "--source", 1, "--target", 5, "--out", "p.obj")
+    assert apart.code == 1
+    assert "component" in error_line(apart)
+    assert not Path("p.obj").exists()
+    joined = run(
+        "path", "cut.obj", "--merge", "exact", "--source", 1, "--target", 3, "--out", "p.obj"
+    )
+    assert joined.code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("info nowhere.ply", "cannot read nowhere.ply"),
+        ("info plane.xyz", "unknown mesh file type 'xyz'"),
+        ("info plane.stl", "STL"),
+        ("distance plane.ply --source -1 --out d.npy", "-1"),
+        ("distance plane.ply --source 121 --out d.npy", "121"),
+        ("distance plane.ply --source 0 --max-distance -2 --out d.npy", "max_distance"),
+        ("distance plane.ply --source 0 --max-distance nan --out d.npy", "max_distance"),
+        ("path plane.ply --source 0 --target 999 --out p.obj", "target"),
+        ("sample knot --faces 3 small.ply", "faces is 3"),
+    ],
+)
+def test_what_fails_says_why_in_one_line(
+    run: Run, plane: Path, arguments: str, message: str
+) -> None:
+    Path("plane.stl").write_bytes(plane.read_bytes())
+    before = sorted(Path().iterdir())
+    ran = run(*arguments.split())
+    assert ran.code == 1
+    assert message in error_line(ran)
+    assert sorted(Path().iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("", "command"),
+        ("fly", "fly"),
+        ("info", "MESH"),
+        ("info plane.ply --quick", "--quick"),
+        ("info plane.ply --merge some", "some"),
+        ("distance plane.ply --out d.npy", "--source"),
+        ("distance plane.ply --source 0", "--out"),
+        ("distance plane.ply --source x --out d.npy", "--source"),
+        ("distance plane.ply --source 0 --out d.txt", "d.txt must end in .npy or .csv or .json"),
+        ("distance plane.ply --source 0 --out no/d.npy", "folder"),
+        ("path plane.ply --source 0 --target 1 --out p.npy", ".obj or .json"),
+        ("sample cube c.ply", "cube"),
+        ("sample knot c.obj", ".ply"),
+        ("serve --port 70000", "--port"),
+    ],
+)
+def test_a_wrong_command_line_says_so_in_one_line(
+    run: Run, plane: Path, arguments: str, message: str
+) -> None:
+    ran = run(*arguments.split())
+    assert ran.code == 2
+    assert message in error_line(ran)
+    assert list(Path().iterdir()) == [plane]
+
+
+def test_an_output_that_cannot_be_written_is_an_error(run: Run, plane: Path) -> None:
+    Path("d.npy").mkdir()
+    ran = run("distance", plane, "--source", 0, "--out", "d.npy")
+    assert ran.code == 1
+    assert "cannot write d.npy" in error_line(ran)
+    assert sorted(Path().iterdir()) == [Path("d.npy"), plane]
+
+
+def test_ctrl_c_stops_the_sweep_and_leaves_nothing(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve = gc.exact_distance
+
+    def press_ctrl_c_at_the_first_look(
+        *arguments: Any, cancel: Callable[[], bool], **_: Any
+    ) -> Any:
+        def press_and_look() -> bool:
+            signal.raise_signal(signal.SIGINT)
+            return cancel()
+
+        return solve(*arguments, cancel=press_and_look)
+
+    monkeypatch.setattr(gc.solvers, "_FIRST_BUDGET", 10)  # looks soon, on so small a mesh
+    monkeypatch.setattr(gc, "exact_distance", press_ctrl_c_at_the_first_look)
+    ran = run("distance", plane, "--source", 0, "--out", "d.npy")
+    assert (ran.code, ran.out, ran.err) == (130, "", "error: interrupted\n")
+    assert list(Path().iterdir()) == [plane]
+
+
+def test_ctrl_c_while_a_mesh_is_read_takes_effect_after_it(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load = gc.load_mesh
+    usual = signal.getsignal(signal.SIGINT)
+
+    def press_ctrl_c(*arguments: Any, **options: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return load(*arguments, **options)
+
+    monkeypatch.setattr(gc, "load_mesh", press_ctrl_c)
+    ran = run("info", plane)
+    assert (ran.code, ran.out, ran.err) == (130, "", "error: interrupted\n")
+    assert signal.getsignal(signal.SIGINT) is usual
+
+
+def test_ctrl_c_pressed_twice_does_not_wait(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def press_ctrl_c_twice(*_: Any, **__: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        pytest.fail("must not get here")
+
+    monkeypatch.setattr(gc, "load_mesh", press_ctrl_c_twice)
+    assert run("info", plane).code == 130
+
+
+def test_an_error_of_the_program_itself_is_not_hidden(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def break_down(*_: Any, **__: Any) -> None:
+        raise gc.errors.InternalError("the sweep is broken")
+
+    monkeypatch.setattr(gc, "exact_distance", break_down)
+    with pytest.raises(gc.errors.InternalError):
+        run("distance", plane, "--source", 0, "--out", "d.npy")
+
+
+def test_version_and_help(run: Run) -> None:
+    assert run("--version").out == f"geodesic {__version__}\n"
+    usage = run("--help")
+    assert usage.code == 0
+    for command in ("serve", "info", "distance", "path", "sample"):
+        assert command in usage.out
+        assert "--help" in run(command, "--help").out
+
+
+def test_help_needs_no_numbers() -> None:
+    script = (
+        "import sys; sys.argv[1:] = ['--help']\n"
+        "from app.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: print(sorted({'numpy', 'numba', 'fastapi'} & set(sys.modules)))"
+    )
+    ran = subprocess.run(  # noqa: S603 - our own script
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.endswith("[]\n")
+
+
+def test_serve_runs_the_application(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    called: dict[str, Any] = {}
+    monkeypatch.setattr(uvicorn, "run", lambda app, **options: called.update(app=app, **options))
+    assert run("serve", "--host", "127.0.0.9", "--port", 8123).code == 0
+    assert isinstance(called["app"], FastAPI)
+    assert (called["host"], called["port"]) == ("127.0.0.9", 8123)
+
+
+def test_serve_refuses_wrong_settings(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uvicorn, "run", lambda *_, **__: pytest.fail("must not start"))
+    monkeypatch.setenv("GEODESIC_WORKERS", "none")
+    ran = run("serve")
+    assert ran.code == 2
+    assert "GEODESIC_WORKERS" in error_line(ran)
+    monkeypatch.delenv("GEODESIC_WORKERS")
+    monkeypatch.setenv("GEODESIC_WORKER", "2")
+    ran = run("serve")
+    assert ran.code == 2
+    assert "GEODESIC_WORKER" in error_line(ran)
+
+
+def test_the_manual_names_every_setting_and_no_other() -> None:
+    manual = (Path(__file__).parents[1] / "docs" / "operations.md").read_text()
+    named = set(re.findall(r"^\| `(GEODESIC_\w+)`", manual, re.MULTILINE))
+    assert named == {variable_of(field) for field in Settings.model_fields}
