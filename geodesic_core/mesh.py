@@ -227,9 +227,12 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
 
 def _as_vertices(vertices: ArrayLike) -> Floats:
     try:
-        array = np.array(vertices, dtype=np.float64, order="C")
+        given = np.asarray(vertices)
+        if given.dtype.kind not in "fiuO":
+            raise TypeError(f"their type is {given.dtype}")
+        array = np.array(given, dtype=np.float64, order="C")
     except (TypeError, ValueError) as error:
-        raise InvalidMesh(f"vertices are not numbers: {error}", kind="vertex") from error
+        raise InvalidMesh(f"vertices are not real numbers: {error}", kind="vertex") from error
     if array.ndim != 2 or array.shape[1] != 3:
         raise InvalidMesh(f"vertices have shape {array.shape}; it must be (V, 3)", kind="vertex")
     return array

@@ -385,11 +385,11 @@ def _read_glb(data: bytes) -> Arrays:
     scene = trimesh.load_scene(
         io.BytesIO(data), file_type="glb", process=False, skip_materials=True
     )
-    order = list(scene.geometry)
+    order = {name: number for number, name in enumerate(scene.geometry)}
     # trimesh walks the nodes from the last to the first.
     nodes = reversed(scene.graph.nodes_geometry)
     placed = [(transform, name) for transform, name in map(scene.graph.get, nodes)]
-    placed.sort(key=lambda place: order.index(place[1]))
+    placed.sort(key=lambda place: order[place[1]])
     vertices, faces, count = [], [], 0
     for transform, name in placed:
         part = scene.geometry[name]

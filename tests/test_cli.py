@@ -273,6 +273,17 @@ def test_ctrl_c_pressed_twice_does_not_wait(
     assert run("info", plane).code == 130
 
 
+def test_ctrl_c_while_the_output_is_written_leaves_nothing(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def press_ctrl_c(*_: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(np, "save", press_ctrl_c)
+    assert run("distance", plane, "--source", 0, "--out", "d.npy").code == 130
+    assert list(Path().iterdir()) == [plane]
+
+
 def test_an_error_of_the_program_itself_is_not_hidden(
     run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -485,13 +485,17 @@ def test_a_file_cut_short_anywhere_is_refused(kind: str, write: Writer) -> None:
         refusal(data[:end], kind)
 
 
-@every_numbered_writer
-@pytest.mark.parametrize("index", [8, -1, 2**31 - 1])
+@pytest.mark.parametrize(
+    ("kind", "write", "index"),
+    [
+        (kind, write, index)
+        for kind, write in NUMBERED
+        for index in (8, -1, 2**31 - 1)
+        if index >= 0 or kind not in ("obj", "glb")  # OBJ counts from 1, glTF has no sign
+    ],
+    ids=name_of,
+)
 def test_an_index_out_of_range_names_its_face(kind: str, write: Writer, index: int) -> None:
-    if kind == "glb" and index < 0:
-        pytest.skip("glTF indices have no sign")
-    if kind == "obj" and index < 0:
-        pytest.skip("written 0, see the test of index 0")
     faces = FACES.copy()
     faces[1, 2] = index
     error = refusal(write(VERTICES, faces), kind)
@@ -676,6 +680,18 @@ def test_damaged_ply_headers_are_refused(write: Writer, old: bytes, new: bytes) 
     data = write(VERTICES, FACES)
     assert old in data
     refusal(data.replace(old, new), "ply")
+
+
+def test_binary_ply_faces_of_two_corners_are_refused() -> None:
+    assert "three corners" in str(refusal(ply_binary(VERTICES, [[0, 1], [1, 2]]), "ply"))
+
+
+def test_ascii_ply_with_another_list_first_is_refused() -> None:
+    data = ply(VERTICES, FACES).replace(
+        b"property list uchar int v",
+        b"property list uchar float weights\nproperty list uchar int v",
+    )
+    assert "another list" in str(refusal(data, "ply"))
 
 
 def test_an_ascii_stl_that_loses_a_corner_is_refused() -> None:
