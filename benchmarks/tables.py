@@ -50,10 +50,10 @@ def machine() -> str:
     return ", ".join(parts)
 
 
-def verdict(value: float, target: float, *, at_least: bool) -> str:
+def verdict(value: float, target: float, *, at_least: bool, unit: str = "") -> str:
     """Return the target and whether it is met, for a table's last column."""
     met = value >= target if at_least else value <= target
-    return f"{'≥' if at_least else '≤'} {target:g} {'met' if met else '**missed**'}"
+    return f"{'≥' if at_least else '≤'} {target:g}{unit} {'met' if met else '**missed**'}"
 
 
 def _row(cells: Sequence[str]) -> str:

@@ -228,11 +228,13 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
 def _as_vertices(vertices: ArrayLike) -> Floats:
     try:
         given = np.asarray(vertices)
-        if given.dtype.kind not in "fiuO":
-            raise TypeError(f"their type is {given.dtype}")
-        array = np.array(given, dtype=np.float64, order="C")
+        array = np.array(given, dtype=np.float64, order="C") if given.dtype.kind in "fiuO" else None
     except (TypeError, ValueError) as error:
         raise InvalidMesh(f"vertices are not real numbers: {error}", kind="vertex") from error
+    if array is None:  # text and complex numbers: numpy would convert them
+        raise InvalidMesh(
+            f"vertices have type {given.dtype}; they must be real numbers", kind="vertex"
+        )
     if array.ndim != 2 or array.shape[1] != 3:
         raise InvalidMesh(f"vertices have shape {array.shape}; it must be (V, 3)", kind="vertex")
     return array

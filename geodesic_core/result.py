@@ -84,7 +84,8 @@ class DistanceField:
     """(V,) int32 index into ``sources``; -1 where unreachable; ties to the lowest."""
     error_bound: ErrorBound
     stats: SweepStats
-    _winner: Floats  # by inner vertex
+    _distance: Floats  # these three by inner vertex
+    _winner: Floats
     _winner_ints: Ints
 
     def path_to(self, target: int | SurfacePoint) -> GeodesicPath:
@@ -138,6 +139,7 @@ class DistanceField:
             faces = np.empty(room, np.int32)
             outcome, count = backtrace.trace_path(
                 self.mesh.topology,
+                self._distance,
                 self._winner,
                 self._winner_ints,
                 self.mesh.topology.inner_vertex[vertex],
@@ -177,13 +179,15 @@ def vertex_of(mesh: TriangleMesh, point: int | SurfacePoint, name: str) -> int:
     InvalidPoint
         The point is no vertex, or the index is out of range; negative indices count as such.
     """
-    index: Any = point.vertex_index if isinstance(point, SurfacePoint) else point
-    if index is None:
-        raise InvalidPoint(
-            f"the {name} lies inside face {point.face}: only vertices can be asked for yet"  # type: ignore[union-attr]
-        )
+    index: Any = point
+    if isinstance(point, SurfacePoint):
+        index = point.vertex_index
+        if index is None and point.face >= 0:
+            raise InvalidPoint(
+                f"the {name} lies in face {point.face}: only vertices can be asked for yet"
+            )
     if isinstance(index, bool) or not isinstance(index, int | np.integer):
-        raise InvalidPoint(f"the {name} is {point!r}; it must be a vertex index or a SurfacePoint")
+        raise InvalidPoint(f"the {name} is {index!r}; it must be a vertex index or a SurfacePoint")
     if not 0 <= index < len(mesh.vertices):
         raise InvalidPoint(
             f"the {name} is vertex {index}, but vertices are numbered 0 to {len(mesh.vertices) - 1}"

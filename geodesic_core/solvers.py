@@ -95,7 +95,7 @@ def exact_distance(
     distances = np.array([start.start_distance for start in starts])
     inner = mesh.topology.inner_vertex
     wave = wavefront.new_wavefront(mesh.topology)
-    _check_memory(wave, control)
+    _check_memory(wavefront.bytes_of(wave), control)
     sweep.start_sweep(mesh.topology, wave, inner[vertices], distances, limit)
     wave = _run(mesh, wave, limit, vertices, control, began)
     nearest = sweep.nearest_sources(wave.distance, wave.winner_ints, wave.origin)
@@ -107,6 +107,7 @@ def exact_distance(
         nearest_source=nearest[inner],
         error_bound=EXACT,
         stats=_stats(mesh, wave, time.perf_counter() - began),
+        _distance=wave.distance,
         _winner=wave.winner,
         _winner_ints=wave.winner_ints,
     )
@@ -162,31 +163,29 @@ def _run(
     """Run the sweep to its end, slice by slice."""
     topology: Topology = mesh.topology
     reachable = int(np.isin(mesh.components, mesh.components[vertices]).sum())
-    budget, shown = _FIRST_BUDGET, 0.0
-    while True:
+    budget, shown, outcome = _FIRST_BUDGET, 0.0, sweep.RUNNING
+    while outcome != sweep.FINISHED:
+        share = _share_done(wave, reachable, limit)
+        if control.progress is not None:
+            shown = max(shown, share)
+            control.progress(shown)
+        if control.cancel is not None and control.cancel():
+            raise Cancelled(f"cancelled with {share:.0%} done")
+        if control.deadline_s is not None and time.perf_counter() - began > control.deadline_s:
+            raise DeadlineExceeded(
+                f"not finished within {control.deadline_s:g} s: {share:.0%} done"
+            )
         slice_began = time.perf_counter()
         outcome = sweep.advance(topology, wave, limit, budget)
         took = time.perf_counter() - slice_began
-        if outcome == sweep.FINISHED:
-            break
         if outcome == POOL_FULL:
+            _check_memory(wavefront.bytes_of(wave) + wave.windows.nbytes, control)
             wave = wavefront.with_larger_pool(wave)
-            _check_memory(wave, control)
         elif outcome == SCRATCH_FULL:
+            _check_memory(wavefront.bytes_of(wave) + wave.scratch.nbytes, control)
             wave = wavefront.with_larger_scratch(wave)
-            _check_memory(wave, control)
-        else:
+        elif outcome == sweep.RUNNING:
             budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
-        if control.progress is not None:
-            shown = max(shown, _share_done(wave, reachable, limit))
-            control.progress(shown)
-        if control.cancel is not None and control.cancel():
-            raise Cancelled(f"cancelled with {_share_done(wave, reachable, limit):.0%} done")
-        if control.deadline_s is not None and time.perf_counter() - began > control.deadline_s:
-            raise DeadlineExceeded(
-                f"not finished within {control.deadline_s:g} s: "
-                f"{_share_done(wave, reachable, limit):.0%} done"
-            )
     if control.progress is not None:
         control.progress(1.0)
     return wave
@@ -217,13 +216,13 @@ def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
 def _as_limit(max_distance: float | None) -> float:
     if max_distance is None:
         return math.inf
-    try:
-        limit = float(max_distance)
-    except (TypeError, ValueError) as error:
-        raise InvalidArgument(f"max_distance is {max_distance!r}; it must be a number") from error
-    if not limit >= 0.0:
-        raise InvalidArgument(f"max_distance is {limit}; it must be 0 or more")
-    return limit
+    if not _is_number(max_distance) or not max_distance >= 0.0:
+        raise InvalidArgument(f"max_distance is {max_distance!r}; it must be a number, 0 or more")
+    return float(max_distance)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
 def _as_sources(mesh: TriangleMesh, sources: Any) -> tuple[Source, ...]:
@@ -236,10 +235,10 @@ def _as_sources(mesh: TriangleMesh, sources: Any) -> tuple[Source, ...]:
         source = item if isinstance(item, Source) else Source(item)
         vertex_of(mesh, source.point, f"source {i}")
         start = source.start_distance
-        if isinstance(start, bool) or not isinstance(start, int | float | np.number):
-            raise InvalidArgument(f"source {i} starts at {start!r}; it must be a number")
-        if not (math.isfinite(start) and start >= 0.0):
-            raise InvalidArgument(f"source {i} starts at {start}; it must be finite and 0 or more")
+        if not _is_number(start) or not (math.isfinite(start) and start >= 0.0):
+            raise InvalidArgument(
+                f"source {i} starts at {start!r}; it must be a finite number, 0 or more"
+            )
         found.append(source)
     if not found:
         raise InvalidPoint("there are no sources: give at least one")
@@ -247,14 +246,13 @@ def _as_sources(mesh: TriangleMesh, sources: Any) -> tuple[Source, ...]:
 
 
 def _check_control(control: Control) -> None:
-    if control.deadline_s is not None and not control.deadline_s > 0.0:
-        raise InvalidArgument(f"deadline_s is {control.deadline_s}; it must be more than 0")
-    if control.memory_limit is not None and not control.memory_limit > 0:
-        raise InvalidArgument(f"memory_limit is {control.memory_limit}; it must be more than 0")
+    for name in ("deadline_s", "memory_limit"):
+        value = getattr(control, name)
+        if value is not None and (not _is_number(value) or not value > 0):
+            raise InvalidArgument(f"{name} is {value!r}; it must be a number above 0")
 
 
-def _check_memory(wave: Wavefront, control: Control) -> None:
-    needed = wavefront.bytes_of(wave)
+def _check_memory(needed: int, control: Control) -> None:
     if control.memory_limit is not None and needed > control.memory_limit:
         raise MemoryLimitExceeded(
             f"the sweep needs {needed} bytes or more; memory_limit is {control.memory_limit}"

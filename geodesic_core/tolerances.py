@@ -51,3 +51,10 @@ TIE = 1e-12
 
 Symmetric meshes make equal distances that rounding tells apart; the lower index wins them.
 """
+
+ON_PATH = 1e-12
+"""Detour, relative to the path's length, up to which a vertex beside a path counts as on it.
+
+A line that meets a vertex may pass it on either side only where the vertex is flat; through the
+vertex itself the path goes on by the vertex's own winner, at most this much longer.
+"""

@@ -13,12 +13,12 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.register_profile(
         "slice",
         derandomize=True,
-        max_examples=5 if WITHOUT_JIT else 25,
+        max_examples=20 if WITHOUT_JIT else 60,
         deadline=None,
         database=None,
     )
     settings.register_profile(
-        "full", derandomize=True, max_examples=500, deadline=None, database=None
+        "full", derandomize=True, max_examples=2000, deadline=None, database=None
     )
     settings.load_profile("slice" if "not full" in config.option.markexpr else "full")
 

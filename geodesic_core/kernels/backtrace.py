@@ -7,6 +7,7 @@ paper's walk around the pseudosource in search of a window, and with it every wi
 (section 7).
 """
 
+import math
 from typing import Any
 
 from geodesic_core.arrays import Floats, Ints
@@ -27,6 +28,7 @@ from geodesic_core.kernels.topology import (
     TAIL,
 )
 from geodesic_core.kernels.wavefront import FROM, VIA
+from geodesic_core.tolerances import ON_PATH
 
 # Outcomes
 TRACED = 0
@@ -52,8 +54,16 @@ def cross_edge(
 
 
 @kernel
+def is_on_path(distance: Floats, u: int, reach: float, here: float, target: int) -> bool:
+    """Whether a path to ``target`` that is at distance ``here``, ``reach`` from u, meets u."""
+    allowed = here + ON_PATH * distance[target]
+    return distance[u] + reach <= allowed and distance[u] < distance[target]
+
+
+@kernel
 def trace_path(
     topology: Any,
+    distance: Floats,
     winner: Floats,
     winner_ints: Ints,
     target: int,
@@ -63,42 +73,56 @@ def trace_path(
 ) -> tuple[int, int]:
     """Trace the path from vertex ``target`` to its source; return (outcome, number of nodes).
 
-    A node is a half-edge h, crossed at ``parameters`` of its length, or -1 - v for a vertex v.
-    ``faces[i]`` is crossed between the nodes i and i + 1. O(faces crossed).
+    A vertex on the way takes over with its own winner: a line through it may go on straight on
+    either side only where it is flat. A node is a half-edge h, crossed at ``parameters`` of its
+    length, or -1 - v for a vertex v. ``faces[i]`` is crossed between the nodes i and i + 1.
+    O(faces crossed).
     """
     links, geometry = topology.links, topology.geometry
-    room = len(nodes)
     nodes[0], parameters[0] = -1 - target, 0.0
     count = 1
     v = target
     while winner_ints[v, VIA] >= 0:
         h, root = winner_ints[v, VIA], winner_ints[v, FROM]
         sx, sy = winner[v, 0], winner[v, 1]
-        length = geometry[h, LENGTH]
-        arrived = root in (links[h, TAIL], links[h, HEAD])
-        if not arrived:
-            # From the apex back over h itself, to the face behind it
-            ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
-            ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
+        face = h // 3
+        ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
+        ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
+        tail, head, stop = links[h, TAIL], links[h, HEAD], -1
+        if tail == root or is_on_path(distance, tail, geometry[h, LENGTH_LEFT], distance[v], v):
+            stop = tail
+        elif head == root or is_on_path(distance, head, geometry[h, LENGTH_RIGHT], distance[v], v):
+            stop = head
+        else:
+            # From the apex back over h itself
+            length = geometry[h, LENGTH]
             x = sx if ay <= sy else (sx * ay - ax * sy) / (ay - sy)
-            x = min(max(x, 0.0), length)
-            if count >= room:
+            x = length - min(max(x, 0.0), length)
+            h, sx, sy = links[h, OPPOSITE] >> 1, length - sx, -sy
+        while stop < 0:
+            # At (x, 0) on h, its face and the pseudosource ahead
+            if h < 0:
+                return LOST, count
+            if count >= len(nodes):
                 return NO_ROOM, count
-            faces[count - 1], nodes[count], parameters[count] = h // 3, h, x / length
+            faces[count - 1], nodes[count], parameters[count] = face, h, x / geometry[h, LENGTH]
             count += 1
-            h = links[h, OPPOSITE] >> 1
-            x, sx, sy = length - x, length - sx, -sy
-            arrived = links[h, APEX] == root
-        while not arrived:
+            face, apex = h // 3, links[h, APEX]
             ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
             ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
-            if count >= room:
-                return NO_ROOM, count
-            faces[count - 1] = h // 3
+            reach = math.sqrt((ax - x) * (ax - x) + ay * ay)
+            here = distance[root] + math.sqrt((sx - x) * (sx - x) + sy * sy)
+            if apex == root or is_on_path(distance, apex, reach, here, v):
+                stop = apex
+                break
             if (ax - x) * sy - ay * (sx - x) >= 0.0:  # s is left of the apex
-                reach = geometry[h, LENGTH_LEFT]
                 x, sx, sy = cross_edge(
-                    x, sx, sy, reach, geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
+                    x,
+                    sx,
+                    sy,
+                    geometry[h, LENGTH_LEFT],
+                    geometry[h, COS_LEFT],
+                    geometry[h, SIN_LEFT],
                 )
                 h = links[h, OUT_LEFT]
             else:  # the same, in the mirror
@@ -113,14 +137,9 @@ def trace_path(
                 )
                 x, sx = reach - x, reach - sx
                 h = links[h, OUT_RIGHT]
-            if h < 0:
-                return LOST, count
-            nodes[count], parameters[count] = h, x / reach
-            count += 1
-            arrived = links[h, APEX] == root
-        if count >= room:
+        if count >= len(nodes):
             return NO_ROOM, count
-        faces[count - 1], nodes[count], parameters[count] = h // 3, -1 - root, 0.0
+        faces[count - 1], nodes[count], parameters[count] = face, -1 - stop, 0.0
         count += 1
-        v = root
+        v = stop
     return TRACED, count

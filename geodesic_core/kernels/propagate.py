@@ -3,7 +3,7 @@
 import math
 from typing import Any
 
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.overlap import trim
 from geodesic_core.kernels.planar import hit_left
 from geodesic_core.kernels.queue import push_or_raise, ring_push
@@ -127,6 +127,14 @@ def collect(wave: Any, h: int) -> int:
     return count
 
 
+@inlined
+def precedence(distance: float, origin: int, known: float, known_origin: int) -> bool:
+    """Whether a distance from one source goes before that from another: ties to the lower."""
+    if origin == known_origin or known == math.inf or abs(distance - known) > TIE * known:
+        return distance < known
+    return origin < known_origin
+
+
 @kernel
 def improve_vertex(
     wave: Any, v: int, distance: float, via: int, sx: float, sy: float, root: int
@@ -136,11 +144,9 @@ def improve_vertex(
     Of equal distances that of the lower source wins.
     """
     known = wave.distance[v]
-    if distance >= known and not (
-        wave.origin[root] < wave.origin[v] and distance <= known * (1.0 + TIE)
+    if distance > wave.max_distance or not precedence(
+        distance, wave.origin[root], known, wave.origin[v]
     ):
-        return
-    if distance > wave.max_distance:
         return
     wave.winner[2 * v] = sx
     wave.winner[2 * v + 1] = sy
@@ -160,22 +166,24 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
     rays cover the apex are asked first; only where none does, the two beside it, for a path that
     bends at the window's end. (To ask them all costs a tenth of the sweep and finds nothing more.)
     """
-    best, nearest, crossing = math.inf, -1, 0.0
+    best, best_origin, nearest, crossing = math.inf, 0, -1, 0.0
     last_left, first_right = -1, -1  # beside the apex
+    gap = GAP * wave.geometry[ROW * h + LENGTH]
     for i in range(count):
         w = WIDTH * i
         sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
         rise = ay - sy
         x = sx * ay - ax * sy  # times rise: where the ray to the apex crosses
-        if x > wave.scratch[w + B1] * rise:
+        if x > (wave.scratch[w + B1] + gap) * rise:
             last_left = i
-        elif x < wave.scratch[w + B0] * rise:
+        elif x < (wave.scratch[w + B0] - gap) * rise:
             if first_right < 0:
                 first_right = i
         else:
             d = math.sqrt((ax - sx) * (ax - sx) + rise * rise) + wave.scratch[w + SIGMA]
-            if d < best:
-                best, nearest = d, i
+            origin = wave.origin[wave.scratch_ints[INTS * i + ROOT]]
+            if precedence(d, origin, best, best_origin):
+                best, best_origin, nearest = d, origin, i
                 crossing = x / rise if rise > 0.0 else sx
     surcharge = 1.0
     if nearest < 0:
@@ -242,6 +250,7 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
     ax, ay = cos_left * length_left, sin_left * length_left
     left, right = wave.links[row + OUT_LEFT], wave.links[row + OUT_RIGHT]
     tail, head, apex = wave.links[row + TAIL], wave.links[row + HEAD], wave.links[row + APEX]
+    overlap = OVERLAP * length
     left_first, left_last, left_size = -1, -1, 0
     right_first, right_last, right_size = -1, -1, 0
     for i in range(count):
@@ -254,10 +263,9 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
         ends_at_apex = goes_left and goes_right
         if i != nearest:
             if ends_at_apex:
-                if x <= crossing * rise:
-                    goes_right = False
-                else:
-                    goes_left = False
+                # Two windows that meet on the ray to the apex both cover it: each keeps its side.
+                goes_right = x >= (crossing - overlap) * rise
+                goes_left = x <= (crossing + overlap) * rise
             elif goes_left:
                 if b0 >= crossing and bent_distance(wave, w, ax, ay)[0] >= least:
                     continue

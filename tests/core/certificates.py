@@ -1,5 +1,7 @@
 """What must hold of every path, whatever the mesh: checked on the path itself."""
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 
@@ -35,7 +37,17 @@ def _check_location(mesh, point, location) -> set[int]:
     corners = mesh.faces[location.face]
     scale = np.abs(mesh.vertices[corners]).max()
     np.testing.assert_allclose(weights @ mesh.vertices[corners], point, rtol=0, atol=1e-14 * scale)
-    carrier = corners[weights > 0]
-    holders = np.isin(mesh.faces, carrier).sum(axis=1) == len(carrier)
-    assert location.face == np.flatnonzero(holders)[0], "the lowest face that holds the point"
-    return set(carrier.tolist())
+    carrier = corners[weights > 0].tolist()
+    holders = set.intersection(*(_faces_at(mesh)[vertex] for vertex in carrier))
+    assert location.face == min(holders), "the lowest face that holds the point"
+    return set(carrier)
+
+
+@lru_cache(maxsize=1)
+def _faces_at(mesh) -> list[set[int]]:
+    """The faces of each vertex."""
+    faces_at: list[set[int]] = [set() for _ in mesh.vertices]
+    for number, face in enumerate(mesh.faces.tolist()):
+        for vertex in face:
+            faces_at[vertex].add(number)
+    return faces_at

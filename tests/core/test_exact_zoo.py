@@ -26,7 +26,7 @@ def check_source(mesh, source, distances):
 @zoo.each(zoo.SMALL)
 def test_small_meshes_from_every_vertex(case):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
-    for source in sources_of(case, 4 if WITHOUT_JIT else len(case.vertices)):
+    for source in sources_of(case, 12 if WITHOUT_JIT else len(case.vertices)):
         check_source(mesh, source, expected.matrix(case)[source])
 
 
