@@ -81,7 +81,7 @@ class TriangleMesh:
     ------
     InvalidMesh
         Naming the elements at fault: wrong shape or type, NaN or infinity, an index out of range, a
-        face that repeats a vertex or has an edge of length zero, an edge of three faces or more,
+        face that repeats a vertex or has an edge of no length, an edge of three faces or more,
         neighbours of inconsistent orientation.
 
     Notes
@@ -297,11 +297,11 @@ def _prepare(vertices: Floats, faces: Longs) -> Topology:
     outcome, count, bad = kernels.build_topology(vertices, triangles, topology)
     if outcome == kernels.SOUND:
         return topology
-    if outcome == kernels.ZERO_LENGTH:
+    if outcome == kernels.TOO_SHORT:
         face = int(topology.outer_face[bad[0]])
         raise InvalidMesh(
-            f"face {face} is {faces[face].tolist()} and has an edge of length zero: two of its "
-            f"vertices lie at one position; merge='exact' joins such vertices, the face must go",
+            f"face {face} is {faces[face].tolist()} and has an edge of length zero (or below "
+            f"{kernels.SHORTEST_EDGE:g}): two of its vertices lie at one position; remove the face",
             kind="face",
             elements=[face],
         )

@@ -58,7 +58,7 @@ POOL_FULL = 1
 SCRATCH_FULL = 2
 
 
-@kernel
+@inlined
 def collect(wave: Any, h: int) -> int:
     """Copy the list of h to scratch, trimmed against each other; return how many are left.
 
@@ -72,6 +72,7 @@ def collect(wave: Any, h: int) -> int:
     overlap, gap = OVERLAP * length, GAP * length
     limited = wave.max_distance < math.inf
     count = 0
+    p0, p1, px, py, p_sigma = 0.0, 0.0, 0.0, 0.0, 0.0  # the window last kept, also in scratch
     slot = wave.lists[LIST * h + FIRST]
     for _ in range(wave.lists[LIST * h + SIZE]):
         w = WIDTH * slot
@@ -81,36 +82,27 @@ def collect(wave: Any, h: int) -> int:
         slot = wave.window_ints[INTS * slot + NEXT]
         if limited and not reaches(b0, b1, sx, sy, sigma, wave.max_distance):
             continue
-        while count > 0:
+        while count > 0 and p1 >= b0:
+            p0, p1, b0, b1 = trim(p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, overlap)
             p = WIDTH * (count - 1)
-            p0, p1 = wave.scratch[p + B0], wave.scratch[p + B1]
-            if p1 < b0:
-                if b0 - p1 <= gap:
-                    b0 = p1
-                break
-            p0, p1, b0, b1 = trim(
-                p0,
-                p1,
-                wave.scratch[p + SX],
-                wave.scratch[p + SY],
-                wave.scratch[p + SIGMA],
-                b0,
-                b1,
-                sx,
-                sy,
-                sigma,
-                overlap,
-            )
             if p1 > p0:
                 wave.scratch[p + B0], wave.scratch[p + B1] = p0, p1
                 break
             count -= 1
+            if count > 0:
+                p -= WIDTH
+                p0, p1 = wave.scratch[p + B0], wave.scratch[p + B1]
+                px, py = wave.scratch[p + SX], wave.scratch[p + SY]
+                p_sigma = wave.scratch[p + SIGMA]
         if b1 <= b0:
             continue
         if count == 0:
             room = from_tail + b1 - sigma
             if room <= 0.0 or room * room < (sx - b1) * (sx - b1) + sy * sy:
                 continue
+        elif b0 > p1 and b0 - p1 <= gap:
+            b0 = p1
+        p0, p1, px, py, p_sigma = b0, b1, sx, sy, sigma
         p = WIDTH * count
         wave.scratch[p + B0], wave.scratch[p + B1] = b0, b1
         wave.scratch[p + SX], wave.scratch[p + SY] = sx, sy
@@ -158,7 +150,7 @@ def improve_vertex(
         push_or_raise(wave, v)
 
 
-@kernel
+@inlined
 def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int, float, float]:
     """Find the window of scratch nearest to the apex; return its index, crossing and distance.
 
@@ -234,7 +226,7 @@ def put_window(
     return slot
 
 
-@kernel
+@inlined
 def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: float) -> None:
     """Send the windows of scratch on to the two other edges of the face.
 
@@ -401,10 +393,18 @@ def incoming_angle(wave: Any, v: int) -> float:
     ey = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
     dx, dy = wave.winner[2 * v] + ex, wave.winner[2 * v + 1] + ey
     turn: float = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
-    corner = ROW * previous(via)
-    start: float = wave.geometry[corner + FAN_ANGLE]
-    widest = math.atan2(wave.geometry[corner + SIN_LEFT], wave.geometry[corner + COS_LEFT])
-    return start + min(max(turn, 0.0), widest)
+    corner = previous(via)
+    start: float = wave.geometry[ROW * corner + FAN_ANGLE]
+    return start + min(max(turn, 0.0), corner_width(wave, v, corner))
+
+
+@kernel
+def corner_width(wave: Any, v: int, h: int) -> float:
+    """Angle at v between the half-edge h that leaves it and the next in its fan."""
+    row = ROW * h
+    after = wave.links[row + NEXT_CORNER]
+    end: float = wave.geometry[ROW * after + FAN_ANGLE] if after >= 0 else wave.total_angle[v]
+    return end - wave.geometry[row + FAN_ANGLE]
 
 
 @kernel
@@ -428,9 +428,8 @@ def emit_pseudosource(wave: Any, v: int) -> None:
     h = wave.first_corner[v]
     while h >= 0:
         row = ROW * h
-        after = wave.links[row + NEXT_CORNER]
         start = wave.geometry[row + FAN_ANGLE]
-        widest = (wave.geometry[ROW * after + FAN_ANGLE] if after >= 0 else total) - start
+        widest = corner_width(wave, v, h)
         if everywhere:
             emit_sector(wave, v, h, 0.0, widest, widest)
         else:
@@ -445,7 +444,7 @@ def emit_pseudosource(wave: Any, v: int) -> None:
         if wave.links[row + OUT_LEFT] < 0:  # the last edge of an open fan: from the tail of h
             distance = wave.distance[v] + wave.geometry[row + LENGTH_LEFT]
             improve_vertex(wave, wave.links[row + APEX], distance, h, 0.0, 0.0, v)
-        h = after
+        h = wave.links[row + NEXT_CORNER]
 
 
 @kernel

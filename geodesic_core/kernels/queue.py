@@ -1,7 +1,8 @@
 """The two queues of the sweep: a heap of vertices by distance, a ring of half-edges to propagate.
 
 Both live in arrays of the caller. The heap is 4-ary and indexed: ``heap_place[v]`` is the place of
-vertex v, or -1. Ties go to the lower vertex, so that the order never depends on history.
+vertex v, or -1; keys lie beside the vertices, where a comparison finds them in cache. Ties go to
+the lower vertex, so that the order never depends on history.
 """
 
 from typing import Any
@@ -16,9 +17,9 @@ _ARITY = 4
 
 
 @kernel
-def precedes(wave: Any, u: int, v: int) -> bool:
-    """Whether vertex u leaves the heap before vertex v."""
-    return wave.distance[u] < wave.distance[v] or (wave.distance[u] == wave.distance[v] and u < v)
+def precedes(key: float, v: int, other_key: float, u: int) -> bool:
+    """Whether vertex v leaves the heap before vertex u."""
+    return key < other_key or (key == other_key and v < u)
 
 
 @kernel
@@ -28,15 +29,16 @@ def push_or_raise(wave: Any, v: int) -> None:
     if i < 0:
         i = wave.counters[HEAP_SIZE]
         wave.counters[HEAP_SIZE] = i + 1
+    key = wave.distance[v]
     while i > 0:
         parent = (i - 1) // _ARITY
-        u = wave.heap[parent]
-        if not precedes(wave, v, u):
+        u, parent_key = wave.heap[parent], wave.heap_keys[parent]
+        if not precedes(key, v, parent_key, u):
             break
-        wave.heap[i] = u
+        wave.heap[i], wave.heap_keys[i] = u, parent_key
         wave.heap_place[u] = i
         i = parent
-    wave.heap[i] = v
+    wave.heap[i], wave.heap_keys[i] = v, key
     wave.heap_place[v] = i
 
 
@@ -48,7 +50,7 @@ def pop_nearest(wave: Any) -> int:
     size = wave.counters[HEAP_SIZE] - 1
     wave.counters[HEAP_SIZE] = size
     if size > 0:
-        v = wave.heap[size]
+        v, key = wave.heap[size], wave.heap_keys[size]
         i = 0
         while True:
             first = _ARITY * i + 1
@@ -56,15 +58,17 @@ def pop_nearest(wave: Any) -> int:
                 break
             child = first
             for c in range(first + 1, min(first + _ARITY, size)):
-                if precedes(wave, wave.heap[c], wave.heap[child]):
+                if precedes(
+                    wave.heap_keys[c], wave.heap[c], wave.heap_keys[child], wave.heap[child]
+                ):
                     child = c
-            u = wave.heap[child]
-            if not precedes(wave, u, v):
+            u, child_key = wave.heap[child], wave.heap_keys[child]
+            if not precedes(child_key, u, key, v):
                 break
-            wave.heap[i] = u
+            wave.heap[i], wave.heap_keys[i] = u, child_key
             wave.heap_place[u] = i
             i = child
-        wave.heap[i] = v
+        wave.heap[i], wave.heap_keys[i] = v, key
         wave.heap_place[v] = i
     return nearest
 

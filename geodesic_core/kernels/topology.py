@@ -61,13 +61,14 @@ SOUND = 0
 NOT_FINITE = 1
 OUT_OF_RANGE = 2
 REPEATED_VERTEX = 3
-ZERO_LENGTH = 4
+TOO_SHORT = 4
 NON_MANIFOLD = 5
 MISORIENTED = 6
 TOO_LARGE = 7
 
-LARGEST_COORDINATE = 1e150
-"""Mesh units; the squares of lengths must stay finite."""
+LARGEST_COORDINATE = 1e50
+SHORTEST_EDGE = 1e-50
+"""Mesh units; between the two, sixth powers of lengths neither overflow nor vanish."""
 
 
 class Topology(NamedTuple):
@@ -278,7 +279,7 @@ def find_bad_edges(links: Ints, limit: int) -> tuple[int, int, Ints]:
 
 @kernel
 def fill_rows(vertices: Floats, faces: Ints, links: Ints, geometry: Floats) -> int:
-    """Fill the geometry and the vertex columns of links; return a face with a zero edge, or -1."""
+    """Fill the geometry and the vertices of links; return a face with too short an edge, or -1."""
     for f in range(faces.shape[0]):
         for i in range(3):
             h = 3 * f + i
@@ -292,7 +293,7 @@ def fill_rows(vertices: Floats, faces: Ints, links: Ints, geometry: Floats) -> i
             wz = vertices[apex, 2] - vertices[tail, 2]
             length = math.sqrt(ux * ux + uy * uy + uz * uz)
             length_left = math.sqrt(wx * wx + wy * wy + wz * wz)
-            if length == 0.0 or length_left == 0.0:
+            if length < SHORTEST_EDGE or length_left < SHORTEST_EDGE:
                 return f
             cx, cy, cz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
             # Cosine and sine from products, not from the law of cosines, which loses all digits on
@@ -438,7 +439,7 @@ def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[int, i
         return outcome, count, bad
     face = fill_rows(inner_vertices, inner_faces, topology.links, topology.geometry)
     if face >= 0:
-        return ZERO_LENGTH, 1, np.full(1, face, np.int32)
+        return TOO_SHORT, 1, np.full(1, face, np.int32)
     unfold_fans(
         topology.links,
         topology.geometry,

@@ -57,6 +57,7 @@ class Wavefront(NamedTuple):
     origin: Ints
     """(V,): index of the source that the vertex had its distance from when it was last improved"""
     heap: Ints
+    heap_keys: Floats
     heap_place: Ints
     ring: Ints
     lists: Ints
@@ -82,6 +83,7 @@ class View(NamedTuple):
     status: Any
     origin: Any
     heap: Any
+    heap_keys: Any
     heap_place: Any
     ring: Any
     lists: Any
@@ -111,6 +113,7 @@ def view_of(topology: Any, wave: Any, max_distance: float) -> Any:
         pointer(wave.status),
         pointer(wave.origin),
         pointer(wave.heap),
+        pointer(wave.heap_keys),
         pointer(wave.heap_place),
         pointer(wave.ring),
         pointer(wave.lists),
@@ -138,6 +141,7 @@ def new_wavefront(topology: Topology) -> Wavefront:
         status=np.zeros(vertices, np.uint8),
         origin=np.zeros(vertices, np.int32),
         heap=np.empty(vertices, np.int32),
+        heap_keys=np.empty(vertices),
         heap_place=np.full(vertices, -1, np.int32),
         ring=np.empty(half_edges, np.int32),
         lists=np.zeros((half_edges, LIST), np.int32),

@@ -9,9 +9,6 @@ from tests.expected import real_mesh
 
 EXACT = 1e-9
 
-PEER_TOO_LONG = {"horse97k.ply": 1}
-"""Vertices at which pygeodesic itself is off: 1.3e-8 too long, where CGAL and VTP agree."""
-
 # blade.ply is left out: pygeodesic is no oracle on slivers. cow.obj has bow-ties, where it fails.
 SLICE = ["fandisk10k.ply", "turbine.ply", "rockerarm20k.ply", "buddha30k.ply"]
 REST = ["fandisk.obj", "armadillo86k.ply", "dragon100k.ply", "horse97k.ply", "bunny.obj"]
@@ -32,14 +29,18 @@ def test_agrees_with_pygeodesic_at_every_vertex(name, seed):
     peer = pytest.importorskip("pygeodesic.geodesic", reason="pygeodesic is not installed")
     mesh = gc.load_mesh(real_mesh(name))
     source = int(np.random.default_rng(seed).integers(len(mesh.vertices))) if seed else 0
-    found = gc.exact_distance(mesh, source).distances
+    field = gc.exact_distance(mesh, source)
     theirs, _ = peer.PyGeodesicAlgorithmExact(mesh.vertices, mesh.faces).geodesicDistances([source])
-    reached = np.isfinite(found)
+    reached = np.isfinite(field.distances)
     np.testing.assert_array_equal(reached, theirs < 1e50)
-    found, theirs = found[reached], theirs[reached]
-    assert (found <= theirs * (1 + EXACT)).all()
-    shorter = np.flatnonzero(found < theirs * (1 - EXACT))
-    assert len(shorter) <= PEER_TOO_LONG.get(name, 0), shorter
+    ours, theirs = field.distances[reached], theirs[reached]
+    assert (ours <= theirs * (1 + EXACT)).all()
+    # The peer is too long by some 1e-8 at a few vertices (where it is not even symmetric, and CGAL
+    # and VTP agree with each other): there, a path over the surface proves the shorter distance.
+    shorter = np.flatnonzero(reached)[ours < theirs * (1 - EXACT)].tolist()
+    assert len(shorter) <= 20
+    for vertex in shorter:
+        check_path(mesh, field.path_to(vertex), source, vertex, field.distances[vertex])
 
 
 @pytest.mark.jit

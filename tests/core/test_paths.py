@@ -14,7 +14,7 @@ def mesh_of(case):
 
 
 def check_paths(case, sources, at_most=10**9):
-    """Check the paths from each source to all vertices, or to ``at_most`` of them, spread evenly."""
+    """Check the paths from each source to all vertices, or about ``at_most``, evenly spread."""
     mesh = mesh_of(case)
     for source in sources:
         field = gc.exact_distance(mesh, source)
