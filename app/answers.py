@@ -70,7 +70,7 @@ def _path(
             mesh, query.source, query.target, cancel=cancel, memory_limit=memory_limit
         )
     except gc.errors.NoPath as error:
-        nothing = {"status": "no_path", "reason": error.reason, "points": np.empty((0, 3))}
+        nothing = {"status": "no_path", "reason": error.reason, "points": None}
         return Answer(members | nothing | {"error_bound": _EXACT}, "points")
     found = {
         "status": "ok",

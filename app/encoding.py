@@ -28,7 +28,8 @@ class Answer:
     members
         In the order of the JSON object; arrays where they are large.
     array
-        Name of the member that is the body in binary formats; the small ones become headers.
+        Name of the member that is the body in binary formats (empty where that is ``None``); the
+        small ones become headers.
     """
 
     members: Mapping[str, Any]
@@ -106,7 +107,9 @@ def _matches(media: str, offered: str) -> bool:
 
 
 def _little_endian(answer: Answer) -> NDArray[Any]:
-    array: NDArray[Any] = answer.members[answer.array]
+    array: NDArray[Any] | None = answer.members[answer.array]
+    if array is None:  # no path: the headers say why
+        return np.empty(0)
     return np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
 
 

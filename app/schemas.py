@@ -175,9 +175,11 @@ class PathAnswer(BaseModel):
     source: ResolvedPoint
     target: ResolvedPoint
     length: float | None = None
-    points: list[tuple[float, float, float]]
-    locations: list[Location] = []
-    faces: list[int] = Field(default=[], description="The face that each piece of the path crosses")
+    points: list[tuple[float, float, float]] | None
+    locations: list[Location] | None = None
+    faces: list[int] | None = Field(
+        default=None, description="The face that each piece of the path crosses"
+    )
     error_bound: ErrorBound
     warnings: list[str]
 

@@ -11,6 +11,7 @@ from geodesic_core.errors import InternalError, InvalidPoint, NoPath
 from geodesic_core.kernels import backtrace
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.surface_point import SurfacePoint
+from geodesic_core.tolerances import PATH_LENGTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,12 +115,19 @@ class DistanceField:
                 crossed.append(int(self.mesh.topology.outer_face[faces[i]]))
             locations.append(here)
         points = np.array([location.position(self.mesh) for location in locations])
-        pieces = np.diff(points, axis=0)
+        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        start = self.sources[self.nearest_source[vertex]].start_distance
+        distance = float(self.distances[vertex])
+        if abs(start + length - distance) > PATH_LENGTH * distance:
+            raise InternalError(
+                f"the path to vertex {vertex} has length {length}, but the field says "
+                f"{distance - start}; please report this mesh"
+            )
         return GeodesicPath(
             points=points,
             locations=tuple(locations),
             faces=np.array(crossed, np.int32),
-            length=float(np.sqrt((pieces * pieces).sum(axis=1)).sum()),
+            length=length,
             error_bound=self.error_bound,
         )
 
