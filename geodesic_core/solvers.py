@@ -98,6 +98,7 @@ def exact_distance(
     _check_memory(wavefront.bytes_of(wave), control)
     sweep.start_sweep(mesh.topology, wave, inner[vertices], distances, limit)
     wave = _run(mesh, wave, limit, vertices, control, began)
+    wave.distance[wave.distance > limit] = math.inf
     nearest = sweep.nearest_sources(wave.distance, wave.winner_ints, wave.origin)
     return DistanceField(
         mesh=mesh,

@@ -30,6 +30,16 @@ def hit_left(b: float, sy: float, sy_left: float, sin_left: float, length_left: 
 
 
 @inlined
+def root_depth(x: float, width: float, delta: float, u: float, v: float) -> float:
+    """How far within (0, width) a root of `bisector` lies; 0 or less if outside, or no solution."""
+    r0 = u + v * x  # these two times 2 delta
+    r1 = r0 - 2.0 * delta * delta
+    if delta * r0 < 0.0 or delta * r1 < 0.0:
+        return 0.0
+    return min(x, width - x)
+
+
+@inlined
 def bisector(
     lo: float,
     hi: float,
@@ -44,24 +54,24 @@ def bisector(
     """Point of [lo, hi] at equal distance from two weighted sources (the quadratic of section 3.3).
 
     The caller knows that the sign of the difference changes once in [lo, hi]; ``guess`` lies there
-    and picks the root where rounding offers two.
+    and serves where rounding leaves no root.
+
+    Let r0 and r1 be the distances to the two. From r1 = r0 - delta it follows that r0 is linear in
+    x, m r0 = u + v x with m = 2 delta, and its square is the quadratic. Squaring has added the
+    other branch of the hyperbola, where r0 or r1 comes out negative.
     """
-    # Around lo as origin: the coefficients are differences of squares.
-    x0, x1 = s0x - lo, s1x - lo
-    alpha = x1 - x0
-    beta = sigma1 - sigma0
-    norm1 = x1 * x1 + s1y * s1y
-    gamma = x0 * x0 + s0y * s0y - norm1 - beta * beta
-    a = alpha * alpha - beta * beta
-    b = gamma * alpha + 2.0 * x1 * beta * beta
-    c = 0.25 * gamma * gamma - norm1 * beta * beta
-    discriminant = max(b * b - 4.0 * a * c, 0.0)
-    q = -0.5 * (b + math.copysign(math.sqrt(discriminant), b))
-    x = guess - lo
-    near, far = x, x
-    if q != 0.0:
-        near = c / q
-    if a != 0.0:
-        far = q / a
-    root = near if abs(near - x) <= abs(far - x) else far
-    return min(max(lo + root, lo), hi)
+    width, x0, x1, delta = hi - lo, s0x - lo, s1x - lo, sigma1 - sigma0
+    m2 = 4.0 * delta * delta
+    u = delta * delta - (x1 - x0) * (x1 + x0) - (s1y - s0y) * (s1y + s0y)
+    v = 2.0 * (x1 - x0)
+    a, b = m2 - v * v, m2 * x0 + u * v
+    c = m2 * (x0 * x0 + s0y * s0y) - u * u
+    t = b + math.copysign(math.sqrt(max(b * b - a * c, 0.0)), b)
+    near = c / t if t != 0.0 else 0.0
+    far = t / a if a != 0.0 else 0.0
+    depth_near = root_depth(near, width, delta, u, v)
+    depth_far = root_depth(far, width, delta, u, v)
+    if max(depth_near, depth_far) <= 0.0:
+        return guess
+    # Where rounding lets in a second root, at an end, it is the inner one that counts.
+    return lo + (near if depth_near >= depth_far else far)

@@ -136,9 +136,7 @@ def improve_vertex(
     Of equal distances that of the lower source wins.
     """
     known = wave.distance[v]
-    if distance > wave.max_distance or not precedence(
-        distance, wave.origin[root], known, wave.origin[v]
-    ):
+    if not precedence(distance, wave.origin[root], known, wave.origin[v]):
         return
     wave.winner[2 * v] = sx
     wave.winner[2 * v + 1] = sy
@@ -379,8 +377,9 @@ def insert_sorted(wave: Any, h: int, slot: int) -> None:
 
 @kernel
 def is_pseudosource(wave: Any, v: int) -> bool:
-    """Whether shortest paths may bend at v (or start there)."""
-    return wave.flags[v] != 0 or wave.winner_ints[WINNER * v + VIA] < 0
+    """Whether shortest paths may bend at v (or start there), within the limit."""
+    bends = wave.flags[v] != 0 or wave.winner_ints[WINNER * v + VIA] < 0
+    return bends and wave.distance[v] <= wave.max_distance
 
 
 @kernel

@@ -67,7 +67,12 @@ def start_sweep(
 
 @kernel
 def advance(topology: Any, wavefront: Any, max_distance: float, budget: int) -> int:
-    """Run the sweep for a slice of about ``budget`` units of 10 ns; return its outcome."""
+    """Run the sweep for a slice of about ``budget`` units of 10 ns; return its outcome.
+
+    Windows wholly beyond ``max_distance`` are dropped. Vertices beyond it are reached and settled
+    all the same, for a list waits for an end of its edge, and windows between two far ends may be
+    near; the caller takes their distances away.
+    """
     wave = view_of(topology, wavefront, max_distance)
     wave.counters[WORK] = 0
     outcome = drain(wave, budget)
@@ -137,7 +142,7 @@ def drain(wave: Any, budget: int) -> int:
 
 @kernel
 def nearest_sources(distance: Floats, winner_ints: Ints, origin: Ints) -> Ints:
-    """Return for each vertex the index of its source: that of its pseudosource, and so on.
+    """Return for each vertex at a finite distance the index of its pseudosource's source.
 
     Asked at the end: a pseudosource may have changed its own source after it emitted.
     """

@@ -1,0 +1,75 @@
+"""Sweeps driven by hand: one list or one vertex at a time, on a mesh of the zoo."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+import geodesic_core as gc
+from geodesic_core.kernels import sweep
+from geodesic_core.kernels.propagate import POOL_FULL, SCRATCH_FULL
+from geodesic_core.kernels.topology import Topology
+from geodesic_core.kernels.wavefront import (
+    View,
+    Wavefront,
+    new_wavefront,
+    with_larger_pool,
+    with_larger_scratch,
+)
+from tests import zoo
+
+WHOLE = 1 << 60
+"""A budget that no sweep uses up."""
+
+
+def topology_of(case: zoo.Case) -> Topology:
+    return gc.TriangleMesh(case.vertices, case.faces).topology
+
+
+def started(topology, sources, starts=None, limit=math.inf) -> Wavefront:
+    """A wavefront at its sources, which are numbered as the caller numbers them."""
+    wave = new_wavefront(topology)
+    inner = topology.inner_vertex[np.atleast_1d(sources)]
+    starts = np.zeros(len(inner)) if starts is None else np.asarray(starts, dtype=float)
+    sweep.start_sweep(topology, wave, inner, starts, limit)
+    return wave
+
+
+def steps(topology, wave, limit=math.inf, budget=1) -> Iterator[tuple[int, Wavefront]]:
+    """Run to the end; after each slice the outcome and the wavefront, which growing replaces.
+
+    With a budget of 1 a slice is one list or one vertex.
+    """
+    outcome = sweep.RUNNING
+    while outcome != sweep.FINISHED:
+        outcome = sweep.advance(topology, wave, limit, budget)
+        if outcome == POOL_FULL:
+            wave = with_larger_pool(wave)
+        elif outcome == SCRATCH_FULL:
+            wave = with_larger_scratch(wave)
+        yield outcome, wave
+
+
+def finished(topology, wave, limit=math.inf, budget=WHOLE) -> Wavefront:
+    for _, last in steps(topology, wave, limit, budget):
+        wave = last
+    return wave
+
+
+def view_of_arrays(topology, wave, limit=math.inf) -> View:
+    """The View that kernels see, of flat arrays in place of pointers: so that tests can hold it."""
+    flat = {
+        name: getattr(state, name).reshape(-1)
+        for state in (topology, wave)
+        for name in state._fields
+        if name in View._fields
+    }
+    return View(
+        **flat,
+        window_ints=wave.windows.view(np.int32).reshape(-1),
+        scratch_ints=wave.scratch.view(np.int32).reshape(-1),
+        ring_capacity=len(wave.ring),
+        pool=len(wave.windows),
+        scratch_size=len(wave.scratch),
+        max_distance=limit,
+    )

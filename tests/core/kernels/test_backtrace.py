@@ -1,0 +1,87 @@
+"""Outcomes of the backtrace beside the path itself, which `tests/core/test_paths.py` checks."""
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from geodesic_core.kernels.backtrace import LOST, NO_ROOM, TRACED, trace_path
+from geodesic_core.kernels.topology import APEX, OPPOSITE
+from geodesic_core.kernels.wavefront import FROM, VIA
+from tests import zoo
+from tests.core.kernels.stepping import finished, started, topology_of
+
+
+def trace(topology, wave, target, room):
+    nodes, faces = np.empty(room, np.int32), np.empty(room, np.int32)
+    outcome, count = trace_path(
+        topology,
+        wave.distance,
+        wave.winner,
+        wave.winner_ints,
+        target,
+        nodes,
+        np.empty(room),
+        faces,
+    )
+    return outcome, nodes[:count], faces[: max(count - 1, 0)]
+
+
+def solved(name, source):
+    topology = topology_of(zoo.SMALL[name])
+    return topology, finished(topology, started(topology, source))
+
+
+@pytest.mark.parametrize("name", ["jittered_grid", "comb", "crumpled_torus"])
+def test_too_little_room_is_told_and_enough_is_enough(name):
+    topology, wave = solved(name, 0)
+    target = int(np.argmax(np.where(np.isfinite(wave.distance), wave.distance, -1)))
+    outcome, nodes, faces = trace(topology, wave, target, 1000)
+    assert outcome == TRACED
+    assert len(nodes) > 4
+    for room in range(1, len(nodes)):
+        assert trace(topology, wave, target, room)[0] == NO_ROOM
+    again, same, crossed = trace(topology, wave, target, len(nodes))
+    assert again == TRACED
+    np.testing.assert_array_equal(same, nodes)
+    np.testing.assert_array_equal(crossed, faces)
+
+
+def broken(name):
+    """A field in which one vertex claims to have been reached from outside, over the boundary."""
+    topology, wave = solved(name, 0)
+    h = int(np.flatnonzero(topology.links[:, OPPOSITE] < 0)[-1])
+    v = int(topology.links[h, APEX])
+    others = np.setdiff1d(np.arange(len(wave.distance)), topology.links[h])
+    wave.winner_ints[v, VIA], wave.winner_ints[v, FROM] = h, others[0]
+    wave.winner[v] = (0.1, -5.0)
+    wave.distance[v] = 0.0  # nothing else lies on the way
+    return topology, wave, v
+
+
+def test_a_line_that_leaves_the_surface_is_lost():
+    topology, wave, v = broken("jittered_grid")
+    outcome, nodes, _ = trace(topology, wave, v, 100)
+    assert outcome == LOST
+    assert nodes.tolist() == [-1 - v]
+
+
+def test_a_lost_line_is_an_internal_error():
+    case = zoo.SMALL["jittered_grid"]
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    field = gc.exact_distance(mesh, 0)
+    _, wave, v = broken("jittered_grid")
+    field._winner[:], field._winner_ints[:] = wave.winner, wave.winner_ints
+    field._distance[:] = wave.distance
+    with pytest.raises(gc.errors.InternalError, match="left the surface"):
+        field.path_to(int(mesh.topology.outer_vertex[v]))
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
+def test_long_paths_get_more_room(scale):
+    """More points than a path gets room for at first."""
+    points, faces = zoo.grid(700, 1)
+    mesh = gc.TriangleMesh(points * scale, faces)
+    path = gc.exact_distance(mesh, 0).path_to(len(points) - 2)
+    assert len(path.points) > 256
+    end = np.linalg.norm(points[-2] - points[0])
+    assert path.length == pytest.approx(scale * end, rel=1e-12)

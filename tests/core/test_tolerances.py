@@ -1,0 +1,251 @@
+"""Each tolerance as the bound that its docstring promises."""
+
+import math
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from geodesic_core import tolerances
+from geodesic_core.kernels.backtrace import is_on_path
+from geodesic_core.kernels.overlap import trim
+from geodesic_core.kernels.propagate import (
+    collect,
+    precedence,
+    put_window,
+    reach_apex,
+)
+from geodesic_core.kernels.topology import (
+    APEX,
+    COS_LEFT,
+    HEAD,
+    LENGTH,
+    LENGTH_LEFT,
+    OPPOSITE,
+    ROW,
+    SADDLE,
+    SIN_LEFT,
+    TAIL,
+)
+from geodesic_core.kernels.wavefront import FIRST, LAST, SIZE
+from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
+from geodesic_core.tolerances import (
+    BEND,
+    GAP,
+    ON_PATH,
+    OVERLAP,
+    PATH_LENGTH,
+    SADDLE_EXCESS,
+    SECTOR_MARGIN,
+    SLACK,
+    TIE,
+)
+from tests import zoo
+from tests.core.kernels.invariants import windows_of
+from tests.core.kernels.stepping import started, steps, topology_of, view_of_arrays
+from tests.oracles import closed_forms
+
+SCALES = pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+
+
+def test_each_tolerance_is_tested():
+    names = [name for name in vars(tolerances) if name.isupper()]
+    tested = [name.removeprefix("test_") for name in globals() if name.startswith("test_")]
+    for name in names:
+        assert any(test.startswith(name.lower()) for test in tested), name
+
+
+# Saddles ----------------------------------------------------------------------------------------
+
+
+def saddle_of(excess: float, splits=0):
+    """A zigzag cone whose total angle exceeds a full turn by as little; also its chart."""
+    low, high = 0.0, 1.0
+    for _ in range(200):
+        tilt = (low + high) / 2
+        *_, total = zoo.cone(8, tilt, zigzag=True)
+        low, high = (tilt, high) if total < 2 * math.pi + excess else (low, tilt)
+    return zoo.cone(8, tilt, zigzag=True, splits=splits)
+
+
+@pytest.mark.parametrize(("share", "is_saddle"), [(0.5, False), (2.0, True)])
+def test_saddle_excess_divides_saddles_from_flat_vertices(share, is_saddle):
+    vertices, faces, _, _ = saddle_of(share * SADDLE_EXCESS)
+    topology = gc.TriangleMesh(vertices, faces).topology
+    assert bool(topology.flags[topology.inner_vertex[0]] & SADDLE) == is_saddle
+
+
+@pytest.mark.parametrize("share", [0.1, 0.9])
+def test_saddle_excess_bounds_the_error_behind_a_flatter_saddle(share):
+    vertices, faces, polar, total = saddle_of(share * SADDLE_EXCESS, splits=2)
+    mesh = gc.TriangleMesh(vertices, faces)
+    for source in range(1, 9):
+        exact = closed_forms.cone(polar, source, total)
+        found = gc.exact_distance(mesh, source).distances
+        # The rim of the saddle is no circle: its vertices lie where they were computed, to 1e-16.
+        np.testing.assert_allclose(found, exact, rtol=SADDLE_EXCESS, atol=0)
+
+
+def test_sector_margin_is_all_that_a_shadow_is_widened_by():
+    vertices, faces, _, total = zoo.cone(12, 0.8, zigzag=True, splits=1)
+    shadow = total - 2 * math.pi
+    topology = topology_of(zoo.Case("saddle", vertices, faces))
+    assert lit_by(topology, 1, 0) == pytest.approx(
+        shadow + 2 * SECTOR_MARGIN, abs=0.01 * SECTOR_MARGIN
+    )
+
+
+def lit_by(topology, source, vertex) -> float:
+    """The angle into which a vertex emits windows."""
+    lit, v = 0.0, topology.inner_vertex[vertex]
+    for _, wave in steps(topology, started(topology, source)):
+        windows = windows_of(wave)
+        lit = max(lit, angles(windows.rows[windows.root == v]).sum())
+    return lit
+
+
+def angles(rows) -> np.ndarray:
+    """The angle that each window takes up as seen from its pseudosource."""
+    b0, b1, sx, sy = rows[:, [B0, B1, SX, SY]].T
+    return np.arctan2(b1 - sx, -sy) - np.arctan2(b0 - sx, -sy)
+
+
+# Windows on an edge -----------------------------------------------------------------------------
+
+
+@SCALES
+def test_overlap_is_the_least_that_is_trimmed(scale):
+    """And what stays could not be told apart: the distances differ by less than the overlap."""
+    for share, trimmed in ((0.5, False), (2.0, True)):
+        b = 0.5 * scale
+        over = share * OVERLAP * scale
+        p, c = (0.0, b + over, 0.1 * scale, -scale, 0.0), (b, scale, scale, -scale, 0.0)
+        left = trim(*p, *c, OVERLAP * scale)
+        assert (left != (p[0], p[1], c[0], c[1])) == trimmed
+
+
+def flat_view(scale):
+    """A flat mesh: its view, its wavefront, and an inner half-edge of length ``scale``."""
+    points, faces = zoo.grid(3, 3)
+    topology = topology_of(zoo.Case("flat", points * scale, faces))
+    wave = started(topology, 0)
+    lengths = topology.geometry[:, LENGTH]
+    inner = (topology.links[:, OPPOSITE] >= 0) & (abs(lengths / scale - 1) < 1e-9)
+    return view_of_arrays(topology, wave), wave, int(np.flatnonzero(inner)[0])
+
+
+def put_list(view, wave, h, windows, root):
+    slots = [put_window(view, *window, root) for window in windows]
+    wave.lists[h, [SIZE, FIRST, LAST]] = len(slots), slots[0], slots[-1]
+    for slot, after in zip(slots, [*slots[1:], -1], strict=True):
+        wave.windows.view(np.int32)[slot, NEXT] = after
+
+
+@SCALES
+@pytest.mark.parametrize(("share", "closed"), [(0.5, True), (2.0, False)])
+def test_gap_is_the_most_that_is_closed(scale, share, closed):
+    view, wave, h = flat_view(scale)
+    b, gap = 0.5 * scale, share * GAP * scale
+    source = (0.5 * scale, -scale, 0.0)
+    put_list(view, wave, h, [(0.1 * scale, b, *source), (b + gap, 0.9 * scale, *source)], 0)
+    assert collect(view, h) == 2
+    assert (wave.scratch[1, B0] == b) == closed
+    assert wave.scratch[1, B0] - b <= gap * (1 + 1e-3)
+    # The ray through the closed gap is off by no more than the gap, and so is its length.
+    here, there = (math.hypot(x - source[0], source[1]) for x in (b, b + gap))
+    assert abs(here - there) <= gap
+
+
+@SCALES
+@pytest.mark.parametrize(("detour", "kept"), [(-1.0, True), (0.0, True), (0.5, True), (3.0, False)])
+@pytest.mark.parametrize("from_tail", [True, False])
+def test_slack_keeps_windows_that_tie_with_a_vertex(scale, detour, kept, from_tail):
+    """At the far end of the window: against the path through the vertex and along the edge."""
+    view, wave, h = flat_view(scale)
+    length = view.geometry[ROW * h + LENGTH]
+    tail, head = view.links[ROW * h + TAIL], view.links[ROW * h + HEAD]
+    wave.distance[[tail, head]] = 1e6 * scale  # as good as unreached
+    wave.distance[tail if from_tail else head] = scale
+    b0, b1 = 0.25 * length, 0.75 * length
+    far = b1 if from_tail else length - b0
+    straight = (scale + far) + detour * SLACK * scale
+    sy = -0.3 * scale
+    reach = math.sqrt(straight**2 - sy**2)
+    sx = b1 - reach if from_tail else b0 + reach
+    put_list(view, wave, h, [(b0, b1, sx, sy, 0.0)], tail)
+    assert collect(view, h) == kept
+
+
+@SCALES
+def test_bend_is_all_that_a_bent_path_is_surcharged(scale):
+    view, wave, h = flat_view(scale)
+    row = view.geometry[ROW * h : ROW * (h + 1)]
+    ax, ay = row[LENGTH_LEFT] * row[COS_LEFT], row[LENGTH_LEFT] * row[SIN_LEFT]
+    apex = view.links[ROW * h + APEX]
+    wave.distance[apex] = math.inf
+    length = row[LENGTH]
+    lies_right = ax < 0.5 * length
+    b0, b1 = (0.6 * length, 0.8 * length) if lies_right else (0.2 * length, 0.4 * length)
+    sx, sy = 0.5 * (b0 + b1), -0.2 * scale
+    end = b0 if lies_right else b1
+    wave.scratch[0, [B0, B1, SX, SY, SIGMA]] = b0, b1, sx, sy, 0.0
+    wave.scratch.view(np.int32)[0, ROOT] = view.links[ROW * h + TAIL]
+    nearest, crossing, _ = reach_apex(view, h, 1, ax, ay)
+    bent = math.hypot(sx - end, sy) + math.hypot(ax - end, ay)
+    assert (nearest, crossing) == (0, end)
+    assert bent < wave.distance[apex] <= bent * (1 + 2 * BEND)
+    assert wave.distance[apex] == pytest.approx(bent * (1 + BEND), rel=2e-16)
+
+
+# Sources and paths ------------------------------------------------------------------------------
+
+
+@SCALES
+def test_tie_is_the_most_that_a_lower_source_may_be_farther(scale):
+    for share, lower_wins in ((0.5, True), (-0.5, True), (2.0, False), (-2.0, True)):
+        offered = scale * (1 + share * TIE)
+        assert precedence(offered, 0, scale, 1) == lower_wins
+        assert precedence(scale, 1, offered, 0) != lower_wins
+    assert not precedence(scale, 0, scale, 0)
+    assert precedence(scale, 7, math.inf, 0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_tie_covers_the_rounding_of_symmetric_meshes(seed):
+    """Turned at random, a grid is symmetric but for rounding: its diagonal goes to source 0."""
+    case = zoo.Case("grid", *zoo.grid(8, 8)).moved(zoo.rotation(seed), (3.0, 1.0, -2.0))
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    corners = [8, 72]
+    field, mirrored = (gc.exact_distance(mesh, ends) for ends in (corners, corners[::-1]))
+    diagonal = np.arange(0, 81, 10)
+    assert (field.nearest_source[diagonal] == 0).all()
+    assert (mirrored.nearest_source[diagonal] == 0).all()
+    late = gc.exact_distance(mesh, [gc.Source(8, 8 * 10 * TIE), gc.Source(72)])
+    assert (late.nearest_source[diagonal] == 1).all()
+
+
+@SCALES
+def test_on_path_is_the_longest_detour_through_a_vertex(scale):
+    target, beside = 0, 1
+    here, reach = 2.0 * scale, 0.5 * scale
+    for share, taken in ((-1.0, True), (0.0, True), (0.5, True), (2.0, False)):
+        distance = scale * np.array([3.0, 0.0])
+        distance[beside] = here - reach + share * ON_PATH * distance[target]
+        assert is_on_path(distance, beside, reach, here, target) == taken
+
+
+def test_on_path_never_leads_away_from_the_source():
+    assert not is_on_path(np.array([1.0, 1.0]), 1, 0.0, 1.0, 0)
+
+
+@SCALES
+@pytest.mark.parametrize("sign", [1, -1])
+def test_path_length_is_the_most_that_a_path_may_differ_from_its_field(scale, sign):
+    points, faces = zoo.grid(5, 4)
+    field = gc.exact_distance(gc.TriangleMesh(points * scale, faces), gc.Source(0, scale))
+    honest = field.distances[-1]
+    field.distances[-1] = honest * (1 + 0.5 * sign * PATH_LENGTH)
+    assert field.path_to(len(points) - 1).length == pytest.approx(honest - scale, rel=1e-14)
+    field.distances[-1] = honest * (1 + 2.0 * sign * PATH_LENGTH)
+    with pytest.raises(gc.errors.InternalError, match="the field says"):
+        field.path_to(len(points) - 1)
