@@ -58,6 +58,10 @@ def trim(
     A window that loses everything comes back empty (its ends equal). Overlaps of at most
     ``tolerance`` stay. Equal windows: p wins.
     """
+    # Half of the sweep is spent here, on branches that no predictor foresees. Tried: one root per
+    # end instead of two, from squared distances (no gain); the quadratic first, the ends only where
+    # it has no root (7 % slower on horse97k); lo by a branch, which does not wait for the trim
+    # before as max() does (16 % faster on icosphere 6, 2 to 4 % slower on scans).
     lo, hi = max(p0, c0), min(p1, c1)
     if hi - lo <= tolerance:
         return p0, p1, c0, c1
