@@ -1,0 +1,105 @@
+"""The mesh: its report, its warnings, merging, and what a store keeps of it."""
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+
+TRIANGLE = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+TETRAHEDRON = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
+CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+
+
+def test_report_of_a_closed_mesh():
+    report = gc.TriangleMesh(CORNERS, TETRAHEDRON).report
+
+    assert (report.vertices, report.faces, report.edges) == (4, 4, 6)
+    assert (report.components, report.boundary_loops, report.euler_characteristic) == (1, 0, 2)
+    assert (report.saddle_vertices, report.boundary_vertices) == (0, 0)
+    assert report.bounds == ((0, 0, 0), (1, 1, 1))
+    assert report.mean_edge_length == pytest.approx((3 + 3 * np.sqrt(2)) / 6, rel=1e-15)
+
+
+def test_report_of_an_open_mesh():
+    report = gc.TriangleMesh(*gc.samples.plane(200)).report
+
+    assert (report.boundary_loops, report.euler_characteristic) == (1, 1)
+    assert report.boundary_vertices == 40
+
+
+def test_report_of_a_handle():
+    assert gc.TriangleMesh(*gc.samples.knot(600)).report.euler_characteristic == 0
+
+
+def test_nothing_to_warn_of():
+    assert gc.TriangleMesh(CORNERS, TETRAHEDRON).warnings == ()
+
+
+def test_warns_of_components():
+    mesh = gc.TriangleMesh(
+        TRIANGLE + [[9, 9, z] for z in (0, 1, 3)] + [[8, 8, 8]], [[0, 1, 2], [3, 6, 5]]
+    )
+    (components, isolated) = mesh.warnings
+
+    assert "2 connected components" in components
+    assert "first is vertex 4" in isolated
+
+
+def test_warns_of_a_seam_and_names_the_remedy():
+    apart = gc.TriangleMesh(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [3, 4, 5]]
+    )
+    assert "merge='exact'" in apart.warnings[1]
+
+    joined = gc.TriangleMesh(apart.vertices, apart.faces, merge="exact")
+    assert joined.warnings == ()
+    np.testing.assert_array_equal(joined.vertex_map, [0, 1, 2, 1, 3, 2])
+    np.testing.assert_array_equal(joined.vertices[joined.vertex_map], apart.vertices)
+    assert gc.exact_distance(joined, 0).distances[3] == pytest.approx(np.sqrt(2), rel=1e-15)
+
+
+def test_merging_takes_the_two_zeros_as_one():
+    points = [[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-0.0, 0, 0], [0, 0, 1], [1, 0, 0]]
+    mesh = gc.TriangleMesh(points, [[0, 1, 2], [3, 4, 5]], merge="exact")
+
+    assert len(mesh.vertices) == 4
+
+
+def test_merge_must_be_known():
+    with pytest.raises(gc.errors.InvalidArgument, match="'near'"):
+        gc.TriangleMesh(TRIANGLE, [[0, 1, 2]], merge="near")
+
+
+def test_warns_of_faces_without_area():
+    mesh = gc.TriangleMesh([*TRIANGLE, [0.5, 0.5, 0]], [[0, 1, 2], [2, 1, 3]])
+
+    assert mesh.report.degenerate_faces == gc.Sample(1, (1,))
+    assert "first is face 1" in mesh.warnings[0]
+
+
+def test_warns_of_fans_that_meet():
+    mesh = gc.TriangleMesh([*TRIANGLE, [-1, 0, 0], [0, -1, 0]], [[0, 1, 2], [0, 3, 4]])
+
+    assert mesh.report.bow_tie_vertices == gc.Sample(1, (0,))
+    assert "first is vertex 0" in mesh.warnings[0]
+
+
+def test_what_a_store_keeps_makes_the_same_mesh():
+    mesh = gc.TriangleMesh(*gc.samples.sphere(320), merge="exact")
+    again = gc.TriangleMesh.from_arrays(mesh.arrays())
+
+    assert again.report == mesh.report
+    assert again.nbytes == mesh.nbytes == sum(array.nbytes for array in mesh.arrays().values())
+    field, twin = gc.exact_distance(mesh, 3), gc.exact_distance(again, 3)
+    assert field.distances.tobytes() == twin.distances.tobytes()
+
+
+def test_is_frozen_and_apart_from_what_was_given():
+    points = np.array(CORNERS, float)
+    mesh = gc.TriangleMesh(points, TETRAHEDRON)
+    points[:] = 7
+
+    assert mesh.vertices.max() == 1
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.vertices[0] = 1
+    assert repr(mesh) == "TriangleMesh(4 vertices, 4 faces)"
