@@ -60,7 +60,7 @@ def kernel(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Compile a kernel that is pasted into its callers; for what runs once per window.
+    """Compile a kernel that is pasted into its callers: what runs per window, or has one caller.
 
     LLVM leaves functions of ten arguments as calls by itself, which costs a quarter of the sweep.
     """
