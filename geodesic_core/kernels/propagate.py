@@ -69,7 +69,7 @@ def collect(wave: Any, h: int) -> int:
     length = wave.geometry[row + LENGTH]
     from_tail = wave.distance[wave.links[row + TAIL]] * (1.0 + SLACK)
     from_head = wave.distance[wave.links[row + HEAD]] * (1.0 + SLACK) + length
-    overlap, gap = OVERLAP * length, GAP * length
+    gap = GAP * length
     limited = wave.max_distance < math.inf
     count = 0
     p0, p1, px, py, p_sigma = 0.0, 0.0, 0.0, 0.0, 0.0  # the window last kept, also in scratch
@@ -83,7 +83,7 @@ def collect(wave: Any, h: int) -> int:
         if limited and not reaches(b0, b1, sx, sy, sigma, wave.max_distance):
             continue
         while count > 0 and p1 >= b0:
-            p0, p1, b0, b1 = trim(p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, overlap)
+            p0, p1, b0, b1 = trim(p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, length)
             p = WIDTH * (count - 1)
             if p1 > p0:
                 wave.scratch[p + B0], wave.scratch[p + B1] = p0, p1

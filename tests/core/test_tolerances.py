@@ -32,6 +32,7 @@ from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.tolerances import (
     BEND,
     GAP,
+    LOOSE_OVERLAP,
     ON_PATH,
     OVERLAP,
     PATH_LENGTH,
@@ -114,14 +115,23 @@ def angles(rows) -> np.ndarray:
 
 
 @SCALES
-def test_overlap_is_the_least_that_is_trimmed(scale):
-    """And what stays could not be told apart: the distances differ by less than the overlap."""
-    for share, trimmed in ((0.5, False), (2.0, True)):
-        b = 0.5 * scale
-        over = share * OVERLAP * scale
-        p, c = (0.0, b + over, 0.1 * scale, -scale, 0.0), (b, scale, scale, -scale, 0.0)
-        left = trim(*p, *c, OVERLAP * scale)
-        assert (left != (p[0], p[1], c[0], c[1])) == trimmed
+@pytest.mark.parametrize(("share", "trimmed"), [(0.5, False), (2.0, True)])
+def test_overlap_is_the_least_that_is_trimmed(scale, share, trimmed):
+    assert is_trimmed(share * OVERLAP, 0.0, scale) == trimmed
+
+
+@SCALES
+@pytest.mark.parametrize(("share", "trimmed"), [(0.5, False), (2.0, True)])
+def test_loose_overlap_is_the_least_that_is_trimmed_of_different_sigma(scale, share, trimmed):
+    assert is_trimmed(share * LOOSE_OVERLAP, 1e-3, scale) == trimmed
+
+
+def is_trimmed(overlap, difference, scale) -> bool:
+    """Of two windows on an edge of length ``scale`` that overlap by a share of it."""
+    b = 0.5 * scale
+    p = (0.0, b + overlap * scale, 0.1 * scale, -scale, 0.0)
+    c = (b, scale, scale, -scale, difference * scale)
+    return trim(*p, *c, scale) != (p[0], p[1], c[0], c[1])
 
 
 def flat_view(scale):
