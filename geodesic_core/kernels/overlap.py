@@ -64,7 +64,8 @@ def trim(
     # it has no root (7 % slower on horse97k); lo by a branch, which does not wait for the trim
     # before as max() does (16 % faster on icosphere 6, 2 to 4 % slower on scans).
     lo, hi = max(p0, c0), min(p1, c1)
-    if hi - lo <= OVERLAP * length:
+    worth = OVERLAP if p_sigma == c_sigma else LOOSE_OVERLAP
+    if hi - lo <= worth * length:
         return p0, p1, c0, c1
     if p_sigma == c_sigma:
         # Mostly two images of one pseudosource: their bisector is a straight line, and squares of
@@ -85,8 +86,6 @@ def trim(
             x = min(max(lo - lead / slope, lo), hi)
             c0, c1 = without(c0, c1, x, hi)
             p0, p1 = without(p0, p1, lo, x)
-        return p0, p1, c0, c1
-    if hi - lo <= LOOSE_OVERLAP * length:
         return p0, p1, c0, c1
     lead_lo = distance_at(lo, cx, cy, c_sigma) - distance_at(lo, px, py, p_sigma)
     lead_hi = distance_at(hi, cx, cy, c_sigma) - distance_at(hi, px, py, p_sigma)
