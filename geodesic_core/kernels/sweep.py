@@ -6,23 +6,12 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.arrival import bound_vertex, improve_vertex
 from geodesic_core.kernels.jit import kernel
-from geodesic_core.kernels.propagate import (
-    POOL_FULL,
-    PROPAGATED,
-    emit_pseudosource,
-    improve_vertex,
-    is_pseudosource,
-    propagate_list,
-    queue_list,
-)
-from geodesic_core.kernels.queue import (
-    HEAP_SIZE,
-    RING_HEAD,
-    RING_SIZE,
-    pop_nearest,
-    ring_pop,
-)
+from geodesic_core.kernels.lists import free_windows, queue_list
+from geodesic_core.kernels.propagate import POOL_FULL, PROPAGATED, propagate_list
+from geodesic_core.kernels.pseudosource import emit_pseudosource, is_pseudosource
+from geodesic_core.kernels.queue import HEAP_SIZE, RING_HEAD, RING_SIZE, pop_nearest, ring_pop
 from geodesic_core.kernels.topology import (
     APEX,
     CORNER_COUNT,
@@ -41,39 +30,42 @@ from geodesic_core.kernels.wavefront import (
     FRONT,
     IN_RING,
     LIST,
+    SIZE,
     VIA,
     WORK,
-    free_windows,
+    merging,
     view_of,
 )
 
-# Outcomes of a slice
+# Outcomes of a slice; those of `propagate` are the others
 FINISHED = 3
-RUNNING = 4  # POOL_FULL and SCRATCH_FULL of `propagate` are the others: grow, and call again
+RUNNING = 4
 
 
 @kernel
 def start_sweep(
-    topology: Any, wavefront: Any, sources: Ints, start_distances: Floats, max_distance: float
+    topology: Any, wavefront: Any, sources: Ints, start_distances: Floats, bounds: Any
 ) -> None:
     """Reach the source vertices at their start distances."""
-    wave = view_of(topology, wavefront, max_distance)
+    wave = view_of(topology, wavefront, bounds)
     for i in range(len(sources)):
         v = sources[i]
         if start_distances[i] < wave.distance[v]:
             wave.origin[v] = i
-            improve_vertex(wave, v, start_distances[i], -1, 0.0, 0.0, v)
+            if merging(wave):
+                bound_vertex(wave, v, start_distances[i])
+            improve_vertex(wave, v, start_distances[i], -1, 0.0, 0.0, v, -1 - v)
 
 
 @kernel
-def advance(topology: Any, wavefront: Any, max_distance: float, budget: int) -> int:
+def advance(topology: Any, wavefront: Any, bounds: Any, budget: int) -> int:
     """Run the sweep for a slice of about ``budget`` units of 10 ns; return its outcome.
 
     Windows wholly beyond ``max_distance`` are dropped. Vertices beyond it are reached and settled
     all the same, for a list waits for an end of its edge, and windows between two far ends may be
     near; the caller takes their distances away.
     """
-    wave = view_of(topology, wavefront, max_distance)
+    wave = view_of(topology, wavefront, bounds)
     wave.counters[WORK] = 0
     outcome = drain(wave, budget)
     while outcome == FINISHED and wave.counters[HEAP_SIZE] > 0:
@@ -91,7 +83,7 @@ def settle_nearest(wave: Any) -> int:
     v = wave.heap[0]
     emits = is_pseudosource(wave, v)
     first = wave.first_corner[v]
-    if emits and first >= 0 and 2 * wave.links[ROW * first + CORNER_COUNT] > free_windows(wave):
+    if emits and first >= 0 and 6 * wave.links[ROW * first + CORNER_COUNT] > free_windows(wave):
         return POOL_FULL
     pop_nearest(wave)
     if wave.status[v] != DONE:
@@ -111,9 +103,11 @@ def settle_nearest(wave: Any) -> int:
         queue_list(wave, previous(h))
         across = wave.links[ROW * following(h) + OPPOSITE]
         if across >= 0:
-            far = wave.links[ROW * (across >> 1) + APEX]
-            if wave.status[far] != FAR:
-                queue_list(wave, across >> 1)
+            across >>= 1
+            if wave.lists[LIST * across + SIZE] > 0:
+                far = wave.links[ROW * across + APEX]
+                if wave.status[far] != FAR:
+                    queue_list(wave, across)
         h = wave.links[ROW * h + NEXT_CORNER]
     return FINISHED
 

@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.arrays import Flags, Floats, Ints, Longs, aligned_rows
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.tolerances import SADDLE_EXCESS
 
@@ -453,10 +453,11 @@ def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[int, i
 
 def empty_topology(vertex_count: int, face_count: int) -> Topology:
     """Allocate the arrays that `build_topology` fills."""
-    links = np.full((3 * face_count, ROW), -1, np.int32)
+    links = aligned_rows(3 * face_count, ROW, np.int32)
+    links[:] = -1
     links[:, CORNER_COUNT] = 0
     return Topology(
-        geometry=np.empty((3 * face_count, ROW), np.float64),
+        geometry=aligned_rows(3 * face_count, ROW, np.float64),
         links=links,
         first_corner=np.full(vertex_count, -1, np.int32),
         total_angle=np.zeros(vertex_count, np.float64),

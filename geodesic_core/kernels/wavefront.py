@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Flags, Floats, Ints, Longs
-from geodesic_core.kernels.jit import kernel, pointer
+from geodesic_core.arrays import Flags, Floats, Ints, Longs, aligned_rows
+from geodesic_core.kernels.jit import inlined, kernel, pointer
 from geodesic_core.kernels.topology import Topology
-from geodesic_core.kernels.window import INTS, NEXT, WIDTH
+from geodesic_core.kernels.window import WIDTH
 
 # Columns of Wavefront.lists, a row per half-edge
 SIZE = 0  # number of windows
@@ -31,6 +31,24 @@ FAR = 0
 FRONT = 1  # shares a face with a vertex that is done
 DONE = 2  # has left the heap
 
+# Columns of Wavefront.light, a row per vertex: angles in its unfolded fan
+LIT_FROM = 0  # the range of directions in which pseudosources are seen; empty if FROM > TO
+LIT_TO = 1
+SENT_FROM = 2  # the same when windows were last emitted
+SENT_TO = 3
+SENT_AT = 4  # and the vertex's distance then; infinite before
+LIGHT = 5
+
+# Columns of Wavefront.merges (float64) and merge_ints (int32), a row per merge
+SPLIT = 0  # position on the half-edge: left of it the first window counts, right of it the second
+LEFT = 1  # SX, SY, SIGMA of the first window
+RIGHT = 4  # of the second
+MERGE = 7
+MERGED_ON = 0  # half-edge
+LEFT_REFERENCE = 1  # what was merged into the first window before; see `window`
+RIGHT_REFERENCE = 2
+MERGE_INTS = 3
+
 # Counters (after the queues' three)
 FREE_FIRST = 3  # free list
 FREE_SIZE = 4
@@ -40,7 +58,32 @@ CREATED = 7  # windows, in all
 KEPT = 8  # windows that survived trimming and were propagated
 PEAK = 9  # windows alive at once, at most
 WORK = 10  # done in this slice, about 10 ns each
+MERGES = 11  # recorded for backtracing
 COUNTERS = 16
+
+
+class Bounds(NamedTuple):
+    """What a sweep keeps to."""
+
+    max_distance: float
+    """Windows wholly beyond it are dropped; mesh units, may be infinite"""
+    relative_error: float
+    """A window may fall short of the exact distance by this share of it, ..."""
+    absolute_error: float
+    """... and by no more than this; mesh units"""
+    merging: tuple[int, ...]
+    """Empty in an exact sweep. Its length is part of its type: kernels are compiled twice, and the
+    exact ones carry nothing of merging"""
+
+
+def exact_bounds(max_distance: float) -> Bounds:
+    """Return the bounds of a sweep that never merges."""
+    return Bounds(max_distance, 0.0, 0.0, ())
+
+
+def merging_bounds(max_distance: float, relative_error: float, absolute_error: float) -> Bounds:
+    """Return the bounds of a sweep that merges windows within both errors."""
+    return Bounds(max_distance, relative_error, absolute_error, (1,))
 
 
 class Wavefront(NamedTuple):
@@ -67,6 +110,19 @@ class Wavefront(NamedTuple):
     scratch: Floats
     """(S, 8): the list that is being propagated"""
     counters: Longs
+    # The following are empty unless the sweep merges.
+    upper: Floats
+    """(V,): upper bound of the exact distance"""
+    light: Floats
+    """(V, 5): LIT_FROM, LIT_TO, SENT_FROM, SENT_TO, SENT_AT"""
+    reference: Ints
+    """(V,): REFERENCE of the winning window"""
+    runs: Flags
+    """(3F,): how often the half-edge's list was propagated"""
+    merges: Floats
+    """(M, 7): SPLIT, LEFT, RIGHT; empty also where no paths are wanted"""
+    merge_ints: Ints
+    """(M, 3): MERGED_ON, LEFT_REFERENCE, RIGHT_REFERENCE"""
 
 
 class View(NamedTuple):
@@ -92,14 +148,24 @@ class View(NamedTuple):
     scratch: Any
     scratch_ints: Any
     counters: Any
+    upper: Any
+    light: Any
+    reference: Any
+    runs: Any
+    merges: Any
+    merge_ints: Any
     ring_capacity: int
     pool: int
     scratch_size: int
+    merge_capacity: int
     max_distance: float
+    relative_error: float
+    absolute_error: float
+    merging: tuple[int, ...]
 
 
 @kernel
-def view_of(topology: Any, wave: Any, max_distance: float) -> Any:
+def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
     """Return the View of two tuples of arrays, which the caller must hold meanwhile."""
     return View(
         pointer(topology.geometry),
@@ -122,16 +188,36 @@ def view_of(topology: Any, wave: Any, max_distance: float) -> Any:
         pointer(wave.scratch),
         pointer(wave.scratch.view(np.int32)),
         pointer(wave.counters),
+        pointer(wave.upper),
+        pointer(wave.light),
+        pointer(wave.reference),
+        pointer(wave.runs),
+        pointer(wave.merges),
+        pointer(wave.merge_ints),
         wave.ring.shape[0],
         wave.windows.shape[0],
         wave.scratch.shape[0],
-        max_distance,
+        wave.merges.shape[0],
+        bounds.max_distance,
+        bounds.relative_error,
+        bounds.absolute_error,
+        bounds.merging,
     )
 
 
-def new_wavefront(topology: Topology) -> Wavefront:
-    """Allocate the state of one sweep: O(V + F), nothing reached yet."""
+@inlined
+def merging(wave: Any) -> bool:
+    """Whether the sweep merges windows; known when it is compiled."""
+    return len(wave.merging) > 0
+
+
+def new_wavefront(topology: Topology, *, merges: bool = False, paths: bool = False) -> Wavefront:
+    """Allocate the state of one sweep: O(V + F), nothing reached yet.
+
+    With ``paths``, a sweep that merges records what it merges, for backtracing.
+    """
     vertices, half_edges = len(topology.first_corner), len(topology.links)
+    merged_vertices = vertices if merges else 0
     counters = np.zeros(COUNTERS, np.int64)
     counters[FREE_FIRST] = -1
     return Wavefront(
@@ -145,53 +231,39 @@ def new_wavefront(topology: Topology) -> Wavefront:
         heap_place=np.full(vertices, -1, np.int32),
         ring=np.empty(half_edges, np.int32),
         lists=np.zeros((half_edges, LIST), np.int32),
-        windows=np.empty((1024, WIDTH)),
-        scratch=np.empty((256, WIDTH)),
+        windows=aligned_rows(1024, WIDTH, np.float64),
+        scratch=aligned_rows(256, WIDTH, np.float64),
         counters=counters,
+        upper=np.full(merged_vertices, np.inf),
+        light=np.tile([1.0, -1.0, 1.0, -1.0, np.inf], (merged_vertices, 1)),
+        reference=np.full(merged_vertices, -1, np.int32),
+        runs=np.zeros(half_edges if merges else 0, np.uint8),
+        merges=np.empty((1024 if paths else 0, MERGE)),
+        merge_ints=np.empty((1024 if paths else 0, MERGE_INTS), np.int32),
     )
 
 
 def with_larger_pool(wave: Wavefront) -> Wavefront:
     """Return the wavefront with twice the windows."""
-    windows = np.empty((2 * len(wave.windows), WIDTH))
+    windows = aligned_rows(2 * len(wave.windows), WIDTH, np.float64)
     windows[: len(wave.windows)] = wave.windows
     return wave._replace(windows=windows)
 
 
 def with_larger_scratch(wave: Wavefront) -> Wavefront:
     """Return the wavefront with room for lists twice as long."""
-    return wave._replace(scratch=np.empty((2 * len(wave.scratch), WIDTH)))
+    return wave._replace(scratch=aligned_rows(2 * len(wave.scratch), WIDTH, np.float64))
+
+
+def with_more_merges(wave: Wavefront) -> Wavefront:
+    """Return the wavefront with room for twice the merges."""
+    room = 2 * len(wave.merges)
+    merges, merge_ints = np.empty((room, MERGE)), np.empty((room, MERGE_INTS), np.int32)
+    merges[: len(wave.merges)] = wave.merges
+    merge_ints[: len(wave.merges)] = wave.merge_ints
+    return wave._replace(merges=merges, merge_ints=merge_ints)
 
 
 def bytes_of(wave: Wavefront) -> int:
     """Memory of the state."""
     return sum(array.nbytes for array in wave)
-
-
-@kernel
-def free_windows(wave: Any) -> int:
-    """Return the number of windows that can be taken before the pool must grow."""
-    return wave.counters[FREE_SIZE] + wave.pool - wave.counters[FRESH]
-
-
-@kernel
-def take_window(wave: Any) -> int:
-    """Take a slot from the pool; the caller has checked that there is one."""
-    slot = wave.counters[FREE_FIRST]
-    if slot >= 0:
-        wave.counters[FREE_FIRST] = wave.window_ints[INTS * slot + NEXT]
-        wave.counters[FREE_SIZE] -= 1
-        return slot
-    slot = wave.counters[FRESH]
-    wave.counters[FRESH] = slot + 1
-    return slot
-
-
-@kernel
-def release_list(wave: Any, h: int) -> None:
-    """Give all windows of the list of h back to the pool, in O(1)."""
-    row = LIST * h
-    wave.window_ints[INTS * wave.lists[row + LAST] + NEXT] = wave.counters[FREE_FIRST]
-    wave.counters[FREE_FIRST] = wave.lists[row + FIRST]
-    wave.counters[FREE_SIZE] += wave.lists[row + SIZE]
-    wave.lists[row + SIZE] = 0

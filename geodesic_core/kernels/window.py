@@ -9,13 +9,17 @@ column     paper                       meaning, unit
 B0, B1     b0, b1                      ends on the half-edge, mesh units from its tail
 SX, SY     d0, d1 and τ, in one        the unfolded pseudosource s in the half-edge's frame
 SIGMA      σ                           distance from s back to the source, mesh units
+XI         ξ                           how much the window may fall short of the exact distance
 =========  ==========================  =======================================================
 
 The unfolded position replaces the two distances d0, d1, whose every use would cost a square root,
-and its side of the edge replaces the direction τ. The last eight bytes of a row hold two int32:
+and its side of the edge replaces the direction τ. The rest of a row holds int32:
 
+REFERENCE  what was merged into the window (4.3): a merge's index, or -1 - ROOT where nothing was
 NEXT       slot of the next window of the same list (or of the next free slot), -1 at the end
-ROOT       vertex of the pseudosource
+ROOT       vertex of the pseudosource; of a merged window, of one of those that it replaces
+
+XI and REFERENCE have a meaning in a merging sweep only.
 """
 
 import math
@@ -27,9 +31,11 @@ B1 = 1
 SX = 2
 SY = 3
 SIGMA = 4
+XI = 5
 
 WIDTH = 8  # float64 columns of a row
-NEXT = 14  # int32 columns of a row
+REFERENCE = 12  # int32 columns of a row
+NEXT = 14
 ROOT = 15
 INTS = 16
 

@@ -41,7 +41,8 @@ def test_paths_on_larger_meshes_and_slivers(case):
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_paths_on_larger_meshes_from_many_sources(case):
-    check_paths(case, range(0, len(case.vertices), 7))
+    sources = np.random.default_rng(7).choice(len(case.vertices), 20)
+    check_paths(case, sources.tolist(), at_most=300)
 
 
 def test_a_path_through_saddles_has_its_vertices_as_points():

@@ -4,17 +4,17 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 import geodesic_core as gc
 from geodesic_core import tolerances
+from geodesic_core.kernels import wavefront
+from geodesic_core.kernels.arrival import precedence
 from geodesic_core.kernels.backtrace import is_on_path
-from geodesic_core.kernels.overlap import trim
-from geodesic_core.kernels.propagate import (
-    collect,
-    precedence,
-    put_window,
-    reach_apex,
-)
+from geodesic_core.kernels.lists import put_window
+from geodesic_core.kernels.merge import accuracy, merged
+from geodesic_core.kernels.propagate import collect, reach_apex
 from geodesic_core.kernels.topology import (
     APEX,
     COS_LEFT,
@@ -27,19 +27,23 @@ from geodesic_core.kernels.topology import (
     SIN_LEFT,
     TAIL,
 )
-from geodesic_core.kernels.wavefront import FIRST, LAST, SIZE
+from geodesic_core.kernels.wavefront import FIRST, LAST, SIZE, merging_bounds, new_wavefront
 from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.tolerances import (
     BEND,
     GAP,
+    LOCAL_SHARE,
     LOOSE_OVERLAP,
+    LOWER_BOUND,
     ON_PATH,
     OVERLAP,
     PATH_LENGTH,
+    RUNS,
     SADDLE_EXCESS,
     SECTOR_MARGIN,
     SLACK,
     TIE,
+    WIDEST_ERROR,
 )
 from tests import zoo
 from tests.core.kernels.invariants import windows_of
@@ -128,10 +132,13 @@ def test_loose_overlap_is_the_least_that_is_trimmed_of_different_sigma(scale, sh
 
 def is_trimmed(overlap, difference, scale) -> bool:
     """Of two windows on an edge of length ``scale`` that overlap by a share of it."""
-    b = 0.5 * scale
-    p = (0.0, b + overlap * scale, 0.1 * scale, -scale, 0.0)
-    c = (b, scale, scale, -scale, difference * scale)
-    return trim(*p, *c, scale) != (p[0], p[1], c[0], c[1])
+    view, wave, h = flat_view(scale)
+    b, source = 0.5 * scale, scale * np.array([(0.1, -1.0, 0.0), (1.0, -1.0, difference)])
+    left, right = (0.1 * scale, b + overlap * scale), (b, 0.9 * scale)
+    put_list(view, wave, h, [(*left, *source[0]), (*right, *source[1])], 0)
+    assert collect(view, h) == 2
+    ends = wave.scratch[0, B1], wave.scratch[1, B0]
+    return ends != (left[1], right[0])
 
 
 def flat_view(scale):
@@ -145,7 +152,7 @@ def flat_view(scale):
 
 
 def put_list(view, wave, h, windows, root):
-    slots = [put_window(view, *window, root) for window in windows]
+    slots = [put_window(view, *window, root, 0.0, -1) for window in windows]
     wave.lists[h, [SIZE, FIRST, LAST]] = len(slots), slots[0], slots[-1]
     for slot, after in zip(slots, [*slots[1:], -1], strict=True):
         wave.windows.view(np.int32)[slot, NEXT] = after
@@ -259,3 +266,74 @@ def test_path_length_is_the_most_that_a_path_may_differ_from_its_field(scale, si
     field.distances[-1] = honest * (1 + 2.0 * sign * PATH_LENGTH)
     with pytest.raises(gc.errors.InternalError, match="the field says"):
         field.path_to(len(points) - 1)
+
+
+# Merging ----------------------------------------------------------------------------------------
+
+
+def merging_view(relative_error, absolute_error=math.inf):
+    points, faces = zoo.grid(3, 3)
+    topology = topology_of(zoo.Case("flat", points, faces))
+    bounds = merging_bounds(math.inf, relative_error, absolute_error)
+    return view_of_arrays(topology, new_wavefront(topology, merges=True), bounds)
+
+
+@pytest.mark.parametrize(("share", "merges"), [(0.9, True), (1.1, False)])
+@pytest.mark.parametrize("absolute", [True, False])
+def test_local_share_is_all_that_one_merge_may_use_up(share, merges, absolute):
+    error, nearest = 1e-3, 7.0
+    allowed = error * nearest
+    view = merging_view(0.5, allowed) if absolute else merging_view(error)
+    own = share * LOCAL_SHARE * allowed
+    assert accuracy(view, own, own, nearest) == merges
+    assert accuracy(view, allowed, 0.0, nearest)
+    assert not accuracy(view, 1.001 * allowed, 0.0, nearest)
+
+
+@given(
+    st.floats(-2, 3), st.floats(-3, -0.01), st.floats(-2, 3), st.floats(-3, -0.01), st.floats(0, 1)
+)
+def test_lower_bound_is_all_that_a_merged_window_rises_by(s0x, s0y, s1x, s1y, joint):
+    b = 0.2 + 0.6 * joint
+    # Both windows give the same distance where they meet
+    gap = math.hypot(s0x - b, s0y) - math.hypot(s1x - b, s1y)
+    sigma0, sigma1 = max(-gap, 0.0), max(gap, 0.0)
+    first, second = (0.0, b, s0x, s0y, sigma0), (b, 1.0, s1x, s1y, sigma1)
+    can, sx, sy, sigma, xi = merged(merging_view(0.5), *first, 0.0, *second, 0.0)
+    if not can:
+        return
+    assert sy < 0
+    assert sigma >= 0
+    for b0, b1, x, y, weight in (first, second):
+        places = np.linspace(b0, b1, 101)
+        before = np.hypot(places - x, y) + weight
+        after = np.hypot(places - sx, sy) + sigma
+        assert (after <= before * (1 + 100 * LOWER_BOUND)).all()
+        assert (before - after <= xi + 1e-12).all()
+
+
+def test_runs_are_all_that_a_list_is_given(monkeypatch):
+    """One list that has used them up ends the sweep, and the error names its edge."""
+    points, faces = zoo.grid(4, 4)
+    mesh = gc.TriangleMesh(points, faces)
+
+    def worn_out(*args, **kwargs):
+        wave = new_wavefront(*args, **kwargs)
+        wave.runs[:] = RUNS
+        return wave
+
+    gc.approximate_distance(mesh, 0)
+    monkeypatch.setattr(wavefront, "new_wavefront", worn_out)
+    with pytest.raises(gc.errors.NotConverged, match=r"edge between vertices \d+ and \d+"):
+        gc.approximate_distance(mesh, 0)
+
+
+def test_widest_error_is_the_most_that_is_used():
+    mesh = gc.TriangleMesh(*gc.samples.knot(2000))
+    widest = gc.approximate_distance(mesh, 0, WIDEST_ERROR)
+    for error in (2 * WIDEST_ERROR, 0.5):
+        field = gc.approximate_distance(mesh, 0, error)
+        assert (field.distances == widest.distances).all()
+        assert field.error_bound.value == error
+    narrower = gc.approximate_distance(mesh, 0, WIDEST_ERROR / 2)
+    assert (narrower.distances != widest.distances).any()

@@ -12,6 +12,7 @@ from geodesic_core.kernels.topology import Topology
 from geodesic_core.kernels.wavefront import (
     View,
     Wavefront,
+    exact_bounds,
     new_wavefront,
     with_larger_pool,
     with_larger_scratch,
@@ -31,7 +32,7 @@ def started(topology, sources, starts=None, limit=math.inf) -> Wavefront:
     wave = new_wavefront(topology)
     inner = topology.inner_vertex[np.atleast_1d(sources)]
     starts = np.zeros(len(inner)) if starts is None else np.asarray(starts, dtype=float)
-    sweep.start_sweep(topology, wave, inner, starts, limit)
+    sweep.start_sweep(topology, wave, inner, starts, exact_bounds(limit))
     return wave
 
 
@@ -42,7 +43,7 @@ def steps(topology, wave, limit=math.inf, budget=1) -> Iterator[tuple[int, Wavef
     """
     outcome = sweep.RUNNING
     while outcome != sweep.FINISHED:
-        outcome = sweep.advance(topology, wave, limit, budget)
+        outcome = sweep.advance(topology, wave, exact_bounds(limit), budget)
         if outcome == POOL_FULL:
             wave = with_larger_pool(wave)
         elif outcome == SCRATCH_FULL:
@@ -56,7 +57,7 @@ def finished(topology, wave, limit=math.inf, budget=WHOLE) -> Wavefront:
     return wave
 
 
-def view_of_arrays(topology, wave, limit=math.inf) -> View:
+def view_of_arrays(topology, wave, bounds=exact_bounds(math.inf)) -> View:  # noqa: B008
     """The View that kernels see, of flat arrays in place of pointers: so that tests can hold it."""
     flat = {
         name: getattr(state, name).reshape(-1)
@@ -71,5 +72,6 @@ def view_of_arrays(topology, wave, limit=math.inf) -> View:
         ring_capacity=len(wave.ring),
         pool=len(wave.windows),
         scratch_size=len(wave.scratch),
-        max_distance=limit,
+        merge_capacity=len(wave.merges),
+        **bounds._asdict(),
     )

@@ -32,12 +32,12 @@ def naive(x, window):
     return np.where((b0 <= x) & (x <= b1), np.hypot(x - sx, sy) + sigma, math.inf)
 
 
-SHORT = 1e-8
-"""An edge's length beside which every overlap here is worth trimming."""
+LEAST = 1e-14
+"""Every wider overlap is trimmed here."""
 
 
 def trimmed(p, c):
-    p0, p1, c0, c1 = trim(*p, *c, SHORT)
+    p0, p1, c0, c1 = trim(*p, *c, LEAST, LEAST)
     return (p0, p1, *p[2:]), (c0, c1, *c[2:])
 
 
@@ -99,7 +99,7 @@ def test_trimming_again_changes_little(p, c):
 def test_of_equal_windows_the_first_stays(p):
     p_left, c_left = trimmed(p, p)
     assert p_left == p
-    assert is_empty(c_left) or p[1] - p[0] <= SHORT
+    assert is_empty(c_left) or p[1] - p[0] <= LEAST
 
 
 @given(windows(), windows())
