@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels.backtrace import LOST, NO_ROOM, TRACED, trace_path
+from geodesic_core.kernels.backtrace import LOST, NO_ROOM, TRACED, Winners, trace_path
 from geodesic_core.kernels.topology import APEX, OPPOSITE
 from geodesic_core.kernels.wavefront import FROM, VIA
 from tests import zoo
@@ -15,9 +15,7 @@ def trace(topology, wave, target, room):
     nodes, faces = np.empty(room, np.int32), np.empty(room, np.int32)
     outcome, count = trace_path(
         topology,
-        wave.distance,
-        wave.winner,
-        wave.winner_ints,
+        Winners(**{name: getattr(wave, name) for name in Winners._fields}),
         target,
         nodes,
         np.empty(room),
@@ -70,8 +68,8 @@ def test_a_lost_line_is_an_internal_error():
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     field = gc.exact_distance(mesh, 0)
     _, wave, v = broken("jittered_grid")
-    field._winner[:], field._winner_ints[:] = wave.winner, wave.winner_ints
-    field._distance[:] = wave.distance
+    for name in ("winner", "winner_ints", "distance"):
+        getattr(field._winners, name)[:] = getattr(wave, name)
     with pytest.raises(gc.errors.InternalError, match="left the surface"):
         field.path_to(int(mesh.topology.outer_vertex[v]))
 
