@@ -9,6 +9,7 @@ from geodesic_core.kernels.topology import (
     BOUNDARY,
     COS_LEFT,
     FAN_ANGLE,
+    LENGTH,
     LENGTH_LEFT,
     NEXT_CORNER,
     ROW,
@@ -106,10 +107,12 @@ def incoming_angle(wave: Any, v: int, via: int, sx: float, sy: float) -> float:
     ex = -wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
     ey = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
     dx, dy = sx + ex, sy + ey
-    turn: float = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
+    turn: float = max(math.atan2(ex * dy - ey * dx, ex * dx + ey * dy), 0.0)
     corner = previous(via)
+    if (wave.geometry[row + LENGTH] + ex) * dy - ey * dx > 0.0:  # beyond the head
+        turn = min(turn, corner_width(wave, v, corner))
     start: float = wave.geometry[ROW * corner + FAN_ANGLE]
-    return start + min(max(turn, 0.0), corner_width(wave, v, corner))
+    return start + turn
 
 
 @kernel

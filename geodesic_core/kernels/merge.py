@@ -103,6 +103,11 @@ def merged(
     width, d0, d1 = c1 - b0, r0 + sigma0, r1 + sigma1
     if not accuracy(wave, max(xi0, xi1), 0.0, min(d0, d1)):
         return refused
+    # Half of all pairs fail here already, before the conic costs anything.
+    meets = min(distance_at(b1, s0x, s0y, sigma0), distance_at(c0, s1x, s1y, sigma1))
+    chord = d0 + (d1 - d0) * (b1 - b0) / width  # nowhere below the merged window
+    if not accuracy(wave, meets - chord, meets - chord, min(d0, d1)):
+        return refused
     difference = d0 - d1
     spare = (width - difference) * (width + difference)
     if spare <= 0.0 or r0 <= 0.0 or r1 <= 0.0:

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from geodesic_core.kernels.arrival import bound_vertex, improve_vertex, light_vertex, precedence
-from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.jit import inlined, kernel, prefetch
 from geodesic_core.kernels.lists import free_windows, put_window, queue_if_due, release_list
 from geodesic_core.kernels.merge import merged
 from geodesic_core.kernels.overlap import leaves_gap, trim
@@ -389,6 +389,9 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
 def propagate_list(wave: Any, h: int) -> int:
     """Propagate the windows of h across its face (section 3.2)."""
     size = wave.lists[LIST * h + SIZE]
+    prefetch(wave.lists, LIST * wave.links[ROW * h + OUT_LEFT])
+    prefetch(wave.lists, LIST * wave.links[ROW * h + OUT_RIGHT])
+    prefetch(wave.distance, wave.links[ROW * h + APEX])
     if 2 * size > free_windows(wave):
         return POOL_FULL
     if size > wave.scratch_size:
