@@ -1,6 +1,7 @@
 """From a validated query to its answer: the only place of the service that calls the solvers."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -28,15 +29,24 @@ def _distances(
 ) -> Answer:
     mesh = opened.mesh
     sources = [gc.Source(source.vertex, source.start_distance) for source in query.sources]
-    field = gc.exact_distance(
-        mesh, sources, query.max_distance, cancel=cancel, memory_limit=memory_limit
-    )
+    if query.approximation is None:
+        field = gc.exact_distance(
+            mesh, sources, query.max_distance, cancel=cancel, memory_limit=memory_limit
+        )
+    else:
+        field = gc.approximate_distance(
+            mesh,
+            sources,
+            **asdict(query.approximation),
+            max_distance=query.max_distance,
+            cancel=cancel,
+            memory_limit=memory_limit,
+        )
     asked = slice(None) if query.targets is None else np.array(query.targets)
     distances = field.distances[asked]
     members: dict[str, Any] = {
         "mesh_id": query.mesh_id,
-        "method": "exact",
-        "exact": True,
+        **_method(query),
         "error_bound": _error_bound(field.error_bound),
         "sources": [
             _point(mesh, source.vertex) | {"start_distance": source.start_distance}
@@ -59,19 +69,16 @@ def _path(
     mesh = opened.mesh
     members: dict[str, Any] = {
         "mesh_id": query.mesh_id,
-        "method": "exact",
-        "exact": True,
+        **_method(query),
         "source": _point(mesh, query.source),
         "target": _point(mesh, query.target),
         "warnings": opened.warnings,
     }
     try:
-        path = gc.shortest_path(
-            mesh, query.source, query.target, cancel=cancel, memory_limit=memory_limit
-        )
+        path = _find_path(query, mesh, cancel, memory_limit)
     except gc.errors.NoPath as error:
         nothing = {"status": "no_path", "reason": error.reason, "points": None}
-        return Answer(members | nothing | {"error_bound": _EXACT}, "points")
+        return Answer(members | nothing | {"error_bound": _CERTAIN}, "points")
     found = {
         "status": "ok",
         "length": path.length,
@@ -86,7 +93,31 @@ def _path(
     return Answer(members | found, "points")
 
 
-_EXACT = {"type": "relative", "value": 0.0, "kind": "guaranteed"}
+def _find_path(
+    query: PathQuery, mesh: gc.TriangleMesh, cancel: Callable[[], bool], memory_limit: int
+) -> gc.GeodesicPath:
+    if query.approximation is None:
+        return gc.shortest_path(
+            mesh, query.source, query.target, cancel=cancel, memory_limit=memory_limit
+        )
+    field = gc.approximate_distance(
+        mesh,
+        query.source,
+        **asdict(query.approximation),
+        keep_windows=True,
+        cancel=cancel,
+        memory_limit=memory_limit,
+    )
+    return field.path_to(query.target)
+
+
+# That there is no path is known without error, by any method.
+_CERTAIN = {"type": "relative", "value": 0.0, "kind": "guaranteed"}
+
+
+def _method(query: Query) -> Mapping[str, Any]:
+    exact = query.approximation is None
+    return {"method": "exact" if exact else "approximate", "exact": exact}
 
 
 def _error_bound(bound: gc.ErrorBound) -> Mapping[str, Any]:

@@ -20,16 +20,19 @@ from typer.exceptions import TyperException
 from app import __version__
 
 if TYPE_CHECKING:
-    from geodesic_core import DistanceField, GeodesicPath, TriangleMesh
+    from geodesic_core import DistanceField, ErrorBound, GeodesicPath, TriangleMesh
 
 FAILED, INTERRUPTED = 1, 130
 """Exit codes: the work failed, Ctrl-C; typer's own for a wrong command line is 2."""
+
+_USUAL_ERROR = 1e-3
+"""The relative error of approximate answers, where none is named."""
 
 _DRAIN_S = 20
 """Granted to requests that run when the server is told to stop."""
 
 cli = typer.Typer(
-    help="Exact geodesic distances and shortest paths on triangle meshes.",
+    help="Geodesic distances and shortest paths on triangle meshes, exact or within an error.",
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -88,6 +91,11 @@ class _Merge(StrEnum):
     EXACT = "exact"
 
 
+class _Method(StrEnum):
+    EXACT = "exact"
+    APPROXIMATE = "approximate"
+
+
 class _SampleName(StrEnum):
     KNOT = "knot"
     SPHERE = "sphere"
@@ -113,6 +121,33 @@ _MeshFile = Annotated[
 _MergeOption = Annotated[
     _Merge, typer.Option("--merge", help="'exact' joins vertices at equal positions.")
 ]
+_MethodOption = Annotated[
+    _Method, typer.Option("--method", help="'approximate' is faster, within the error asked for.")
+]
+_RelativeError = Annotated[
+    float | None,
+    typer.Option(
+        help="For approximate: the error granted, as a share of the distance; "
+        f"{_USUAL_ERROR} where no error is named."
+    ),
+]
+_AbsoluteError = Annotated[
+    float | None,
+    typer.Option(help="For approximate: the same in mesh units; with both, both hold."),
+]
+
+
+def _granted(
+    method: _Method, relative_error: float | None, absolute_error: float | None
+) -> tuple[float | None, float | None] | None:
+    """Return the relative and the absolute error to solve with; None where the method is exact."""
+    is_named = relative_error is not None or absolute_error is not None
+    if method is _Method.APPROXIMATE:
+        return (relative_error, absolute_error) if is_named else (_USUAL_ERROR, None)
+    if is_named:
+        name = "--absolute-error" if relative_error is None else "--relative-error"
+        raise typer.BadParameter(f"{name} goes with --method approximate only")
+    return None
 
 
 # Commands -----------------------------------------------------------------------------------------
@@ -166,22 +201,30 @@ def distance(
     max_distance: Annotated[
         float | None, typer.Option(help="Go no farther than this, in mesh units.")
     ] = None,
+    method: _MethodOption = _Method.EXACT,
+    relative_error: _RelativeError = None,
+    absolute_error: _AbsoluteError = None,
     merge: _MergeOption = _Merge.NONE,
 ) -> None:
-    """Compute the exact distance of every vertex from the nearest source."""
+    """Compute the distance of every vertex from the nearest source."""
+    granted = _granted(method, relative_error, absolute_error)
     mesh, seconds = _read(mesh_file, merge)
     import numpy as np
 
-    from geodesic_core import exact_distance
+    from geodesic_core import approximate_distance, exact_distance
 
     with _step("Computing distances") as step:
-        field = exact_distance(mesh, source, max_distance, **step._asdict())
+        if granted is None:
+            field = exact_distance(mesh, source, max_distance, **step._asdict())
+        else:
+            field = approximate_distance(mesh, source, *granted, max_distance, **step._asdict())
     _write(out, _DISTANCE_WRITERS[out.suffix.lower()], field)
     reached = np.isfinite(field.distances)
     farthest = int(np.argmax(np.where(reached, field.distances, -1.0)))
     typer.echo(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
     typer.echo(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
     typer.echo(f"farthest    vertex {farthest} at {float(field.distances[farthest])!r}")
+    typer.echo(f"error bound {_bound_in_words(field.error_bound)}")
     typer.echo(f"took        {seconds:.3f} s to read, {field.stats.seconds:.3f} s to solve")
     typer.echo(f"written     {out}")
 
@@ -198,20 +241,31 @@ def path(
             callback=_writable(".obj", ".json"),
         ),
     ],
+    method: _MethodOption = _Method.EXACT,
+    relative_error: _RelativeError = None,
+    absolute_error: _AbsoluteError = None,
     merge: _MergeOption = _Merge.NONE,
 ) -> None:
-    """Compute an exact shortest path over the surface between two vertices."""
+    """Compute a shortest path over the surface between two vertices."""
+    granted = _granted(method, relative_error, absolute_error)
     mesh, seconds = _read(mesh_file, merge)
-    from geodesic_core import shortest_path
+    from geodesic_core import approximate_distance, shortest_path
 
     with _step("Computing the path") as step:
         start = perf_counter()
-        found = shortest_path(mesh, source, target, **step._asdict())
+        if granted is None:
+            found = shortest_path(mesh, source, target, **step._asdict())
+        else:
+            field = approximate_distance(
+                mesh, source, *granted, keep_windows=True, **step._asdict()
+            )
+            found = field.path_to(target)
         solved = perf_counter() - start
     _write(out, _PATH_WRITERS[out.suffix.lower()], found)
     typer.echo(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
     typer.echo(f"length      {found.length!r}")
     typer.echo(f"points      {len(found.points)}")
+    typer.echo(f"error bound {_bound_in_words(found.error_bound)}")
     typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
     typer.echo(f"written     {out}")
 
@@ -308,6 +362,10 @@ def _in_words(value: Any) -> str:
             return repr(value)
 
 
+def _bound_in_words(bound: "ErrorBound") -> str:
+    return f"{bound.value!r} ({bound.type}, {bound.kind})"
+
+
 # Files --------------------------------------------------------------------------------------------
 
 
@@ -346,6 +404,7 @@ def _distances_to_json(file: IO[bytes], field: "DistanceField") -> None:
             "sources": [source.point for source in field.sources],
             "distances": field.distances,  # infinity becomes null
             "nearest_source": field.nearest_source,
+            "error_bound": field.error_bound,
             "stats": field.stats.as_dict(),
         },
     )
@@ -368,6 +427,7 @@ def _path_to_json(file: IO[bytes], path: "GeodesicPath") -> None:
             "points": path.points,
             "locations": locations,
             "faces": path.faces,
+            "error_bound": path.error_bound,
         },
     )
 

@@ -57,7 +57,9 @@ CODES: Mapping[str, Code] = {
     ),
     "invalid_point": Code(422, "Invalid point", "A source or target is not a point of the mesh."),
     "limit_exceeded": Code(
-        422, "Limit exceeded", "The request exceeds a limit of this service; see `setting`."
+        422,
+        "Limit exceeded",
+        "The request exceeds a limit of this service; see `setting` or `hint`.",
     ),
     "memory_limit": Code(
         422, "Memory limit", "The query needs more memory than the service grants to one query."
@@ -176,6 +178,11 @@ def _invalid_mesh(error: core.InvalidMesh) -> Problem:
     return Problem("invalid_mesh", str(error), errors=tuple(_mesh_faults(error)))
 
 
+def _not_converged(error: core.NotConverged) -> Problem:
+    hint = "ask for a smaller relative_error or absolute_error, or for method exact"
+    return Problem("limit_exceeded", str(error), hint=hint)
+
+
 def _system_error(error: OSError) -> Problem:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return Problem("storage_full", "the store has no room left on its disk")
@@ -194,6 +201,7 @@ EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (core.InvalidArgument, lambda error: Problem("invalid_request", str(error))),
     (core.DeadlineExceeded, lambda error: Problem("deadline_exceeded", str(error))),
     (core.MemoryLimitExceeded, lambda error: Problem("memory_limit", str(error))),
+    (core.NotConverged, _not_converged),
     (MemoryError, lambda _: Problem("memory_limit", "the worker ran out of memory")),
     (OSError, _system_error),
     (BaseException, _internal_error),

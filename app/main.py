@@ -26,7 +26,7 @@ def create_app(settings: Settings) -> FastAPI:
     app = _Application(
         title="Geodesic",
         version=__version__,
-        summary="Exact geodesic distances and paths on triangle meshes",
+        summary="Geodesic distances and paths on triangle meshes, exact or within a chosen error",
         lifespan=lifespan,
         docs_url=None,  # its page loads scripts from elsewhere
         redoc_url=None,

@@ -27,6 +27,17 @@ class Source:
 
 
 @dataclass(frozen=True)
+class Approximation:
+    """By how much distances may fall short: in shares of them, in mesh units, or both."""
+
+    relative_error: float | None
+    absolute_error: float | None
+
+
+_USUAL = Approximation(relative_error=1e-3, absolute_error=None)
+
+
+@dataclass(frozen=True)
 class DistancesQuery:
     """Distances from ``sources`` to all vertices, or to ``targets`` only."""
 
@@ -35,6 +46,7 @@ class DistancesQuery:
     targets: tuple[int, ...] | None
     max_distance: float | None
     nearest_source: bool
+    approximation: Approximation | None = None  # exact without
 
 
 @dataclass(frozen=True)
@@ -44,6 +56,7 @@ class PathQuery:
     mesh_id: str
     source: int
     target: int
+    approximation: Approximation | None = None
 
 
 Query = DistancesQuery | PathQuery
@@ -66,7 +79,7 @@ def distances_query(
     mesh_id: str, vertices: int, request: schemas.DistancesRequest, settings: Settings
 ) -> DistancesQuery:
     """Validate ``request`` against a mesh of so many ``vertices``."""
-    _refuse_approximate(request.method)
+    approximation = _approximation(request)
     if len(request.sources) > settings.max_sources:
         raise over_limit(
             "limit_exceeded", "sources", len(request.sources), settings.max_sources, "max_sources"
@@ -86,32 +99,27 @@ def distances_query(
         None if request.targets is None else tuple(point.vertex for point in request.targets),
         request.max_distance,
         "nearest_source" in request.include,
+        approximation,
     )
 
 
-def path_query(
-    mesh_id: str,
-    vertices: int,
-    request: schemas.PathRequest,
-    places: tuple[str, str] = ("/source/vertex", "/target/vertex"),
-) -> PathQuery:
-    """Validate ``request`` against a mesh of so many ``vertices``; ``places`` name its ends."""
-    _refuse_approximate(request.method)
-    ends = (request.source.vertex, request.target.vertex)
-    _refuse_outside(vertices, zip(places, ends, strict=True))
-    return PathQuery(mesh_id, *ends)
+def path_query(mesh_id: str, vertices: int, request: schemas.PathRequest) -> PathQuery:
+    """Validate ``request`` against a mesh of so many ``vertices``."""
+    approximation = _approximation(request)
+    source, target = request.source.vertex, request.target.vertex
+    _refuse_outside(vertices, (("/source/vertex", source), ("/target/vertex", target)))
+    return PathQuery(mesh_id, source, target, approximation)
 
 
 def written_path_query(
     mesh_id: str, vertices: int, parameters: schemas.PathParameters
 ) -> PathQuery:
     """Validate the parameters of a ``GET``, which ask the same as the body of a ``POST``."""
-    places = ("/query/from", "/query/to")
-    request = schemas.PathRequest(
-        source=_written_point(places[0], parameters.source),
-        target=_written_point(places[1], parameters.target),
-    )
-    return path_query(mesh_id, vertices, request, places)
+    approximation = _approximation(parameters, "/query")
+    source = _written_vertex("/query/from", parameters.source)
+    target = _written_vertex("/query/to", parameters.target)
+    _refuse_outside(vertices, (("/query/from", source), ("/query/to", target)))
+    return PathQuery(mesh_id, source, target, approximation)
 
 
 def refuse_large_json(query: Query, vertices: int, settings: Settings) -> None:
@@ -131,20 +139,29 @@ def refuse_large_json(query: Query, vertices: int, settings: Settings) -> None:
         )
 
 
-def _refuse_approximate(method: str) -> None:
-    if method == "approximate":
-        fault = Fault("/method", "only 'exact' is available yet")
-        raise refuse(
-            "invalid_request", "the approximate method is not available yet", errors=(fault,)
-        )
+def _approximation(accuracy: schemas.Accuracy, root: str = "") -> Approximation | None:
+    """Return the errors that are granted, if any; ``root`` is where the request has its fields."""
+    errors = {
+        "relative_error": accuracy.relative_error,
+        "absolute_error": accuracy.absolute_error,
+    }
+    given = [name for name, value in errors.items() if value is not None]
+    if accuracy.method == "approximate":
+        return Approximation(**errors) if given else _USUAL
+    if given:
+        message = "goes with method 'approximate' only; exact answers have no error"
+        faults = tuple(Fault(root + pointer(name), message) for name in given)
+        detail = f"{faults[0].pointer}: {message}"
+        raise refuse("invalid_request", detail, errors=faults)
+    return None
 
 
-def _written_point(place: str, text: str) -> schemas.Point:
+def _written_vertex(place: str, text: str) -> int:
     written = _WRITTEN_VERTEX.fullmatch(text)
     if written is None:
         message = f"{text!r} is not a vertex written as v and its index, such as v0"
         raise refuse("invalid_point", message, errors=(Fault(place, message),))
-    return schemas.Point(vertex=int(written[1]))
+    return int(written[1])
 
 
 def _refuse_outside(vertices: int, points: Iterable[tuple[str, int]]) -> None:

@@ -7,6 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveInt, Str
 Merge = Literal["none", "exact"]
 MeshFormat = Literal["obj", "off", "ply", "stl", "glb"]
 SampleName = Literal["knot", "sphere", "plane"]
+Method = Literal["exact", "approximate"]
 NonNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 
@@ -31,21 +32,36 @@ class Source(Point):
     start_distance: NonNegative = 0.0
 
 
-class DistancesRequest(Wire):
+class Accuracy(Wire):
+    """How exact the answer has to be."""
+
+    method: Method = "exact"
+    relative_error: Annotated[FiniteFloat, Field(gt=0, lt=1)] | None = Field(
+        default=None,
+        description="For `approximate`: share of the exact distance by which one may fall short; "
+        "0.001 where neither error is given",
+    )
+    absolute_error: Annotated[FiniteFloat, Field(gt=0)] | None = Field(
+        default=None,
+        description="For `approximate`: the same in mesh units; where both errors are given, "
+        "both hold",
+    )
+
+
+class DistancesRequest(Accuracy):
     """Distances from the nearest of ``sources`` to all vertices, or to ``targets`` only."""
 
     model_config = ConfigDict(json_schema_extra={"examples": [{"sources": [{"vertex": 0}]}]})
 
     sources: list[Source] = Field(min_length=1)
     targets: list[Point] | None = Field(default=None, min_length=1)
-    method: Literal["exact", "approximate"] = "exact"
     max_distance: NonNegative | None = Field(
         default=None, description="Vertices farther than this are left unreached"
     )
     include: list[Literal["nearest_source"]] = []
 
 
-class PathRequest(Wire):
+class PathRequest(Accuracy):
     """The shortest path from ``source`` to ``target``."""
 
     model_config = ConfigDict(
@@ -54,7 +70,6 @@ class PathRequest(Wire):
 
     source: Point
     target: Point
-    method: Literal["exact", "approximate"] = "exact"
 
 
 AnswerFormat = Literal["json", "npy", "octets"]
@@ -66,7 +81,7 @@ class AnswerParameters(Wire):
     format: AnswerFormat | None = Field(default=None, description="Overrides `Accept`")
 
 
-class PathParameters(AnswerParameters):
+class PathParameters(AnswerParameters, Accuracy):
     """The ends of a path, each a vertex as ``v`` and its index."""
 
     source: str = Field(alias="from", examples=["v0"])
@@ -113,9 +128,13 @@ class MeshList(BaseModel):
 
 
 class ErrorBound(BaseModel):
-    """How far an answer can be from the exact one."""
+    """How far an answer can be from the exact one.
 
-    type: str
+    Approximate distances are too short by that much at most; the length of an approximate path is
+    too long by that much at most.
+    """
+
+    type: Literal["relative", "absolute"]
     value: float
     kind: Literal["guaranteed", "estimated"]
 
@@ -144,7 +163,7 @@ class DistancesAnswer(BaseModel):
     """Distances in mesh units, ``null`` where unreachable."""
 
     mesh_id: str
-    method: str
+    method: Method
     exact: bool
     error_bound: ErrorBound
     sources: list[ResolvedSource]
@@ -168,7 +187,7 @@ class PathAnswer(BaseModel):
     """A path from source to target, or the reason why there is none."""
 
     mesh_id: str
-    method: str
+    method: Method
     exact: bool
     status: Literal["ok", "no_path"]
     reason: str | None = None
@@ -202,7 +221,7 @@ class About(BaseModel):
     """Version, formats and the limits in force."""
 
     version: str
-    methods: list[str]
+    methods: list[Method]
     mesh_formats: list[str]
     answer_formats: dict[str, str]
     samples: list[str]

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -134,12 +135,102 @@ def test_distance_stops_at_max_distance(run: Run, plane: Path) -> None:
     assert answer == [d if np.isfinite(d) else None for d in expected.tolist()]
 
 
+@pytest.fixture
+def knot(run: Run) -> Path:
+    """A curved mesh, on which windows merge."""
+    assert run("sample", "knot", "--faces", 3000, "knot.ply").code == 0
+    return Path("knot.ply")
+
+
+@pytest.mark.parametrize(
+    ("options", "errors", "bound"),
+    [
+        ("", {}, "0.001 (relative, guaranteed)"),
+        ("--relative-error 0.05", {"relative_error": 0.05}, "0.05 (relative, guaranteed)"),
+        (
+            "--absolute-error 0.02",
+            {"relative_error": None, "absolute_error": 0.02},
+            "0.02 (absolute, guaranteed)",
+        ),
+        (
+            "--relative-error 0.05 --absolute-error 0.02",
+            {"relative_error": 0.05, "absolute_error": 0.02},
+            "0.05 (relative, guaranteed)",
+        ),
+    ],
+)
+def test_approximate_distances_are_the_library_s(
+    run: Run, knot: Path, options: str, errors: dict[str, Any], bound: str
+) -> None:
+    mesh = gc.load_mesh(knot)
+    sources = ["--source", 3, "--source", 700]
+    ran = run(
+        "distance", knot, *sources, "--method", "approximate", *options.split(), "--out", "d.json"
+    )
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("error bound") == bound
+    answer = json.loads(Path("d.json").read_text())
+    expected = gc.approximate_distance(mesh, [3, 700], **errors)
+    assert answer["distances"] == expected.distances.tolist()
+    assert answer["error_bound"] == asdict(expected.error_bound)
+    exact = gc.exact_distance(mesh, [3, 700]).distances
+    share = errors.get("relative_error", 1e-3) or 1.0
+    assert (expected.distances <= exact * (1 + 1e-9)).all()
+    assert (exact - expected.distances <= share * exact).all()
+    assert (exact - expected.distances <= errors.get("absolute_error", np.inf)).all()
+
+
+def test_exact_distances_have_no_error(run: Run, plane: Path) -> None:
+    for options in ([], ["--method", "exact"]):
+        ran = run("distance", plane, "--source", 0, *options, "--out", "d.json")
+        assert ran.figure("error bound") == "0.0 (relative, guaranteed)"
+        assert json.loads(Path("d.json").read_text())["error_bound"]["value"] == 0
+
+
+def test_approximate_distances_stop_at_max_distance(run: Run, knot: Path) -> None:
+    options = ["--method", "approximate", "--relative-error", 0.05, "--max-distance", 2]
+    ran = run("distance", knot, "--source", 3, *options, "--out", "d.npy")
+    assert ran.code == 0
+    exact = gc.exact_distance(gc.load_mesh(knot), 3).distances
+    reached = np.isfinite(np.load("d.npy"))
+    assert 0 < reached.sum() < len(reached)
+    assert reached[exact <= 2].all()
+    assert (exact[reached] <= 2 / 0.95).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "errors"),
+    [
+        ("", {}),
+        ("--relative-error 0.05", {"relative_error": 0.05}),
+        ("--absolute-error 0.1", {"relative_error": None, "absolute_error": 0.1}),
+    ],
+)
+def test_an_approximate_path_reports_its_own_bound(
+    run: Run, knot: Path, options: str, errors: dict[str, Any]
+) -> None:
+    ends = ["--source", 3, "--target", 700]
+    ran = run("path", knot, *ends, "--method", "approximate", *options.split(), "--out", "p.json")
+    assert (ran.code, ran.err) == (0, "")
+    mesh = gc.load_mesh(knot)
+    expected = gc.approximate_distance(mesh, 3, **errors, keep_windows=True).path_to(700)
+    assert ran.figure("length") == repr(expected.length)
+    value = expected.error_bound.value
+    assert ran.figure("error bound") == f"{value!r} (relative, guaranteed)"
+    answer = json.loads(Path("p.json").read_text())
+    assert answer["points"] == expected.points.tolist()
+    assert answer["error_bound"] == asdict(expected.error_bound)
+    exact = gc.shortest_path(mesh, 3, 700).length
+    assert exact * (1 - 1e-9) <= expected.length <= exact * (1 + value + 1e-9)
+
+
 def test_path_writes_a_polyline_and_json(run: Run, plane: Path) -> None:
     expected = gc.shortest_path(gc.load_mesh(plane), 0, 115)
     for name in ("p.obj", "p.json"):
         ran = run("path", plane, "--source", 0, "--target", 115, "--out", name)
         assert (ran.code, ran.err) == (0, "")
         assert ran.figure("length") == repr(expected.length)
+        assert ran.figure("error bound") == "0.0 (relative, guaranteed)"
     rows = [row.split() for row in Path("p.obj").read_text().splitlines()]
     points = [[float(x) for x in row[1:]] for row in rows if row[0] == "v"]
     assert points == expected.points.tolist()
@@ -182,6 +273,22 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
         ("distance plane.ply --source 0 --max-distance -2 --out d.npy", "max_distance"),
         ("distance plane.ply --source 0 --max-distance nan --out d.npy", "max_distance"),
         ("path plane.ply --source 0 --target 999 --out p.obj", "target"),
+        ("path plane.ply --method approximate --source 0 --target 999 --out p.obj", "target"),
+        *(
+            (f"{command} --method approximate {option} {value}", f"{name} is")
+            for command in (
+                "distance plane.ply --source 0 --out d.npy",
+                "path plane.ply --source 0 --target 1 --out p.obj",
+            )
+            for option, name, value in (
+                ("--relative-error", "relative_error", "0"),
+                ("--relative-error", "relative_error", "1"),
+                ("--relative-error", "relative_error", "-0.1"),
+                ("--relative-error", "relative_error", "nan"),
+                ("--absolute-error", "absolute_error", "0"),
+                ("--absolute-error", "absolute_error", "inf"),
+            )
+        ),
         ("sample knot --faces 3 small.ply", "faces is 3"),
     ],
 )
@@ -210,6 +317,16 @@ def test_what_fails_says_why_in_one_line(
         ("distance plane.ply --source 0 --out d.txt", "d.txt must end in .npy or .csv or .json"),
         ("distance plane.ply --source 0 --out no/d.npy", "folder"),
         ("path plane.ply --source 0 --target 1 --out p.npy", ".obj or .json"),
+        ("distance plane.ply --source 0 --out d.npy --method heat", "heat"),
+        ("distance plane.ply --source 0 --out d.npy --relative-error much", "--relative-error"),
+        (
+            "distance plane.ply --source 0 --out d.npy --relative-error 0.1",
+            "--relative-error goes with --method approximate only",
+        ),
+        (
+            "path plane.ply --source 0 --target 1 --out p.obj --method exact --absolute-error 1",
+            "--absolute-error goes with --method approximate only",
+        ),
         ("sample cube c.ply", "cube"),
         ("sample knot c.obj", ".ply"),
         ("serve --port 70000", "--port"),

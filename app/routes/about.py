@@ -1,5 +1,7 @@
 """The service itself: index, health, limits, and the meaning of its errors."""
 
+from typing import get_args
+
 from fastapi import APIRouter, Response
 
 from app import __version__
@@ -7,7 +9,7 @@ from app.dependencies import ServiceDep
 from app.encoding import FORMATS
 from app.errors import CODES, refuse
 from app.responses import problems
-from app.schemas import About, Health, Index, ProblemCode
+from app.schemas import About, Health, Index, Method, ProblemCode
 from app.settings import variable_of
 from app.uploads import FORMATS as MESH_FORMATS
 
@@ -58,7 +60,7 @@ async def get_about(service: ServiceDep) -> About:
     """Return what this service can do, and how much of it."""
     return About(
         version=__version__,
-        methods=["exact"],
+        methods=list(get_args(Method)),
         mesh_formats=[*MESH_FORMATS, "json"],
         answer_formats=dict(FORMATS),
         samples=["knot", "sphere", "plane"],

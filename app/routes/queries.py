@@ -57,7 +57,7 @@ def _answers(model: type, array: str) -> dict[int | str, dict[str, Any]]:
 @router.post(
     "/distances",
     operation_id="computeDistances",
-    summary="Exact distances from sources to all vertices",
+    summary="Distances from sources to all vertices, exact or within a chosen error",
     response_class=Response,
     responses={**_answers(DistancesAnswer, "distances"), **_BODY_PROBLEMS},
     dependencies=[Depends(require_json)],
@@ -79,7 +79,7 @@ async def compute_distances(
 @router.post(
     "/path",
     operation_id="computePath",
-    summary="The exact shortest path between two points",
+    summary="The shortest path between two points, exact or within a chosen error",
     response_class=Response,
     responses={**_answers(PathAnswer, "points"), **_BODY_PROBLEMS},
     dependencies=[Depends(require_json)],
@@ -101,7 +101,7 @@ async def compute_path(
 @router.get(
     "/path",
     operation_id="getPath",
-    summary="The exact shortest path between two points, cacheable",
+    summary="The shortest path between two points, cacheable",
     response_class=Response,
     responses={**_answers(PathAnswer, "points"), **_PROBLEMS},
 )

@@ -3,16 +3,25 @@
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+import geodesic_core as gc
 from app.main import create_app
 from app.settings import Settings
 
 MESHES = Path(__file__).parents[3] / "shared" / "meshes"
+
+NPY = {"Accept": "application/x-npy"}
+TWO_TRIANGLES = {
+    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [9, 0, 0], [8, 0, 0], [9, 1, 0]],
+    "faces": [[0, 1, 2], [3, 4, 5]],
+}
 
 Serve = Callable[..., AbstractContextManager[TestClient]]
 
@@ -51,10 +60,30 @@ def plane(client: TestClient) -> str:
     return upload_sample(client, "plane", 200)
 
 
+@pytest.fixture(scope="session")
+def apart(client: TestClient) -> str:
+    """The id of a mesh of two components."""
+    return str(client.post("/v1/meshes", json=TWO_TRIANGLES).json()["id"])
+
+
 def upload_sample(client: TestClient, name: str, faces: int) -> str:
     response = client.post("/v1/meshes", params={"sample": name, "faces": faces})
     assert response.status_code in (200, 201), response.text
     return str(response.json()["id"])
+
+
+def distances(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
+    """Ask for distances, from vertex 0 where ``body`` names no sources."""
+    body.setdefault("sources", [{"vertex": 0}])
+    return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
+
+
+def mesh_of(client: TestClient, mesh_id: str) -> gc.TriangleMesh:
+    """Return what is stored under an id, as the library has it."""
+    load = lambda name: np.load(  # noqa: E731
+        BytesIO(client.get(f"/v1/meshes/{mesh_id}/arrays/{name}").content)
+    )
+    return gc.TriangleMesh(load("vertices"), load("faces"))
 
 
 @pytest.fixture

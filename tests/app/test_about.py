@@ -25,6 +25,7 @@ def test_about_tells_the_limits_in_force(client: TestClient) -> None:
     assert about["limits"]["GEODESIC_MAX_FACES"] == 5_000_000
     assert about["answer_formats"]["npy"] == "application/x-npy"
     assert "ply" in about["mesh_formats"]
+    assert about["methods"] == ["exact", "approximate"]
 
 
 def test_listens_before_it_is_ready(tmp_path) -> None:

@@ -18,7 +18,7 @@ from app.engine.worker import Clock, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
 from app.mesh_store import MeshStore
-from app.queries import PathQuery
+from app.queries import Approximation, PathQuery
 from app.settings import Settings
 from geodesic_core import TriangleMesh, samples
 
@@ -321,13 +321,16 @@ def test_a_defect_in_a_worker_is_logged_there_and_told(
     assert "ZeroDivisionError" in caplog.text
 
 
-def test_work_that_was_asked_to_stop_stops(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("approximation", [None, Approximation(0.01, None)])
+def test_work_that_was_asked_to_stop_stops(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, approximation: Approximation | None
+) -> None:
     asked = c_longlong(0)
     state = Worker(config(tmp_path), asked)
     state.store.prepare()
     mesh_id, _ = state.store.add(TriangleMesh(*samples.sphere(100_000)))
     monkeypatch.setattr(worker, "_worker", state)
-    work = Answering(PathQuery(mesh_id, 0, 1), "application/json", f"{mesh_id}/key")
+    work = Answering(PathQuery(mesh_id, 0, 1, approximation), "application/json", f"{mesh_id}/key")
     (tmp_path / "results").mkdir()
 
     asked.value = 2

@@ -60,6 +60,7 @@ def test_unknown_code(client: TestClient) -> None:
         (core.InvalidArgument("bad"), "invalid_request"),
         (core.DeadlineExceeded("late"), "deadline_exceeded"),
         (core.MemoryLimitExceeded("much"), "memory_limit"),
+        (core.NotConverged("in circles"), "limit_exceeded"),
         (MemoryError(), "memory_limit"),
         (OSError(errno.ENOSPC, "full"), "storage_full"),
         (OSError(errno.EIO, "broken"), "internal_error"),
@@ -82,6 +83,13 @@ def test_invalid_mesh_names_its_elements() -> None:
 
     assert [fault.pointer for fault in faces.errors] == ["/faces/3", "/faces/5"]
     assert [fault.message for fault in edge.errors] == ["edge 3-5 is at fault"]
+
+
+def test_what_does_not_converge_says_what_to_do_about_it() -> None:
+    problem = problem_of(core.NotConverged("in circles"))
+
+    assert (problem.status, problem.detail) == (422, "in circles")
+    assert "smaller" in str(problem.hint)
 
 
 def test_problems_survive_the_pipe_of_a_worker() -> None:

@@ -1,6 +1,5 @@
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,31 +8,7 @@ from starlette.testclient import TestClient
 import geodesic_core as gc
 from app.queries import DistancesQuery, Source, result_key
 
-from .conftest import check_problem, serving, upload_sample
-
-NPY = {"Accept": "application/x-npy"}
-TWO_TRIANGLES = {
-    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [9, 0, 0], [8, 0, 0], [9, 1, 0]],
-    "faces": [[0, 1, 2], [3, 4, 5]],
-}
-
-
-def distances(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
-    body.setdefault("sources", [{"vertex": 0}])
-    return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
-
-
-def mesh_of(client: TestClient, mesh_id: str) -> gc.TriangleMesh:
-    load = lambda name: np.load(  # noqa: E731
-        BytesIO(client.get(f"/v1/meshes/{mesh_id}/arrays/{name}").content)
-    )
-    return gc.TriangleMesh(load("vertices"), load("faces"))
-
-
-@pytest.fixture(scope="module")
-def apart(client: TestClient) -> str:
-    """The id of a mesh of two components."""
-    return str(client.post("/v1/meshes", json=TWO_TRIANGLES).json()["id"])
+from .conftest import NPY, check_problem, distances, mesh_of, serving, upload_sample
 
 
 def test_distances_are_the_library_s(client: TestClient, plane: str) -> None:
@@ -150,7 +125,6 @@ def test_the_hash_of_a_query_is_stable(monkeypatch: pytest.MonkeyPatch) -> None:
             ["/sources/0/start_distance"],
         ),
         ({"sources": [{"vertex": 0}], "max_distance": -1}, "invalid_request", ["/max_distance"]),
-        ({"sources": [{"vertex": 0}], "method": "approximate"}, "invalid_request", ["/method"]),
         ({"sources": [{"vertex": 0}], "method": "heat"}, "invalid_request", ["/method"]),
         ({"sources": [{"vertex": 0}], "include": ["paths"]}, "invalid_request", ["/include/0"]),
     ],
@@ -162,12 +136,6 @@ def test_refused_distances(
 
     problem = check_problem(response, 422, code)
     assert places is None or [fault["pointer"] for fault in problem["errors"]] == places
-
-
-def test_the_approximate_method_says_that_it_is_to_come(client: TestClient, plane: str) -> None:
-    problem = distances(client, plane, method="approximate").json()
-
-    assert "not available yet" in problem["detail"]
 
 
 @pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
@@ -239,7 +207,11 @@ def test_limits_of_queries(tmp_path: Path) -> None:
         large = check_problem(distances(client, mesh_id, **twice), 413, "result_too_large")
         assert large["actual"] == 52
 
-        check_problem(distances(client, mesh_id, NPY), 422, "memory_limit")
+        for method in ("exact", "approximate"):
+            response = distances(client, mesh_id, NPY, method=method)
+            check_problem(response, 422, "memory_limit")
+            path = f"/v1/meshes/{mesh_id}/path?from=v0&to=v9&method={method}"
+            check_problem(client.get(path), 422, "memory_limit")
 
 
 # Paths
@@ -332,11 +304,6 @@ def test_refused_gets(client: TestClient, plane: str, query: str, code: str, pla
         ),
         ({"source": {"vertex": 0}}, "invalid_request", ["/target"]),
         ({"source": 0, "target": 1}, "invalid_request", ["/source", "/target"]),
-        (
-            {"source": {"vertex": 0}, "target": {"vertex": 1}, "method": "approximate"},
-            "invalid_request",
-            ["/method"],
-        ),
     ],
 )
 def test_refused_posts(
