@@ -1,1 +1,1 @@
-"""Measurements against peers and targets: ``python -m benchmarks [exact|topology|service …]``."""
+"""Measurements against peers and targets: ``python -m benchmarks [name …]``."""

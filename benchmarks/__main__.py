@@ -3,11 +3,18 @@
 import argparse
 from pathlib import Path
 
-from benchmarks import exact, service, topology
+from benchmarks import approximate, exact, service, topology
 from benchmarks.inputs import Inputs
 from benchmarks.tables import keep
 
-BENCHMARKS = {"topology": topology.run, "exact": exact.run, "service": service.run}
+BENCHMARKS = {
+    "topology": topology.run,
+    "exact": exact.run,
+    "approximate": approximate.run,
+    "merging": approximate.run_merging,
+    "growth": approximate.run_growth,
+    "service": service.run,
+}
 ROOT = Path(__file__).parents[1]
 
 

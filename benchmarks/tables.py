@@ -39,7 +39,8 @@ def keep(section: Section, path: Path) -> None:
 
 def machine() -> str:
     """Return the processor, its cores, and the versions that matter."""
-    packages = [f"{name} {_version(name)}" for name in ("numpy", "numba", "pygeodesic")]
+    names = ("numpy", "numba", "pygeodesic", "potpourri3d")
+    packages = [f"{name} {_version(name)}" for name in names]
     today = dt.datetime.now(dt.UTC).date().isoformat()
     parts = [
         today,

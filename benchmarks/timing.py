@@ -1,9 +1,11 @@
 """How long a call takes."""
 
 import gc
+import math
 import time
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Callable, Sequence
+from statistics import median
+from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 
@@ -14,3 +16,23 @@ def timed(call: Callable[[], Result]) -> tuple[float, Result]:
     start = time.perf_counter()
     result = call()
     return time.perf_counter() - start, result
+
+
+def by_turns(
+    calls: Sequence[Callable[[], Any]], runs: int, patience: float = math.inf
+) -> list[tuple[float, Any]]:
+    """Time calls by turns; return for each the median of its seconds, and its last result.
+
+    There are at most ``runs`` rounds, and none begins more than ``patience`` seconds after the
+    first.
+    """
+    seconds: list[list[float]] = [[] for _ in calls]
+    results: list[Any] = [None] * len(calls)
+    began = time.perf_counter()
+    for _ in range(runs):
+        for i, call in enumerate(calls):
+            took, results[i] = timed(call)
+            seconds[i].append(took)
+        if time.perf_counter() - began > patience:
+            break
+    return [(median(some), result) for some, result in zip(seconds, results, strict=True)]

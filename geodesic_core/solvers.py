@@ -129,7 +129,7 @@ def approximate_distance(
     Raises
     ------
     NotConverged
-        The windows of an edge came up too often; never seen on a real mesh. A smaller error helps.
+        The windows of an edge came up too often; not seen yet. A smaller error would help.
     InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `exact_distance`.
 

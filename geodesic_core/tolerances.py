@@ -32,6 +32,12 @@ A fifth of the sweep on scans, for a tenth more windows. Beyond 1e-1 the windows
 roots did.
 """
 
+DOUBLE_ROOT = 1e-4
+"""Share of an interval within which the two roots of a bisector's quadratic count as one.
+
+A root loses as many digits as its distance from the other has; at this distance it has twelve left.
+"""
+
 GAP = 1e-12
 """Share of an edge's length up to which a gap between two windows is rounding and is closed.
 
@@ -88,7 +94,7 @@ RUNS = 50
 """How often a list may be propagated in a merging sweep before it is given up.
 
 The paper's argument has no proof that merged windows cannot go in a circle (monotonicity, section
-4.1). Measured: 5 times at most, 1.25 on average.
+4.1). Measured: 24 times at most, 1.05 to 1.42 times an edge on average.
 """
 
 WIDEST_ERROR = 2e-3

@@ -95,8 +95,7 @@ def trim(
         if wins_throughout(lo, hi, cx, cy, c_sigma, px, py, p_sigma):
             p0, p1 = without(p0, p1, lo, hi)
     else:
-        guess = lo + (hi - lo) * lead_lo / (lead_lo - lead_hi)
-        x = bisector(lo, hi, px, py, p_sigma, cx, cy, c_sigma, guess)
+        x = bisector(lo, hi, px, py, p_sigma, cx, cy, c_sigma)
         if lead_lo > 0.0:  # p wins below x
             c0, c1 = without(c0, c1, lo, x)
             p0, p1 = without(p0, p1, x, hi)

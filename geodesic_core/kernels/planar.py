@@ -13,7 +13,8 @@ The unfolded source of a window lies at (sx, sy) with sy <= 0::
 
 import math
 
-from geodesic_core.kernels.jit import inlined
+from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.tolerances import DOUBLE_ROOT
 
 
 @inlined
@@ -27,6 +28,23 @@ def hit_left(b: float, sy: float, sy_left: float, sin_left: float, length_left: 
     if height >= 0.0:
         return length_left
     return min(b * sy / height, length_left)
+
+
+@kernel
+def bisected(
+    lo: float, hi: float, s0x: float, s0y: float, s1x: float, s1y: float, delta: float
+) -> float:
+    """Find what `bisector` looks for, by halving the interval to the last bit."""
+    lead_lo = math.hypot(lo - s1x, s1y) - math.hypot(lo - s0x, s0y)
+    rises = math.hypot(hi - s1x, s1y) - math.hypot(hi - s0x, s0y) > lead_lo
+    while True:
+        x = 0.5 * (lo + hi)
+        if x <= lo or x >= hi:
+            return x
+        if (math.hypot(x - s1x, s1y) + delta > math.hypot(x - s0x, s0y)) == rises:
+            hi = x
+        else:
+            lo = x
 
 
 @inlined
@@ -49,12 +67,10 @@ def bisector(
     s1x: float,
     s1y: float,
     sigma1: float,
-    guess: float,
 ) -> float:
     """Point of [lo, hi] at equal distance from two weighted sources (the quadratic of section 3.3).
 
-    The caller knows that the sign of the difference changes once in [lo, hi]; ``guess`` lies there
-    and serves where rounding leaves no root.
+    The caller knows that the sign of the difference changes once in [lo, hi].
 
     Let r0 and r1 be the distances to the two. From r1 = r0 - delta it follows that r0 is linear in
     x, m r0 = u + v x with m = 2 delta, and its square is the quadratic. Squaring has added the
@@ -71,7 +87,9 @@ def bisector(
     far = t / a if a != 0.0 else 0.0
     depth_near = root_depth(near, width, delta, u, v)
     depth_far = root_depth(far, width, delta, u, v)
-    if max(depth_near, depth_far) <= 0.0:
-        return guess
+    if max(depth_near, depth_far) <= 0.0 or abs(near - far) <= DOUBLE_ROOT * width:
+        # Weights that are nearly equal: both roots are the straight bisector's, with half of its
+        # digits, and the signs of r0 and r1 are rounding.
+        return bisected(lo, hi, s0x, s0y, s1x, s1y, delta)
     # Where rounding lets in a second root, at an end, it is the inner one that counts.
     return lo + (near if depth_near >= depth_far else far)

@@ -201,6 +201,8 @@ def record_merge(
 def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int, float, float]:
     """Find the window of scratch nearest to the apex; return its index, crossing and distance.
 
+    The distance is infinite if no window covers the apex: then none beats another for sure.
+
     The crossing is where the window's shortest path to the apex passes the half-edge. Windows whose
     rays cover the apex are asked first; only where none does, the two beside it, for a path that
     bends at the window's end. (To ask them all costs a tenth of the sweep and finds nothing more.)
@@ -253,7 +255,8 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
         wave.scratch_ints[INTS * nearest + ROOT],
         reference,
     )
-    return nearest, crossing, best
+    covered = surcharge == 1.0
+    return nearest, crossing, best if covered else math.inf
 
 
 @kernel
@@ -304,7 +307,6 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
     left, right = wave.links[row + OUT_LEFT], wave.links[row + OUT_RIGHT]
     tail, head, apex = wave.links[row + TAIL], wave.links[row + HEAD], wave.links[row + APEX]
     overlap = OVERLAP * length
-    n = WIDTH * nearest
     left_first, left_last, left_size = -1, -1, 0
     right_first, right_last, right_size = -1, -1, 0
     for i in range(count):
@@ -323,9 +325,11 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
                 # Two windows that meet on the ray to the apex both cover it: each keeps its side.
                 goes_right = x >= (crossing - overlap) * rise
                 goes_left = x <= (crossing + overlap) * rise
-                if merging(wave):  # a fictitious pseudosource may have its window in another's
-                    goes_right = goes_right or b1 > wave.scratch[n + B1]
-                    goes_left = goes_left or b0 < wave.scratch[n + B0]
+                if merging(wave):
+                    # One window may lie within the other and win there: what is beyond the nearest
+                    # path to the apex already has not crossed it.
+                    goes_right = goes_right or b1 > crossing
+                    goes_left = goes_left or b0 < crossing
             elif goes_left:
                 if b0 >= crossing and bent_distance(wave, w, ax, ay)[0] >= least:
                     continue

@@ -14,6 +14,7 @@ from geodesic_core.kernels.arrival import precedence
 from geodesic_core.kernels.backtrace import is_on_path
 from geodesic_core.kernels.lists import put_window
 from geodesic_core.kernels.merge import accuracy, merged
+from geodesic_core.kernels.planar import bisector
 from geodesic_core.kernels.propagate import collect, reach_apex
 from geodesic_core.kernels.topology import (
     APEX,
@@ -31,6 +32,7 @@ from geodesic_core.kernels.wavefront import FIRST, LAST, SIZE, merging_bounds, n
 from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.tolerances import (
     BEND,
+    DOUBLE_ROOT,
     GAP,
     LOCAL_SHARE,
     LOOSE_OVERLAP,
@@ -139,6 +141,17 @@ def is_trimmed(overlap, difference, scale) -> bool:
     assert collect(view, h) == 2
     ends = wave.scratch[0, B1], wave.scratch[1, B0]
     return ends != (left[1], right[0])
+
+
+@pytest.mark.parametrize("delta", [0.0, *np.geomspace(1e-18, 1e-3, 31)])
+def test_double_root_leaves_the_bisector_its_digits(delta):
+    """Whichever way it is found: on both sides of the bound."""
+    s0, s1 = (0.1, -0.7), (1.2, -1.1)
+    x = bisector(0.0, 2.0, *s0, 0.0, *s1, delta)
+    lead = math.hypot(x - s1[0], s1[1]) + delta - math.hypot(x - s0[0], s0[1])
+    assert abs(lead) <= 1e-16 / DOUBLE_ROOT
+    straight = bisector(0.0, 2.0, *s0, 0.0, *s1, 0.0)
+    assert abs(x - straight) <= 2 * delta + 1e-16 / DOUBLE_ROOT
 
 
 def flat_view(scale):
