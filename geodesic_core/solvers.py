@@ -203,17 +203,17 @@ def _solve(
     starts = _as_sources(mesh, sources)
     wave = _sweep(mesh, starts, bounds, control, began, keeps=keeps)
     wave.distance[wave.distance > bounds.max_distance] = math.inf
-    nearest = sweep.nearest_sources(wave.distance, wave.winner_ints, wave.origin)
+    winners = _winners_of(wave)
     inner = mesh.topology.inner_vertex
     return DistanceField(
         mesh=mesh,
         sources=starts,
         max_distance=bounds.max_distance,
         distances=wave.distance[inner],
-        nearest_source=nearest[inner],
+        nearest_source=winners.nearest[inner],
         error_bound=promise,
         stats=_stats(mesh, wave, time.perf_counter() - began),
-        _winners=_winners_of(wave) if keeps else None,
+        _winners=winners if keeps else None,
         _find_winners=partial(_find_winners, mesh, starts, bounds),
     )
 
@@ -227,6 +227,7 @@ def _find_winners(mesh: TriangleMesh, starts: tuple[Source, ...], bounds: Bounds
 def _winners_of(wave: Wavefront) -> Winners:
     count = wave.counters[wavefront.MERGES]
     return Winners(
+        nearest=sweep.nearest_sources(wave.distance, wave.winner_ints, wave.origin),
         distance=wave.distance,
         winner=wave.winner,
         winner_ints=wave.winner_ints,

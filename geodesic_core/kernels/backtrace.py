@@ -45,8 +45,10 @@ from geodesic_core.tolerances import ON_PATH
 
 
 class Winners(NamedTuple):
-    """What a finished sweep leaves for backtracing; arrays of its `Wavefront`."""
+    """What a finished sweep leaves for backtracing: arrays of its `Wavefront`, and one more."""
 
+    nearest: Ints
+    """(V,): index of the nearest source, by inner vertex; -1 where unreached"""
     distance: Floats
     winner: Floats
     winner_ints: Ints
@@ -79,8 +81,14 @@ def cross_edge(
 
 
 @kernel
-def is_on_path(distance: Floats, u: int, reach: float, here: float, target: int) -> bool:
-    """Whether a path to ``target`` that is at distance ``here``, ``reach`` from u, meets u."""
+def is_on_path(winners: Any, u: int, reach: float, here: float, target: int) -> bool:
+    """Whether a path to ``target`` that is at distance ``here``, ``reach`` from u, meets u.
+
+    A vertex that is nearest to another source may lie as near: the path goes on past it.
+    """
+    distance = winners.distance
+    if winners.nearest[u] != winners.nearest[target]:
+        return False
     allowed = here + ON_PATH * distance[target]
     return distance[u] + reach <= allowed and distance[u] < distance[target]
 
@@ -130,9 +138,9 @@ def trace_path(
         ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
         ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
         tail, head, stop = links[h, TAIL], links[h, HEAD], -1
-        if tail == root or is_on_path(distance, tail, geometry[h, LENGTH_LEFT], distance[v], v):
+        if tail == root or is_on_path(winners, tail, geometry[h, LENGTH_LEFT], distance[v], v):
             stop = tail
-        elif head == root or is_on_path(distance, head, geometry[h, LENGTH_RIGHT], distance[v], v):
+        elif head == root or is_on_path(winners, head, geometry[h, LENGTH_RIGHT], distance[v], v):
             stop = head
         else:
             # From the apex back over h itself
@@ -165,7 +173,7 @@ def trace_path(
             ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
             reach = math.sqrt((ax - x) * (ax - x) + ay * ay)
             here = sigma + math.sqrt((sx - x) * (sx - x) + sy * sy)
-            if apex == root or is_on_path(distance, apex, reach, here, v):
+            if apex == root or is_on_path(winners, apex, reach, here, v):
                 stop = apex
                 break
             if (ax - x) * sy - ay * (sx - x) >= 0.0:  # s is left of the apex

@@ -19,17 +19,17 @@ from typing import Any
 
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.window import distance_at
-from geodesic_core.tolerances import LOCAL_SHARE, LOWER_BOUND
+from geodesic_core.tolerances import GRAZING, LOCAL_SHARE, LOWER_BOUND
 
 
 @inlined
 def directionality(along: float, reach: float) -> float:
-    """Height of s' above the edge's line, squared, if it lies on the windows' side; else -1.
+    """Height of s' above the edge's line, squared; -1 if it is not clearly on the windows' side.
 
     ``along`` and ``reach`` are its place along the edge and its distance, both from q0.
     """
     square = reach * reach - along * along
-    return square if square > 1e-24 * reach * reach else -1.0
+    return square if square > GRAZING * GRAZING * reach * reach else -1.0
 
 
 @inlined
@@ -64,6 +64,8 @@ def shortfall(
 
     There is one such point: where s, s' and the point are collinear. Without it, 0.
     """
+    if sy == ny:
+        return 0.0
     x = (nx * sy - sx * ny) / (sy - ny)
     if lo < x < hi:
         return distance_at(x, sx, sy, sigma) - distance_at(x, nx, ny, n_sigma)

@@ -116,7 +116,7 @@ def emit_between(wave: Any, v: int, lo: float, hi: float) -> None:
     """Emit between two angles of the unfolded fan, which at an inner vertex closes to a circle."""
     if hi <= lo:
         return
-    around = lo - 1.0  # where a sector that passes the fan's seam ends; none yet
+    around = -1.0  # where a sector that passes the seam of the fan ends; none does yet
     if not wave.flags[v] & BOUNDARY:
         turn = wave.total_angle[v]
         turns = math.floor(lo / turn)

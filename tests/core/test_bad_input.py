@@ -216,6 +216,77 @@ def test_max_distance_is_a_distance(mesh, limit):
         gc.exact_distance(mesh, 0, max_distance=limit)
 
 
+@pytest.mark.parametrize(
+    "value",
+    [
+        0,
+        -1,
+        1,
+        2,
+        0.0,
+        -0.0,
+        1.0,
+        -1e-300,
+        np.nan,
+        np.inf,
+        -np.inf,
+        True,
+        False,
+        "x",
+        "0.1",
+        1j,
+        [0.1],
+    ],
+    ids=repr,
+)
+@pytest.mark.parametrize("absolute", [None, 0.1])
+def test_relative_error_lies_between_zero_and_one(mesh, value, absolute):
+    with pytest.raises(gc.errors.InvalidArgument, match=r"^relative_error") as caught:
+        gc.approximate_distance(mesh, 0, value, absolute)
+    assert repr(value) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "value", [0, -1, 0.0, -1e-300, np.nan, np.inf, -np.inf, True, False, "x", 1j, [0.1]], ids=repr
+)
+@pytest.mark.parametrize("relative", [None, 1e-3])
+def test_absolute_error_is_finite_and_above_zero(mesh, value, relative):
+    with pytest.raises(gc.errors.InvalidArgument, match=r"^absolute_error") as caught:
+        gc.approximate_distance(mesh, 0, relative, value)
+    assert repr(value) in str(caught.value)
+
+
+def test_some_error_is_granted(mesh):
+    with pytest.raises(gc.errors.InvalidArgument, match=r"relative_error.*absolute_error.*None"):
+        gc.approximate_distance(mesh, 0, None)
+    with pytest.raises(gc.errors.InvalidArgument, match="None"):
+        gc.approximate_distance(mesh, 0, relative_error=None, absolute_error=None)
+
+
+@pytest.mark.parametrize("value", [np.nextafter(0, 1), 1e-300, np.nextafter(1, 0), np.float32(0.5)])
+def test_errors_at_the_limits_of_their_domain(mesh, value):
+    distances = gc.exact_distance(mesh, 0).distances
+    for arguments in ((value,), (None, value), (value, value), (value, 1e300)):
+        found = gc.approximate_distance(mesh, 0, *arguments).distances
+        np.testing.assert_allclose(found, distances, rtol=2 * float(value) + 1e-12)
+
+
+def test_approximate_distances_refuse_what_exact_ones_refuse(mesh):
+    refused = [
+        ({"sources": -1}, gc.errors.InvalidPoint),
+        ({"sources": []}, gc.errors.InvalidPoint),
+        ({"sources": gc.Source(0, np.nan)}, gc.errors.InvalidArgument),
+        ({"sources": 0, "max_distance": -1.0}, gc.errors.InvalidArgument),
+        ({"sources": 0, "deadline_s": 0}, gc.errors.InvalidArgument),
+        ({"sources": 0, "memory_limit": "much"}, gc.errors.InvalidArgument),
+    ]
+    for arguments, error in refused:
+        with pytest.raises(error):
+            gc.approximate_distance(mesh, **arguments)
+    with pytest.raises(gc.errors.InvalidPoint, match="4"):
+        gc.approximate_distance(mesh, 0).path_to(4)
+
+
 @pytest.mark.parametrize("value", [0, -1, np.nan, "1", [1]], ids=repr)
 @pytest.mark.parametrize("name", ["deadline_s", "memory_limit"])
 def test_what_is_granted_is_a_number_above_zero(mesh, name, value):

@@ -178,3 +178,88 @@ def test_other_threads_run_while_a_sweep_does(mesh):
         done.set()
         thread.join()
     assert len(ticks) > 20 * seconds
+
+
+# Approximate sweeps -----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def approximate(mesh):
+    return gc.approximate_distance(mesh, 0).distances
+
+
+def check_still_usable(mesh, approximate):
+    np.testing.assert_array_equal(gc.approximate_distance(mesh, 0).distances, approximate)
+
+
+@pytest.mark.parametrize(
+    "arguments", [{}, {"max_distance": 1.0}, {"keep_windows": True}, {"relative_error": 1e-6}]
+)
+def test_progress_of_approximate_sweeps_grows_to_one(mesh, arguments):
+    seen = []
+    gc.approximate_distance(mesh, 0, progress=seen.append, **arguments)
+    assert len(seen) >= 2
+    assert all(0 <= value <= 1 for value in seen)
+    assert seen == sorted(seen)
+    assert seen[-1] == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        ({"cancel": lambda: True}, gc.errors.Cancelled),
+        ({"deadline_s": 1e-9}, gc.errors.DeadlineExceeded),
+        ({"memory_limit": 1}, gc.errors.MemoryLimitExceeded),
+        ({"memory_limit": 1_000_000}, gc.errors.MemoryLimitExceeded),
+    ],
+)
+@pytest.mark.parametrize("keep_windows", [True, False])
+def test_approximate_sweeps_stop_too(mesh, approximate, arguments, error, keep_windows):
+    with pytest.raises(error):
+        gc.approximate_distance(mesh, 0, keep_windows=keep_windows, **arguments)
+    check_still_usable(mesh, approximate)
+
+
+def test_approximate_sweeps_are_stopped_under_way(mesh, approximate):
+    asked = []
+
+    def cancel():
+        asked.append(1)
+        return len(asked) == 2
+
+    with pytest.raises(gc.errors.Cancelled):
+        repeat_approximate_sweeps(mesh, cancel)
+    assert len(asked) == 2
+    check_still_usable(mesh, approximate)
+
+
+def repeat_approximate_sweeps(mesh, cancel):
+    while True:
+        gc.approximate_distance(mesh, 0, 1e-6, cancel=cancel)
+
+
+@pytest.mark.parametrize("keep_windows", [True, False])
+def test_memory_limit_is_what_an_approximate_sweep_needs(mesh, approximate, keep_windows):
+    stats = gc.approximate_distance(mesh, 0, keep_windows=keep_windows).stats
+    enough = {"keep_windows": keep_windows, "memory_limit": stats.peak_bytes}
+    field = gc.approximate_distance(mesh, 0, **enough)
+    np.testing.assert_array_equal(field.distances, approximate)
+    with pytest.raises(gc.errors.MemoryLimitExceeded):
+        gc.approximate_distance(mesh, 0, **(enough | {"memory_limit": stats.peak_bytes // 2}))
+
+
+def test_what_is_merged_counts_as_memory(mesh):
+    """What is enough without paths is not with them."""
+    lean = gc.approximate_distance(mesh, 0).stats.peak_bytes
+    with pytest.raises(gc.errors.MemoryLimitExceeded):
+        gc.approximate_distance(mesh, 0, keep_windows=True, memory_limit=lean)
+
+
+def test_an_exception_in_a_callback_of_an_approximate_sweep_comes_out(mesh, approximate):
+    def fail(*_):
+        raise LookupError("the caller's own")
+
+    for stop in ("progress", "cancel"):
+        with pytest.raises(LookupError, match="the caller's own"):
+            gc.approximate_distance(mesh, 0, **{stop: fail})
+    check_still_usable(mesh, approximate)

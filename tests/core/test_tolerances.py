@@ -11,9 +11,9 @@ import geodesic_core as gc
 from geodesic_core import tolerances
 from geodesic_core.kernels import wavefront
 from geodesic_core.kernels.arrival import precedence
-from geodesic_core.kernels.backtrace import is_on_path
+from geodesic_core.kernels.backtrace import Winners, is_on_path
 from geodesic_core.kernels.lists import put_window
-from geodesic_core.kernels.merge import accuracy, merged
+from geodesic_core.kernels.merge import accuracy, directionality, merged
 from geodesic_core.kernels.planar import bisector
 from geodesic_core.kernels.propagate import collect, reach_apex
 from geodesic_core.kernels.topology import (
@@ -34,6 +34,7 @@ from geodesic_core.tolerances import (
     BEND,
     DOUBLE_ROOT,
     GAP,
+    GRAZING,
     LOCAL_SHARE,
     LOOSE_OVERLAP,
     LOWER_BOUND,
@@ -261,11 +262,20 @@ def test_on_path_is_the_longest_detour_through_a_vertex(scale):
     for share, taken in ((-1.0, True), (0.0, True), (0.5, True), (2.0, False)):
         distance = scale * np.array([3.0, 0.0])
         distance[beside] = here - reach + share * ON_PATH * distance[target]
-        assert is_on_path(distance, beside, reach, here, target) == taken
+        assert is_on_path(winners(distance), beside, reach, here, target) == taken
+        assert not is_on_path(winners(distance, [0, 1]), beside, reach, here, target)
 
 
 def test_on_path_never_leads_away_from_the_source():
-    assert not is_on_path(np.array([1.0, 1.0]), 1, 0.0, 1.0, 0)
+    assert not is_on_path(winners(np.array([1.0, 1.0])), 1, 0.0, 1.0, 0)
+
+
+def winners(distance, nearest=(0, 0)) -> Winners:
+    """Two vertices at these distances from these sources."""
+    nothing, none = np.empty((0, 2)), np.empty((0, 2), np.int32)
+    return Winners(
+        np.array(nearest, np.int32), distance, nothing, none, none[:, 0].copy(), nothing, none
+    )
 
 
 @SCALES
@@ -301,6 +311,14 @@ def test_local_share_is_all_that_one_merge_may_use_up(share, merges, absolute):
     assert accuracy(view, own, own, nearest) == merges
     assert accuracy(view, allowed, 0.0, nearest)
     assert not accuracy(view, 1.001 * allowed, 0.0, nearest)
+
+
+@pytest.mark.parametrize("reach", [1e-9, 1.0, 1e9])
+def test_grazing_is_the_least_angle_of_a_merged_pseudosource(reach):
+    for share, taken in ((0.99, False), (1.01, True)):
+        angle = math.asin(share * GRAZING)
+        for along in (math.cos(angle), -math.cos(angle)):
+            assert (directionality(along * reach, reach) > 0.0) == taken
 
 
 @given(

@@ -5,6 +5,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.kernels.backtrace import LOST, NO_ROOM, TRACED, Winners, trace_path
+from geodesic_core.kernels.sweep import nearest_sources
 from geodesic_core.kernels.topology import APEX, OPPOSITE
 from geodesic_core.kernels.wavefront import FROM, VIA
 from tests import zoo
@@ -13,9 +14,12 @@ from tests.core.kernels.stepping import finished, started, topology_of
 
 def trace(topology, wave, target, room):
     nodes, faces = np.empty(room, np.int32), np.empty(room, np.int32)
+    nearest = nearest_sources(wave.distance, wave.winner_ints, wave.origin)
+    found = {name: getattr(wave, name) for name in Winners._fields[1:]}
+    winners = Winners(nearest=nearest, **found)
     outcome, count = trace_path(
         topology,
-        Winners(**{name: getattr(wave, name) for name in Winners._fields}),
+        winners,
         target,
         nodes,
         np.empty(room),
