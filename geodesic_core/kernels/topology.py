@@ -204,52 +204,37 @@ def renumber(
 
 
 @kernel
-def half_edges_by_edge(faces: Ints, vertex_count: int) -> Ints:
-    """Sort all half-edges by (lower vertex, higher vertex) in O(V + F).
+def link_opposites(faces: Ints, vertex_count: int) -> Ints:
+    """Return each half-edge's OPPOSITE: together, the cycle of half-edges around each edge.
 
-    Two counting sorts, the less significant key first: unlike a search in the bucket of one vertex
-    this stays linear on a fan of a hundred thousand faces.
+    O(V + F), even where a hundred thousand faces share a vertex: half-edges are sorted by their
+    lower vertex, and those of one lower vertex find each other at their higher one.
     """
-    count = 3 * faces.shape[0]
     flat = faces.reshape(-1)
-    lower, higher = np.empty(count, np.int32), np.empty(count, np.int32)
-    for h in range(count):
-        a, b = flat[h], flat[following(h)]
-        lower[h], higher[h] = min(a, b), max(a, b)
-    by_higher, order = np.empty(count, np.int32), np.empty(count, np.int32)
-    counting_sort(higher, vertex_count, np.arange(count).astype(np.int32), by_higher)
-    counting_sort(lower, vertex_count, by_higher, order)
-    return order
-
-
-@kernel
-def link_opposites(faces: Ints, vertex_count: int, links: Ints) -> None:
-    """Fill OPPOSITE: the cycle of half-edges around each edge."""
-    flat = faces.reshape(-1)
-    order = half_edges_by_edge(faces, vertex_count)
-    count = len(order)
-    begin = 0
-    while begin < count:
-        h = order[begin]
-        tail, head = flat[h], flat[following(h)]
-        end = begin + 1
-        while end < count:
-            g = order[end]
-            a, b = flat[g], flat[following(g)]
-            if min(a, b) != min(tail, head) or max(a, b) != max(tail, head):
-                break
-            end += 1
-        if end - begin == 1:
-            links[h, OPPOSITE] = -1
+    count = len(flat)
+    lower = np.empty(count, np.int32)
+    for i in range(count):
+        lower[i] = min(flat[i], flat[following(i)])
+    order = np.empty(count, np.int32)
+    counting_sort(lower, vertex_count, np.arange(count).astype(np.int32), order)
+    opposite = np.full(count, -1, np.int32)
+    first, last = np.empty(vertex_count, np.int32), np.full(vertex_count, -1, np.int32)
+    for i in range(count):
+        h = order[i]
+        higher = max(flat[h], flat[following(h)])
+        g = last[higher]
+        if g >= 0 and lower[g] == lower[h]:  # an edge seen before: h joins its cycle
+            start = first[higher]
+            opposite[g] = 2 * h + (flat[g] == flat[h])
+            opposite[h] = 2 * start + (flat[h] == flat[start])
         else:
-            for i in range(begin, end):
-                h, g = order[i], order[i + 1 if i + 1 < end else begin]
-                links[h, OPPOSITE] = 2 * g + (flat[h] == flat[g])
-        begin = end
+            first[higher] = h
+        last[higher] = h
+    return opposite
 
 
 @kernel
-def find_bad_edges(links: Ints, limit: int) -> tuple[int, int, Ints]:
+def find_bad_edges(opposite: Ints, limit: int) -> tuple[int, int, Ints]:
     """Return (outcome, count, up to ``limit`` half-edges) of edges that the sweep cannot cross.
 
     Non-manifold edges (three faces or more) are reported before misoriented ones.
@@ -257,17 +242,16 @@ def find_bad_edges(links: Ints, limit: int) -> tuple[int, int, Ints]:
     found = np.empty(limit, np.int32)
     for outcome in (NON_MANIFOLD, MISORIENTED):
         count = 0
-        for h in range(links.shape[0]):
-            code = links[h, OPPOSITE]
-            if code < 0:
-                continue
+        for h in range(len(opposite)):
+            code = opposite[h]
+            if code < 0 or (code & 1 == 0 and opposite[code >> 1] >> 1 == h):
+                continue  # a boundary, or two faces that agree
             g, lowest, size = code >> 1, h, 1
-            same_way = code & 1
             while g != h:
                 lowest = min(lowest, g)
                 size += 1
-                g = links[g, OPPOSITE] >> 1
-            bad = size > 2 if outcome == NON_MANIFOLD else (size == 2 and same_way == 1)
+                g = opposite[g] >> 1
+            bad = size > 2 if outcome == NON_MANIFOLD else size == 2
             if bad and lowest == h:
                 if count < limit:
                     found[count] = h
@@ -278,13 +262,15 @@ def find_bad_edges(links: Ints, limit: int) -> tuple[int, int, Ints]:
 
 
 @kernel
-def fill_rows(vertices: Floats, faces: Ints, links: Ints, geometry: Floats) -> int:
-    """Fill the geometry and the vertices of links; return a face with too short an edge, or -1."""
+def fill_geometry(vertices: Floats, faces: Ints, geometry: Floats, angles: Floats) -> int:
+    """Fill the geometry but for FAN_ANGLE, and the angle at each half-edge's tail, radians.
+
+    Returns a face with too short an edge, or -1.
+    """
     for f in range(faces.shape[0]):
         for i in range(3):
             h = 3 * f + i
             tail, head, apex = faces[f, i], faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
-            links[h, TAIL], links[h, HEAD], links[h, APEX] = tail, head, apex
             ux = vertices[head, 0] - vertices[tail, 0]
             uy = vertices[head, 1] - vertices[tail, 1]
             uz = vertices[head, 2] - vertices[tail, 2]
@@ -292,8 +278,7 @@ def fill_rows(vertices: Floats, faces: Ints, links: Ints, geometry: Floats) -> i
             wy = vertices[apex, 1] - vertices[tail, 1]
             wz = vertices[apex, 2] - vertices[tail, 2]
             length = math.sqrt(ux * ux + uy * uy + uz * uz)
-            length_left = math.sqrt(wx * wx + wy * wy + wz * wz)
-            if length < SHORTEST_EDGE or length_left < SHORTEST_EDGE:
+            if length < SHORTEST_EDGE:
                 return f
             cx, cy, cz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
             # Cosine and sine from products, not from the law of cosines, which loses all digits on
@@ -302,46 +287,59 @@ def fill_rows(vertices: Floats, faces: Ints, links: Ints, geometry: Floats) -> i
             cross = math.sqrt(cx * cx + cy * cy + cz * cz)
             norm = math.sqrt(dot * dot + cross * cross)
             geometry[h, LENGTH] = length
-            geometry[h, LENGTH_LEFT] = length_left
             geometry[h, COS_LEFT] = dot / norm
             geometry[h, SIN_LEFT] = cross / norm
+            angles[h] = angle_of(dot / norm, cross / norm)
         for i in range(3):
             h, n, p = 3 * f + i, 3 * f + (i + 1) % 3, 3 * f + (i + 2) % 3
+            geometry[h, LENGTH_LEFT] = geometry[p, LENGTH]
             geometry[h, LENGTH_RIGHT] = geometry[n, LENGTH]
             geometry[h, COS_RIGHT] = geometry[n, COS_LEFT]
             geometry[h, SIN_RIGHT] = geometry[n, SIN_LEFT]
-            links[h, OUT_LEFT] = links[p, OPPOSITE] >> 1
-            links[h, OUT_RIGHT] = links[n, OPPOSITE] >> 1
     return -1
 
 
 @kernel
-def corner_angle(geometry: Floats, h: int) -> float:
-    """Angle of the face at the tail of h, radians."""
-    return math.atan2(geometry[h, SIN_LEFT], geometry[h, COS_LEFT])
+def fill_links(faces: Ints, opposite: Ints, vertex_count: int, links: Ints) -> None:
+    """Fill the links but for NEXT_CORNER."""
+    corners = np.zeros(vertex_count, np.int32)
+    for v in faces.reshape(-1):
+        corners[v] += 1
+    for f in range(faces.shape[0]):
+        for i in range(3):
+            h, n, p = 3 * f + i, (i + 1) % 3, (i + 2) % 3
+            links[h, OUT_LEFT] = opposite[3 * f + p] >> 1
+            links[h, OUT_RIGHT] = opposite[3 * f + n] >> 1
+            links[h, APEX], links[h, TAIL], links[h, HEAD] = faces[f, p], faces[f, i], faces[f, n]
+            links[h, OPPOSITE] = opposite[h]
+            links[h, CORNER_COUNT] = corners[faces[f, i]]
 
 
 @kernel
-def unfold_fans(
-    links: Ints,
-    geometry: Floats,
-    first_corner: Ints,
-    total_angle: Floats,
-    flags: Flags,
-) -> None:
+def angle_of(cosine: float, sine: float) -> float:
+    """Angle in [0, π] of its cosine and sine ≥ 0, radians: by an arctangent that is cheap."""
+    half = math.atan(sine / (1.0 + abs(cosine)))
+    return 2.0 * half if cosine >= 0.0 else math.pi - 2.0 * half
+
+
+@kernel
+def unfold_fans(faces: Ints, opposite: Ints, angles: Floats, topology: Any) -> None:
     """Order the corners around each vertex, lay their angles out and classify the vertex.
 
     A fan starts at its clockwise boundary where it has one. The corners of several fans at one
-    vertex follow each other in one chain.
+    vertex follow each other in one chain. The walk reads ``opposite`` and ``angles`` alone, which
+    fit the caches; the rows of the topology do not.
     """
-    count = links.shape[0]
+    links, geometry = topology.links, topology.geometry
+    first_corner, total_angle, flags = topology.first_corner, topology.total_angle, topology.flags
+    flat = faces.reshape(-1)
     last_corner = np.full(len(first_corner), -1, np.int32)
-    seen = np.zeros(count, np.uint8)
+    seen = np.zeros(len(flat), np.uint8)
     for at_boundary in (True, False):  # open fans first: a walk must not start in their middle
-        for start in range(count):
-            v = links[start, TAIL]
-            if seen[start] or (at_boundary and links[start, OPPOSITE] >= 0):
+        for start in range(len(flat)):
+            if seen[start] or (at_boundary and opposite[start] >= 0):
                 continue
+            v = flat[start]
             if last_corner[v] < 0:
                 first_corner[v] = start
             else:
@@ -351,28 +349,21 @@ def unfold_fans(
             corner = start
             while True:
                 seen[corner] = 1
-                last_corner[v] = corner
                 geometry[corner, FAN_ANGLE] = angle
-                angle += corner_angle(geometry, corner)
-                links[first_corner[v], CORNER_COUNT] += 1
-                across = links[corner, OUT_LEFT]
+                angle += angles[corner]
+                across = opposite[previous(corner)] >> 1
                 if across < 0 or seen[across]:
-                    if across < 0:
-                        flags[v] |= BOUNDARY
                     break
                 links[corner, NEXT_CORNER] = across
                 corner = across
+            if across < 0:
+                flags[v] |= BOUNDARY
+            links[corner, NEXT_CORNER] = -1
+            last_corner[v] = corner
             total_angle[v] = angle
     for v in range(len(first_corner)):
-        if first_corner[v] < 0:
-            continue
         if not flags[v] & BOUNDARY and total_angle[v] > 2.0 * math.pi + SADDLE_EXCESS:
             flags[v] |= SADDLE
-        corner = first_corner[v]
-        corners = links[corner, CORNER_COUNT]
-        while corner >= 0:
-            links[corner, CORNER_COUNT] = corners
-            corner = links[corner, NEXT_CORNER]
 
 
 @kernel
@@ -433,32 +424,25 @@ def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[int, i
     inner_vertices, inner_faces = renumber(
         vertices, faces, topology.inner_vertex, topology.outer_vertex, topology.outer_face
     )
-    link_opposites(inner_faces, len(vertices), topology.links)
-    outcome, count, bad = find_bad_edges(topology.links, 10)
+    opposite = link_opposites(inner_faces, len(vertices))
+    outcome, count, bad = find_bad_edges(opposite, 10)
     if outcome != SOUND:
         return outcome, count, bad
-    face = fill_rows(inner_vertices, inner_faces, topology.links, topology.geometry)
+    angles = np.empty(len(opposite))
+    face = fill_geometry(inner_vertices, inner_faces, topology.geometry, angles)
     if face >= 0:
         return TOO_SHORT, 1, np.full(1, face, np.int32)
-    unfold_fans(
-        topology.links,
-        topology.geometry,
-        topology.first_corner,
-        topology.total_angle,
-        topology.flags,
-    )
+    fill_links(inner_faces, opposite, len(vertices), topology.links)
+    unfold_fans(inner_faces, opposite, angles, topology)
     topology.component[:] = label_components(faces, len(vertices))
     return SOUND, 0, bad
 
 
 def empty_topology(vertex_count: int, face_count: int) -> Topology:
     """Allocate the arrays that `build_topology` fills."""
-    links = aligned_rows(3 * face_count, ROW, np.int32)
-    links[:] = -1
-    links[:, CORNER_COUNT] = 0
     return Topology(
         geometry=aligned_rows(3 * face_count, ROW, np.float64),
-        links=links,
+        links=aligned_rows(3 * face_count, ROW, np.int32),
         first_corner=np.full(vertex_count, -1, np.int32),
         total_angle=np.zeros(vertex_count, np.float64),
         flags=np.zeros(vertex_count, np.uint8),

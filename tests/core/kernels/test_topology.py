@@ -25,7 +25,6 @@ from geodesic_core.kernels.topology import (
     OPPOSITE,
     OUT_LEFT,
     OUT_RIGHT,
-    ROW,
     SADDLE,
     SIN_LEFT,
     SIN_RIGHT,
@@ -33,7 +32,8 @@ from geodesic_core.kernels.topology import (
     Topology,
     count_boundary_loops,
     empty_topology,
-    fill_rows,
+    fill_geometry,
+    fill_links,
     following,
     link_opposites,
     previous,
@@ -82,8 +82,7 @@ def test_half_edges_around_an_edge_are_a_cycle_with_a_bit_for_the_direction(name
     """However many faces meet, and however they are wound."""
     refused = zoo.REFUSED[name]
     faces = np.ascontiguousarray(refused.faces, np.int32)
-    links = np.full((faces.size, ROW), -1, np.int32)
-    link_opposites(faces, len(refused.vertices), links)
+    opposite = link_opposites(faces, len(refused.vertices))
     flat, ahead = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     around = {}
     for h, (a, b) in enumerate(zip(flat.tolist(), ahead.tolist(), strict=True)):
@@ -91,11 +90,11 @@ def test_half_edges_around_an_edge_are_a_cycle_with_a_bit_for_the_direction(name
     for start in range(faces.size):
         here = around[frozenset((flat[start], ahead[start]))]
         if len(here) == 1:
-            assert links[start, OPPOSITE] == -1
+            assert opposite[start] == -1
             continue
         cycle, h = [], start
         for _ in here:
-            code = links[h, OPPOSITE]
+            code = opposite[h]
             assert code % 2 == (flat[h] == flat[code >> 1])
             h = code >> 1
             cycle.append(h)
@@ -205,15 +204,10 @@ def topology_as_given(case) -> Topology:
     """Built without renumbering, from the same parts."""
     topology = empty_topology(len(case.vertices), len(case.faces))
     faces = np.ascontiguousarray(case.faces, np.int32)
-    link_opposites(faces, len(case.vertices), topology.links)
-    assert fill_rows(case.vertices, faces, topology.links, topology.geometry) == -1
-    unfold_fans(
-        topology.links,
-        topology.geometry,
-        topology.first_corner,
-        topology.total_angle,
-        topology.flags,
-    )
+    opposite, angles = link_opposites(faces, len(case.vertices)), np.empty(faces.size)
+    assert fill_geometry(case.vertices, faces, topology.geometry, angles) == -1
+    fill_links(faces, opposite, len(case.vertices), topology.links)
+    unfold_fans(faces, opposite, angles, topology)
     for array in (topology.inner_vertex, topology.outer_vertex, topology.outer_face):
         array[:] = np.arange(len(array))
     for array in topology:
