@@ -187,7 +187,7 @@ class TriangleMesh:
         """Counts and defects; O(V + F), computed once."""
         topology = self.topology
         inner = topology.inner_vertex
-        used = (topology.first_corner >= 0)[inner]
+        used = (np.diff(topology.first_corner) > 0)[inner]
         flags = topology.flags[inner]
         edges = self.edge_count
         lengths = topology.geometry[:, kernels.LENGTH]

@@ -153,8 +153,9 @@ class DistanceField:
     def _location(self, node: int, parameter: float) -> SurfacePoint:
         if node < 0:
             topology = self.mesh.topology
-            vertex = int(topology.outer_vertex[-1 - node])
-            if topology.first_corner[-1 - node] < 0:  # a source that belongs to no face
+            v = -1 - node
+            vertex = int(topology.outer_vertex[v])
+            if topology.first_corner[v] == topology.first_corner[v + 1]:  # a source without a face
                 return SurfacePoint.vertex(vertex)
             return SurfacePoint.at_vertex(self.mesh, vertex)
         return SurfacePoint.on_half_edge(self.mesh, node, parameter)

@@ -7,7 +7,6 @@ import numpy as np
 from geodesic_core.arrays import Floats
 from geodesic_core.kernels.topology import (
     HEAD,
-    NEXT_CORNER,
     OPPOSITE,
     TAIL,
     outer_half_edge,
@@ -44,12 +43,10 @@ class SurfacePoint:
     def at_vertex(cls, mesh: TriangleMesh, index: int) -> "SurfacePoint":
         """Return the canonical point at a vertex that belongs to a face."""
         topology = mesh.topology
-        corner = int(topology.first_corner[topology.inner_vertex[index]])
-        corners = []
-        while corner >= 0:
-            corners.append(outer_half_edge(topology.outer_face, corner))
-            corner = int(topology.links[corner, NEXT_CORNER])
-        face, place = divmod(int(min(corners)), 3)
+        v = topology.inner_vertex[index]
+        corners = topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]]
+        lowest = min(outer_half_edge(topology.outer_face, int(h)) for h in corners)
+        face, place = divmod(int(lowest), 3)
         return cls(face, _CORNERS[place], index)
 
     @classmethod

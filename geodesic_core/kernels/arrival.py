@@ -6,15 +6,13 @@ from typing import Any
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.queue import push_or_raise
 from geodesic_core.kernels.topology import (
+    APEX_ANGLE,
     BOUNDARY,
     COS_LEFT,
-    FAN_ANGLE,
     LENGTH,
     LENGTH_LEFT,
-    NEXT_CORNER,
     ROW,
     SIN_LEFT,
-    previous,
 )
 from geodesic_core.kernels.wavefront import (
     DONE,
@@ -79,7 +77,7 @@ def light_vertex(wave: Any, v: int, distance: float, via: int, sx: float, sy: fl
     """
     if distance > wave.upper[v] * (1.0 + SLACK):
         return
-    angle = incoming_angle(wave, v, via, sx, sy)
+    angle = incoming_angle(wave, via, sx, sy)
     row = LIGHT * v
     lo, hi = wave.light[row + LIT_FROM], wave.light[row + LIT_TO]
     if lo > hi:
@@ -97,28 +95,19 @@ def light_vertex(wave: Any, v: int, distance: float, via: int, sx: float, sy: fl
 
 
 @kernel
-def incoming_angle(wave: Any, v: int, via: int, sx: float, sy: float) -> float:
-    """Angle, in the unfolded fan of v, at which v sees a pseudosource.
+def incoming_angle(wave: Any, via: int, sx: float, sy: float) -> float:
+    """Angle, in its unfolded fan, at which the apex of a half-edge sees a pseudosource.
 
-    The pseudosource is at (sx, sy) in the frame of the half-edge ``via``, whose apex is v.
+    The pseudosource is at (sx, sy) in the frame of the half-edge ``via``.
     """
     row = ROW * via
     # From the apex: toward the tail, and toward the pseudosource
     ex = -wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
     ey = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
+    hx = ex + wave.geometry[row + LENGTH]
     dx, dy = sx + ex, sy + ey
-    turn: float = max(math.atan2(ex * dy - ey * dx, ex * dx + ey * dy), 0.0)
-    corner = previous(via)
-    if (wave.geometry[row + LENGTH] + ex) * dy - ey * dx > 0.0:  # beyond the head
-        turn = min(turn, corner_width(wave, v, corner))
-    start: float = wave.geometry[ROW * corner + FAN_ANGLE]
-    return start + turn
-
-
-@kernel
-def corner_width(wave: Any, v: int, h: int) -> float:
-    """Angle at v between the half-edge h that leaves it and the next in its fan."""
-    row = ROW * h
-    after = wave.links[row + NEXT_CORNER]
-    end: float = wave.geometry[ROW * after + FAN_ANGLE] if after >= 0 else wave.total_angle[v]
-    return end - wave.geometry[row + FAN_ANGLE]
+    if hx * dy - ey * dx > 0.0:  # beyond the head
+        dx, dy = hx, ey
+    turn = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
+    start: float = wave.geometry[row + APEX_ANGLE]
+    return start + max(turn, 0.0)

@@ -16,6 +16,9 @@ import math
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.tolerances import DOUBLE_ROOT
 
+_ROUNDING = 2.0**-53
+_MOST_STEPS = 100  # of false position, which takes less than ten
+
 
 @inlined
 def hit_left(b: float, sy: float, sy_left: float, sin_left: float, length_left: float) -> float:
@@ -30,21 +33,41 @@ def hit_left(b: float, sy: float, sy_left: float, sin_left: float, length_left: 
     return min(b * sy / height, length_left)
 
 
+@inlined
+def distance(x: float, sx: float, sy: float) -> float:
+    """Distance from (x, 0) to (sx, sy)."""
+    return math.sqrt((x - sx) * (x - sx) + sy * sy)
+
+
 @kernel
-def bisected(
+def bracketed(
     lo: float, hi: float, s0x: float, s0y: float, s1x: float, s1y: float, delta: float
 ) -> float:
-    """Find what `bisector` looks for, by halving the interval to the last bit."""
-    lead_lo = math.hypot(lo - s1x, s1y) - math.hypot(lo - s0x, s0y)
-    rises = math.hypot(hi - s1x, s1y) - math.hypot(hi - s0x, s0y) > lead_lo
-    while True:
-        x = 0.5 * (lo + hi)
+    """Find what `bisector` looks for by false position (Illinois), to within rounding."""
+    lead_lo = distance(lo, s1x, s1y) + delta - distance(lo, s0x, s0y)
+    lead_hi = distance(hi, s1x, s1y) + delta - distance(hi, s0x, s0y)
+    if lead_lo * lead_hi >= 0.0:  # no sign change: by rounding alone, at an end
+        return lo if abs(lead_lo) <= abs(lead_hi) else hi
+    x, moved = lo, 0
+    for _ in range(_MOST_STEPS):
+        x = lo - lead_lo * ((hi - lo) / (lead_hi - lead_lo))
         if x <= lo or x >= hi:
-            return x
-        if (math.hypot(x - s1x, s1y) + delta > math.hypot(x - s0x, s0y)) == rises:
-            hi = x
+            break
+        r0, r1 = distance(x, s0x, s0y), distance(x, s1x, s1y)
+        lead = r1 + delta - r0
+        if abs(lead) <= _ROUNDING * (r0 + r1):
+            break
+        if (lead > 0.0) == (lead_lo > 0.0):
+            lo, lead_lo = x, lead
+            if moved < 0:  # twice the same end: draw the other nearer
+                lead_hi *= 0.5
+            moved = -1
         else:
-            lo = x
+            hi, lead_hi = x, lead
+            if moved > 0:
+                lead_lo *= 0.5
+            moved = 1
+    return min(max(x, lo), hi)
 
 
 @inlined
@@ -90,6 +113,6 @@ def bisector(
     if max(depth_near, depth_far) <= 0.0 or abs(near - far) <= DOUBLE_ROOT * width:
         # Weights that are nearly equal: both roots are the straight bisector's, with half of its
         # digits, and the signs of r0 and r1 are rounding.
-        return bisected(lo, hi, s0x, s0y, s1x, s1y, delta)
+        return bracketed(lo, hi, s0x, s0y, s1x, s1y, delta)
     # Where rounding lets in a second root, at an end, it is the inner one that counts.
     return lo + (near if depth_near >= depth_far else far)

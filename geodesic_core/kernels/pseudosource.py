@@ -5,7 +5,6 @@ from typing import Any
 
 from geodesic_core.kernels.arrival import (
     bound_vertex,
-    corner_width,
     improve_vertex,
     incoming_angle,
     light_vertex,
@@ -15,21 +14,16 @@ from geodesic_core.kernels.lists import insert_sorted, put_window, queue_if_due
 from geodesic_core.kernels.topology import (
     APEX,
     BOUNDARY,
-    COS_LEFT,
     COS_RIGHT,
-    FAN_ANGLE,
     FANS,
     HEAD,
     LENGTH,
     LENGTH_LEFT,
-    NEXT_CORNER,
-    OPPOSITE,
+    LENGTH_RIGHT,
     OUT_LEFT,
+    OUT_RIGHT,
     ROW,
-    SIN_LEFT,
     SIN_RIGHT,
-    TAIL,
-    following,
     previous,
 )
 from geodesic_core.kernels.wavefront import (
@@ -69,7 +63,7 @@ def emit_pseudosource(wave: Any, v: int) -> None:
         emit_shadows(wave, v)
     else:
         via = wave.winner_ints[WINNER * v + VIA]
-        lit = incoming_angle(wave, v, via, wave.winner[2 * v], wave.winner[2 * v + 1])
+        lit = incoming_angle(wave, via, wave.winner[2 * v], wave.winner[2 * v + 1])
         if wave.flags[v] & BOUNDARY:
             emit_between(wave, v, lit + math.pi - SECTOR_MARGIN, total)
             emit_between(wave, v, 0.0, lit - math.pi + SECTOR_MARGIN)
@@ -101,14 +95,21 @@ def emit_shadows(wave: Any, v: int) -> None:
 @kernel
 def emit_around(wave: Any, v: int) -> None:
     """Emit into every face at v."""
-    h = wave.first_corner[v]
-    while h >= 0:
-        widest = corner_width(wave, v, h)
+    for c in range(wave.first_corner[v], wave.first_corner[v + 1]):
+        h, widest = wave.corners[c], corner_end(wave, v, c) - wave.corner_angles[c]
         emit_sector(wave, v, h, 0.0, widest, widest)
         walk_ahead(wave, v, h)
         if wave.links[ROW * h + OUT_LEFT] < 0:
             walk_last(wave, v, h)
-        h = wave.links[ROW * h + NEXT_CORNER]
+
+
+@kernel
+def corner_end(wave: Any, v: int, c: int) -> float:
+    """Angle at which the corner at c of the corners ends in the unfolded fan of v."""
+    end: float = wave.total_angle[v]
+    if c + 1 < wave.first_corner[v + 1]:
+        end = wave.corner_angles[c + 1]
+    return end
 
 
 @kernel
@@ -122,11 +123,8 @@ def emit_between(wave: Any, v: int, lo: float, hi: float) -> None:
         turns = math.floor(lo / turn)
         lo, hi = lo - turns * turn, hi - turns * turn
         around = hi - turn
-    h = wave.first_corner[v]
-    start = 0.0
-    while h >= 0:
-        after = wave.links[ROW * h + NEXT_CORNER]
-        end = wave.geometry[ROW * after + FAN_ANGLE] if after >= 0 else wave.total_angle[v]
+    for c in range(wave.first_corner[v], wave.first_corner[v + 1]):
+        h, start, end = wave.corners[c], wave.corner_angles[c], corner_end(wave, v, c)
         if lo < end and start < hi:
             emit_sector(wave, v, h, lo - start, hi - start, end - start)
         if start < around:
@@ -135,8 +133,6 @@ def emit_between(wave: Any, v: int, lo: float, hi: float) -> None:
             walk_ahead(wave, v, h)
         if end <= hi and wave.links[ROW * h + OUT_LEFT] < 0:
             walk_last(wave, v, h)
-        start = end
-        h = after
 
 
 @kernel
@@ -173,38 +169,36 @@ def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) 
     """
     if hi <= 0.0 or lo >= widest or hi <= lo:
         return
-    link = following(h)  # from the head of h to its apex; v is its own apex
-    across = wave.links[ROW * link + OPPOSITE]
+    row = ROW * h
+    across = wave.links[row + OUT_RIGHT]
     if across < 0:
         return
-    across >>= 1
-    row = ROW * link
-    length = wave.geometry[row + LENGTH]
+    length = wave.geometry[row + LENGTH_RIGHT]
     b0, b1 = 0.0, length
-    # The frame of the opposite half-edge starts at the apex: distances count from its far end.
+    # The frame of the half-edge across starts at the apex: distances count from its far end.
     if lo > 0.0:
-        b1 = length - along_link(wave, h, lo)
+        b1 = length - along_far_edge(wave, h, lo)
     if hi < widest:
-        b0 = length - along_link(wave, h, hi)
+        b0 = length - along_far_edge(wave, h, hi)
     if b1 <= b0:
         return
-    sx = length - wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
-    sy = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
+    sx = length - wave.geometry[row + COS_RIGHT] * wave.geometry[row + LENGTH]
+    sy = -wave.geometry[row + SIN_RIGHT] * wave.geometry[row + LENGTH]
     sigma, xi = wave.distance[v], 0.0
     if merging(wave):
         xi = wave.upper[v] - sigma
     insert_sorted(wave, across, put_window(wave, b0, b1, sx, sy, sigma, v, xi, -1 - v))
     wave.counters[CREATED] += 1
-    queue_if_due(wave, across, wave.links[row + TAIL], wave.links[row + HEAD])
+    queue_if_due(wave, across, wave.links[row + HEAD], wave.links[row + APEX])
 
 
 @kernel
-def along_link(wave: Any, h: int, angle: float) -> float:
+def along_far_edge(wave: Any, h: int, angle: float) -> float:
     """Where the ray from the tail of h at ``angle`` meets the far edge, from the head of h."""
     row = ROW * h
     sine, cosine = math.sin(angle), math.cos(angle)
     far = sine * wave.geometry[row + COS_RIGHT] + cosine * wave.geometry[row + SIN_RIGHT]
-    reach: float = wave.geometry[ROW * following(h) + LENGTH]
+    reach: float = wave.geometry[row + LENGTH_RIGHT]
     if far <= 0.0:
         return reach
     place: float = wave.geometry[row + LENGTH] * sine / far

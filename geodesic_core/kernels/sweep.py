@@ -14,12 +14,10 @@ from geodesic_core.kernels.pseudosource import emit_pseudosource, is_pseudosourc
 from geodesic_core.kernels.queue import HEAP_SIZE, RING_HEAD, RING_SIZE, pop_nearest, ring_pop
 from geodesic_core.kernels.topology import (
     APEX,
-    CORNER_COUNT,
     HEAD,
-    NEXT_CORNER,
-    OPPOSITE,
+    OUT_LEFT,
+    OUT_RIGHT,
     ROW,
-    following,
     previous,
 )
 from geodesic_core.kernels.wavefront import (
@@ -82,8 +80,8 @@ def settle_nearest(wave: Any) -> int:
     """Take the nearest vertex: emit its windows, wake the lists around it."""
     v = wave.heap[0]
     emits = is_pseudosource(wave, v)
-    first = wave.first_corner[v]
-    if emits and first >= 0 and 6 * wave.links[ROW * first + CORNER_COUNT] > free_windows(wave):
+    first, last = wave.first_corner[v], wave.first_corner[v + 1]
+    if emits and 6 * (last - first) > free_windows(wave):
         return POOL_FULL
     pop_nearest(wave)
     if wave.status[v] != DONE:
@@ -92,23 +90,20 @@ def settle_nearest(wave: Any) -> int:
     wave.counters[WORK] += 30
     if emits:
         emit_pseudosource(wave, v)
-    h = first
-    while h >= 0:
-        mark_front(wave, wave.links[ROW * h + HEAD])
-        mark_front(wave, wave.links[ROW * h + APEX])
-        h = wave.links[ROW * h + NEXT_CORNER]
-    h = first
-    while h >= 0:
+    for c in range(first, last):
+        row = ROW * wave.corners[c]
+        mark_front(wave, wave.links[row + HEAD])
+        if wave.links[row + OUT_LEFT] < 0:
+            mark_front(wave, wave.links[row + APEX])
+    for c in range(first, last):
+        h = wave.corners[c]
         queue_list(wave, h)
         queue_list(wave, previous(h))
-        across = wave.links[ROW * following(h) + OPPOSITE]
-        if across >= 0:
-            across >>= 1
-            if wave.lists[LIST * across + SIZE] > 0:
-                far = wave.links[ROW * across + APEX]
-                if wave.status[far] != FAR:
-                    queue_list(wave, across)
-        h = wave.links[ROW * h + NEXT_CORNER]
+        across = wave.links[ROW * h + OUT_RIGHT]
+        if across >= 0 and wave.lists[LIST * across + SIZE] > 0:
+            far = wave.links[ROW * across + APEX]
+            if wave.status[far] != FAR:
+                queue_list(wave, across)
     return FINISHED
 
 

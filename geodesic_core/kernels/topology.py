@@ -37,7 +37,7 @@ LENGTH_LEFT = 3  # |tail apex|
 COS_RIGHT = 4  # of the angle at the head
 SIN_RIGHT = 5
 LENGTH_RIGHT = 6  # |head apex|
-FAN_ANGLE = 7  # where this half-edge leaves its tail, in the tail's unfolded fan; radians
+APEX_ANGLE = 7  # where the side toward the tail leaves the apex, in its unfolded fan; radians
 
 # Columns of Topology.links, a row per half-edge
 OUT_LEFT = 0  # the half-edge across (tail, apex), in the neighbour; -1 at a boundary
@@ -46,8 +46,7 @@ APEX = 2
 TAIL = 3
 HEAD = 4
 OPPOSITE = 5  # next half-edge around this edge, 2 h + 1 if it runs the same way, else 2 h; or -1
-NEXT_CORNER = 6  # the next corner around the tail, counter-clockwise; -1 after the last
-CORNER_COUNT = 7  # number of corners at the tail
+SPARE = 6  # this column and the next fill the row, half a cache line
 
 ROW = 8  # columns of both
 
@@ -75,11 +74,15 @@ class Topology(NamedTuple):
     """What the sweep needs to know of a mesh, in inner numbering; read-only once built."""
 
     geometry: Floats
-    """(3F, 8): LENGTH … FAN_ANGLE"""
+    """(3F, 8): LENGTH … APEX_ANGLE"""
     links: Ints
-    """(3F, 8): OUT_LEFT … CORNER_COUNT"""
+    """(3F, 8): OUT_LEFT … SPARE"""
     first_corner: Ints
-    """(V,): a half-edge that leaves the vertex, first of its fan; -1 at an isolated vertex"""
+    """(V + 1,): where in `corners` those of each vertex start; the next vertex's follow"""
+    corners: Ints
+    """(3F,): the half-edges that leave a vertex, counter-clockwise, fan after fan"""
+    corner_angles: Floats
+    """(3F,): where each of `corners` leaves in the unfolded fan of its vertex, radians"""
     total_angle: Floats
     """(V,): sum of the angles at the vertex, radians"""
     flags: Flags
@@ -263,7 +266,7 @@ def find_bad_edges(opposite: Ints, limit: int) -> tuple[int, int, Ints]:
 
 @kernel
 def fill_geometry(vertices: Floats, faces: Ints, geometry: Floats, angles: Floats) -> int:
-    """Fill the geometry but for FAN_ANGLE, and the angle at each half-edge's tail, radians.
+    """Fill the geometry but for APEX_ANGLE, and the angle at each half-edge's tail, radians.
 
     Returns a face with too short an edge, or -1.
     """
@@ -300,11 +303,8 @@ def fill_geometry(vertices: Floats, faces: Ints, geometry: Floats, angles: Float
 
 
 @kernel
-def fill_links(faces: Ints, opposite: Ints, vertex_count: int, links: Ints) -> None:
-    """Fill the links but for NEXT_CORNER."""
-    corners = np.zeros(vertex_count, np.int32)
-    for v in faces.reshape(-1):
-        corners[v] += 1
+def fill_links(faces: Ints, opposite: Ints, links: Ints) -> None:
+    """Fill the links."""
     for f in range(faces.shape[0]):
         for i in range(3):
             h, n, p = 3 * f + i, (i + 1) % 3, (i + 2) % 3
@@ -312,7 +312,7 @@ def fill_links(faces: Ints, opposite: Ints, vertex_count: int, links: Ints) -> N
             links[h, OUT_RIGHT] = opposite[3 * f + n] >> 1
             links[h, APEX], links[h, TAIL], links[h, HEAD] = faces[f, p], faces[f, i], faces[f, n]
             links[h, OPPOSITE] = opposite[h]
-            links[h, CORNER_COUNT] = corners[faces[f, i]]
+            links[h, SPARE] = links[h, SPARE + 1] = 0
 
 
 @kernel
@@ -326,42 +326,41 @@ def angle_of(cosine: float, sine: float) -> float:
 def unfold_fans(faces: Ints, opposite: Ints, angles: Floats, topology: Any) -> None:
     """Order the corners around each vertex, lay their angles out and classify the vertex.
 
-    A fan starts at its clockwise boundary where it has one. The corners of several fans at one
-    vertex follow each other in one chain. The walk reads ``opposite`` and ``angles`` alone, which
-    fit the caches; the rows of the topology do not.
+    A fan starts at its clockwise boundary where it has one. The walk reads ``opposite`` and
+    ``angles`` alone, which fit the caches; the rows of the topology do not.
     """
-    links, geometry = topology.links, topology.geometry
+    corners, corner_angles = topology.corners, topology.corner_angles
     first_corner, total_angle, flags = topology.first_corner, topology.total_angle, topology.flags
     flat = faces.reshape(-1)
-    last_corner = np.full(len(first_corner), -1, np.int32)
+    first_corner[:] = 0
+    for h in range(len(flat)):
+        first_corner[flat[h] + 1] += 1
+    for v in range(len(total_angle)):
+        first_corner[v + 1] += first_corner[v]
+    free = first_corner.copy()
     seen = np.zeros(len(flat), np.uint8)
     for at_boundary in (True, False):  # open fans first: a walk must not start in their middle
         for start in range(len(flat)):
             if seen[start] or (at_boundary and opposite[start] >= 0):
                 continue
             v = flat[start]
-            if last_corner[v] < 0:
-                first_corner[v] = start
-            else:
+            place, angle, corner = free[v], total_angle[v], start
+            if place > first_corner[v]:
                 flags[v] |= FANS
-                links[last_corner[v], NEXT_CORNER] = start
-            angle = total_angle[v]
-            corner = start
             while True:
                 seen[corner] = 1
-                geometry[corner, FAN_ANGLE] = angle
+                corners[place], corner_angles[place] = corner, angle
+                topology.geometry[following(corner), APEX_ANGLE] = angle
+                place += 1
                 angle += angles[corner]
                 across = opposite[previous(corner)] >> 1
                 if across < 0 or seen[across]:
                     break
-                links[corner, NEXT_CORNER] = across
                 corner = across
             if across < 0:
                 flags[v] |= BOUNDARY
-            links[corner, NEXT_CORNER] = -1
-            last_corner[v] = corner
-            total_angle[v] = angle
-    for v in range(len(first_corner)):
+            free[v], total_angle[v] = place, angle
+    for v in range(len(total_angle)):
         if not flags[v] & BOUNDARY and total_angle[v] > 2.0 * math.pi + SADDLE_EXCESS:
             flags[v] |= SADDLE
 
@@ -432,7 +431,7 @@ def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[int, i
     face = fill_geometry(inner_vertices, inner_faces, topology.geometry, angles)
     if face >= 0:
         return TOO_SHORT, 1, np.full(1, face, np.int32)
-    fill_links(inner_faces, opposite, len(vertices), topology.links)
+    fill_links(inner_faces, opposite, topology.links)
     unfold_fans(inner_faces, opposite, angles, topology)
     topology.component[:] = label_components(faces, len(vertices))
     return SOUND, 0, bad
@@ -443,7 +442,9 @@ def empty_topology(vertex_count: int, face_count: int) -> Topology:
     return Topology(
         geometry=aligned_rows(3 * face_count, ROW, np.float64),
         links=aligned_rows(3 * face_count, ROW, np.int32),
-        first_corner=np.full(vertex_count, -1, np.int32),
+        first_corner=np.empty(vertex_count + 1, np.int32),
+        corners=np.empty(3 * face_count, np.int32),
+        corner_angles=np.empty(3 * face_count, np.float64),
         total_angle=np.zeros(vertex_count, np.float64),
         flags=np.zeros(vertex_count, np.uint8),
         component=np.empty(vertex_count, np.int32),

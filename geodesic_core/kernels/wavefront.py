@@ -131,6 +131,8 @@ class View(NamedTuple):
     geometry: Any
     links: Any
     first_corner: Any
+    corners: Any
+    corner_angles: Any
     total_angle: Any
     flags: Any
     distance: Any
@@ -171,6 +173,8 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         pointer(topology.geometry),
         pointer(topology.links),
         pointer(topology.first_corner),
+        pointer(topology.corners),
+        pointer(topology.corner_angles),
         pointer(topology.total_angle),
         pointer(topology.flags),
         pointer(wave.distance),
@@ -216,7 +220,7 @@ def new_wavefront(topology: Topology, *, merges: bool = False, paths: bool = Fal
 
     With ``paths``, a sweep that merges records what it merges, for backtracing.
     """
-    vertices, half_edges = len(topology.first_corner), len(topology.links)
+    vertices, half_edges = len(topology.total_angle), len(topology.links)
     merged_vertices = vertices if merges else 0
     counters = np.zeros(COUNTERS, np.int64)
     counters[FREE_FIRST] = -1

@@ -11,9 +11,7 @@ from geodesic_core.kernels.pseudosource import emit_shadows
 from geodesic_core.kernels.queue import HEAP_SIZE
 from geodesic_core.kernels.topology import (
     COS_LEFT,
-    FAN_ANGLE,
     LENGTH_LEFT,
-    NEXT_CORNER,
     SIN_LEFT,
     following,
 )
@@ -60,13 +58,13 @@ class Vertex:
 
     def see(self, angle, distance=1.0):
         """A pseudosource in this direction of the unfolded fan."""
-        h = int(self.topology.first_corner[self.v])
-        geometry, links = self.topology.geometry, self.topology.links
-        while links[h, NEXT_CORNER] >= 0 and geometry[links[h, NEXT_CORNER], FAN_ANGLE] <= angle:
-            h = int(links[h, NEXT_CORNER])
-        via = int(following(h))
+        geometry, first = self.topology.geometry, self.topology.first_corner
+        here = slice(first[self.v], first[self.v + 1])
+        starts = self.topology.corner_angles[here]
+        place = int(np.searchsorted(starts, angle, side="right")) - 1
+        via = int(following(self.topology.corners[here][place]))
         apex = geometry[via, LENGTH_LEFT] * geometry[via, [COS_LEFT, SIN_LEFT]]
-        turn = angle - geometry[h, FAN_ANGLE]
+        turn = angle - starts[place]
         toward_tail = complex(*-apex)
         s = complex(*apex) + 9 * toward_tail * complex(math.cos(turn), math.sin(turn))
         light_vertex(self.view, self.v, distance, via, s.real, s.imag)

@@ -20,7 +20,7 @@ from tests.core.kernels.invariants import check_heap
 from tests.core.kernels.stepping import topology_of, view_of_arrays
 
 TOPOLOGY = topology_of(zoo.SMALL["crags"])
-VERTICES, HALF_EDGES = len(TOPOLOGY.first_corner), len(TOPOLOGY.links)
+VERTICES, HALF_EDGES = len(TOPOLOGY.total_angle), len(TOPOLOGY.links)
 
 
 def empty():

@@ -11,17 +11,15 @@ import pytest
 import geodesic_core as gc
 from geodesic_core.kernels.topology import (
     APEX,
+    APEX_ANGLE,
     BOUNDARY,
-    CORNER_COUNT,
     COS_LEFT,
     COS_RIGHT,
-    FAN_ANGLE,
     FANS,
     HEAD,
     LENGTH,
     LENGTH_LEFT,
     LENGTH_RIGHT,
-    NEXT_CORNER,
     OPPOSITE,
     OUT_LEFT,
     OUT_RIGHT,
@@ -124,21 +122,20 @@ def test_rows_are_the_triangle_as_seen_from_the_half_edge(case):
 
 
 @zoo.each(zoo.SMALL)
-def test_corners_of_a_vertex_are_chained_fan_by_fan(case):
+def test_corners_of_a_vertex_follow_each_other_fan_by_fan(case):
     topology = topology_of(case)
     links, faces = topology.links, inner_faces(topology)
     for v in range(len(case.vertices)):
-        chain, h = [], topology.first_corner[v]
-        while h >= 0:
-            chain.append(int(h))
-            h = links[h, NEXT_CORNER]
-        assert sorted(chain) == np.flatnonzero(faces.reshape(-1) == v).tolist()
-        assert (links[chain, CORNER_COUNT] == len(chain)).all()
-        angles = [_angle(topology, h) for h in chain]
-        starts = topology.geometry[chain, FAN_ANGLE]
-        np.testing.assert_allclose(starts, [0.0, *np.cumsum(angles)][: len(chain)], atol=1e-14)
+        here = slice(topology.first_corner[v], topology.first_corner[v + 1])
+        corners, starts = topology.corners[here], topology.corner_angles[here]
+        assert sorted(corners) == np.flatnonzero(faces.reshape(-1) == v).tolist()
+        angles = [_angle(topology, h) for h in corners]
+        expected = [0.0, *np.cumsum(angles)][: len(corners)]
+        np.testing.assert_allclose(starts, expected, atol=1e-14)
+        for h, start in zip(corners.tolist(), starts, strict=True):
+            assert topology.geometry[following(h), APEX_ANGLE] == start
         assert topology.total_angle[v] == pytest.approx(sum(angles), abs=1e-14)
-        breaks = sum(links[a, OUT_LEFT] != b for a, b in itertools.pairwise(chain))
+        breaks = sum(links[a, OUT_LEFT] != b for a, b in itertools.pairwise(corners))
         assert breaks == max(_fans_at(faces, v) - 1, 0)
 
 
@@ -206,7 +203,7 @@ def topology_as_given(case) -> Topology:
     faces = np.ascontiguousarray(case.faces, np.int32)
     opposite, angles = link_opposites(faces, len(case.vertices)), np.empty(faces.size)
     assert fill_geometry(case.vertices, faces, topology.geometry, angles) == -1
-    fill_links(faces, opposite, len(case.vertices), topology.links)
+    fill_links(faces, opposite, topology.links)
     unfold_fans(faces, opposite, angles, topology)
     for array in (topology.inner_vertex, topology.outer_vertex, topology.outer_face):
         array[:] = np.arange(len(array))
@@ -235,7 +232,7 @@ def test_a_fan_of_many_faces_takes_linear_time():
         faces = [(0, k, k + 1) for k in range(1, sides + 1)]
         began = time.perf_counter()
         topology = gc.TriangleMesh(vertices, faces).topology
-        assert topology.links[:, CORNER_COUNT].max() == sides
+        assert np.diff(topology.first_corner).max() == sides
         return time.perf_counter() - began
 
     # A search in the bucket of the hub would take 100 times as long for 10 times the faces.
