@@ -9,8 +9,15 @@ from geodesic_core import errors, samples
 from geodesic_core.errors import GeodesicError
 from geodesic_core.mesh import MeshReport, Sample, TriangleMesh
 from geodesic_core.mesh_io import load_mesh
-from geodesic_core.result import DistanceField, ErrorBound, GeodesicPath, Source, SweepStats
-from geodesic_core.solvers import approximate_distance, exact_distance, shortest_path, warm_up
+from geodesic_core.path import ErrorBound, GeodesicPath, SearchStep
+from geodesic_core.result import DistanceField, Source, SweepStats
+from geodesic_core.solvers import (
+    Solver,
+    approximate_distance,
+    exact_distance,
+    shortest_path,
+    warm_up,
+)
 from geodesic_core.surface_point import SurfacePoint
 
 __all__ = [
@@ -20,6 +27,8 @@ __all__ = [
     "GeodesicPath",
     "MeshReport",
     "Sample",
+    "SearchStep",
+    "Solver",
     "Source",
     "SurfacePoint",
     "SweepStats",

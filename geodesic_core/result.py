@@ -1,17 +1,17 @@
 """What the solvers give back."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import InternalError, InvalidPoint, NoPath
-from geodesic_core.kernels import backtrace
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.mesh import TriangleMesh
+from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, traced_path
 from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import PATH_LENGTH
 
@@ -22,19 +22,6 @@ class Source:
 
     point: int | SurfacePoint
     start_distance: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class ErrorBound:
-    """How far an answer may be from the exact one."""
-
-    type: Literal["relative", "absolute"]
-    value: float
-    kind: Literal["guaranteed", "estimated"]
-
-
-EXACT = ErrorBound("relative", 0.0, "guaranteed")
-"""The bound of exact answers: floating-point rounding aside, there is no error."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,26 +43,6 @@ class SweepStats:
     def as_dict(self) -> dict[str, Any]:
         """Return the statistics as what JSON can hold."""
         return asdict(self)
-
-
-@dataclass(frozen=True)
-class GeodesicPath:
-    """A path over the surface, from its source to its target.
-
-    An exact field gives shortest paths. An approximate one gives paths whose length U is an upper
-    bound of the exact distance, as the field's value D is a lower bound: ``error_bound`` holds
-    (U - D) / D.
-    """
-
-    points: Floats
-    """(K, 3) positions, mesh units."""
-    locations: tuple[SurfacePoint, ...]
-    """The K points on the surface, canonical."""
-    faces: Ints
-    """(K - 1,) int32: the face that each piece crosses."""
-    length: float
-    """Sum of the pieces, mesh units."""
-    error_bound: ErrorBound
 
 
 @dataclass(frozen=True)
@@ -117,72 +84,21 @@ class DistanceField:
         vertex = vertex_of(self.mesh, target, "target")
         if self.nearest_source[vertex] < 0:
             raise self._no_path(vertex)
-        nodes, parameters, faces = self._trace(vertex)
-        locations: list[SurfacePoint] = []
-        crossed: list[int] = []
-        for i in range(len(nodes) - 1, -1, -1):
-            here = self._location(int(nodes[i]), float(parameters[i]))
-            if locations and here == locations[-1]:
-                continue  # a path through a vertex meets several edges there
-            if locations:
-                crossed.append(int(self.mesh.topology.outer_face[faces[i]]))
-            locations.append(here)
-        points = np.array([location.position(self.mesh) for location in locations])
-        length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        v = int(self.mesh.topology.inner_vertex[vertex])
+        path = traced_path(self.mesh, self._known_winners, v, EXACT)
         start = self.sources[self.nearest_source[vertex]].start_distance
         distance = float(self.distances[vertex])
-        excess = start + length - distance
+        excess = start + path.length - distance
         exact = self.error_bound == EXACT
         if excess < -PATH_LENGTH * distance or (exact and excess > PATH_LENGTH * distance):
             raise InternalError(
-                f"the path to vertex {vertex} has length {length}, but the field says "
+                f"the path to vertex {vertex} has length {path.length}, but the field says "
                 f"{distance - start}; please report this mesh"
             )
-        bound = EXACT
-        if not exact:
-            share = max(excess, 0.0) / distance if distance > 0.0 else 0.0
-            bound = ErrorBound("relative", share, "guaranteed")
-        return GeodesicPath(
-            points=points,
-            locations=tuple(locations),
-            faces=np.array(crossed, np.int32),
-            length=length,
-            error_bound=bound,
-        )
-
-    def _location(self, node: int, parameter: float) -> SurfacePoint:
-        if node < 0:
-            topology = self.mesh.topology
-            v = -1 - node
-            vertex = int(topology.outer_vertex[v])
-            if topology.first_corner[v] == topology.first_corner[v + 1]:  # a source without a face
-                return SurfacePoint.vertex(vertex)
-            return SurfacePoint.at_vertex(self.mesh, vertex)
-        return SurfacePoint.on_half_edge(self.mesh, node, parameter)
-
-    def _trace(self, vertex: int) -> tuple[Ints, Floats, Ints]:
-        room = 256
-        while True:
-            nodes, parameters = np.empty(room, np.int32), np.empty(room)
-            faces = np.empty(room, np.int32)
-            outcome, count = backtrace.trace_path(
-                self.mesh.topology,
-                self._known_winners,
-                self.mesh.topology.inner_vertex[vertex],
-                nodes,
-                parameters,
-                faces,
-            )
-            if outcome == backtrace.TRACED:
-                return nodes[:count], parameters[:count], faces[: count - 1]
-            # A shortest path crosses a face at most once, and an approximate one hardly more often:
-            # a longer walk is lost as well.
-            if outcome == backtrace.LOST or room > 4 * len(self.mesh.faces) + 256:
-                raise InternalError(
-                    f"the path to vertex {vertex} left the surface after {count} points; "
-                    f"please report this mesh"
-                )
-            room *= 4
+        if exact:
+            return path
+        share = max(excess, 0.0) / distance if distance > 0.0 else 0.0
+        return replace(path, error_bound=ErrorBound("relative", share, "guaranteed"))
 
     def _no_path(self, vertex: int) -> NoPath:
         components = self.mesh.components

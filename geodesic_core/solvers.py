@@ -1,59 +1,31 @@
-"""The solvers: arguments in, sweep, results out; status codes become exceptions here."""
+"""The solvers: arguments in, sweeps, results out."""
 
 import math
 import time
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from geodesic_core.errors import (
-    Cancelled,
-    DeadlineExceeded,
-    InvalidArgument,
-    InvalidPoint,
-    MemoryLimitExceeded,
-    NotConverged,
-)
+from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.kernels import sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
-from geodesic_core.kernels.propagate import MERGES_FULL, POOL_FULL, RUNAWAY, SCRATCH_FULL
-from geodesic_core.kernels.topology import HEAD, TAIL, Topology
 from geodesic_core.kernels.wavefront import Bounds, Wavefront
 from geodesic_core.mesh import TriangleMesh
+from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, joined
+from geodesic_core.path_search import PathSearch
 from geodesic_core.result import (
-    EXACT,
     DistanceField,
-    ErrorBound,
-    GeodesicPath,
     Source,
     Sources,
     SweepStats,
     vertex_of,
 )
+from geodesic_core.run import Control, is_number, run_sweep, share_of_vertices
 from geodesic_core.surface_point import SurfacePoint
-from geodesic_core.tolerances import RUNS, WIDEST_ERROR
-
-SLICE_SECONDS = 0.05
-"""About how long the sweep runs before it looks up: what cancelling takes, at most."""
-
-_FIRST_BUDGET = 1_000_000
-
-
-@dataclass(frozen=True)
-class Control:
-    """How a caller watches a sweep and stops it."""
-
-    progress: Callable[[float], None] | None = None
-    """Called about every 50 ms with the share that is done, from 0 to 1, never decreasing."""
-    cancel: Callable[[], bool] | None = None
-    """Asked about every 50 ms; the sweep stops once it answers true."""
-    deadline_s: float | None = None
-    """Seconds granted, from the call."""
-    memory_limit: int | None = None
-    """Bytes granted for the state of the sweep, the mesh itself not counted."""
+from geodesic_core.tolerances import WIDEST_ERROR
 
 
 def exact_distance(
@@ -152,31 +124,113 @@ def shortest_path(
     mesh: TriangleMesh,
     source: int | SurfacePoint,
     target: int | SurfacePoint,
+    waypoints: Sequence[int | SurfacePoint] = (),
     *,
+    explain: bool = False,
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
     deadline_s: float | None = None,
     memory_limit: int | None = None,
 ) -> GeodesicPath:
-    """Return an exact shortest path between two vertices (sections 3 and 3.5).
+    """Return an exact shortest path between two vertices (section 5).
+
+    For many paths on one mesh, a `Solver` is faster.
+
+    Parameters
+    ----------
+    mesh
+        The surface.
+    source, target
+        Vertex indices, or `SurfacePoint` of vertices.
+    waypoints
+        Points that the path passes in order; it is shortest from each to the next.
+    explain
+        Also return what each step of the search did, in `GeodesicPath.steps`.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
 
     Raises
     ------
     NoPath
-        The two are not connected.
+        Two of the points are not connected.
     InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
-        As in `exact_distance`, whose parameters these are.
+        As in `exact_distance`.
+
+    Notes
+    -----
+    In practice O(region), a thin strip around the path and a larger one for its bounds; allocating
+    the state is O(V + F), about two thirds of the mesh's own arrays.
     """
-    vertex_of(mesh, target, "target")
-    field = exact_distance(
-        mesh,
+    return Solver(mesh).shortest_path(
         source,
+        target,
+        waypoints,
+        explain=explain,
         progress=progress,
         cancel=cancel,
         deadline_s=deadline_s,
         memory_limit=memory_limit,
     )
-    return field.path_to(target)
+
+
+class Solver:
+    """Solvers of one mesh that keep between calls what they can share.
+
+    Paths need scratch memory, about two thirds of the mesh's own arrays, and get faster with
+    landmarks, which are added while paths are asked for (64 bytes a vertex). Not for use by several
+    threads at once.
+    """
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self.mesh = mesh
+        self._search: PathSearch | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Memory kept, bytes, the mesh not counted."""
+        return 0 if self._search is None else self._search.nbytes
+
+    def exact_distance(self, *arguments: Any, **options: Any) -> DistanceField:
+        """Do as `exact_distance` does, on this mesh."""
+        return exact_distance(self.mesh, *arguments, **options)
+
+    def approximate_distance(self, *arguments: Any, **options: Any) -> DistanceField:
+        """Do as `approximate_distance` does, on this mesh."""
+        return approximate_distance(self.mesh, *arguments, **options)
+
+    def shortest_path(
+        self,
+        source: int | SurfacePoint,
+        target: int | SurfacePoint,
+        waypoints: Sequence[int | SurfacePoint] = (),
+        *,
+        explain: bool = False,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> GeodesicPath:
+        """Do as `shortest_path` does, on this mesh; in time that does not depend on its size."""
+        control = Control(progress, cancel, deadline_s, memory_limit)
+        mesh = self.mesh
+        stops = [vertex_of(mesh, source, "source")]
+        stops += [vertex_of(mesh, point, f"waypoint {i}") for i, point in enumerate(waypoints)]
+        stops.append(vertex_of(mesh, target, "target"))
+        for here, there in pairwise(stops):
+            if mesh.components[here] != mesh.components[there]:
+                raise NoPath(
+                    f"vertices {here} and {there} are in different connected components",
+                    "disconnected",
+                )
+        if self._search is None:
+            self._search = PathSearch(mesh)
+        legs: list[GeodesicPath] = []
+        for here, there in pairwise(stops):
+            control.look_up(len(legs) / (len(stops) - 1))
+            legs.append(self._search.find(here, there, control, explain=explain))
+        if progress is not None:
+            progress(1.0)
+        return legs[0] if len(legs) == 1 else joined(legs)
 
 
 def warm_up() -> None:
@@ -185,6 +239,7 @@ def warm_up() -> None:
     mesh = TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     exact_distance(mesh, 0).path_to(3)
     approximate_distance(mesh, 0, keep_windows=True).path_to(3)
+    shortest_path(mesh, 0, 3, explain=True)
     mesh.report  # noqa: B018 - computed on access
 
 
@@ -198,10 +253,8 @@ def _solve(
     keeps: bool,
 ) -> DistanceField:
     """Check the arguments, sweep, and make the result; without ``keeps``, none for backtracing."""
-    began = time.perf_counter()
-    _check_control(control)
     starts = _as_sources(mesh, sources)
-    wave = _sweep(mesh, starts, bounds, control, began, keeps=keeps)
+    wave = _sweep(mesh, starts, bounds, control, keeps=keeps)
     wave.distance[wave.distance > bounds.max_distance] = math.inf
     winners = _winners_of(wave)
     inner = mesh.topology.inner_vertex
@@ -212,7 +265,7 @@ def _solve(
         distances=wave.distance[inner],
         nearest_source=winners.nearest[inner],
         error_bound=promise,
-        stats=_stats(mesh, wave, time.perf_counter() - began),
+        stats=_stats(mesh, wave, time.perf_counter() - control.began),
         _winners=winners if keeps else None,
         _find_winners=partial(_find_winners, mesh, starts, bounds),
     )
@@ -220,7 +273,7 @@ def _solve(
 
 def _find_winners(mesh: TriangleMesh, starts: tuple[Source, ...], bounds: Bounds) -> Winners:
     """Sweep again, and keep what backtracing needs: sweeps are the same to the bit."""
-    wave = _sweep(mesh, starts, bounds, Control(), time.perf_counter(), keeps=True)
+    wave = _sweep(mesh, starts, bounds, Control(), keeps=True)
     return _winners_of(wave)
 
 
@@ -242,80 +295,22 @@ def _sweep(
     starts: tuple[Source, ...],
     bounds: Bounds,
     control: Control,
-    began: float,
     *,
     keeps: bool,
 ) -> Wavefront:
+    topology = mesh.topology
     vertices = np.array([vertex_of(mesh, start.point, "source") for start in starts], np.int64)
     distances = np.array([start.start_distance for start in starts])
     merges = bool(bounds.merging)
-    wave = wavefront.new_wavefront(mesh.topology, merges=merges, paths=merges and keeps)
-    _check_memory(wavefront.bytes_of(wave), control)
-    inner = mesh.topology.inner_vertex[vertices]
-    sweep.start_sweep(mesh.topology, wave, inner, distances, bounds)
-    return _run(mesh, wave, bounds, vertices, control, began)
-
-
-def _run(
-    mesh: TriangleMesh,
-    wave: Wavefront,
-    bounds: Bounds,
-    vertices: Any,
-    control: Control,
-    began: float,
-) -> Wavefront:
-    """Run the sweep to its end, slice by slice."""
-    topology: Topology = mesh.topology
+    wave = wavefront.new_wavefront(topology, merges=merges, paths=merges and keeps)
+    control.grant_memory(wavefront.bytes_of(wave))
+    sweep.start_sweep(topology, wave, topology.inner_vertex[vertices], distances, bounds)
     reachable = int(np.isin(mesh.components, mesh.components[vertices]).sum())
-    budget, shown, outcome = _FIRST_BUDGET, 0.0, sweep.RUNNING
-    while outcome != sweep.FINISHED:
-        share = _share_done(wave, reachable, bounds.max_distance)
-        if control.progress is not None:
-            shown = max(shown, share)
-            control.progress(shown)
-        if control.cancel is not None and control.cancel():
-            raise Cancelled(f"cancelled with {share:.0%} done")
-        if control.deadline_s is not None and time.perf_counter() - began > control.deadline_s:
-            raise DeadlineExceeded(
-                f"not finished within {control.deadline_s:g} s: {share:.0%} done"
-            )
-        slice_began = time.perf_counter()
-        outcome = sweep.advance(topology, wave, bounds, budget)
-        took = time.perf_counter() - slice_began
-        if outcome == POOL_FULL:
-            _check_memory(wavefront.bytes_of(wave) + wave.windows.nbytes, control)
-            wave = wavefront.with_larger_pool(wave)
-        elif outcome == SCRATCH_FULL:
-            _check_memory(wavefront.bytes_of(wave) + wave.scratch.nbytes, control)
-            wave = wavefront.with_larger_scratch(wave)
-        elif outcome == MERGES_FULL:
-            _check_memory(wavefront.bytes_of(wave) + wave.merges.nbytes, control)
-            wave = wavefront.with_more_merges(wave)
-        elif outcome == RUNAWAY:
-            raise _not_converged(mesh, wave)
-        elif outcome == sweep.RUNNING:
-            budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
+    share = share_of_vertices(reachable, bounds.max_distance)
+    wave = run_sweep(mesh, wave, bounds, control, share)
     if control.progress is not None:
         control.progress(1.0)
     return wave
-
-
-def _not_converged(mesh: TriangleMesh, wave: Wavefront) -> NotConverged:
-    half_edge = int(np.argmax(wave.runs))
-    ends = mesh.topology.links[half_edge, [TAIL, HEAD]]
-    u, v = mesh.topology.outer_vertex[ends]
-    return NotConverged(
-        f"the windows of the edge between vertices {u} and {v} came up more than {RUNS} times; "
-        f"ask for a smaller error, or for exact distances"
-    )
-
-
-def _share_done(wave: Wavefront, reachable: int, limit: float) -> float:
-    """Return the share of the sweep that is done: vertices, or distance where it is limited."""
-    share = float(wave.counters[wavefront.DONE_VERTICES]) / reachable
-    if math.isfinite(limit) and wave.counters[0] > 0:
-        share = max(share, float(wave.distance[wave.heap[0]]) / limit if limit else 1.0)
-    return min(share, 1.0)
 
 
 def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
@@ -335,7 +330,7 @@ def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
 def _as_limit(max_distance: float | None) -> float:
     if max_distance is None:
         return math.inf
-    if not _is_number(max_distance) or not max_distance >= 0.0:
+    if not is_number(max_distance) or not max_distance >= 0.0:
         raise InvalidArgument(f"max_distance is {max_distance!r}; it must be a number, 0 or more")
     return float(max_distance)
 
@@ -343,22 +338,18 @@ def _as_limit(max_distance: float | None) -> float:
 def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, float]:
     if relative is None and absolute is None:
         raise InvalidArgument("relative_error and absolute_error are both None; give at least one")
-    if relative is not None and not (_is_number(relative) and 0.0 < relative < 1.0):
+    if relative is not None and not (is_number(relative) and 0.0 < relative < 1.0):
         raise InvalidArgument(
             f"relative_error is {relative!r}; it must be a number above 0 and below 1"
         )
     if absolute is not None and not (
-        _is_number(absolute) and absolute > 0.0 and math.isfinite(absolute)
+        is_number(absolute) and absolute > 0.0 and math.isfinite(absolute)
     ):
         raise InvalidArgument(f"absolute_error is {absolute!r}; it must be a finite number above 0")
     return (
         math.inf if relative is None else float(relative),
         math.inf if absolute is None else float(absolute),
     )
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
 def _as_sources(mesh: TriangleMesh, sources: Any) -> tuple[Source, ...]:
@@ -371,7 +362,7 @@ def _as_sources(mesh: TriangleMesh, sources: Any) -> tuple[Source, ...]:
         source = item if isinstance(item, Source) else Source(item)
         vertex_of(mesh, source.point, f"source {i}")
         start = source.start_distance
-        if not _is_number(start) or not (math.isfinite(start) and start >= 0.0):
+        if not is_number(start) or not (math.isfinite(start) and start >= 0.0):
             raise InvalidArgument(
                 f"source {i} starts at {start!r}; it must be a finite number, 0 or more"
             )
@@ -379,17 +370,3 @@ def _as_sources(mesh: TriangleMesh, sources: Any) -> tuple[Source, ...]:
     if not found:
         raise InvalidPoint("there are no sources: give at least one")
     return tuple(found)
-
-
-def _check_control(control: Control) -> None:
-    for name in ("deadline_s", "memory_limit"):
-        value = getattr(control, name)
-        if value is not None and (not _is_number(value) or not value > 0):
-            raise InvalidArgument(f"{name} is {value!r}; it must be a number above 0")
-
-
-def _check_memory(needed: int, control: Control) -> None:
-    if control.memory_limit is not None and needed > control.memory_limit:
-        raise MemoryLimitExceeded(
-            f"the sweep needs {needed} bytes or more; memory_limit is {control.memory_limit}"
-        )

@@ -110,3 +110,21 @@ WIDEST_ERROR = 2e-3
 There is little left to merge, while the bounds that vertices give loosen: fewer windows can be
 dropped than are merged. At 1e-2 a sweep keeps up to a third more windows than at 2e-3.
 """
+
+STRAIGHT = 1e-5
+"""Relative gain, or radians, below which a path along edges is not shortened any further.
+
+It bounds a search that bounds the next: there, tighter bounds save less than they cost here.
+"""
+
+LANDMARK_ERROR = 1e-3
+"""Relative error of the distances from landmarks.
+
+Exact ones would cost up to ten times as much, and bound by a thousandth better.
+"""
+
+SEARCH_SLACK = 1e-10
+"""Relative amount by which a search between two points looks beyond its upper bound.
+
+The path itself must not be pruned by rounding.
+"""

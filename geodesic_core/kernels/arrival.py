@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.prune import touch
 from geodesic_core.kernels.queue import push_or_raise
 from geodesic_core.kernels.topology import (
     APEX_ANGLE,
@@ -16,6 +17,7 @@ from geodesic_core.kernels.topology import (
 )
 from geodesic_core.kernels.wavefront import (
     DONE,
+    FAR,
     FROM,
     LIGHT,
     LIT_FROM,
@@ -46,6 +48,8 @@ def improve_vertex(
     known = wave.distance[v]
     if not precedence(distance, wave.origin[root], known, wave.origin[v]):
         return
+    if known == math.inf and wave.status[v] == FAR:
+        touch(wave, v)
     wave.winner[2 * v] = sx
     wave.winner[2 * v + 1] = sy
     wave.winner_ints[WINNER * v + VIA] = via
@@ -55,7 +59,7 @@ def improve_vertex(
         wave.reference[v] = reference
     if distance < known:
         wave.distance[v] = distance
-        push_or_raise(wave, v)
+        push_or_raise(wave, v, distance)
 
 
 @kernel
@@ -91,7 +95,7 @@ def light_vertex(wave: Any, v: int, distance: float, via: int, sx: float, sy: fl
         lo, hi = min(lo, angle), max(hi, angle)
     wave.light[row + LIT_FROM], wave.light[row + LIT_TO] = lo, hi
     if wave.status[v] == DONE:
-        push_or_raise(wave, v)
+        push_or_raise(wave, v, wave.distance[v])
 
 
 @kernel

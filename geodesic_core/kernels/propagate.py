@@ -74,8 +74,8 @@ RUNAWAY = 6  # a list came up again and again
 def collect(wave: Any, h: int) -> int:
     """Copy the list of h to scratch, trimmed against each other; return how many are left.
 
-    The filters of Xin and Wang (2009) take away what a path along the edge beats: only at both
-    ends of the list, where nearly all of what they would find lies.
+    The filters of Xin and Wang (2009) take away what a path along the edge beats, or what no path
+    of allowed length may pass: only at both ends of the list, where nearly all of it lies.
     """
     row = ROW * h
     length = wave.geometry[row + LENGTH]
@@ -84,7 +84,11 @@ def collect(wave: Any, h: int) -> int:
         from_tail, from_head = wave.upper[tail], wave.upper[head]
     else:
         from_tail, from_head = wave.distance[tail], wave.distance[head]
-    from_tail, from_head = from_tail * (1.0 + SLACK), from_head * (1.0 + SLACK) + length
+    from_tail, from_head = from_tail * (1.0 + SLACK), from_head * (1.0 + SLACK)
+    if wave.pruned:
+        from_tail = min(from_tail, wave.limit - wave.toward[tail])
+        from_head = min(from_head, wave.limit - wave.toward[head])
+    from_head += length
     gap, overlap = GAP * length, OVERLAP * length
     # Merging makes few windows of many: there, none is too many to be trimmed.
     uneven_overlap = overlap if merging(wave) else LOOSE_OVERLAP * length

@@ -11,6 +11,7 @@ from geodesic_core.kernels.arrival import (
 )
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.lists import insert_sorted, put_window, queue_if_due
+from geodesic_core.kernels.prune import may_pass
 from geodesic_core.kernels.topology import (
     APEX,
     BOUNDARY,
@@ -45,7 +46,7 @@ from geodesic_core.tolerances import SECTOR_MARGIN
 def is_pseudosource(wave: Any, v: int) -> bool:
     """Whether shortest paths may bend at v (or start there), within the limit."""
     bends = wave.flags[v] != 0 or wave.winner_ints[WINNER * v + VIA] < 0
-    return bends and wave.distance[v] <= wave.max_distance
+    return bends and wave.distance[v] <= wave.max_distance and may_pass(wave, v)
 
 
 @kernel

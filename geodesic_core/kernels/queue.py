@@ -23,13 +23,12 @@ def precedes(key: float, v: int, other_key: float, u: int) -> bool:
 
 
 @kernel
-def push_or_raise(wave: Any, v: int) -> None:
-    """Put v into the heap, or move it up after its distance has decreased."""
+def push_or_raise(wave: Any, v: int, key: float) -> None:
+    """Put v into the heap, or move it up after its key has decreased."""
     i = wave.heap_place[v]
     if i < 0:
         i = wave.counters[HEAP_SIZE]
         wave.counters[HEAP_SIZE] = i + 1
-    key = wave.distance[v]
     while i > 0:
         parent = (i - 1) // _ARITY
         u, parent_key = wave.heap[parent], wave.heap_keys[parent]

@@ -10,6 +10,7 @@ from geodesic_core.kernels.arrival import bound_vertex, improve_vertex
 from geodesic_core.kernels.jit import inlined, kernel, prefetch
 from geodesic_core.kernels.lists import free_windows, queue_list
 from geodesic_core.kernels.propagate import POOL_FULL, PROPAGATED, propagate_list
+from geodesic_core.kernels.prune import touch
 from geodesic_core.kernels.pseudosource import emit_pseudosource, is_pseudosource
 from geodesic_core.kernels.queue import HEAP_SIZE, RING_HEAD, RING_SIZE, pop_nearest, ring_pop
 from geodesic_core.kernels.topology import (
@@ -123,6 +124,8 @@ def ask_ahead(wave: Any, v: int) -> None:
 def mark_front(wave: Any, v: int) -> None:
     """Mark a neighbour of a vertex that is done."""
     if wave.status[v] == FAR:
+        if wave.distance[v] == math.inf:
+            touch(wave, v)
         wave.status[v] = FRONT
 
 

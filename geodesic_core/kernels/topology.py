@@ -73,6 +73,8 @@ SHORTEST_EDGE = 1e-50
 class Topology(NamedTuple):
     """What the sweep needs to know of a mesh, in inner numbering; read-only once built."""
 
+    positions: Floats
+    """(V, 3): of the vertices, mesh units"""
     geometry: Floats
     """(3F, 8): LENGTH … APEX_ANGLE"""
     links: Ints
@@ -177,9 +179,14 @@ def counting_sort(keys: Ints, key_count: int, order: Ints, sorted_order: Ints) -
 
 @kernel
 def renumber(
-    vertices: Floats, faces: Ints, inner_vertex: Ints, outer_vertex: Ints, outer_face: Ints
-) -> tuple[Floats, Ints]:
-    """Fill the three maps and return the vertices and faces in inner numbering; O(V + F)."""
+    vertices: Floats,
+    faces: Ints,
+    inner_vertex: Ints,
+    outer_vertex: Ints,
+    outer_face: Ints,
+    positions: Floats,
+) -> Ints:
+    """Fill the three maps and the positions; return the faces in inner numbering; O(V + F)."""
     codes = morton_codes(vertices)
     digits = np.empty(len(vertices), np.int32)
     order, previous_order = outer_vertex, np.empty(len(vertices), np.int32)
@@ -189,11 +196,10 @@ def renumber(
         for v in range(len(vertices)):
             digits[v] = (codes[v] >> shift) & ((1 << _RADIX_BITS) - 1)
         counting_sort(digits, 1 << _RADIX_BITS, previous_order, order)
-    inner_vertices = np.empty_like(vertices)
     for v in range(len(vertices)):
         inner_vertex[order[v]] = v
         for axis in range(3):
-            inner_vertices[v, axis] = vertices[order[v], axis]
+            positions[v, axis] = vertices[order[v], axis]
     lowest = np.empty(len(faces), np.int32)
     for f in range(len(faces)):
         a, b, c = inner_vertex[faces[f, 0]], inner_vertex[faces[f, 1]], inner_vertex[faces[f, 2]]
@@ -203,7 +209,7 @@ def renumber(
     for f in range(len(faces)):
         for i in range(3):
             inner_faces[f, i] = inner_vertex[faces[outer_face[f], i]]
-    return inner_vertices, inner_faces
+    return inner_faces
 
 
 @kernel
@@ -420,15 +426,20 @@ def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[int, i
 
     Returns (outcome, count, elements at fault): half-edges or a face, in inner numbering.
     """
-    inner_vertices, inner_faces = renumber(
-        vertices, faces, topology.inner_vertex, topology.outer_vertex, topology.outer_face
+    inner_faces = renumber(
+        vertices,
+        faces,
+        topology.inner_vertex,
+        topology.outer_vertex,
+        topology.outer_face,
+        topology.positions,
     )
     opposite = link_opposites(inner_faces, len(vertices))
     outcome, count, bad = find_bad_edges(opposite, 10)
     if outcome != SOUND:
         return outcome, count, bad
     angles = np.empty(len(opposite))
-    face = fill_geometry(inner_vertices, inner_faces, topology.geometry, angles)
+    face = fill_geometry(topology.positions, inner_faces, topology.geometry, angles)
     if face >= 0:
         return TOO_SHORT, 1, np.full(1, face, np.int32)
     fill_links(inner_faces, opposite, topology.links)
@@ -440,6 +451,7 @@ def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[int, i
 def empty_topology(vertex_count: int, face_count: int) -> Topology:
     """Allocate the arrays that `build_topology` fills."""
     return Topology(
+        positions=np.empty((vertex_count, 3)),
         geometry=aligned_rows(3 * face_count, ROW, np.float64),
         links=aligned_rows(3 * face_count, ROW, np.int32),
         first_corner=np.empty(vertex_count + 1, np.int32),

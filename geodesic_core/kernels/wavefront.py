@@ -5,11 +5,12 @@ face, ordered along the edge. Rows come from a pool with a last-in-first-out fre
 the rows in use within a cache's reach.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Flags, Floats, Ints, Longs, aligned_rows
+from geodesic_core.arrays import Flags, Floats, Ints, Longs, Singles, aligned_rows
 from geodesic_core.kernels.jit import inlined, kernel, pointer
 from geodesic_core.kernels.topology import Topology
 from geodesic_core.kernels.window import WIDTH
@@ -49,6 +50,8 @@ LEFT_REFERENCE = 1  # what was merged into the first window before; see `window`
 RIGHT_REFERENCE = 2
 MERGE_INTS = 3
 
+LANDMARKS = 16  # of a mesh, at most: a cache line of distances per vertex
+
 # Counters (after the queues' three)
 FREE_FIRST = 3  # free list
 FREE_SIZE = 4
@@ -59,7 +62,48 @@ KEPT = 8  # windows that survived trimming and were propagated
 PEAK = 9  # windows alive at once, at most
 WORK = 10  # done in this slice, about 10 ns each
 MERGES = 11  # recorded for backtracing
+TOUCHED = 12  # vertices
 COUNTERS = 16
+
+
+class Goal(NamedTuple):
+    """What a pruned sweep is after (section 5): paths through a start, not longer than a limit.
+
+    Lower bounds come from straight distances to the start, from landmarks and, where a sweep has
+    been before, from its values, up to the ceiling within which it pruned nothing.
+    """
+
+    start: int
+    """Inner vertex"""
+    limit: float
+    """How long a path may be in all, mesh units; infinite where nothing is pruned"""
+    landmarks: Singles
+    """(V, LANDMARKS): distances from landmarks, or (0, LANDMARKS)"""
+    landmark_count: int
+    known: Floats
+    """(V,): distances of an earlier sweep, or (0,)"""
+    ceiling: float
+    """The limit of that sweep"""
+
+
+def goal_at(
+    start: int,
+    limit: float,
+    landmarks: Singles | None = None,
+    landmark_count: int = 0,
+    known: Floats | None = None,
+    ceiling: float = math.inf,
+) -> Goal:
+    """Return a goal of which not everything is known."""
+    if landmarks is None:
+        landmarks = np.empty((0, LANDMARKS), np.float32)
+    if known is None:
+        known = np.empty(0)
+    return Goal(start, limit, landmarks, landmark_count, known, ceiling)
+
+
+NO_GOAL = goal_at(0, math.inf)
+"""Of a sweep that is not pruned."""
 
 
 class Bounds(NamedTuple):
@@ -74,16 +118,19 @@ class Bounds(NamedTuple):
     merging: tuple[int, ...]
     """Empty in an exact sweep. Its length is part of its type: kernels are compiled twice, and the
     exact ones carry nothing of merging"""
+    goal: Goal
 
 
-def exact_bounds(max_distance: float) -> Bounds:
+def exact_bounds(max_distance: float, goal: Goal = NO_GOAL) -> Bounds:
     """Return the bounds of a sweep that never merges."""
-    return Bounds(max_distance, 0.0, 0.0, ())
+    return Bounds(max_distance, 0.0, 0.0, (), goal)
 
 
-def merging_bounds(max_distance: float, relative_error: float, absolute_error: float) -> Bounds:
+def merging_bounds(
+    max_distance: float, relative_error: float, absolute_error: float, goal: Goal = NO_GOAL
+) -> Bounds:
     """Return the bounds of a sweep that merges windows within both errors."""
-    return Bounds(max_distance, relative_error, absolute_error, (1,))
+    return Bounds(max_distance, relative_error, absolute_error, (1,), goal)
 
 
 class Wavefront(NamedTuple):
@@ -110,6 +157,10 @@ class Wavefront(NamedTuple):
     scratch: Floats
     """(S, 8): the list that is being propagated"""
     counters: Longs
+    touched: Ints
+    """(V,): the vertices that are not as they were at first"""
+    toward: Floats
+    """(V,): lower bound of the rest of a path from a touched vertex on; empty unless pruned"""
     # The following are empty unless the sweep merges.
     upper: Floats
     """(V,): upper bound of the exact distance"""
@@ -128,6 +179,7 @@ class Wavefront(NamedTuple):
 class View(NamedTuple):
     """A Topology and a Wavefront as raw pointers; plain arrays when the JIT is off."""
 
+    positions: Any
     geometry: Any
     links: Any
     first_corner: Any
@@ -150,6 +202,10 @@ class View(NamedTuple):
     scratch: Any
     scratch_ints: Any
     counters: Any
+    touched: Any
+    toward: Any
+    known: Any
+    landmarks: Any
     upper: Any
     light: Any
     reference: Any
@@ -164,12 +220,19 @@ class View(NamedTuple):
     relative_error: float
     absolute_error: float
     merging: tuple[int, ...]
+    pruned: bool
+    start: int
+    limit: float
+    landmark_count: int
+    knows: bool
+    ceiling: float
 
 
 @kernel
 def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
     """Return the View of two tuples of arrays, which the caller must hold meanwhile."""
     return View(
+        pointer(topology.positions),
         pointer(topology.geometry),
         pointer(topology.links),
         pointer(topology.first_corner),
@@ -192,6 +255,10 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         pointer(wave.scratch),
         pointer(wave.scratch.view(np.int32)),
         pointer(wave.counters),
+        pointer(wave.touched),
+        pointer(wave.toward),
+        pointer(bounds.goal.known),
+        pointer(bounds.goal.landmarks),
         pointer(wave.upper),
         pointer(wave.light),
         pointer(wave.reference),
@@ -206,6 +273,12 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         bounds.relative_error,
         bounds.absolute_error,
         bounds.merging,
+        wave.toward.shape[0] > 0,
+        bounds.goal.start,
+        bounds.goal.limit,
+        bounds.goal.landmark_count,
+        bounds.goal.known.shape[0] > 0,
+        bounds.goal.ceiling,
     )
 
 
@@ -215,7 +288,9 @@ def merging(wave: Any) -> bool:
     return len(wave.merging) > 0
 
 
-def new_wavefront(topology: Topology, *, merges: bool = False, paths: bool = False) -> Wavefront:
+def new_wavefront(
+    topology: Topology, *, merges: bool = False, paths: bool = False, pruned: bool = False
+) -> Wavefront:
     """Allocate the state of one sweep: O(V + F), nothing reached yet.
 
     With ``paths``, a sweep that merges records what it merges, for backtracing.
@@ -238,6 +313,8 @@ def new_wavefront(topology: Topology, *, merges: bool = False, paths: bool = Fal
         windows=aligned_rows(1024, WIDTH, np.float64),
         scratch=aligned_rows(256, WIDTH, np.float64),
         counters=counters,
+        touched=np.empty(vertices, np.int32),
+        toward=np.empty(vertices if pruned else 0),
         upper=np.full(merged_vertices, np.inf),
         light=np.tile([1.0, -1.0, 1.0, -1.0, np.inf], (merged_vertices, 1)),
         reference=np.full(merged_vertices, -1, np.int32),

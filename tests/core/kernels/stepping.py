@@ -65,13 +65,23 @@ def view_of_arrays(topology, wave, bounds=exact_bounds(math.inf)) -> View:  # no
         for name in state._fields
         if name in View._fields
     }
+    goal, scalars = bounds.goal, bounds._asdict()
+    del scalars["goal"]
     return View(
         **flat,
+        known=goal.known,
+        landmarks=goal.landmarks.reshape(-1),
         window_ints=wave.windows.view(np.int32).reshape(-1),
         scratch_ints=wave.scratch.view(np.int32).reshape(-1),
         ring_capacity=len(wave.ring),
         pool=len(wave.windows),
         scratch_size=len(wave.scratch),
         merge_capacity=len(wave.merges),
-        **bounds._asdict(),
+        **scalars,
+        pruned=len(wave.toward) > 0,
+        start=goal.start,
+        limit=goal.limit,
+        landmark_count=goal.landmark_count,
+        knows=len(goal.known) > 0,
+        ceiling=goal.ceiling,
     )

@@ -39,7 +39,7 @@ def test_vertices_leave_by_distance_and_then_by_number(distances, random):
     order = list(range(VERTICES))
     random.shuffle(order)
     for v in order:
-        push_or_raise(view, v)
+        push_or_raise(view, v, view.distance[v])
     check_heap(wave)
     assert drained(view) == sorted(range(VERTICES), key=lambda v: (distances[v], v))
     assert (wave.heap_place == -1).all()
@@ -53,7 +53,7 @@ def test_distances_decrease_while_others_leave(offers):
     for i, (v, distance) in enumerate(offers):
         if distance < wave.distance[v]:
             wave.distance[v] = distance
-            push_or_raise(view, v)
+            push_or_raise(view, v, view.distance[v])
             waiting[v] = distance
         check_heap_order(wave)
         if i % 3 == 2 and waiting:

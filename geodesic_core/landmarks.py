@@ -1,0 +1,54 @@
+"""Landmarks: distances from a few far-apart vertices, which bound all others (section 5, outlook).
+
+Goldberg and Harrelson, *Computing the Shortest Path: A* Search Meets Graph Theory* (2005).
+"""
+
+import math
+
+import numpy as np
+
+from geodesic_core.arrays import Singles, aligned_rows
+from geodesic_core.kernels import sweep, wavefront
+from geodesic_core.kernels.wavefront import LANDMARKS
+from geodesic_core.mesh import TriangleMesh
+from geodesic_core.run import Control, run_sweep
+from geodesic_core.tolerances import LANDMARK_ERROR
+
+
+class Landmarks:
+    """A growing set of landmarks of one mesh.
+
+    By the triangle inequality the distance of two vertices is at least the difference of their
+    distances from a landmark. Those are approximate, which costs ``LANDMARK_ERROR`` of them: an
+    exact sweep would cost up to ten times as much.
+    """
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self.mesh = mesh
+        self.count = 0
+        self.distances: Singles = np.empty((0, LANDMARKS), np.float32)
+        """(V, LANDMARKS) by inner vertex, mesh units; the first ``count`` columns are set"""
+        self._nearest = np.full(len(mesh.vertices), math.inf)
+
+    def add(self, beside: int, control: Control) -> None:
+        """Add the vertex farthest from all others, in the component of inner vertex ``beside``."""
+        mesh = self.mesh
+        topology = mesh.topology
+        component = mesh.components[topology.outer_vertex]
+        candidates = np.flatnonzero(component == component[beside])
+        if np.isinf(self._nearest[beside]):  # the first here: far from somewhere, at least
+            apart = topology.positions[candidates] - topology.positions[beside]
+            chosen = candidates[np.argmax(np.einsum("vk,vk->v", apart, apart))]
+        else:
+            chosen = candidates[np.argmax(self._nearest[candidates])]
+        bounds = wavefront.merging_bounds(math.inf, LANDMARK_ERROR, math.inf)
+        wave = wavefront.new_wavefront(topology, merges=True)
+        control.grant_memory(wavefront.bytes_of(wave))
+        start = np.array([chosen], np.int32)
+        sweep.start_sweep(topology, wave, start, np.zeros(1), bounds)
+        wave = run_sweep(mesh, wave, bounds, control, lambda _: 0.0)
+        if self.count == 0:
+            self.distances = aligned_rows(len(mesh.vertices), LANDMARKS, np.float32)
+        self.distances[:, self.count] = wave.distance
+        self.count += 1
+        self._nearest = np.minimum(self._nearest, wave.distance)

@@ -1,0 +1,136 @@
+"""Running a sweep to its end: slice by slice, watched by its caller; codes become exceptions."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from geodesic_core.errors import (
+    Cancelled,
+    DeadlineExceeded,
+    InvalidArgument,
+    MemoryLimitExceeded,
+    NotConverged,
+)
+from geodesic_core.kernels import sweep, wavefront
+from geodesic_core.kernels.propagate import MERGES_FULL, POOL_FULL, RUNAWAY, SCRATCH_FULL
+from geodesic_core.kernels.topology import HEAD, TAIL
+from geodesic_core.kernels.wavefront import Bounds, Wavefront
+from geodesic_core.mesh import TriangleMesh
+from geodesic_core.tolerances import RUNS
+
+SLICE_SECONDS = 0.05
+"""About how long the sweep runs before it looks up: what cancelling takes, at most."""
+
+_FIRST_BUDGET = 1_000_000
+
+
+@dataclass(frozen=True)
+class Control:
+    """How a caller watches a call and stops it."""
+
+    progress: Callable[[float], None] | None = None
+    """Called about every 50 ms with the share that is done, from 0 to 1, never decreasing."""
+    cancel: Callable[[], bool] | None = None
+    """Asked about every 50 ms; the call stops once it answers true."""
+    deadline_s: float | None = None
+    """Seconds granted, from the call."""
+    memory_limit: int | None = None
+    """Bytes granted for the state of the call, the mesh itself not counted."""
+    began: float = field(default_factory=time.perf_counter)
+    """When the call began."""
+
+    def __post_init__(self) -> None:
+        for name in ("deadline_s", "memory_limit"):
+            value = getattr(self, name)
+            if value is not None and (not is_number(value) or not value > 0):
+                raise InvalidArgument(f"{name} is {value!r}; it must be a number above 0")
+
+    def look_up(self, share: float) -> None:
+        """Report progress; raise if the call is to stop."""
+        if self.progress is not None:
+            self.progress(share)
+        if self.cancel is not None and self.cancel():
+            raise Cancelled(f"cancelled with {share:.0%} done")
+        if self.deadline_s is not None and time.perf_counter() - self.began > self.deadline_s:
+            raise DeadlineExceeded(f"not finished within {self.deadline_s:g} s: {share:.0%} done")
+
+    def grant_memory(self, needed: int) -> None:
+        """Raise if the call needs more memory than it may take."""
+        if self.memory_limit is not None and needed > self.memory_limit:
+            raise MemoryLimitExceeded(
+                f"the sweep needs {needed} bytes or more; memory_limit is {self.memory_limit}"
+            )
+
+
+def run_sweep(
+    mesh: TriangleMesh,
+    wave: Wavefront,
+    bounds: Bounds,
+    control: Control,
+    share_done: Callable[[Wavefront], float],
+    bytes_beside: int = 0,
+) -> Wavefront:
+    """Run a sweep that has started to its end; return its state, which may have grown.
+
+    ``share_done`` tells how much of the call is done, and ``bytes_beside`` what it holds besides.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As the control says.
+    NotConverged
+        The windows of an edge came up too often.
+    """
+    budget, shown, outcome = _FIRST_BUDGET, 0.0, sweep.RUNNING
+    while outcome != sweep.FINISHED:
+        shown = max(shown, share_done(wave))
+        control.look_up(shown)
+        began = time.perf_counter()
+        outcome = sweep.advance(mesh.topology, wave, bounds, budget)
+        took = time.perf_counter() - began
+        if outcome == POOL_FULL:
+            grown = wavefront.with_larger_pool
+        elif outcome == SCRATCH_FULL:
+            grown = wavefront.with_larger_scratch
+        elif outcome == MERGES_FULL:
+            grown = wavefront.with_more_merges
+        elif outcome == RUNAWAY:
+            raise _not_converged(mesh, wave)
+        else:
+            if outcome == sweep.RUNNING:
+                budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
+            continue
+        wave = grown(wave)
+        control.grant_memory(wavefront.bytes_of(wave) + bytes_beside)
+    return wave
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a real number, and not a truth value."""
+    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
+
+
+def _not_converged(mesh: TriangleMesh, wave: Wavefront) -> NotConverged:
+    half_edge = int(np.argmax(wave.runs))
+    ends = mesh.topology.links[half_edge, [TAIL, HEAD]]
+    u, v = mesh.topology.outer_vertex[ends]
+    return NotConverged(
+        f"the windows of the edge between vertices {u} and {v} came up more than {RUNS} times; "
+        f"ask for a smaller error, or for exact distances"
+    )
+
+
+def share_of_vertices(reachable: int, limit: float) -> Callable[[Wavefront], float]:
+    """Return what tells the share of a sweep: of its vertices, or of the distance to a limit."""
+
+    def share(wave: Wavefront) -> float:
+        done = float(wave.counters[wavefront.DONE_VERTICES]) / reachable
+        if math.isfinite(limit) and wave.counters[0] > 0:
+            done = max(done, float(wave.distance[wave.heap[0]]) / limit if limit else 1.0)
+        return min(done, 1.0)
+
+    return share
