@@ -36,7 +36,9 @@ from geodesic_core.kernels.wavefront import (
 )
 from geodesic_core.tolerances import LANDMARK_ERROR
 
-_STRETCH = (1.0 + 1e-6) / (1.0 - LANDMARK_ERROR)  # landmarks are rounded to single precision
+# Stored distances from landmarks are lower bounds, rounded to single precision.
+_LEAST = 1.0 - 1e-6
+_MOST = (1.0 + 1e-6) / (1.0 - LANDMARK_ERROR)
 
 
 @kernel
@@ -52,30 +54,50 @@ def touch(wave: Any, v: int) -> None:
 def least_rest(wave: Any, v: int) -> float:
     """Lower bound of the distance from v to where a path is to end.
 
-    What an earlier sweep from there knows of v counts up to its ceiling: were v farther, or the
-    path to it pruned, its distance and the least one to the start would exceed that together.
+    What an earlier sweep from there knows of v counts up to its ceiling. Had it pruned the path to
+    v at a point q, then D(q) + L(q) would exceed the ceiling, and so D(v) + L'(v), where L' is a
+    bound that no L exceeds by more than the way from v to it: the steepest.
     """
-    least = least_to_start(wave, v)
+    straight = straight_to_start(wave, v)
     if wave.knows:
-        return min(wave.known[v], wave.ceiling - least)
+        return min(wave.known[v], wave.ceiling - steepest_to_start(wave, v, straight))
+    return least_to_start(wave, v, straight)
+
+
+@inlined
+def straight_to_start(wave: Any, v: int) -> float:
+    """Euclidean distance from v to the start."""
+    x = wave.positions[3 * v] - wave.positions[3 * wave.start]
+    y = wave.positions[3 * v + 1] - wave.positions[3 * wave.start + 1]
+    z = wave.positions[3 * v + 2] - wave.positions[3 * wave.start + 2]
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@kernel
+def least_to_start(wave: Any, v: int, straight: float) -> float:
+    """Lower bound of the distance from v to the start: straight, or by a landmark.
+
+    The exact distance from a landmark is known to be from _LEAST to _MOST times the stored one.
+    """
+    least = straight
+    for i in range(wave.landmark_count):
+        here, there = wave.landmarks[LANDMARKS * v + i], wave.landmarks[LANDMARKS * wave.start + i]
+        bound = max(_LEAST * here - _MOST * there, _LEAST * there - _MOST * here)
+        if bound > least:
+            least = bound
     return least
 
 
 @kernel
-def least_to_start(wave: Any, v: int) -> float:
-    """Lower bound of the distance from v to the start: straight, or by the triangle inequality."""
-    start = wave.start
-    x = wave.positions[3 * v] - wave.positions[3 * start]
-    y = wave.positions[3 * v + 1] - wave.positions[3 * start + 1]
-    z = wave.positions[3 * v + 2] - wave.positions[3 * start + 2]
-    least = math.sqrt(x * x + y * y + z * z)
+def steepest_to_start(wave: Any, v: int, straight: float) -> float:
+    """Return what `least_to_start`, at any point q, exceeds by the distance of v and q at most."""
+    steepest = straight
     for i in range(wave.landmark_count):
-        # An exact distance from a landmark is between the one known and its stretched value.
-        here, there = wave.landmarks[LANDMARKS * v + i], wave.landmarks[LANDMARKS * start + i]
-        bound = max(here - _STRETCH * there, there - _STRETCH * here)
-        if bound > least:
-            least = bound
-    return least
+        here, there = wave.landmarks[LANDMARKS * v + i], wave.landmarks[LANDMARKS * wave.start + i]
+        bound = _MOST * abs(here - there)
+        if bound > steepest:
+            steepest = bound
+    return steepest
 
 
 @inlined
