@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from app.errors import ProblemError, refuse
 from geodesic_core import TriangleMesh
 
-VERSION = 1
+VERSION = 2
 PUBLIC_ARRAYS = {
     "vertices": "vertices",
     "faces": "faces",
