@@ -30,8 +30,14 @@ class Landmarks:
         """(V, LANDMARKS) by inner vertex, mesh units; the first ``count`` columns are set"""
         self._nearest = np.full(len(mesh.vertices), math.inf)
 
-    def add(self, beside: int, control: Control) -> None:
-        """Add the vertex farthest from all others, in the component of inner vertex ``beside``."""
+    def add(self, beside: int, bytes_beside: int, control: Control) -> None:
+        """Add the vertex farthest from all others, in the component of inner vertex ``beside``.
+
+        Raises
+        ------
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As the control says, with ``bytes_beside`` held by others; nothing is added then.
+        """
         mesh = self.mesh
         topology = mesh.topology
         component = mesh.components[topology.outer_vertex]
@@ -43,10 +49,10 @@ class Landmarks:
             chosen = candidates[np.argmax(self._nearest[candidates])]
         bounds = wavefront.merging_bounds(math.inf, LANDMARK_ERROR, math.inf)
         wave = wavefront.new_wavefront(topology, merges=True)
-        control.grant_memory(wavefront.bytes_of(wave))
+        control.grant_memory(wavefront.bytes_of(wave) + bytes_beside)
         start = np.array([chosen], np.int32)
         sweep.start_sweep(topology, wave, start, np.zeros(1), bounds)
-        wave = run_sweep(mesh, wave, bounds, control, lambda _: 0.0)
+        wave = run_sweep(mesh, wave, bounds, control, lambda _: 1.0, bytes_beside)
         if self.count == 0:
             self.distances = aligned_rows(len(mesh.vertices), LANDMARKS, np.float32)
         self.distances[:, self.count] = wave.distance

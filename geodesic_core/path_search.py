@@ -10,12 +10,18 @@
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from geodesic_core.arrays import Ints
-from geodesic_core.errors import InternalError
+from geodesic_core.errors import (
+    Cancelled,
+    DeadlineExceeded,
+    InternalError,
+    MemoryLimitExceeded,
+)
 from geodesic_core.kernels import edge_path, prune, straighten, sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.topology import LENGTH
@@ -31,6 +37,10 @@ GUIDE_ERROR = 1e-3
 
 _MARGIN = 2.0
 """Mean edges by which step 2 looks beyond U: its values next to the path are then not pruned."""
+
+# The share of a search that is done, about, before steps 2 and 4
+_AFTER_EDGES = 0.2
+_AFTER_APPROXIMATE = 0.9
 
 
 class PathSearch:
@@ -66,9 +76,9 @@ class PathSearch:
             As in `run_sweep`.
         """
         control.grant_memory(self.nbytes)
+        control.look_up(0.0)
         inner = self.mesh.topology.inner_vertex
         start, end = int(inner[source]), int(inner[target])
-        self._add_landmark_if_due(start, control)
         log = _Log(self, explain)
         try:
             upper = self._search_edges(start, end, log)
@@ -76,13 +86,16 @@ class PathSearch:
             path = self._sweep_outward(start, end, upper, toward, control, log)
         finally:
             self._forget()
+        self._add_landmark_if_due(start, control)
         return replace(path, steps=tuple(log.steps)) if explain else path
 
     def _add_landmark_if_due(self, start: int, control: Control) -> None:
         count = self._landmarks.count
         due = self._touched >= (count + 1) * len(self.mesh.vertices)
         if due and count < wavefront.LANDMARKS:
-            self._landmarks.add(start, control)
+            # The path is found already: what stops a landmark must not lose it.
+            with suppress(Cancelled, DeadlineExceeded, MemoryLimitExceeded):
+                self._landmarks.add(start, self.nbytes, control)
 
     def _goal(self, start: int, limit: float) -> Goal:
         return goal_at(start, limit, self._landmarks.distances, self._landmarks.count)
@@ -109,7 +122,7 @@ class PathSearch:
         """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
         limit = upper * (1.0 + SEARCH_SLACK) + self._margin
         bounds = wavefront.merging_bounds(math.inf, GUIDE_ERROR, math.inf, self._goal(start, limit))
-        self._toward = self._run(self._toward, end, bounds, control)
+        self._toward = self._run(self._toward, end, bounds, control, _AFTER_EDGES)
         if math.isinf(self._toward.distance[start]):
             raise self._lost(start, end, "by the merging sweep")
         self._touched += int(self._toward.counters[TOUCHED])
@@ -126,7 +139,7 @@ class PathSearch:
     ) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
         bounds = wavefront.exact_bounds(math.inf, goal)
-        self._outward = self._run(self._outward, start, bounds, control)
+        self._outward = self._run(self._outward, start, bounds, control, _AFTER_APPROXIMATE)
         distance = float(self._outward.distance[end])
         if not distance <= upper * (1.0 + SEARCH_SLACK):
             raise self._lost(start, end, "by the exact sweep")
@@ -137,11 +150,13 @@ class PathSearch:
         log.add("path", distance)
         return path
 
-    def _run(self, wave: Wavefront, begin: int, bounds: Bounds, control: Control) -> Wavefront:
+    def _run(
+        self, wave: Wavefront, begin: int, bounds: Bounds, control: Control, share: float
+    ) -> Wavefront:
         starts = np.array([begin], np.int32)
         sweep.start_sweep(self.mesh.topology, wave, starts, np.zeros(1), bounds)
         beside = self.nbytes - wavefront.bytes_of(wave)
-        return run_sweep(self.mesh, wave, bounds, control, lambda _: 0.0, beside)
+        return run_sweep(self.mesh, wave, bounds, control, lambda _: share, beside)
 
     def _winners(self, wave: Wavefront) -> Winners:
         return Winners(

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,13 @@ class Control:
             raise Cancelled(f"cancelled with {share:.0%} done")
         if self.deadline_s is not None and time.perf_counter() - self.began > self.deadline_s:
             raise DeadlineExceeded(f"not finished within {self.deadline_s:g} s: {share:.0%} done")
+
+    def for_part(self, part: int, parts: int) -> "Control":
+        """Return the control of one of several equal parts of the call."""
+        progress = self.progress
+        if progress is None:
+            return self
+        return replace(self, progress=lambda share: progress((part + share) / parts))
 
     def grant_memory(self, needed: int) -> None:
         """Raise if the call needs more memory than it may take."""

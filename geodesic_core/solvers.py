@@ -226,8 +226,8 @@ class Solver:
             self._search = PathSearch(mesh)
         legs: list[GeodesicPath] = []
         for here, there in pairwise(stops):
-            control.look_up(len(legs) / (len(stops) - 1))
-            legs.append(self._search.find(here, there, control, explain=explain))
+            leg_control = control.for_part(len(legs), len(stops) - 1)
+            legs.append(self._search.find(here, there, leg_control, explain=explain))
         if progress is not None:
             progress(1.0)
         return legs[0] if len(legs) == 1 else joined(legs)
