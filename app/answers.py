@@ -27,15 +27,14 @@ def answer(
 def _distances(
     query: DistancesQuery, opened: OpenMesh, cancel: Callable[[], bool], memory_limit: int
 ) -> Answer:
-    mesh = opened.mesh
+    mesh, solver = opened.mesh, opened.solver
     sources = [gc.Source(source.vertex, source.start_distance) for source in query.sources]
     if query.approximation is None:
-        field = gc.exact_distance(
-            mesh, sources, query.max_distance, cancel=cancel, memory_limit=memory_limit
+        field = solver.exact_distance(
+            sources, query.max_distance, cancel=cancel, memory_limit=memory_limit
         )
     else:
-        field = gc.approximate_distance(
-            mesh,
+        field = solver.approximate_distance(
             sources,
             **asdict(query.approximation),
             max_distance=query.max_distance,
@@ -72,14 +71,15 @@ def _path(
         **_method(query),
         "source": _point(mesh, query.source),
         "target": _point(mesh, query.target),
+        "waypoints": [_point(mesh, vertex) for vertex in query.waypoints],
         "warnings": opened.warnings,
     }
     try:
-        path = _find_path(query, mesh, cancel, memory_limit)
+        path = _find_path(query, opened.solver, cancel, memory_limit)
     except gc.errors.NoPath as error:
         nothing = {"status": "no_path", "reason": error.reason, "points": None}
         return Answer(members | nothing | {"error_bound": _CERTAIN}, "points")
-    found = {
+    found: dict[str, Any] = {
         "status": "ok",
         "length": path.length,
         "points": path.points,
@@ -90,18 +90,26 @@ def _path(
         "faces": path.faces,
         "error_bound": _error_bound(path.error_bound),
     }
-    return Answer(members | found, "points")
+    values = 8 * len(path.points)
+    if path.steps is not None:
+        found["steps"] = path.steps
+        values += sum(step.faces.size for step in path.steps)
+    return Answer(members | found, "points", values)
 
 
 def _find_path(
-    query: PathQuery, mesh: gc.TriangleMesh, cancel: Callable[[], bool], memory_limit: int
+    query: PathQuery, solver: gc.Solver, cancel: Callable[[], bool], memory_limit: int
 ) -> gc.GeodesicPath:
     if query.approximation is None:
-        return gc.shortest_path(
-            mesh, query.source, query.target, cancel=cancel, memory_limit=memory_limit
+        return solver.shortest_path(
+            query.source,
+            query.target,
+            query.waypoints,
+            explain=query.explain,
+            cancel=cancel,
+            memory_limit=memory_limit,
         )
-    field = gc.approximate_distance(
-        mesh,
+    field = solver.approximate_distance(
         query.source,
         **asdict(query.approximation),
         keep_windows=True,

@@ -241,6 +241,14 @@ def path(
             callback=_writable(".obj", ".json"),
         ),
     ],
+    via: Annotated[
+        list[int] | None,
+        typer.Option(help="A vertex to pass on the way; may be given again, in order."),
+    ] = None,
+    explain: Annotated[
+        bool,
+        typer.Option("--explain", help="Tell what each step of the search did; exact paths only."),
+    ] = False,
     method: _MethodOption = _Method.EXACT,
     relative_error: _RelativeError = None,
     absolute_error: _AbsoluteError = None,
@@ -248,13 +256,17 @@ def path(
 ) -> None:
     """Compute a shortest path over the surface between two vertices."""
     granted = _granted(method, relative_error, absolute_error)
+    if granted is not None and (via or explain):
+        name = "--via" if via else "--explain"
+        raise typer.BadParameter(f"{name} goes with --method exact only")
     mesh, seconds = _read(mesh_file, merge)
     from geodesic_core import approximate_distance, shortest_path
 
     with _step("Computing the path") as step:
         start = perf_counter()
         if granted is None:
-            found = shortest_path(mesh, source, target, **step._asdict())
+            stops = (source, target, via or ())
+            found = shortest_path(mesh, *stops, explain=explain, **step._asdict())
         else:
             field = approximate_distance(
                 mesh, source, *granted, keep_windows=True, **step._asdict()
@@ -267,6 +279,11 @@ def path(
     typer.echo(f"points      {len(found.points)}")
     typer.echo(f"error bound {_bound_in_words(found.error_bound)}")
     typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
+    for part in found.steps or ():
+        typer.echo(
+            f"leg {part.leg}, {part.name:12} {1e3 * part.seconds:8.2f} ms, bound {part.bound!r}, "
+            f"{part.windows} windows, {len(part.faces)} faces"
+        )
     typer.echo(f"written     {out}")
 
 
@@ -428,6 +445,7 @@ def _path_to_json(file: IO[bytes], path: "GeodesicPath") -> None:
             "locations": locations,
             "faces": path.faces,
             "error_bound": path.error_bound,
+            "steps": path.steps,
         },
     )
 

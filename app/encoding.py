@@ -30,10 +30,13 @@ class Answer:
     array
         Name of the member that is the body in binary formats (empty where that is ``None``); the
         small ones become headers.
+    values
+        How many values its JSON has, where the query did not tell before it was answered.
     """
 
     members: Mapping[str, Any]
     array: str
+    values: int = 0
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ import orjson
 from numpy.typing import NDArray
 
 from app.errors import ProblemError, refuse
-from geodesic_core import TriangleMesh
+from geodesic_core import Solver, TriangleMesh
 
 VERSION = 2
 PUBLIC_ARRAYS = {
@@ -48,10 +48,20 @@ _DEFINING_ARRAYS = ("vertices", "faces", "vertex_map")
 
 @dataclass(frozen=True)
 class OpenMesh:
-    """A mesh over memory-mapped arrays, and what its reader had to say about the file."""
+    """A mesh over memory-mapped arrays, its solver, and what its reader said of the file."""
 
-    mesh: TriangleMesh
+    solver: Solver
     warnings: Sequence[str]
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The mesh itself."""
+        return self.solver.mesh
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the mesh, and of what its solver keeps; that grows while paths are asked for."""
+        return self.mesh.nbytes + self.solver.nbytes
 
 
 class MeshStore:
@@ -118,7 +128,7 @@ class MeshStore:
                 raise _damaged(mesh_id, f"its array {name} cannot be read") from error
             if _checksum(arrays[name]) != checksum:
                 raise _damaged(mesh_id, f"its array {name} is not what was written")
-        return OpenMesh(TriangleMesh.from_arrays(arrays), manifest["warnings"])
+        return OpenMesh(Solver(TriangleMesh.from_arrays(arrays)), manifest["warnings"])
 
     def array_file(self, mesh_id: str, name: str) -> Path:
         """Return the file of an array that clients may read."""

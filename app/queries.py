@@ -2,15 +2,17 @@
 
 import hashlib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from itertools import islice
+from typing import Any, ClassVar
+from uuid import uuid4
 
 import orjson
 
 from app import __version__, schemas
-from app.errors import Fault, over_limit, pointer, refuse
+from app.errors import Fault, ProblemError, over_limit, pointer, refuse
 from app.settings import Settings
 from geodesic_core.kernels.jit import sources_digest
 
@@ -48,15 +50,24 @@ class DistancesQuery:
     nearest_source: bool
     approximation: Approximation | None = None  # exact without
 
+    is_repeatable: ClassVar[bool] = True
+
 
 @dataclass(frozen=True)
 class PathQuery:
-    """The shortest path between two vertices."""
+    """The shortest path between two vertices, past ``waypoints`` in their order."""
 
     mesh_id: str
     source: int
     target: int
     approximation: Approximation | None = None
+    waypoints: tuple[int, ...] = ()
+    explain: bool = False
+
+    @property
+    def is_repeatable(self) -> bool:
+        """Whether the answer is the same in every run: one that tells seconds is not."""
+        return not self.explain
 
 
 Query = DistancesQuery | PathQuery
@@ -69,7 +80,12 @@ def code_version() -> str:
 
 
 def result_key(query: Query, media_type: str) -> str:
-    """Return the hash that names the answer to ``query`` in ``media_type``, the same in any run."""
+    """Return the hash that names the answer to ``query`` in ``media_type``.
+
+    It is the same in any run, unless the answer is not: that of each run has a name of its own.
+    """
+    if not query.is_repeatable:
+        return uuid4().hex
     parts = [type(query).__name__, asdict(query), media_type, code_version()]
     text = orjson.dumps(parts, option=orjson.OPT_SORT_KEYS)
     return hashlib.blake2b(text, digest_size=16).hexdigest()
@@ -103,40 +119,74 @@ def distances_query(
     )
 
 
-def path_query(mesh_id: str, vertices: int, request: schemas.PathRequest) -> PathQuery:
+def path_query(
+    mesh_id: str,
+    vertices: int,
+    request: schemas.PathRequest,
+    parameters: schemas.PathAnswerParameters,
+    settings: Settings,
+) -> PathQuery:
     """Validate ``request`` against a mesh of so many ``vertices``."""
     approximation = _approximation(request)
+    if approximation is not None:
+        _refuse_for_approximate(
+            {
+                "/waypoints": request.waypoints,
+                "/explain": request.explain,
+                "/query/explain": parameters.explain,
+            }
+        )
+    _refuse_many_waypoints(len(request.waypoints), settings)
     source, target = request.source.vertex, request.target.vertex
-    _refuse_outside(vertices, (("/source/vertex", source), ("/target/vertex", target)))
-    return PathQuery(mesh_id, source, target, approximation)
+    waypoints = tuple(point.vertex for point in request.waypoints)
+    named = {"/source/vertex": source, "/target/vertex": target}
+    named |= {pointer("waypoints", i, "vertex"): vertex for i, vertex in enumerate(waypoints)}
+    _refuse_outside(vertices, named.items())
+    explain = request.explain or parameters.explain
+    return PathQuery(mesh_id, source, target, approximation, waypoints, explain)
 
 
 def written_path_query(
-    mesh_id: str, vertices: int, parameters: schemas.PathParameters
+    mesh_id: str, vertices: int, parameters: schemas.PathParameters, settings: Settings
 ) -> PathQuery:
     """Validate the parameters of a ``GET``, which ask the same as the body of a ``POST``."""
     approximation = _approximation(parameters, "/query")
-    source = _written_vertex("/query/from", parameters.source)
-    target = _written_vertex("/query/to", parameters.target)
-    _refuse_outside(vertices, (("/query/from", source), ("/query/to", target)))
-    return PathQuery(mesh_id, source, target, approximation)
-
-
-def refuse_large_json(query: Query, vertices: int, settings: Settings) -> None:
-    """Refuse a query whose answer has more values than JSON is good for."""
-    if isinstance(query, PathQuery):
-        return
-    per_point = 2 if query.nearest_source else 1
-    values = per_point * (vertices if query.targets is None else len(query.targets))
-    if values > settings.max_json_values:
-        raise over_limit(
-            "result_too_large",
-            "values in JSON",
-            values,
-            settings.max_json_values,
-            "max_json_values",
-            hint="ask for application/x-npy, with `Accept` or with ?format=npy",
+    if approximation is not None:
+        _refuse_for_approximate(
+            {"/query/via": parameters.via, "/query/explain": parameters.explain}
         )
+    _refuse_many_waypoints(len(parameters.via), settings)
+    written = {"/query/from": parameters.source, "/query/to": parameters.target}
+    written |= {pointer("query", "via", i): text for i, text in enumerate(parameters.via)}
+    named = {place: _written_vertex(place, text) for place, text in written.items()}
+    _refuse_outside(vertices, named.items())
+    source, target, *waypoints = named.values()
+    return PathQuery(mesh_id, source, target, approximation, tuple(waypoints), parameters.explain)
+
+
+def value_count(query: Query, vertices: int) -> int:
+    """Return how many values the answer will have; 0 for a path, which tells when it is found."""
+    if isinstance(query, PathQuery):
+        return 0
+    per_point = 2 if query.nearest_source else 1
+    return per_point * (vertices if query.targets is None else len(query.targets))
+
+
+def refuse_large_json(query: Query, values: int, settings: Settings) -> None:
+    """Refuse a query whose answer has more ``values`` than JSON is good for."""
+    if values <= settings.max_json_values:
+        return
+    hint = "ask for application/x-npy, with `Accept` or with ?format=npy"
+    if isinstance(query, PathQuery) and query.explain:
+        hint = "ask without explain, or past fewer waypoints at once"
+    raise over_limit(
+        "result_too_large",
+        "values in JSON",
+        values,
+        settings.max_json_values,
+        "max_json_values",
+        hint=hint,
+    )
 
 
 def _approximation(accuracy: schemas.Accuracy, root: str = "") -> Approximation | None:
@@ -150,10 +200,26 @@ def _approximation(accuracy: schemas.Accuracy, root: str = "") -> Approximation 
         return Approximation(**errors) if given else _USUAL
     if given:
         message = "goes with method 'approximate' only; exact answers have no error"
-        faults = tuple(Fault(root + pointer(name), message) for name in given)
-        detail = f"{faults[0].pointer}: {message}"
-        raise refuse("invalid_request", detail, errors=faults)
+        raise _misplaced([root + pointer(name) for name in given], message)
     return None
+
+
+def _refuse_for_approximate(asked: Mapping[str, Any]) -> None:
+    """Refuse what approximate paths do not have; ``asked`` says by place whether it is wanted."""
+    given = [place for place, wanted in asked.items() if wanted]
+    if given:
+        raise _misplaced(given, "goes with method 'exact' only")
+
+
+def _misplaced(places: Sequence[str], message: str) -> ProblemError:
+    faults = tuple(Fault(place, message) for place in places)
+    return refuse("invalid_request", f"{places[0]}: {message}", errors=faults)
+
+
+def _refuse_many_waypoints(count: int, settings: Settings) -> None:
+    limit = settings.max_waypoints
+    if count > limit:
+        raise over_limit("limit_exceeded", "waypoints", count, limit, "max_waypoints")
 
 
 def _written_vertex(place: str, text: str) -> int:

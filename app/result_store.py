@@ -9,7 +9,7 @@ import tempfile
 import zlib
 from collections import Counter, OrderedDict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from anyio import to_thread
@@ -31,6 +31,8 @@ class Result:
     name: str
     path: Path
     headers: Mapping[str, str]
+    is_kept: bool = True
+    """Whether it stays when it has been sent."""
 
     @property
     def key(self) -> str:
@@ -92,13 +94,16 @@ class ResultStore:
         self._remove(name)
         return None
 
-    def take_new(self, name: str) -> Result:
+    def take_new(self, name: str, *, is_kept: bool = True) -> Result:
         """Take the result that a worker has just written."""
-        return self._take(name, _Seal.model_validate_json(_seal(self._root, name).read_bytes()))
+        seal = _Seal.model_validate_json(_seal(self._root, name).read_bytes())
+        return replace(self._take(name, seal), is_kept=is_kept)
 
     def give_back(self, result: Result) -> None:
         """Say that ``result`` has been sent."""
         self._let_go(result.name)
+        if not result.is_kept:
+            self._remove(result.name)
         self._evict()
 
     def forget_mesh(self, mesh_id: str) -> None:

@@ -2,12 +2,21 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, PositiveInt, StrictInt
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PositiveInt,
+    StrictBool,
+    StrictInt,
+)
 
 Merge = Literal["none", "exact"]
 MeshFormat = Literal["obj", "off", "ply", "stl", "glb"]
 SampleName = Literal["knot", "sphere", "plane"]
 Method = Literal["exact", "approximate"]
+StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
 NonNegative = Annotated[FiniteFloat, Field(ge=0)]
 
 
@@ -62,14 +71,28 @@ class DistancesRequest(Accuracy):
 
 
 class PathRequest(Accuracy):
-    """The shortest path from ``source`` to ``target``."""
+    """The shortest path from ``source`` to ``target``, past ``waypoints`` in their order."""
 
     model_config = ConfigDict(
-        json_schema_extra={"examples": [{"source": {"vertex": 0}, "target": {"vertex": 99}}]}
+        json_schema_extra={
+            "examples": [
+                {"source": {"vertex": 0}, "target": {"vertex": 99}},
+                {"source": {"vertex": 0}, "target": {"vertex": 99}, "waypoints": [{"vertex": 7}]},
+            ]
+        }
     )
 
     source: Point
     target: Point
+    waypoints: list[Point] = Field(
+        default=[],
+        description="The path is shortest from each stop to the next; for `exact` only",
+    )
+    explain: StrictBool = Field(
+        default=False,
+        description="Also tell what each step of the search did, in `steps`; for `exact` and JSON "
+        "only, and not cacheable, since it tells seconds",
+    )
 
 
 AnswerFormat = Literal["json", "npy", "octets"]
@@ -81,11 +104,22 @@ class AnswerParameters(Wire):
     format: AnswerFormat | None = Field(default=None, description="Overrides `Accept`")
 
 
-class PathParameters(AnswerParameters, Accuracy):
-    """The ends of a path, each a vertex as ``v`` and its index."""
+class PathAnswerParameters(AnswerParameters):
+    """How the answer is to be written, and whether with the steps of the search."""
+
+    explain: bool = Field(
+        default=False, description="Also tell what each step of the search did, in `steps`"
+    )
+
+
+class PathParameters(PathAnswerParameters, Accuracy):
+    """The stops of a path, each a vertex as ``v`` and its index."""
 
     source: str = Field(alias="from", examples=["v0"])
     target: str = Field(alias="to", examples=["v99"])
+    via: list[str] = Field(
+        default=[], description="A waypoint; may be given again, in order", examples=[["v7"]]
+    )
 
 
 class UploadParameters(Wire):
@@ -183,6 +217,20 @@ class Location(BaseModel):
     barycentric: tuple[float, float, float]
 
 
+class SearchStep(BaseModel):
+    """What a step of the search for a leg did: a leg leads from one stop to the next."""
+
+    leg: int = Field(description="From 0")
+    name: StepName
+    seconds: float
+    bound: float = Field(
+        description="The least upper bound of the leg's length that is known after the step; after "
+        "`exact`, the length"
+    )
+    windows: int = Field(description="Windows created")
+    faces: list[int] = Field(description="The region that was visited")
+
+
 class PathAnswer(BaseModel):
     """A path from source to target, or the reason why there is none."""
 
@@ -193,11 +241,15 @@ class PathAnswer(BaseModel):
     reason: str | None = None
     source: ResolvedPoint
     target: ResolvedPoint
+    waypoints: list[ResolvedPoint]
     length: float | None = None
     points: list[tuple[float, float, float]] | None
     locations: list[Location] | None = None
     faces: list[int] | None = Field(
         default=None, description="The face that each piece of the path crosses"
+    )
+    steps: list[SearchStep] | None = Field(
+        default=None, description="Of the search, leg by leg, where asked for by `explain`"
     )
     error_bound: ErrorBound
     warnings: list[str]

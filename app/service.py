@@ -20,7 +20,7 @@ from app.engine import (
 )
 from app.errors import Fault, ProblemError, refuse
 from app.mesh_store import PUBLIC_ARRAYS, MeshStore
-from app.queries import DistancesQuery, Query, refuse_large_json, result_key
+from app.queries import DistancesQuery, Query, refuse_large_json, result_key, value_count
 from app.result_store import Result, ResultStore, result_name
 from app.settings import Settings, variable_of
 
@@ -106,11 +106,13 @@ class Service:
         if kept is not None:
             return Answered(kept, {})
         done = await self._run(Answering(query, media_type, name), deadline_s, query.mesh_id)
-        return Answered(self.results.take_new(name), done.seconds)
+        result = self.results.take_new(name, is_kept=query.is_repeatable)
+        return Answered(result, done.seconds)
 
     def _refuse_format(self, query: Query, media_type: str) -> None:
         if media_type == JSON:
-            refuse_large_json(query, self.vertex_count(query.mesh_id), self.settings)
+            values = value_count(query, self.vertex_count(query.mesh_id))
+            refuse_large_json(query, values, self.settings)
         elif isinstance(query, DistancesQuery) and query.nearest_source:
             fault = Fault("/include", "nearest_source comes with JSON only")
             raise refuse("invalid_request", f"{media_type} holds one array", errors=(fault,))

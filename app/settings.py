@@ -31,7 +31,7 @@ class Settings(BaseSettings):
     workers: PositiveInt = Field(default_factory=_cores)
     """Worker processes; one for each core, unless set."""
     worker_mesh_bytes: PositiveInt = 2 * GIB
-    """Size of the meshes that a worker keeps open."""
+    """Size of the meshes that a worker keeps open, with what it keeps for paths on them."""
     results_bytes: PositiveInt = 4 * GIB
     """Size of the finished results that the store keeps."""
     max_upload_bytes: PositiveInt = 512 * MIB
@@ -42,6 +42,8 @@ class Settings(BaseSettings):
     """Most faces of a mesh."""
     max_sources: PositiveInt = 10_000
     """Most sources of a query."""
+    max_waypoints: PositiveInt = 100
+    """Most waypoints of a path."""
     max_json_values: PositiveInt = 2_000_000
     """Most values of an answer in JSON; binary ones have no such limit."""
     query_memory_bytes: PositiveInt = 8 * GIB

@@ -1,9 +1,8 @@
 """Paths over the surface: what they are, and how they are made of what backtracing finds."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
 from typing import Any, Literal
 
 import numpy as np
@@ -36,6 +35,8 @@ StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "
 class SearchStep:
     """What a step of the search between two points did (section 5, figure 10)."""
 
+    leg: int
+    """From one stop to the next, counted from 0."""
     name: StepName
     seconds: float
     bound: float
@@ -141,13 +142,13 @@ def joined(legs: Sequence[GeodesicPath]) -> GeodesicPath:
         arrays = [getattr(leg, name) for leg in legs]
         return np.concatenate([arrays[0], *(array[1:] for array in arrays[1:])])
 
-    steps = [leg.steps for leg in legs if leg.steps is not None]
+    steps = [replace(step, leg=i) for i, leg in enumerate(legs) for step in (leg.steps or ())]
     return GeodesicPath(
         points=chained("points"),
         faces=np.concatenate([leg.faces for leg in legs]),
         length=sum(leg.length for leg in legs),
         error_bound=EXACT,
-        steps=tuple(chain.from_iterable(steps)) or None,
+        steps=tuple(steps) or None,
         _location_faces=chained("_location_faces"),
         _location_weights=chained("_location_weights"),
         _location_vertices=chained("_location_vertices"),

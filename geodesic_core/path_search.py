@@ -21,6 +21,7 @@ from geodesic_core.errors import (
     DeadlineExceeded,
     InternalError,
     MemoryLimitExceeded,
+    NotConverged,
 )
 from geodesic_core.kernels import edge_path, prune, straighten, sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
@@ -47,8 +48,6 @@ class PathSearch:
     """Searches for paths on one mesh, with memory that is kept between them.
 
     A search resets what it touched, so that its cost does not depend on the size of the mesh.
-    Landmarks are added while searches go on, one whenever these have touched as many vertices as it
-    will: they never cost more than what was spent without them.
     """
 
     def __init__(self, mesh: TriangleMesh) -> None:
@@ -86,16 +85,20 @@ class PathSearch:
             path = self._sweep_outward(start, end, upper, toward, control, log)
         finally:
             self._forget()
-        self._add_landmark_if_due(start, control)
         return replace(path, steps=tuple(log.steps)) if explain else path
 
-    def _add_landmark_if_due(self, start: int, control: Control) -> None:
+    def add_landmark_if_due(self, beside: int, control: Control) -> None:
+        """Add a landmark in the component of a vertex, once searches touched as much as it will.
+
+        So landmarks never cost more than what was spent without them. What stops the call before
+        there is one is left for the next call to raise: it must not lose the path just found.
+        """
         count = self._landmarks.count
         due = self._touched >= (count + 1) * len(self.mesh.vertices)
         if due and count < wavefront.LANDMARKS:
-            # The path is found already: what stops a landmark must not lose it.
-            with suppress(Cancelled, DeadlineExceeded, MemoryLimitExceeded):
-                self._landmarks.add(start, self.nbytes, control)
+            with suppress(Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged):
+                inner = int(self.mesh.topology.inner_vertex[beside])
+                self._landmarks.add(inner, self.nbytes, control)
 
     def _goal(self, start: int, limit: float) -> Goal:
         return goal_at(start, limit, self._landmarks.distances, self._landmarks.count)
@@ -203,5 +206,5 @@ class _Log:
             prune.mark_visited(self._mesh.topology, wave.distance, touched, visited)
             faces = np.flatnonzero(visited).astype(np.int32)
         windows = 0 if wave is None else int(wave.counters[CREATED])
-        self.steps.append(SearchStep(name, seconds, bound, windows, faces))
+        self.steps.append(SearchStep(0, name, seconds, bound, windows, faces))
         self._began = time.perf_counter()

@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -161,16 +162,9 @@ def shortest_path(
     In practice O(region), a thin strip around the path and a larger one for its bounds; allocating
     the state is O(V + F), about two thirds of the mesh's own arrays.
     """
-    return Solver(mesh).shortest_path(
-        source,
-        target,
-        waypoints,
-        explain=explain,
-        progress=progress,
-        cancel=cancel,
-        deadline_s=deadline_s,
-        memory_limit=memory_limit,
-    )
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    stops = _as_stops(mesh, source, target, waypoints)
+    return _shortest_through(PathSearch(mesh), stops, control, explain=explain)
 
 
 class Solver:
@@ -212,25 +206,26 @@ class Solver:
     ) -> GeodesicPath:
         """Do as `shortest_path` does, on this mesh; in time that does not depend on its size."""
         control = Control(progress, cancel, deadline_s, memory_limit)
-        mesh = self.mesh
-        stops = [vertex_of(mesh, source, "source")]
-        stops += [vertex_of(mesh, point, f"waypoint {i}") for i, point in enumerate(waypoints)]
-        stops.append(vertex_of(mesh, target, "target"))
-        for here, there in pairwise(stops):
-            if mesh.components[here] != mesh.components[there]:
-                raise NoPath(
-                    f"vertices {here} and {there} are in different connected components",
-                    "disconnected",
-                )
+        stops = _as_stops(self.mesh, source, target, waypoints)
         if self._search is None:
-            self._search = PathSearch(mesh)
-        legs: list[GeodesicPath] = []
-        for here, there in pairwise(stops):
-            leg_control = control.for_part(len(legs), len(stops) - 1)
-            legs.append(self._search.find(here, there, leg_control, explain=explain))
-        if progress is not None:
-            progress(1.0)
-        return legs[0] if len(legs) == 1 else joined(legs)
+            self._search = PathSearch(self.mesh)
+        path = _shortest_through(self._search, stops, control, explain=explain)
+        self._search.add_landmark_if_due(stops[0], replace(control, progress=None))
+        return path
+
+
+def _shortest_through(
+    search: PathSearch, stops: Sequence[int], control: Control, *, explain: bool
+) -> GeodesicPath:
+    legs: list[GeodesicPath] = []
+    for here, there in pairwise(stops):
+        leg_control = control.for_part(len(legs), len(stops) - 1)
+        if legs:
+            search.add_landmark_if_due(here, replace(control, progress=None))
+        legs.append(search.find(here, there, leg_control, explain=explain))
+    if control.progress is not None:
+        control.progress(1.0)
+    return legs[0] if len(legs) == 1 else joined(legs)
 
 
 def warm_up() -> None:
@@ -325,6 +320,25 @@ def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
         peak_bytes=wavefront.bytes_of(wave),
         seconds=seconds,
     )
+
+
+def _as_stops(
+    mesh: TriangleMesh,
+    source: int | SurfacePoint,
+    target: int | SurfacePoint,
+    waypoints: Sequence[int | SurfacePoint],
+) -> list[int]:
+    """Return the vertices of a path, which must be connected."""
+    stops = [vertex_of(mesh, source, "source")]
+    stops += [vertex_of(mesh, point, f"waypoint {i}") for i, point in enumerate(waypoints)]
+    stops.append(vertex_of(mesh, target, "target"))
+    for here, there in pairwise(stops):
+        if mesh.components[here] != mesh.components[there]:
+            raise NoPath(
+                f"vertices {here} and {there} are in different connected components",
+                "disconnected",
+            )
+    return stops
 
 
 def _as_limit(max_distance: float | None) -> float:

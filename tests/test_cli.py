@@ -242,6 +242,29 @@ def test_path_writes_a_polyline_and_json(run: Run, plane: Path) -> None:
     assert len(answer["locations"]) == len(points)
 
 
+def test_a_path_by_way_of_others_tells_its_steps(run: Run, plane: Path) -> None:
+    ends = ["--source", 0, "--target", 115]
+    expected = gc.shortest_path(gc.load_mesh(plane), 0, 115, [60, 7], explain=True)
+    assert expected.steps is not None
+
+    ran = run("path", plane, *ends, "--via", 60, "--via", 7, "--explain", "--out", "p.json")
+
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("length") == repr(expected.length)
+    told = [row for row in ran.out.splitlines() if row.startswith("leg ")]
+    assert len(told) == len(expected.steps) == 18
+    for row, step in zip(told, expected.steps, strict=True):
+        assert row.startswith(f"leg {step.leg}, {step.name} ")
+        assert row.endswith(
+            f"bound {step.bound!r}, {step.windows} windows, {len(step.faces)} faces"
+        )
+    answer = json.loads(Path("p.json").read_text())
+    assert answer["points"] == expected.points.tolist()
+    assert [step["faces"] for step in answer["steps"]] == [
+        step.faces.tolist() for step in expected.steps
+    ]
+
+
 def test_a_path_to_its_own_source_is_a_point(run: Run, plane: Path) -> None:
     assert run("path", plane, "--source", 7, "--target", 7, "--out", "p.obj").code == 0
     assert Path("p.obj").read_text().splitlines()[-1] == "p 1"
@@ -326,6 +349,14 @@ def test_what_fails_says_why_in_one_line(
         (
             "path plane.ply --source 0 --target 1 --out p.obj --method exact --absolute-error 1",
             "--absolute-error goes with --method approximate only",
+        ),
+        (
+            "path plane.ply --source 0 --target 1 --out p.obj --method approximate --via 3",
+            "--via goes with --method exact only",
+        ),
+        (
+            "path plane.ply --source 0 --target 1 --out p.obj --method approximate --explain",
+            "--explain goes with --method exact only",
         ),
         ("sample cube c.ply", "cube"),
         ("sample knot c.obj", ".ply"),

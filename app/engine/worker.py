@@ -16,11 +16,12 @@ from setproctitle import setproctitle
 
 import geodesic_core as gc
 from app.answers import answer
-from app.encoding import encode
+from app.encoding import JSON, encode
 from app.engine.work import Answering, Done, MeshFromFile, MeshFromSample, StoredMesh, Work
 from app.errors import Problem, over_limit, problem_of
 from app.json_mesh import read_json_mesh
 from app.mesh_store import MeshStore, OpenMesh
+from app.queries import refuse_large_json
 from app.result_store import write_result
 from app.settings import Settings
 
@@ -75,6 +76,8 @@ class Worker:
             found = answer(
                 work.query, opened, cancel=cancel, memory_limit=self.settings.query_memory_bytes
             )
+        if work.media_type == JSON:
+            refuse_large_json(work.query, found.values, self.settings)
         with clock.phase("encode"):
             encoded = encode(found, work.media_type)
             write_result(self.config.results, work.result_name, encoded.parts, encoded.headers)
@@ -89,7 +92,7 @@ class Worker:
         return self.meshes[mesh_id]
 
     def _open_bytes(self) -> int:
-        return sum(opened.mesh.nbytes for opened in self.meshes.values())
+        return sum(opened.nbytes for opened in self.meshes.values())
 
 
 class Clock:

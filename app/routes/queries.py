@@ -20,6 +20,7 @@ from app.schemas import (
     DistancesAnswer,
     DistancesRequest,
     PathAnswer,
+    PathAnswerParameters,
     PathParameters,
     PathRequest,
 )
@@ -87,13 +88,14 @@ async def compute_distances(
 async def compute_path(
     mesh_id: str,
     body: PathRequest,
-    parameters: Annotated[AnswerParameters, Query()],
+    parameters: Annotated[PathAnswerParameters, Query()],
     request: Request,
     service: ServiceDep,
     deadline: Deadline,
 ) -> Response:
     """Return the points of the path, from source to target, and the faces it crosses."""
-    query = path_query(mesh_id, service.vertex_count(mesh_id), body)
+    vertices = service.vertex_count(mesh_id)
+    query = path_query(mesh_id, vertices, body, parameters, service.settings)
     media_type = media_type_of(request, parameters.format)
     return await _respond(service, request, query, media_type, deadline)
 
@@ -112,8 +114,9 @@ async def get_path(
     service: ServiceDep,
     deadline: Deadline,
 ) -> Response:
-    """Return the same as `POST`, for ends written as `v0`."""
-    query = written_path_query(mesh_id, service.vertex_count(mesh_id), parameters)
+    """Return the same as `POST`, for points written as `v0`."""
+    vertices = service.vertex_count(mesh_id)
+    query = written_path_query(mesh_id, vertices, parameters, service.settings)
     media_type = media_type_of(request, parameters.format)
     unchanged = not_modified(request, etag_of(result_key(query, media_type)), CACHED)
     return unchanged or await _respond(service, request, query, media_type, deadline)
@@ -124,5 +127,6 @@ async def _respond(
 ) -> Response:
     answering = service.answer(query, media_type, deadline)
     answered = await while_connected(request, answering)
-    headers = CACHED if request.method == "GET" else _UNSTORED
+    is_cacheable = request.method == "GET" and query.is_repeatable
+    headers = CACHED if is_cacheable else _UNSTORED
     return ResultResponse(answered, media_type, service.results, headers)

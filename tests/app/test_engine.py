@@ -300,6 +300,23 @@ def test_a_worker_closes_meshes_that_do_not_fit(tmp_path: Path) -> None:
     assert list(state.meshes) == ids[1:]
 
 
+def test_what_paths_need_counts_as_part_of_an_open_mesh(tmp_path: Path) -> None:
+    store = MeshStore(tmp_path)
+    store.prepare()
+    meshes = [TriangleMesh(*samples.plane(faces)) for faces in (200, 300)]
+    ids = [store.add(mesh)[0] for mesh in meshes]
+    room = sum(mesh.nbytes for mesh in meshes) + 100
+    state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0))
+
+    for mesh_id in ids:
+        state._open(mesh_id)
+    assert list(state.meshes) == ids
+    state.meshes[ids[1]].solver.shortest_path(0, 60)
+    state._open(ids[1])
+
+    assert list(state.meshes) == ids[1:]
+
+
 def test_the_clock_measures_each_phase() -> None:
     clock = Clock()
     with clock.phase("load"):
