@@ -84,7 +84,7 @@ def _path(
         "length": path.length,
         "points": path.points,
         "locations": [
-            {"face": location.face, "barycentric": location.barycentric}
+            {"face": location.face_index, "barycentric": location.barycentric}
             for location in path.locations
         ],
         "faces": path.faces,

@@ -436,7 +436,7 @@ def _path_to_obj(file: IO[bytes], path: "GeodesicPath") -> None:
 
 
 def _path_to_json(file: IO[bytes], path: "GeodesicPath") -> None:
-    locations = [{"face": p.face, "barycentric": p.barycentric} for p in path.locations]
+    locations = [{"face": p.face_index, "barycentric": p.barycentric} for p in path.locations]
     _dump_json(
         file,
         {

@@ -7,9 +7,10 @@ import math
 
 import numpy as np
 
-from geodesic_core.arrays import Singles, aligned_rows
+from geodesic_core.arrays import Floats, Ints, Singles, aligned_rows
 from geodesic_core.kernels import sweep, wavefront
-from geodesic_core.kernels.wavefront import LANDMARKS
+from geodesic_core.kernels.prune import LEAST, MOST
+from geodesic_core.kernels.wavefront import LANDMARKS, Goal, goal_at
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.run import Control, run_sweep
 from geodesic_core.tolerances import LANDMARK_ERROR
@@ -29,6 +30,17 @@ class Landmarks:
         self.distances: Singles = np.empty((0, LANDMARKS), np.float32)
         """(V, LANDMARKS) by inner vertex, mesh units; the first ``count`` columns are set"""
         self._nearest = np.full(len(mesh.vertices), math.inf)
+
+    def goal(self, position: Floats, corners: Ints, reaches: Floats, limit: float) -> Goal:
+        """Return the goal of paths through a point that lies ``reaches`` away from ``corners``."""
+        least, most = np.zeros(LANDMARKS), np.zeros(LANDMARKS)
+        known = self.distances[corners, : self.count].astype(np.float64)
+        if self.count > 0:
+            least[: self.count] = (LEAST * known - reaches[:, None]).max(axis=0)
+            most[: self.count] = (MOST * known + reaches[:, None]).min(axis=0)
+        return goal_at(position, limit)._replace(
+            landmarks=self.distances, landmark_count=self.count, least=least, most=most
+        )
 
     def add(self, beside: int, bytes_beside: int, control: Control) -> None:
         """Add the vertex farthest from all others, in the component of inner vertex ``beside``.

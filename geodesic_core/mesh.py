@@ -8,10 +8,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from geodesic_core import canonical
+from geodesic_core.arguments import as_limit
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.errors import InvalidArgument, InvalidMesh
+from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 from geodesic_core.kernels import topology as kernels
 from geodesic_core.kernels.topology import Topology
+from geodesic_core.nearest_face import NearestFace
+from geodesic_core.surface_point import SurfacePoint
+from geodesic_core.tolerances import SNAP
 
 Merge = Literal["none", "exact"]
 
@@ -143,6 +148,96 @@ class TriangleMesh:
     def components(self) -> Ints:
         """(V,) int32: the connected component of each vertex."""
         return self.topology.component
+
+    @cached_property
+    def inner_face(self) -> Ints:
+        """(F,) int32: the topology's number of each face."""
+        inner = np.empty(len(self.faces), np.int32)
+        inner[self.topology.outer_face] = np.arange(len(inner), dtype=np.int32)
+        return inner
+
+    @cached_property
+    def diagonal(self) -> float:
+        """Length of the bounding box's diagonal, mesh units."""
+        return float(np.linalg.norm(self.vertices.max(axis=0) - self.vertices.min(axis=0)))
+
+    @cached_property
+    def _nearest_face(self) -> NearestFace:
+        return NearestFace(self.vertices, self.faces)
+
+    def locate(self, position: ArrayLike, max_distance: float | None = None) -> SurfacePoint:
+        """Return the point of the surface nearest to a position.
+
+        Parameters
+        ----------
+        position
+            (3,) mesh units.
+        max_distance
+            How far the surface may be, mesh units.
+
+        Raises
+        ------
+        InvalidPoint
+            The position is not three finite numbers, or the surface is farther away.
+        InvalidArgument
+            The distance is not a number, 0 or more.
+
+        Notes
+        -----
+        What lies within 1e-12 of the bounding box from a vertex or an edge counts as on it. The
+        first call builds a search tree, O(F log F).
+        """
+        try:
+            place = np.asarray(position, dtype=np.float64)
+        except (TypeError, ValueError):
+            place = np.empty(0)
+        if place.shape != (3,) or not np.isfinite(place).all():
+            raise InvalidPoint(f"the position is {position!r}; it must be three finite numbers")
+        limit = as_limit(max_distance)
+        face, point, distance = self._nearest_face(place)
+        if distance > limit:
+            raise InvalidPoint(
+                f"the nearest point of the surface is {distance:g} away from {place.tolist()}, "
+                f"which is more than max_distance = {limit:g}"
+            )
+        weights = canonical.weights_of(point, self.vertices[self.faces[face]], SNAP * self.diagonal)
+        return canonical.in_face(self.topology, self.inner_face, face, weights)
+
+    def point(self, point: int | SurfacePoint, name: str = "point") -> SurfacePoint:
+        """Return a point in its one spelling: all that name the same come out equal, to the bit.
+
+        Raises
+        ------
+        InvalidPoint
+            It is not a point of this mesh; ``name`` is how the message calls it.
+        """
+        index: Any = point
+        if isinstance(point, SurfacePoint):
+            if point.vertex_index is None:
+                canonical.check_index(point.face_index, len(self.faces), "face", name)
+                canonical.check_weights(point.barycentric, point.face_index, name)
+                return canonical.in_face(
+                    self.topology, self.inner_face, point.face_index, point.barycentric
+                )
+            index = point.vertex_index
+        canonical.check_index(index, len(self.vertices), "vertex", name)
+        return canonical.at_vertex(self.topology, int(index))
+
+    def position(self, point: int | SurfacePoint) -> Floats:
+        """Return the (3,) position of a point, mesh units; of a vertex exactly the mesh's own.
+
+        Raises
+        ------
+        InvalidPoint
+            It is not a point of this mesh.
+        """
+        place = self.point(point)
+        position: Floats
+        if place.vertex_index is not None:
+            position = self.vertices[place.vertex_index]
+        else:
+            position = np.array(place.barycentric) @ self.vertices[self.faces[place.face_index]]
+        return position
 
     @cached_property
     def edge_count(self) -> int:

@@ -12,6 +12,7 @@ from geodesic_core.errors import InternalError
 from geodesic_core.kernels import backtrace, places
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.mesh import TriangleMesh
+from geodesic_core.nodes import Nodes
 from geodesic_core.surface_point import SurfacePoint
 
 
@@ -85,7 +86,7 @@ class GeodesicPath:
 
 
 def trace(mesh: TriangleMesh, winners: Winners, v: int) -> tuple[Ints, Floats, Ints]:
-    """Trace the path from inner vertex v to its source: nodes, parameters and inner faces."""
+    """Trace the path from node v to its source: nodes, parameters and inner faces."""
     room = 256
     while True:
         nodes, parameters = np.empty(room, np.int32), np.empty(room)
@@ -96,16 +97,17 @@ def trace(mesh: TriangleMesh, winners: Winners, v: int) -> tuple[Ints, Floats, I
         # A shortest path crosses a face at most once, and an approximate one hardly more often:
         # a longer walk is lost as well.
         if outcome == backtrace.LOST or room > 4 * len(mesh.faces) + 256:
-            vertex = mesh.topology.outer_vertex[v]
             raise InternalError(
-                f"the path to vertex {vertex} left the surface after {count} points; "
+                f"the path to node {v} left the surface after {count} points; "
                 f"please report this mesh"
             )
         room *= 4
 
 
-def traced_path(mesh: TriangleMesh, winners: Winners, v: int, bound: ErrorBound) -> GeodesicPath:
-    """Return the path from its source to inner vertex v; O(faces crossed)."""
+def traced_path(
+    mesh: TriangleMesh, winners: Winners, nodes_of_sweep: Nodes, v: int, bound: ErrorBound
+) -> GeodesicPath:
+    """Return the path from its source to node v; O(faces crossed)."""
     nodes, parameters, crossed = trace(mesh, winners, v)
     count = len(nodes)
     faces, vertices = np.empty(count, np.int32), np.empty(count, np.int64)
@@ -114,6 +116,12 @@ def traced_path(mesh: TriangleMesh, winners: Winners, v: int, bound: ErrorBound)
     places.place_nodes(
         mesh.topology, mesh.faces, nodes, parameters, faces, weights, vertices, points
     )
+    for i in (0, count - 1):
+        site = -1 - int(nodes[i]) - len(mesh.vertices)
+        if site >= 0:
+            point = nodes_of_sweep.points[site]
+            faces[i], vertices[i], weights[i] = point.face_index, -1, point.barycentric
+            points[i] = nodes_of_sweep.positions[site]
     kept = np.empty(count, np.uint8)
     places.leave_out_repeated(faces, weights, kept)
     where = np.flatnonzero(kept)
@@ -133,6 +141,18 @@ def traced_path(mesh: TriangleMesh, winners: Winners, v: int, bound: ErrorBound)
 def length_of(points: Floats) -> float:
     """Length of a polyline, mesh units."""
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def turned_round(path: GeodesicPath) -> GeodesicPath:
+    """Return the path from its target to its source."""
+    return replace(
+        path,
+        points=path.points[::-1].copy(),
+        faces=path.faces[::-1].copy(),
+        _location_faces=path._location_faces[::-1].copy(),
+        _location_weights=path._location_weights[::-1].copy(),
+        _location_vertices=path._location_vertices[::-1].copy(),
+    )
 
 
 def joined(legs: Sequence[GeodesicPath]) -> GeodesicPath:

@@ -1,4 +1,4 @@
-"""The exact path between two vertices: a sequence of searches with tightening bounds (section 5).
+"""The exact path between two points: a sequence of searches with tightening bounds (section 5).
 
 1. Along edges from the target to the start, directed by lower bounds; what it finds is shortened
    across faces: an upper bound U.
@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from geodesic_core.arrays import Ints
+from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import (
     Cancelled,
     DeadlineExceeded,
@@ -23,14 +23,27 @@ from geodesic_core.errors import (
     MemoryLimitExceeded,
     NotConverged,
 )
-from geodesic_core.kernels import edge_path, prune, straighten, sweep, wavefront
+from geodesic_core.kernels import edge_path, prune, straighten, wavefront
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.topology import LENGTH
-from geodesic_core.kernels.wavefront import CREATED, FROM, TOUCHED, Bounds, Goal, Wavefront, goal_at
+from geodesic_core.kernels.wavefront import (
+    CREATED,
+    FROM,
+    NO_SITES,
+    TOUCHED,
+    Bounds,
+    Goal,
+    Sites,
+    Wavefront,
+    new_wavefront,
+    with_sites,
+)
 from geodesic_core.landmarks import Landmarks
 from geodesic_core.mesh import TriangleMesh
+from geodesic_core.nodes import Nodes, corners_of, nodes_of
 from geodesic_core.path import EXACT, GeodesicPath, SearchStep, StepName, length_of, traced_path
-from geodesic_core.run import Control, run_sweep
+from geodesic_core.run import Control, sweep_nodes, winners_of
+from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import PATH_LENGTH, SEARCH_SLACK
 
 GUIDE_ERROR = 1e-3
@@ -53,10 +66,11 @@ class PathSearch:
     def __init__(self, mesh: TriangleMesh) -> None:
         self.mesh = mesh
         topology = mesh.topology
-        self._toward = wavefront.new_wavefront(topology, merges=True, paths=True, pruned=True)
-        self._outward = wavefront.new_wavefront(topology, pruned=True)
+        room = Sites(2, *NO_SITES[1:])  # both ends may be no vertices
+        self._toward = new_wavefront(topology, room, merges=True, paths=True, pruned=True)
+        self._outward = new_wavefront(topology, room, pruned=True)
         self._landmarks = Landmarks(mesh)
-        self._nearest = np.zeros(len(mesh.vertices), np.int32)
+        self._nearest = np.zeros(len(mesh.vertices) + room.nodes, np.int32)
         self._margin = _MARGIN * float(topology.geometry[:, LENGTH].mean())
         self._touched = 0
 
@@ -66,8 +80,10 @@ class PathSearch:
         kept = self._landmarks.distances.nbytes + self._nearest.nbytes
         return kept + wavefront.bytes_of(self._toward) + wavefront.bytes_of(self._outward)
 
-    def find(self, source: int, target: int, control: Control, *, explain: bool) -> GeodesicPath:
-        """Return an exact path between two vertices of one component.
+    def find(
+        self, source: SurfacePoint, target: SurfacePoint, control: Control, *, explain: bool
+    ) -> GeodesicPath:
+        """Return an exact path between two canonical points of one component.
 
         Raises
         ------
@@ -76,8 +92,7 @@ class PathSearch:
         """
         control.grant_memory(self.nbytes)
         control.look_up(0.0)
-        inner = self.mesh.topology.inner_vertex
-        start, end = int(inner[source]), int(inner[target])
+        start, end = _End(self.mesh, source), _End(self.mesh, target)
         log = _Log(self, explain)
         try:
             upper = self._search_edges(start, end, log)
@@ -87,8 +102,8 @@ class PathSearch:
             self._forget()
         return replace(path, steps=tuple(log.steps)) if explain else path
 
-    def add_landmark_if_due(self, beside: int, control: Control) -> None:
-        """Add a landmark in the component of a vertex, once searches touched as much as it will.
+    def add_landmark_if_due(self, beside: SurfacePoint, control: Control) -> None:
+        """Add a landmark in the component of a point, once searches touched as much as it will.
 
         So landmarks never cost more than what was spent without them. What stops the call before
         there is one is left for the next call to raise: it must not lose the path just found.
@@ -97,80 +112,94 @@ class PathSearch:
         due = self._touched >= (count + 1) * len(self.mesh.vertices)
         if due and count < wavefront.LANDMARKS:
             with suppress(Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged):
-                inner = int(self.mesh.topology.inner_vertex[beside])
-                self._landmarks.add(inner, self.nbytes, control)
+                corners, _ = corners_of(self.mesh, beside)
+                self._landmarks.add(int(corners[0]), self.nbytes, control)
 
-    def _goal(self, start: int, limit: float) -> Goal:
-        return goal_at(start, limit, self._landmarks.distances, self._landmarks.count)
+    def _goal(self, start: "_End", limit: float) -> Goal:
+        return self._landmarks.goal(start.position, start.corners, start.reaches, limit)
 
-    def _search_edges(self, start: int, end: int, log: "_Log") -> float:
-        """Return the length of a path along edges, shortened across faces (step 1)."""
+    def _search_edges(self, start: "_End", end: "_End", log: "_Log") -> float:
+        """Return the length of a path along edges, shortened across faces (step 1).
+
+        From a point that is no vertex it begins at the nearest corner.
+        """
         topology, wave = self.mesh.topology, self._outward
-        bounds = wavefront.exact_bounds(math.inf, self._goal(start, math.inf))
-        edge_path.search_edges(topology, wave, bounds, end, start)
+        first, last = start.nearest_corner, end.nearest_corner
+        beside = start.reaches.min() + end.reaches.min()
+        there = np.array([first]), np.zeros(1)
+        goal = self._landmarks.goal(topology.positions[first].copy(), *there, math.inf)
+        bounds = wavefront.exact_bounds(math.inf, goal)
+        edge_path.search_edges(topology, wave, bounds, last, first)
         self._touched += int(wave.counters[TOUCHED])
-        upper = float(wave.distance[start])
+        upper = float(wave.distance[first])
         if math.isinf(upper):
             raise self._lost(start, end, "along edges")
-        log.add("dijkstra", upper, wave)
-        path = edge_path.vertices_to(wave.winner_ints[:, FROM], start)
+        log.add("dijkstra", upper + beside, wave)
+        path = edge_path.vertices_to(wave.winner_ints[:, FROM], first)
         prune.forget(topology, wave, bounds)
-        upper = min(upper, straighten.shortened(topology, path))
+        upper = min(upper, straighten.shortened(topology, path)) + beside
+        if start.point.face_index == end.point.face_index:
+            upper = min(upper, float(np.linalg.norm(start.position - end.position)))
         log.add("shorten", upper)
         return upper
 
     def _sweep_toward(
-        self, start: int, end: int, upper: float, control: Control, log: "_Log"
+        self, start: "_End", end: "_End", upper: float, control: Control, log: "_Log"
     ) -> tuple[float, Goal]:
         """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
         limit = upper * (1.0 + SEARCH_SLACK) + self._margin
         bounds = wavefront.merging_bounds(math.inf, GUIDE_ERROR, math.inf, self._goal(start, limit))
-        self._toward = self._run(self._toward, end, bounds, control, _AFTER_EDGES)
-        if math.isinf(self._toward.distance[start]):
+        self._toward, nodes = self._run(self._toward, end, start, bounds, control, _AFTER_EDGES)
+        node = nodes.targets[0]
+        if math.isinf(self._toward.distance[node]):
             raise self._lost(start, end, "by the merging sweep")
         self._touched += int(self._toward.counters[TOUCHED])
         log.add("approximate", upper, self._toward)
         winners = self._winners(self._toward)
-        points = traced_path(self.mesh, winners, start, EXACT).points
+        points = traced_path(self.mesh, winners, nodes, node, EXACT).points
         upper = min(upper, length_of(points))
         log.add("backtrace", upper)
         known = self._goal(start, upper * (1.0 + SEARCH_SLACK))
         return upper, known._replace(known=self._toward.distance, ceiling=limit)
 
     def _sweep_outward(
-        self, start: int, end: int, upper: float, goal: Goal, control: Control, log: "_Log"
+        self, start: "_End", end: "_End", upper: float, goal: Goal, control: Control, log: "_Log"
     ) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
         bounds = wavefront.exact_bounds(math.inf, goal)
-        self._outward = self._run(self._outward, start, bounds, control, _AFTER_APPROXIMATE)
-        distance = float(self._outward.distance[end])
+        self._outward, nodes = self._run(
+            self._outward, start, end, bounds, control, _AFTER_APPROXIMATE
+        )
+        node = nodes.targets[0]
+        distance = float(self._outward.distance[node])
         if not distance <= upper * (1.0 + SEARCH_SLACK):
             raise self._lost(start, end, "by the exact sweep")
         log.add("exact", distance, self._outward)
-        path = traced_path(self.mesh, self._winners(self._outward), end, EXACT)
+        path = traced_path(self.mesh, self._winners(self._outward), nodes, node, EXACT)
         if abs(path.length - distance) > PATH_LENGTH * distance:
             raise self._lost(start, end, f"by backtracing, at {path.length} for {distance},")
         log.add("path", distance)
         return path
 
     def _run(
-        self, wave: Wavefront, begin: int, bounds: Bounds, control: Control, share: float
-    ) -> Wavefront:
-        starts = np.array([begin], np.int32)
-        sweep.start_sweep(self.mesh.topology, wave, starts, np.zeros(1), bounds)
+        self,
+        wave: Wavefront,
+        begin: "_End",
+        end: "_End",
+        bounds: Bounds,
+        control: Control,
+        share: float,
+    ) -> tuple[Wavefront, Nodes]:
+        nodes = nodes_of(self.mesh, [begin.point], [end.point])
         beside = self.nbytes - wavefront.bytes_of(wave)
-        return run_sweep(self.mesh, wave, bounds, control, lambda _: share, beside)
+        wave = with_sites(wave, nodes.sites)
+        wave = sweep_nodes(
+            self.mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: share, beside
+        )
+        return wave, nodes
 
     def _winners(self, wave: Wavefront) -> Winners:
-        return Winners(
-            nearest=self._nearest,
-            distance=wave.distance,
-            winner=wave.winner,
-            winner_ints=wave.winner_ints,
-            reference=wave.reference,
-            merges=wave.merges,
-            merge_ints=wave.merge_ints,
-        )
+        return winners_of(wave, self._nearest)
 
     def _forget(self) -> None:
         topology = self.mesh.topology
@@ -178,12 +207,25 @@ class PathSearch:
         prune.forget(topology, self._toward, merging)
         prune.forget(topology, self._outward, wavefront.exact_bounds(math.inf))
 
-    def _lost(self, start: int, end: int, how: str) -> InternalError:
-        source, target = self.mesh.topology.outer_vertex[[start, end]]
+    def _lost(self, start: "_End", end: "_End", how: str) -> InternalError:
         return InternalError(
-            f"vertex {target} was not reached {how} from vertex {source}, though the two are "
-            f"connected; please report this mesh"
+            f"{end.point} was not reached {how} from {start.point}, though the two are connected; "
+            f"please report this mesh"
         )
+
+
+class _End:
+    """An end of a search, and the vertices around it."""
+
+    def __init__(self, mesh: TriangleMesh, point: SurfacePoint) -> None:
+        self.point = point
+        self.position: Floats = np.array(mesh.position(point))
+        self.corners, self.reaches = corners_of(mesh, point)
+
+    @property
+    def nearest_corner(self) -> int:
+        """The inner vertex nearest to it."""
+        return int(self.corners[self.reaches.argmin()])
 
 
 class _Log:

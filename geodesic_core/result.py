@@ -1,6 +1,7 @@
 """What the solvers give back."""
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -8,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.errors import InternalError, InvalidPoint, NoPath
+from geodesic_core.errors import InternalError, NoPath
 from geodesic_core.kernels.backtrace import Winners
+from geodesic_core.kernels.wavefront import Bounds
 from geodesic_core.mesh import TriangleMesh
+from geodesic_core.nearest_source import NearestSource, find_nearest_source
+from geodesic_core.nodes import Nodes, component_of
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, traced_path
-from geodesic_core.surface_point import SurfacePoint
+from geodesic_core.surface_point import Point, SurfacePoint
 from geodesic_core.tolerances import PATH_LENGTH
 
 
@@ -20,7 +24,7 @@ from geodesic_core.tolerances import PATH_LENGTH
 class Source:
     """A source, and the distance at which it starts (mesh units, 0 or more)."""
 
-    point: int | SurfacePoint
+    point: Point
     start_distance: float = 0.0
 
 
@@ -59,6 +63,14 @@ class DistanceField:
     """(V,) int32 index into ``sources``; -1 where unreachable; ties to the lowest."""
     error_bound: ErrorBound
     stats: SweepStats
+    _places: tuple[SurfacePoint, ...]
+    """The sources' points, canonical"""
+    _bounds: Bounds
+    _nodes: Nodes
+    _node_of: Mapping[SurfacePoint, int]
+    """The nodes of the targets that the sweep was told of"""
+    _node_distances: Floats
+    """(N,) by node"""
     _winners: Winners | None
     """For backtracing; None where the sweep kept nothing for it."""
     _find_winners: Callable[[], Winners]
@@ -67,32 +79,57 @@ class DistanceField:
     def _known_winners(self) -> Winners:
         return self._find_winners() if self._winners is None else self._winners
 
-    def path_to(self, target: int | SurfacePoint) -> GeodesicPath:
-        """Return a path from the nearest source to a vertex (sections 3.5 and 4.3).
+    def distance_at(self, point: Point) -> float:
+        """Return the distance of any point of the surface, mesh units; infinite as in `distances`.
 
-        Of an exact field its length is the vertex's distance less the start distance of its source;
-        of an approximate one at most the promised error more. O(faces crossed). Where an
-        approximate field was not told to keep its windows, the first call runs the sweep again.
+        At a vertex or a target of the sweep it is what the sweep found, O(1). Elsewhere it is
+        exact, also where the field is approximate: by an exact sweep from the point to the nearest
+        source, in a thin strip that the field's own values leave.
 
         Raises
         ------
         InvalidPoint
-            The target is not a vertex of the mesh.
-        NoPath
-            The vertex is not connected to a source, or lies beyond ``max_distance``.
+            It is not a point of the mesh.
         """
-        vertex = vertex_of(self.mesh, target, "target")
-        if self.nearest_source[vertex] < 0:
-            raise self._no_path(vertex)
-        v = int(self.mesh.topology.inner_vertex[vertex])
-        path = traced_path(self.mesh, self._known_winners, v, EXACT)
-        start = self.sources[self.nearest_source[vertex]].start_distance
-        distance = float(self.distances[vertex])
+        place = self.mesh.point(point)
+        node = self._node(place)
+        if node is not None:
+            return float(self._node_distances[node])
+        return self._nearest_to(place).distance
+
+    def path_to(self, target: Point) -> GeodesicPath:
+        """Return a path from the nearest source to any point of the surface (sections 3.5 and 4.3).
+
+        Of an exact field its length is the point's distance less the start distance of its source;
+        of an approximate one at most the promised error more. O(faces crossed) to a vertex or a
+        target of the sweep. Where an approximate field was not told to keep its windows, the first
+        of those runs the sweep again. To other points as in `distance_at`.
+
+        Raises
+        ------
+        InvalidPoint
+            The target is not a point of the mesh.
+        NoPath
+            It is not connected to a source, or lies beyond ``max_distance``.
+        """
+        place = self.mesh.point(target, "target")
+        node = self._node(place)
+        if node is None:
+            nearest = self._nearest_to(place)
+            if nearest.path is None:
+                raise self._no_path(place)
+            return nearest.path
+        distance = float(self._node_distances[node])
+        if math.isinf(distance):
+            raise self._no_path(place)
+        winners = self._known_winners
+        path = traced_path(self.mesh, winners, self._nodes, node, EXACT)
+        start = self.sources[winners.nearest[node]].start_distance
         excess = start + path.length - distance
         exact = self.error_bound == EXACT
         if excess < -PATH_LENGTH * distance or (exact and excess > PATH_LENGTH * distance):
             raise InternalError(
-                f"the path to vertex {vertex} has length {path.length}, but the field says "
+                f"the path to {place} has length {path.length}, but the field says "
                 f"{distance - start}; please report this mesh"
             )
         if exact:
@@ -100,42 +137,26 @@ class DistanceField:
         share = max(excess, 0.0) / distance if distance > 0.0 else 0.0
         return replace(path, error_bound=ErrorBound("relative", share, "guaranteed"))
 
-    def _no_path(self, vertex: int) -> NoPath:
-        components = self.mesh.components
-        mine = {int(components[vertex_of(self.mesh, s.point, "source")]) for s in self.sources}
-        if int(components[vertex]) in mine:
+    def _node(self, place: SurfacePoint) -> int | None:
+        if place.vertex_index is not None:
+            return int(self.mesh.topology.inner_vertex[place.vertex_index])
+        return self._node_of.get(place)
+
+    def _nearest_to(self, place: SurfacePoint) -> NearestSource:
+        starts = np.array([source.start_distance for source in self.sources])
+        return find_nearest_source(
+            self.mesh, self._places, starts, self._node_distances, self._bounds, place
+        )
+
+    def _no_path(self, place: SurfacePoint) -> NoPath:
+        if component_of(self.mesh, place) in {component_of(self.mesh, p) for p in self._places}:
             return NoPath(
-                f"vertex {vertex} is farther than max_distance = {self.max_distance:g} from every "
-                f"source",
+                f"{place} is farther than max_distance = {self.max_distance:g} from every source",
                 "beyond_max_distance",
             )
         return NoPath(
-            f"vertex {vertex} is in another connected component than every source", "disconnected"
+            f"{place} is in another connected component than every source", "disconnected"
         )
 
 
-def vertex_of(mesh: TriangleMesh, point: int | SurfacePoint, name: str) -> int:
-    """Return the vertex that a point is.
-
-    Raises
-    ------
-    InvalidPoint
-        The point is no vertex, or the index is out of range; negative indices count as such.
-    """
-    index: Any = point
-    if isinstance(point, SurfacePoint):
-        index = point.vertex_index
-        if index is None and point.face >= 0:
-            raise InvalidPoint(
-                f"the {name} lies in face {point.face}: only vertices can be asked for yet"
-            )
-    if isinstance(index, bool) or not isinstance(index, int | np.integer):
-        raise InvalidPoint(f"the {name} is {index!r}; it must be a vertex index or a SurfacePoint")
-    if not 0 <= index < len(mesh.vertices):
-        raise InvalidPoint(
-            f"the {name} is vertex {index}, but vertices are numbered 0 to {len(mesh.vertices) - 1}"
-        )
-    return int(index)
-
-
-Sources = int | SurfacePoint | Source | Sequence[int | SurfacePoint | Source]
+Sources = Point | Source | Sequence[Point | Source]

@@ -4,10 +4,11 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
+from geodesic_core.arguments import is_number
+from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import (
     Cancelled,
     DeadlineExceeded,
@@ -15,11 +16,13 @@ from geodesic_core.errors import (
     MemoryLimitExceeded,
     NotConverged,
 )
-from geodesic_core.kernels import sweep, wavefront
+from geodesic_core.kernels import sites, sweep, wavefront
+from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.propagate import MERGES_FULL, POOL_FULL, RUNAWAY, SCRATCH_FULL
 from geodesic_core.kernels.topology import HEAD, TAIL
 from geodesic_core.kernels.wavefront import Bounds, Wavefront
 from geodesic_core.mesh import TriangleMesh
+from geodesic_core.nodes import Nodes
 from geodesic_core.tolerances import RUNS
 
 SLICE_SECONDS = 0.05
@@ -73,6 +76,31 @@ class Control:
             )
 
 
+def sweep_nodes(
+    mesh: TriangleMesh,
+    wave: Wavefront,
+    nodes: Nodes,
+    start_distances: Floats,
+    bounds: Bounds,
+    control: Control,
+    share_done: Callable[[Wavefront], float],
+    bytes_beside: int = 0,
+) -> Wavefront:
+    """Start a sweep at the sources of ``nodes``, run it to its end, and reach its targets.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged
+        As in `run_sweep`.
+    """
+    topology = mesh.topology
+    sweep.start_sweep(topology, wave, nodes.sources, start_distances, bounds)
+    sites.watch_sites(topology, wave, bounds, nodes.first_target)
+    wave = run_sweep(mesh, wave, bounds, control, share_done, bytes_beside)
+    sites.reach_sites_inside(topology, wave, bounds, nodes.first_target)
+    return wave
+
+
 def run_sweep(
     mesh: TriangleMesh,
     wave: Wavefront,
@@ -116,9 +144,20 @@ def run_sweep(
     return wave
 
 
-def is_number(value: Any) -> bool:
-    """Whether a value is a real number, and not a truth value."""
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
+def winners_of(wave: Wavefront, nearest: Ints) -> Winners:
+    """Return what backtracing needs of a sweep that has finished; ``nearest`` as in `Winners`."""
+    count = wave.counters[wavefront.MERGES]
+    return Winners(
+        nearest=nearest,
+        distance=wave.distance,
+        winner=wave.winner,
+        winner_ints=wave.winner_ints,
+        reference=wave.reference,
+        merges=wave.merges[:count],
+        merge_ints=wave.merge_ints[:count],
+        site_ints=wave.site_ints,
+        site_weights=wave.site_weights,
+    )
 
 
 def _not_converged(mesh: TriangleMesh, wave: Wavefront) -> NotConverged:

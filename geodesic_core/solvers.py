@@ -10,22 +10,19 @@ from typing import Any
 
 import numpy as np
 
+from geodesic_core.arguments import as_limit, is_number
+from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.kernels import sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.wavefront import Bounds, Wavefront
 from geodesic_core.mesh import TriangleMesh
+from geodesic_core.nodes import Nodes, component_of, nodes_of
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, joined
 from geodesic_core.path_search import PathSearch
-from geodesic_core.result import (
-    DistanceField,
-    Source,
-    Sources,
-    SweepStats,
-    vertex_of,
-)
-from geodesic_core.run import Control, is_number, run_sweep, share_of_vertices
-from geodesic_core.surface_point import SurfacePoint
+from geodesic_core.result import DistanceField, Source, Sources, SweepStats
+from geodesic_core.run import Control, share_of_vertices, sweep_nodes, winners_of
+from geodesic_core.surface_point import Point, SurfacePoint
 from geodesic_core.tolerances import WIDEST_ERROR
 
 
@@ -33,6 +30,7 @@ def exact_distance(
     mesh: TriangleMesh,
     sources: Sources,
     max_distance: float | None = None,
+    targets: Sequence[Point] = (),
     *,
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
@@ -49,6 +47,9 @@ def exact_distance(
         A vertex index, a `SurfacePoint`, a `Source` with a start distance, or several of these.
     max_distance
         Vertices farther than this (mesh units) are not looked for; they count as unreachable.
+    targets
+        Points whose distances are found on the way, so that `DistanceField.distance_at` and
+        `DistanceField.path_to` know them without a search of their own.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
@@ -65,8 +66,8 @@ def exact_distance(
     arrays, since windows are given back as soon as they are propagated.
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    bounds = wavefront.exact_bounds(_as_limit(max_distance))
-    return _solve(mesh, sources, bounds, EXACT, control, keeps=True)
+    bounds = wavefront.exact_bounds(as_limit(max_distance))
+    return _solve(mesh, sources, targets, bounds, EXACT, control, keeps=True)
 
 
 def approximate_distance(
@@ -75,6 +76,7 @@ def approximate_distance(
     relative_error: float | None = 1e-3,
     absolute_error: float | None = None,
     max_distance: float | None = None,
+    targets: Sequence[Point] = (),
     *,
     keep_windows: bool = False,
     progress: Callable[[float], None] | None = None,
@@ -86,7 +88,7 @@ def approximate_distance(
 
     Parameters
     ----------
-    mesh, sources, max_distance
+    mesh, sources, max_distance, targets
         As in `exact_distance`.
     relative_error
         Share of the exact distance by which a distance may fall short: above 0 and below 1. None
@@ -112,20 +114,20 @@ def approximate_distance(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     relative, absolute = _as_errors(relative_error, absolute_error)
-    limit = _as_limit(max_distance)
+    limit = as_limit(max_distance)
     bounds = wavefront.merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
     if math.isfinite(relative):
         promise = ErrorBound("relative", relative, "guaranteed")
     else:
         promise = ErrorBound("absolute", absolute, "guaranteed")
-    return _solve(mesh, sources, bounds, promise, control, keeps=keep_windows)
+    return _solve(mesh, sources, targets, bounds, promise, control, keeps=keep_windows)
 
 
 def shortest_path(
     mesh: TriangleMesh,
-    source: int | SurfacePoint,
-    target: int | SurfacePoint,
-    waypoints: Sequence[int | SurfacePoint] = (),
+    source: Point,
+    target: Point,
+    waypoints: Sequence[Point] = (),
     *,
     explain: bool = False,
     progress: Callable[[float], None] | None = None,
@@ -194,9 +196,9 @@ class Solver:
 
     def shortest_path(
         self,
-        source: int | SurfacePoint,
-        target: int | SurfacePoint,
-        waypoints: Sequence[int | SurfacePoint] = (),
+        source: Point,
+        target: Point,
+        waypoints: Sequence[Point] = (),
         *,
         explain: bool = False,
         progress: Callable[[float], None] | None = None,
@@ -215,7 +217,7 @@ class Solver:
 
 
 def _shortest_through(
-    search: PathSearch, stops: Sequence[int], control: Control, *, explain: bool
+    search: PathSearch, stops: Sequence[SurfacePoint], control: Control, *, explain: bool
 ) -> GeodesicPath:
     legs: list[GeodesicPath] = []
     for here, there in pairwise(stops):
@@ -241,6 +243,7 @@ def warm_up() -> None:
 def _solve(
     mesh: TriangleMesh,
     sources: Sources,
+    targets: Sequence[Point],
     bounds: Bounds,
     promise: ErrorBound,
     control: Control,
@@ -248,8 +251,11 @@ def _solve(
     keeps: bool,
 ) -> DistanceField:
     """Check the arguments, sweep, and make the result; without ``keeps``, none for backtracing."""
-    starts = _as_sources(mesh, sources)
-    wave = _sweep(mesh, starts, bounds, control, keeps=keeps)
+    starts, places = _as_sources(mesh, sources)
+    ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
+    nodes = nodes_of(mesh, places, ends)
+    distances = np.array([start.start_distance for start in starts])
+    wave = _sweep(mesh, nodes, distances, bounds, control, keeps=keeps)
     wave.distance[wave.distance > bounds.max_distance] = math.inf
     winners = _winners_of(wave)
     inner = mesh.topology.inner_vertex
@@ -261,48 +267,46 @@ def _solve(
         nearest_source=winners.nearest[inner],
         error_bound=promise,
         stats=_stats(mesh, wave, time.perf_counter() - control.began),
+        _places=places,
+        _bounds=bounds,
+        _nodes=nodes,
+        _node_of=dict(zip(ends, nodes.targets.tolist(), strict=True)),
+        _node_distances=wave.distance,
         _winners=winners if keeps else None,
-        _find_winners=partial(_find_winners, mesh, starts, bounds),
+        _find_winners=partial(_find_winners, mesh, nodes, distances, bounds),
     )
 
 
-def _find_winners(mesh: TriangleMesh, starts: tuple[Source, ...], bounds: Bounds) -> Winners:
+def _find_winners(
+    mesh: TriangleMesh, nodes: Nodes, start_distances: Floats, bounds: Bounds
+) -> Winners:
     """Sweep again, and keep what backtracing needs: sweeps are the same to the bit."""
-    wave = _sweep(mesh, starts, bounds, Control(), keeps=True)
+    wave = _sweep(mesh, nodes, start_distances, bounds, Control(), keeps=True)
     return _winners_of(wave)
 
 
 def _winners_of(wave: Wavefront) -> Winners:
-    count = wave.counters[wavefront.MERGES]
-    return Winners(
-        nearest=sweep.nearest_sources(wave.distance, wave.winner_ints, wave.origin),
-        distance=wave.distance,
-        winner=wave.winner,
-        winner_ints=wave.winner_ints,
-        reference=wave.reference,
-        merges=wave.merges[:count].copy(),
-        merge_ints=wave.merge_ints[:count].copy(),
-    )
+    nearest = sweep.nearest_sources(wave.distance, wave.winner_ints, wave.origin)
+    found = winners_of(wave, nearest)
+    # What was recorded of merges is kept, not the room for more.
+    return found._replace(merges=found.merges.copy(), merge_ints=found.merge_ints.copy())
 
 
 def _sweep(
     mesh: TriangleMesh,
-    starts: tuple[Source, ...],
+    nodes: Nodes,
+    start_distances: Floats,
     bounds: Bounds,
     control: Control,
     *,
     keeps: bool,
 ) -> Wavefront:
-    topology = mesh.topology
-    vertices = np.array([vertex_of(mesh, start.point, "source") for start in starts], np.int64)
-    distances = np.array([start.start_distance for start in starts])
     merges = bool(bounds.merging)
-    wave = wavefront.new_wavefront(topology, merges=merges, paths=merges and keeps)
+    wave = wavefront.new_wavefront(mesh.topology, nodes.sites, merges=merges, paths=merges and keeps)
     control.grant_memory(wavefront.bytes_of(wave))
-    sweep.start_sweep(topology, wave, topology.inner_vertex[vertices], distances, bounds)
-    reachable = int(np.isin(mesh.components, mesh.components[vertices]).sum())
+    reachable = int(np.isin(mesh.components, nodes.components).sum())
     share = share_of_vertices(reachable, bounds.max_distance)
-    wave = run_sweep(mesh, wave, bounds, control, share)
+    wave = sweep_nodes(mesh, wave, nodes, start_distances, bounds, control, share)
     if control.progress is not None:
         control.progress(1.0)
     return wave
@@ -323,30 +327,18 @@ def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
 
 
 def _as_stops(
-    mesh: TriangleMesh,
-    source: int | SurfacePoint,
-    target: int | SurfacePoint,
-    waypoints: Sequence[int | SurfacePoint],
-) -> list[int]:
-    """Return the vertices of a path, which must be connected."""
-    stops = [vertex_of(mesh, source, "source")]
-    stops += [vertex_of(mesh, point, f"waypoint {i}") for i, point in enumerate(waypoints)]
-    stops.append(vertex_of(mesh, target, "target"))
+    mesh: TriangleMesh, source: Point, target: Point, waypoints: Sequence[Point]
+) -> list[SurfacePoint]:
+    """Return the stops of a path, which must be connected."""
+    stops = [mesh.point(source, "source")]
+    stops += [mesh.point(point, f"waypoint {i}") for i, point in enumerate(waypoints)]
+    stops.append(mesh.point(target, "target"))
     for here, there in pairwise(stops):
-        if mesh.components[here] != mesh.components[there]:
+        if component_of(mesh, here) != component_of(mesh, there):
             raise NoPath(
-                f"vertices {here} and {there} are in different connected components",
-                "disconnected",
+                f"{here} and {there} are in different connected components", "disconnected"
             )
     return stops
-
-
-def _as_limit(max_distance: float | None) -> float:
-    if max_distance is None:
-        return math.inf
-    if not is_number(max_distance) or not max_distance >= 0.0:
-        raise InvalidArgument(f"max_distance is {max_distance!r}; it must be a number, 0 or more")
-    return float(max_distance)
 
 
 def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, float]:
@@ -366,15 +358,18 @@ def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, f
     )
 
 
-def _as_sources(mesh: TriangleMesh, sources: Any) -> tuple[Source, ...]:
+def _as_sources(
+    mesh: TriangleMesh, sources: Any
+) -> tuple[tuple[Source, ...], tuple[SurfacePoint, ...]]:
+    """Return the sources, and their canonical points."""
     if isinstance(sources, str | bytes):
         raise InvalidPoint(f"the source is {sources!r}; it must be a vertex index or a Source")
     if isinstance(sources, Source | SurfacePoint) or not isinstance(sources, Iterable):
         sources = [sources]
-    found = []
+    found, places = [], []
     for i, item in enumerate(sources):
         source = item if isinstance(item, Source) else Source(item)
-        vertex_of(mesh, source.point, f"source {i}")
+        places.append(mesh.point(source.point, f"source {i}"))
         start = source.start_distance
         if not is_number(start) or not (math.isfinite(start) and start >= 0.0):
             raise InvalidArgument(
@@ -383,4 +378,4 @@ def _as_sources(mesh: TriangleMesh, sources: Any) -> tuple[Source, ...]:
         found.append(source)
     if not found:
         raise InvalidPoint("there are no sources: give at least one")
-    return tuple(found)
+    return tuple(found), tuple(places)

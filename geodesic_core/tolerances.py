@@ -128,3 +128,19 @@ SEARCH_SLACK = 1e-10
 
 The path itself must not be pruned by rounding.
 """
+
+WEIGHT = 1e-12
+"""Barycentric weight up to which a point counts as lying on the opposite edge: rounding."""
+
+WEIGHT_ERROR = 1e-9
+"""How far barycentric weights may be below zero, or their sum from one: written with ten digits."""
+
+EDGE_STEPS = 2.0**40
+"""Into how many steps an edge is divided, to tell the points on it apart.
+
+One spelling of a point differs from another by rounding: by 1e-16 of the edge as a share of it, by
+1e-16 of the mesh as a position. A step is 1e-12 of an edge.
+"""
+
+SNAP = 1e-12
+"""Share of the bounding box's diagonal within which a position counts as on a vertex or an edge."""

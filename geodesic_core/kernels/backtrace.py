@@ -32,10 +32,12 @@ from geodesic_core.kernels.topology import (
     TAIL,
 )
 from geodesic_core.kernels.wavefront import (
+    FACE,
     FROM,
     LEFT,
     LEFT_REFERENCE,
     MERGED_ON,
+    NODE,
     RIGHT,
     RIGHT_REFERENCE,
     SPLIT,
@@ -48,13 +50,15 @@ class Winners(NamedTuple):
     """What a finished sweep leaves for backtracing: arrays of its `Wavefront`, and one more."""
 
     nearest: Ints
-    """(V,): index of the nearest source, by inner vertex; -1 where unreached"""
+    """(N,): index of the nearest source, by node; -1 where unreached"""
     distance: Floats
     winner: Floats
     winner_ints: Ints
     reference: Ints
     merges: Floats
     merge_ints: Ints
+    site_ints: Ints
+    site_weights: Floats
 
 
 # Outcomes
@@ -78,6 +82,31 @@ def cross_edge(
         return min(max(along, 0.0), length), along, ahead
     u = ex - (along - ex) * ey / (ahead - ey)
     return min(max(u, 0.0), length), along, ahead
+
+
+@kernel
+def row_in_face(winners: Any, node: int, face: int) -> int:
+    """Row of a site in a face; -1 where it is not in that face, or is a vertex."""
+    rows = len(winners.site_ints)
+    if rows == 0 or node < winners.site_ints[0, NODE]:
+        return -1
+    for k in range(rows):
+        if winners.site_ints[k, NODE] == node and winners.site_ints[k, FACE] == face:
+            return k
+    return -1
+
+
+@kernel
+def target_in_frame(topology: Any, winners: Any, node: int, h: int) -> tuple[float, float]:
+    """Where the target lies in the frame of its VIA h: at the apex, or a site in the face."""
+    geometry = topology.geometry
+    ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
+    ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
+    if node < len(topology.total_angle):
+        return ax, ay
+    k = row_in_face(winners, node, h // 3)
+    along, up = winners.site_weights[k, (h + 1) % 3], winners.site_weights[k, (h + 2) % 3]
+    return along * geometry[h, LENGTH] + up * ax, up * ay
 
 
 @kernel
@@ -116,12 +145,12 @@ def trace_path(
     parameters: Floats,
     faces: Ints,
 ) -> tuple[int, int]:
-    """Trace the path from vertex ``target`` to its source; return (outcome, number of nodes).
+    """Trace the path from node ``target`` to its source; return (outcome, number of nodes).
 
     A vertex on the way takes over with its own winner: a line through it may go on straight on
-    either side only where it is flat. A node is a half-edge h, crossed at ``parameters`` of its
-    length, or -1 - v for a vertex v. ``faces[i]`` is crossed between the nodes i and i + 1.
-    O(faces crossed).
+    either side only where it is flat. What is filled in is a half-edge h, crossed at ``parameters``
+    of its length, or -1 - v for a vertex or site v. ``faces[i]`` is crossed between the nodes i and
+    i + 1. O(faces crossed).
     """
     links, geometry = topology.links, topology.geometry
     distance, winner_ints = winners.distance, winners.winner_ints
@@ -134,17 +163,18 @@ def trace_path(
         reference = winners.reference[v] if len(winners.reference) > 0 else -1 - root
         if reference >= 0:
             root = -1  # not known before the merges are undone
-        face = h // 3
-        ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
-        ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
+        face, length = h // 3, geometry[h, LENGTH]
+        ax, ay = target_in_frame(topology, winners, v, h)
+        to_tail, to_head = math.hypot(ax, ay), math.hypot(ax - length, ay)
         tail, head, stop = links[h, TAIL], links[h, HEAD], -1
-        if tail == root or is_on_path(winners, tail, geometry[h, LENGTH_LEFT], distance[v], v):
+        if row_in_face(winners, root, face) >= 0:
+            stop = root
+        elif tail == root or is_on_path(winners, tail, to_tail, distance[v], v):
             stop = tail
-        elif head == root or is_on_path(winners, head, geometry[h, LENGTH_RIGHT], distance[v], v):
+        elif head == root or is_on_path(winners, head, to_head, distance[v], v):
             stop = head
         else:
-            # From the apex back over h itself
-            length = geometry[h, LENGTH]
+            # From there back over h itself
             x = sx if ay <= sy else (sx * ay - ax * sy) / (ay - sy)
             x = min(max(x, 0.0), length)
             sigma = distance[v] - math.hypot(ax - x, ay) - math.hypot(sx - x, sy)
@@ -169,6 +199,9 @@ def trace_path(
                 sx, sy = length - sx, -sy
                 root = -1 - reference if reference < 0 else -1
             face, apex = h // 3, links[h, APEX]
+            if row_in_face(winners, root, face) >= 0:
+                stop = root
+                break
             ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
             ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
             reach = math.sqrt((ax - x) * (ax - x) + ay * ay)

@@ -14,6 +14,7 @@ from geodesic_core.kernels.wavefront import (
     IN_RING,
     LAST,
     LIST,
+    MARKS,
     SIZE,
     merging,
 )
@@ -92,8 +93,8 @@ def queue_list(wave: Any, h: int) -> None:
 
     Its rows are asked for ahead of its turn: 7 % of an exact sweep, 18 % of a merging one.
     """
-    if wave.lists[LIST * h + SIZE] > 0 and not wave.lists[LIST * h + IN_RING]:
-        wave.lists[LIST * h + IN_RING] = 1
+    if wave.lists[LIST * h + SIZE] > 0 and not wave.lists[LIST * h + MARKS] & IN_RING:
+        wave.lists[LIST * h + MARKS] |= IN_RING
         prefetch(wave.geometry, ROW * h)
         prefetch(wave.links, ROW * h)
         ring_push(wave, h)

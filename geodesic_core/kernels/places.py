@@ -20,7 +20,8 @@ def place_nodes(
 ) -> None:
     """Fill the canonical face, its barycentric weights, the vertex (or -1) and the position.
 
-    Nodes as in `backtrace.trace_path`; a vertex of no face has face -1. ``faces`` are the caller's.
+    Nodes as in `backtrace.trace_path`; a vertex of no face has face -1, and sites are left as they
+    are. ``faces`` are the caller's.
     """
     for i in range(len(nodes)):
         v, t = -1 - nodes[i], parameters[i]
@@ -28,6 +29,8 @@ def place_nodes(
             # At a vertex, also where t is too small to tell
             v = topology.links[nodes[i], TAIL if t < 0.5 else HEAD]
         weights[i, 0], weights[i, 1], weights[i, 2] = 0.0, 0.0, 0.0
+        if v >= len(topology.total_angle):
+            continue  # a site
         if v >= 0:
             vertex_of[i] = topology.outer_vertex[v]
             points[i] = topology.positions[v]

@@ -9,6 +9,7 @@ from geodesic_core.kernels.lists import free_windows, put_window, queue_if_due, 
 from geodesic_core.kernels.merge import merged
 from geodesic_core.kernels.overlap import leaves_gap, trim
 from geodesic_core.kernels.planar import hit_left
+from geodesic_core.kernels.sites import reach_sites
 from geodesic_core.kernels.topology import (
     APEX,
     COS_LEFT,
@@ -34,6 +35,7 @@ from geodesic_core.kernels.wavefront import (
     LEFT,
     LEFT_REFERENCE,
     LIST,
+    MARKS,
     MERGE,
     MERGE_INTS,
     MERGED_ON,
@@ -41,6 +43,7 @@ from geodesic_core.kernels.wavefront import (
     PEAK,
     RIGHT,
     RIGHT_REFERENCE,
+    SITE_SHIFT,
     SIZE,
     SPLIT,
     WORK,
@@ -419,6 +422,8 @@ def propagate_list(wave: Any, h: int) -> int:
         ax = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
         ay = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
         nearest, crossing, least = reach_apex(wave, h, count, ax, ay)
+        if wave.lists[LIST * h + MARKS] >> SITE_SHIFT:
+            reach_sites(wave, h, count)
         spread(wave, h, count, nearest, crossing, least)
         alive = wave.counters[FRESH] - wave.counters[FREE_SIZE]
         wave.counters[PEAK] = max(wave.counters[PEAK], alive)

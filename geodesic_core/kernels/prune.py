@@ -15,18 +15,21 @@ from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.topology import TAIL
 from geodesic_core.kernels.wavefront import (
     COUNTERS,
+    FACE,
     FAR,
     FREE_FIRST,
     FROM,
-    IN_RING,
     LANDMARKS,
     LIGHT,
     LIST,
     LIT_FROM,
     LIT_TO,
+    MARKS,
+    NODE,
     SENT_AT,
     SENT_FROM,
     SENT_TO,
+    SITE,
     SIZE,
     TOUCHED,
     VIA,
@@ -37,8 +40,8 @@ from geodesic_core.kernels.wavefront import (
 from geodesic_core.tolerances import LANDMARK_ERROR
 
 # Stored distances from landmarks are lower bounds, rounded to single precision.
-_LEAST = 1.0 - 1e-6
-_MOST = (1.0 + 1e-6) / (1.0 - LANDMARK_ERROR)
+LEAST = 1.0 - 1e-6
+MOST = (1.0 + 1e-6) / (1.0 - LANDMARK_ERROR)
 
 
 @kernel
@@ -67,9 +70,9 @@ def least_rest(wave: Any, v: int) -> float:
 @inlined
 def straight_to_start(wave: Any, v: int) -> float:
     """Euclidean distance from v to the start."""
-    x = wave.positions[3 * v] - wave.positions[3 * wave.start]
-    y = wave.positions[3 * v + 1] - wave.positions[3 * wave.start + 1]
-    z = wave.positions[3 * v + 2] - wave.positions[3 * wave.start + 2]
+    x = wave.positions[3 * v] - wave.start[0]
+    y = wave.positions[3 * v + 1] - wave.start[1]
+    z = wave.positions[3 * v + 2] - wave.start[2]
     return math.sqrt(x * x + y * y + z * z)
 
 
@@ -77,12 +80,12 @@ def straight_to_start(wave: Any, v: int) -> float:
 def least_to_start(wave: Any, v: int, straight: float) -> float:
     """Lower bound of the distance from v to the start: straight, or by a landmark.
 
-    The exact distance from a landmark is known to be from _LEAST to _MOST times the stored one.
+    The exact distance from a landmark is known to be from LEAST to MOST times the stored one.
     """
     least = straight
     for i in range(wave.landmark_count):
-        here, there = wave.landmarks[LANDMARKS * v + i], wave.landmarks[LANDMARKS * wave.start + i]
-        bound = max(_LEAST * here - _MOST * there, _LEAST * there - _MOST * here)
+        here = wave.landmarks[LANDMARKS * v + i]
+        bound = max(LEAST * here - wave.most[i], wave.least[i] - MOST * here)
         if bound > least:
             least = bound
     return least
@@ -93,8 +96,8 @@ def steepest_to_start(wave: Any, v: int, straight: float) -> float:
     """Return what `least_to_start`, at any point q, exceeds by the distance of v and q at most."""
     steepest = straight
     for i in range(wave.landmark_count):
-        here, there = wave.landmarks[LANDMARKS * v + i], wave.landmarks[LANDMARKS * wave.start + i]
-        bound = _MOST * abs(here - there)
+        here = wave.landmarks[LANDMARKS * v + i]
+        bound = max(MOST * here - wave.most[i], wave.least[i] - LEAST * here)
         if bound > steepest:
             steepest = bound
     return steepest
@@ -129,9 +132,18 @@ def forget(topology: Any, wavefront: Any, bounds: Any) -> None:
             face = wave.corners[c] // 3
             for h in range(3 * face, 3 * face + 3):
                 wave.lists[LIST * h + SIZE] = 0
-                wave.lists[LIST * h + IN_RING] = 0
+                wave.lists[LIST * h + MARKS] = 0
                 if merging(wave):
                     wave.runs[h] = 0
+    for k in range(wave.site_count):
+        node, face = wave.site_ints[SITE * k + NODE], wave.site_ints[SITE * k + FACE]
+        wave.distance[node] = math.inf
+        wave.winner_ints[WINNER * node + VIA] = -1
+        wave.winner_ints[WINNER * node + FROM] = -1
+        if merging(wave):
+            wave.reference[node] = -1
+        for h in range(3 * face, 3 * face + 3):
+            wave.lists[LIST * h + MARKS] = 0
     for i in range(COUNTERS):
         wave.counters[i] = 0
     wave.counters[FREE_FIRST] = -1

@@ -13,6 +13,7 @@ from geodesic_core.kernels.propagate import POOL_FULL, PROPAGATED, propagate_lis
 from geodesic_core.kernels.prune import touch
 from geodesic_core.kernels.pseudosource import emit_pseudosource, is_pseudosource
 from geodesic_core.kernels.queue import HEAP_SIZE, RING_HEAD, RING_SIZE, pop_nearest, ring_pop
+from geodesic_core.kernels.sites import emit_site
 from geodesic_core.kernels.topology import (
     APEX,
     HEAD,
@@ -29,8 +30,12 @@ from geodesic_core.kernels.wavefront import (
     FRONT,
     IN_RING,
     LIST,
+    MARKS,
+    NODE,
+    SITE,
     SIZE,
     VIA,
+    WINNER,
     WORK,
     merging,
     view_of,
@@ -45,15 +50,22 @@ RUNNING = 4
 def start_sweep(
     topology: Any, wavefront: Any, sources: Ints, start_distances: Floats, bounds: Any
 ) -> None:
-    """Reach the source vertices at their start distances."""
+    """Reach the source nodes at their start distances; sites among them emit their windows."""
     wave = view_of(topology, wavefront, bounds)
     for i in range(len(sources)):
         v = sources[i]
-        if start_distances[i] < wave.distance[v]:
-            wave.origin[v] = i
+        if start_distances[i] >= wave.distance[v]:
+            continue
+        wave.origin[v] = i
+        if v < wave.vertex_count:
             if merging(wave):
                 bound_vertex(wave, v, start_distances[i])
             improve_vertex(wave, v, start_distances[i], -1, 0.0, 0.0, v, -1 - v)
+        else:
+            wave.distance[v], wave.winner_ints[WINNER * v + FROM] = start_distances[i], v
+    for k in range(wave.site_count):
+        if wave.distance[wave.site_ints[SITE * k + NODE]] < math.inf:
+            emit_site(wave, k)
 
 
 @kernel
@@ -140,7 +152,7 @@ def drain(wave: Any, budget: int) -> int:
         if outcome != PROPAGATED:
             return outcome
         ring_pop(wave)
-        wave.lists[LIST * h + IN_RING] = 0
+        wave.lists[LIST * h + MARKS] &= ~IN_RING
     return FINISHED
 
 

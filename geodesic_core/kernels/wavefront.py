@@ -19,12 +19,21 @@ from geodesic_core.kernels.window import WIDTH
 SIZE = 0  # number of windows
 FIRST = 1  # slot of the first window; without meaning in an empty list
 LAST = 2
-IN_RING = 3  # whether the half-edge is in the ring
+MARKS = 3  # IN_RING, and from SITE_SHIFT on 1 + the row of the first site to reach in its face
 LIST = 4
 
-# Columns of Wavefront.winner_ints, a row per vertex
+IN_RING = 1  # the mark of a half-edge that is in the ring
+SITE_SHIFT = 1
+
+# Columns of Wavefront.site_ints, a row per site and face that it belongs to
+NODE = 0  # its number among vertices and sites
+FACE = 1
+NEXT_SITE = 2  # row of the next site to reach in the same face; -1 at the end
+SITE = 3
+
+# Columns of Wavefront.winner_ints, a row per node: the vertices, and after them the sites
 VIA = 0  # half-edge whose apex the vertex is and whose window reached it; -1 at a source
-FROM = 1  # vertex of that window's pseudosource; -1 where unreached, itself at a source
+FROM = 1  # node of that window's pseudosource; -1 where unreached, itself at a source
 WINNER = 2
 
 # Status of a vertex
@@ -73,12 +82,16 @@ class Goal(NamedTuple):
     been before, from its values, up to the ceiling within which it pruned nothing.
     """
 
-    start: int
-    """Inner vertex"""
+    position: Floats
+    """(3,): of the start"""
     limit: float
     """How long a path may be in all, mesh units; infinite where nothing is pruned"""
     landmarks: Singles
     """(V, LANDMARKS): distances from landmarks, or (0, LANDMARKS)"""
+    least: Floats
+    """(LANDMARKS,): lower bounds of the start's exact distances from the landmarks"""
+    most: Floats
+    """(LANDMARKS,): upper bounds of the same"""
     landmark_count: int
     known: Floats
     """(V,): distances of an earlier sweep, or (0,)"""
@@ -87,23 +100,36 @@ class Goal(NamedTuple):
 
 
 def goal_at(
-    start: int,
-    limit: float,
-    landmarks: Singles | None = None,
-    landmark_count: int = 0,
-    known: Floats | None = None,
-    ceiling: float = math.inf,
+    position: Floats, limit: float, known: Floats | None = None, ceiling: float = math.inf
 ) -> Goal:
-    """Return a goal of which not everything is known."""
-    if landmarks is None:
-        landmarks = np.empty((0, LANDMARKS), np.float32)
-    if known is None:
-        known = np.empty(0)
-    return Goal(start, limit, landmarks, landmark_count, known, ceiling)
+    """Return a goal of which no landmarks are known."""
+    return Goal(
+        position=position,
+        limit=limit,
+        landmarks=np.empty((0, LANDMARKS), np.float32),
+        least=np.zeros(LANDMARKS),
+        most=np.zeros(LANDMARKS),
+        landmark_count=0,
+        known=np.empty(0) if known is None else known,
+        ceiling=ceiling,
+    )
 
 
-NO_GOAL = goal_at(0, math.inf)
+NO_GOAL = goal_at(np.zeros(3), math.inf)
 """Of a sweep that is not pruned."""
+
+
+class Sites(NamedTuple):
+    """Points that are no vertices, as a sweep needs them; see `sites`."""
+
+    nodes: int
+    ints: Ints
+    """(S, 3): NODE, FACE, NEXT_SITE; a site's rows follow each other, in the order of the nodes"""
+    weights: Floats
+    """(S, 3): barycentric, at the corners of the face"""
+
+
+NO_SITES = Sites(0, np.empty((0, SITE), np.int32), np.empty((0, 3)))
 
 
 class Bounds(NamedTuple):
@@ -134,29 +160,33 @@ def merging_bounds(
 
 
 class Wavefront(NamedTuple):
-    """All that changes while a sweep runs."""
+    """All that changes while a sweep runs; N counts vertices and sites."""
 
     distance: Floats
-    """(V,): least distance known, infinite where unreached; final when the sweep has finished"""
+    """(N,): least distance known, infinite where unreached; final when the sweep has finished"""
     winner: Floats
-    """(V, 2): unfolded pseudosource of the winning window, in the frame of its VIA"""
+    """(N, 2): unfolded pseudosource of the winning window, in the frame of its VIA"""
     winner_ints: Ints
-    """(V, 2): VIA, FROM"""
+    """(N, 2): VIA, FROM"""
     status: Flags
     """(V,): FAR, FRONT or DONE"""
     origin: Ints
-    """(V,): index of the source that the vertex had its distance from when it was last improved"""
+    """(N,): index of the source that the node had its distance from when it was last improved"""
     heap: Ints
     heap_keys: Floats
     heap_place: Ints
     ring: Ints
     lists: Ints
-    """(3F, 4): SIZE, FIRST, LAST, IN_RING"""
+    """(3F, 4): SIZE, FIRST, LAST, MARKS"""
     windows: Floats
     """(P, 8): the pool, see `window`"""
     scratch: Floats
     """(S, 8): the list that is being propagated"""
     counters: Longs
+    site_ints: Ints
+    """(S, 3): NODE, FACE, NEXT_SITE; the sources' rows first"""
+    site_weights: Floats
+    """(S, 3): barycentric, at the corners of the face"""
     touched: Ints
     """(V,): the vertices that are not as they were at first"""
     toward: Floats
@@ -167,7 +197,7 @@ class Wavefront(NamedTuple):
     light: Floats
     """(V, 5): LIT_FROM, LIT_TO, SENT_FROM, SENT_TO, SENT_AT"""
     reference: Ints
-    """(V,): REFERENCE of the winning window"""
+    """(N,): REFERENCE of the winning window"""
     runs: Flags
     """(3F,): how often the half-edge's list was propagated"""
     merges: Floats
@@ -202,16 +232,23 @@ class View(NamedTuple):
     scratch: Any
     scratch_ints: Any
     counters: Any
+    site_ints: Any
+    site_weights: Any
     touched: Any
     toward: Any
     known: Any
     landmarks: Any
+    start: Any
+    least: Any
+    most: Any
     upper: Any
     light: Any
     reference: Any
     runs: Any
     merges: Any
     merge_ints: Any
+    vertex_count: int
+    site_count: int
     ring_capacity: int
     pool: int
     scratch_size: int
@@ -221,7 +258,6 @@ class View(NamedTuple):
     absolute_error: float
     merging: tuple[int, ...]
     pruned: bool
-    start: int
     limit: float
     landmark_count: int
     knows: bool
@@ -255,16 +291,23 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         pointer(wave.scratch),
         pointer(wave.scratch.view(np.int32)),
         pointer(wave.counters),
+        pointer(wave.site_ints),
+        pointer(wave.site_weights),
         pointer(wave.touched),
         pointer(wave.toward),
         pointer(bounds.goal.known),
         pointer(bounds.goal.landmarks),
+        pointer(bounds.goal.position),
+        pointer(bounds.goal.least),
+        pointer(bounds.goal.most),
         pointer(wave.upper),
         pointer(wave.light),
         pointer(wave.reference),
         pointer(wave.runs),
         pointer(wave.merges),
         pointer(wave.merge_ints),
+        topology.total_angle.shape[0],
+        wave.site_ints.shape[0],
         wave.ring.shape[0],
         wave.windows.shape[0],
         wave.scratch.shape[0],
@@ -274,7 +317,6 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         bounds.absolute_error,
         bounds.merging,
         wave.toward.shape[0] > 0,
-        bounds.goal.start,
         bounds.goal.limit,
         bounds.goal.landmark_count,
         bounds.goal.known.shape[0] > 0,
@@ -289,39 +331,52 @@ def merging(wave: Any) -> bool:
 
 
 def new_wavefront(
-    topology: Topology, *, merges: bool = False, paths: bool = False, pruned: bool = False
+    topology: Topology,
+    sites: Sites = NO_SITES,
+    *,
+    merges: bool = False,
+    paths: bool = False,
+    pruned: bool = False,
 ) -> Wavefront:
     """Allocate the state of one sweep: O(V + F), nothing reached yet.
 
     With ``paths``, a sweep that merges records what it merges, for backtracing.
     """
     vertices, half_edges = len(topology.total_angle), len(topology.links)
-    merged_vertices = vertices if merges else 0
+    nodes = vertices + sites.nodes
+    merged_vertices, merged_nodes = (vertices, nodes) if merges else (0, 0)
     counters = np.zeros(COUNTERS, np.int64)
     counters[FREE_FIRST] = -1
     return Wavefront(
-        distance=np.full(vertices, np.inf),
-        winner=np.empty((vertices, 2)),
-        winner_ints=np.full((vertices, WINNER), -1, np.int32),
+        distance=np.full(nodes, np.inf),
+        winner=np.empty((nodes, 2)),
+        winner_ints=np.full((nodes, WINNER), -1, np.int32),
         status=np.zeros(vertices, np.uint8),
-        origin=np.zeros(vertices, np.int32),
+        origin=np.zeros(nodes, np.int32),
         heap=np.empty(vertices, np.int32),
         heap_keys=np.empty(vertices),
         heap_place=np.full(vertices, -1, np.int32),
         ring=np.empty(half_edges, np.int32),
         lists=np.zeros((half_edges, LIST), np.int32),
-        windows=aligned_rows(1024, WIDTH, np.float64),
+        windows=aligned_rows(1024 + 3 * len(sites.ints), WIDTH, np.float64),
         scratch=aligned_rows(256, WIDTH, np.float64),
         counters=counters,
+        site_ints=sites.ints.copy(),
+        site_weights=sites.weights,
         touched=np.empty(vertices, np.int32),
         toward=np.empty(vertices if pruned else 0),
         upper=np.full(merged_vertices, np.inf),
         light=np.tile([1.0, -1.0, 1.0, -1.0, np.inf], (merged_vertices, 1)),
-        reference=np.full(merged_vertices, -1, np.int32),
+        reference=np.full(merged_nodes, -1, np.int32),
         runs=np.zeros(half_edges if merges else 0, np.uint8),
         merges=np.empty((1024 if paths else 0, MERGE)),
         merge_ints=np.empty((1024 if paths else 0, MERGE_INTS), np.int32),
     )
+
+
+def with_sites(wave: Wavefront, sites: Sites) -> Wavefront:
+    """Return the wavefront, which has room for as many nodes, with other sites."""
+    return wave._replace(site_ints=sites.ints, site_weights=sites.weights)
 
 
 def with_larger_pool(wave: Wavefront) -> Wavefront:

@@ -34,12 +34,12 @@ def _check_location(mesh, point, location) -> set[int]:
     weights = np.array(location.barycentric)
     assert (weights >= 0).all()
     assert weights.sum() == pytest.approx(1, abs=1e-15)
-    corners = mesh.faces[location.face]
+    corners = mesh.faces[location.face_index]
     scale = np.abs(mesh.vertices[corners]).max()
     np.testing.assert_allclose(weights @ mesh.vertices[corners], point, rtol=0, atol=1e-14 * scale)
     carrier = corners[weights > 0].tolist()
     holders = set.intersection(*(_faces_at(mesh)[vertex] for vertex in carrier))
-    assert location.face == min(holders), "the lowest face that holds the point"
+    assert location.face_index == min(holders), "the lowest face that holds the point"
     return set(carrier)
 
 

@@ -1,0 +1,149 @@
+"""One spelling for each point of the surface: the same weights, to the bit, however it was written.
+
+A point is a vertex, lies on an edge or inside a face. Weights that are rounding are taken for zero,
+and places on an edge are told apart up to `EDGE_STEPS` only, so that 0.3 from one end and 0.7 from
+the other are one.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from geodesic_core.arguments import is_index, is_number
+from geodesic_core.arrays import Floats, Ints
+from geodesic_core.errors import InvalidPoint
+from geodesic_core.kernels.topology import HEAD, OPPOSITE, TAIL, Topology, following
+from geodesic_core.surface_point import SurfacePoint
+from geodesic_core.tolerances import EDGE_STEPS, WEIGHT, WEIGHT_ERROR
+
+
+ROUNDING = 4.0 * np.finfo(np.float64).eps
+"""By how much the sum of three weights may differ from one."""
+
+
+def at_vertex(topology: Topology, vertex: int) -> SurfacePoint:
+    """Return the point at a vertex, in the lowest of its faces."""
+    v = topology.inner_vertex[vertex]
+    corners = topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]]
+    if len(corners) == 0:
+        return SurfacePoint.vertex(vertex)
+    outer = 3 * topology.outer_face[corners // 3].astype(int) + corners % 3
+    lowest = int(outer.min())
+    weights = [0.0, 0.0, 0.0]
+    weights[lowest % 3] = 1.0
+    return SurfacePoint(lowest // 3, (weights[0], weights[1], weights[2]), vertex)
+
+
+def in_face(
+    topology: Topology, inner_face: Ints, face: int, weights: Sequence[float]
+) -> SurfacePoint:
+    """Return the point of a face that has these weights, which may be rounded."""
+    kept = [float(weight) if weight > WEIGHT else 0.0 for weight in weights]
+    total = math.fsum(kept)
+    if abs(total - 1.0) <= ROUNDING:
+        total = 1.0  # else a canonical point would change each time it is asked for
+    u, v, w = (weight / total for weight in kept)
+    h = 3 * int(inner_face[face])
+    match u > 0.0, v > 0.0, w > 0.0:
+        case True, True, True:
+            return SurfacePoint(face, (u, v, w))
+        case _, _, False:
+            return _on_edge(topology, h, u, v)
+        case False, _, _:
+            return _on_edge(topology, h + 1, v, w)
+    return _on_edge(topology, h + 2, w, u)
+
+
+def weights_of(point: Floats, corners: Floats, snap: float) -> list[float]:
+    """Return the weights of a point of a face, zero where it is nearer than ``snap`` to an edge.
+
+    Each from the height above its edge: of a face of no area, from places along its longest edge.
+    """
+    edges = np.roll(corners, -1, axis=0) - corners  # from each corner to the next
+    normal = np.cross(edges[0], edges[1])
+    area = float(np.linalg.norm(normal))  # twice
+    lengths = np.linalg.norm(edges, axis=1)
+    if area > 0.0:
+        parts = np.cross(edges, point - corners) @ normal / area  # height times length, by edge
+        parts[parts <= snap * lengths] = 0.0
+        weights = np.roll(parts / area, -1)  # what is above an edge is the share of its apex
+    else:
+        longest = int(np.argmax(lengths))
+        share = float((point - corners[longest]) @ edges[longest]) / lengths[longest] ** 2
+        weights = np.zeros(3)
+        weights[longest], weights[(longest + 1) % 3] = 1.0 - share, share
+    for i in range(3):  # of two corners, that within reach takes all
+        if float(np.linalg.norm(point - corners[i])) <= snap:
+            weights = np.eye(3)[i]
+    return [max(float(weight), 0.0) for weight in weights]
+
+
+def check_index(index: Any, count: int, kind: str, name: str) -> None:
+    """Refuse what is not the index of one of ``count`` vertices or faces.
+
+    Raises
+    ------
+    InvalidPoint
+        Negative indices are refused, too.
+    """
+    if not is_index(index):
+        raise InvalidPoint(f"the {name} is {index!r}; it must be a vertex index or a SurfacePoint")
+    if not 0 <= index < count:
+        many = "vertices" if kind == "vertex" else f"{kind}s"
+        raise InvalidPoint(
+            f"the {name} is {kind} {index}, but {many} are numbered 0 to {count - 1}"
+        )
+
+
+def check_weights(weights: Any, face: int, name: str) -> None:
+    """Refuse weights that are not a point of a face.
+
+    Raises
+    ------
+    InvalidPoint
+        They are not three numbers; one is negative, or their sum is not one, beyond rounding.
+    """
+    is_sound = (
+        isinstance(weights, Sequence | np.ndarray)
+        and len(weights) == 3
+        and all(is_number(weight) for weight in weights)
+        and min(weights) >= -WEIGHT_ERROR
+        and abs(sum(weights) - 1.0) <= WEIGHT_ERROR
+    )
+    if not is_sound:
+        raise InvalidPoint(
+            f"the {name} has the weights {weights!r} in face {face}: they must be three numbers, "
+            f"0 or more, whose sum is 1"
+        )
+
+
+def _on_edge(topology: Topology, h: int, at_tail: float, at_head: float) -> SurfacePoint:
+    """Return the point of half-edge h with these weights of its ends, one of them above zero."""
+    links, outer_vertex = topology.links, topology.outer_vertex
+    tail, head = (int(outer_vertex[v]) for v in links[h, [TAIL, HEAD]])
+    upper = at_head if tail < head else at_tail
+    upper = round(upper / (at_tail + at_head) * EDGE_STEPS) / EDGE_STEPS
+    if upper in (0.0, 1.0):
+        return at_vertex(topology, min(tail, head) if upper == 0.0 else max(tail, head))
+    outer, lowest = min((_outer_half_edge(topology, g), g) for g in half_edges_around(links, h))
+    from_tail = outer_vertex[links[lowest, TAIL]] < outer_vertex[links[lowest, HEAD]]
+    weights = [0.0, 0.0, 0.0]
+    weights[outer % 3] = 1.0 - upper if from_tail else upper
+    weights[following(outer) % 3] = upper if from_tail else 1.0 - upper
+    return SurfacePoint(outer // 3, (weights[0], weights[1], weights[2]))
+
+
+def half_edges_around(links: Ints, h: int) -> Iterator[int]:
+    """Yield the half-edges of the edge of h, one for each of its faces, h first."""
+    g = h
+    while True:
+        yield g
+        g = int(links[g, OPPOSITE]) >> 1
+        if g < 0 or g == h:
+            return
+
+
+def _outer_half_edge(topology: Topology, h: int) -> int:
+    return 3 * int(topology.outer_face[h // 3]) + h % 3

@@ -1,0 +1,173 @@
+"""Sites: points of a sweep that are no vertices, where it begins or which it is to reach.
+
+A site has a node of its own, numbered after the vertices, and a row for each face that it belongs
+to: one inside a face, one for each face of an edge. It emits windows over the edges of its faces,
+as a vertex does over those opposite to it; and it is reached as the apex of a face is, by the
+windows that cross its face. No vertex is inserted, so that there are no slivers.
+"""
+
+import math
+from typing import Any
+
+from geodesic_core.kernels.arrival import bound_vertex, improve_vertex, light_vertex, precedence
+from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.lists import insert_sorted, put_window
+from geodesic_core.kernels.topology import (
+    APEX,
+    COS_LEFT,
+    LENGTH,
+    LENGTH_LEFT,
+    OPPOSITE,
+    ROW,
+    SIN_LEFT,
+    TAIL,
+)
+from geodesic_core.kernels.wavefront import (
+    CREATED,
+    FACE,
+    FROM,
+    LIST,
+    MARKS,
+    NEXT_SITE,
+    NODE,
+    SITE,
+    SITE_SHIFT,
+    VIA,
+    WINNER,
+    merging,
+    view_of,
+)
+from geodesic_core.kernels.window import B0, B1, INTS, REFERENCE, ROOT, SIGMA, SX, SY, WIDTH
+from geodesic_core.tolerances import BEND, GAP
+
+
+@kernel
+def site_in_frame(wave: Any, k: int, h: int) -> tuple[float, float]:
+    """Where the site of row k lies in the frame of half-edge h, of its face."""
+    row, i = ROW * h, h % 3
+    along = wave.site_weights[3 * k + (i + 1) % 3]
+    up = wave.site_weights[3 * k + (i + 2) % 3]
+    ax = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
+    ay = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
+    return along * wave.geometry[row + LENGTH] + up * ax, up * ay
+
+
+@kernel
+def emit_site(wave: Any, k: int) -> None:
+    """Send windows from the site of row k over all edges of its face, and reach the corners."""
+    node, face = wave.site_ints[SITE * k + NODE], wave.site_ints[SITE * k + FACE]
+    sigma = wave.distance[node]
+    for h in range(3 * face, 3 * face + 3):
+        x, y = site_in_frame(wave, k, h)
+        row = ROW * h
+        length = wave.geometry[row + LENGTH]
+        across = wave.links[row + OPPOSITE] >> 1
+        if across >= 0 and y > 0.0:
+            slot = put_window(wave, 0.0, length, length - x, -y, sigma, node, 0.0, -1 - node)
+            insert_sorted(wave, across, slot)
+            wave.counters[CREATED] += 1
+        ax = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
+        ay = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
+        distance = sigma + math.hypot(ax - x, ay - y)
+        apex = wave.links[row + APEX]
+        if merging(wave):
+            bound_vertex(wave, apex, distance)
+            if wave.flags[apex]:
+                light_vertex(wave, apex, distance, h, x, y)
+        improve_vertex(wave, apex, distance, h, x, y, node, -1 - node)
+
+
+@kernel
+def watch_sites(topology: Any, wavefront: Any, bounds: Any, first: int) -> None:
+    """Have the sites of the rows from ``first`` on reached by whatever crosses their faces."""
+    wave = view_of(topology, wavefront, bounds)
+    for k in range(first, wave.site_count):
+        face = wave.site_ints[SITE * k + FACE]
+        marks = wave.lists[LIST * 3 * face + MARKS]
+        wave.site_ints[SITE * k + NEXT_SITE] = (marks >> SITE_SHIFT) - 1
+        for h in range(3 * face, 3 * face + 3):
+            wave.lists[LIST * h + MARKS] = (k + 1) << SITE_SHIFT
+
+
+@kernel
+def reach_sites(wave: Any, h: int, count: int) -> None:
+    """Offer the sites in the face of h the windows of scratch."""
+    k = (wave.lists[LIST * h + MARKS] >> SITE_SHIFT) - 1
+    while k >= 0:
+        reach_site(wave, h, count, k)
+        k = wave.site_ints[SITE * k + NEXT_SITE]
+
+
+@kernel
+def reach_site(wave: Any, h: int, count: int, k: int) -> None:
+    """Offer the site of row k the nearest of the windows of scratch.
+
+    Unlike an apex it asks them all: it has no neighbours that would make up for a gap.
+    """
+    node = wave.site_ints[SITE * k + NODE]
+    x, y = site_in_frame(wave, k, h)
+    gap = GAP * wave.geometry[ROW * h + LENGTH]
+    for i in range(count):
+        w = WIDTH * i
+        sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
+        b0, b1 = wave.scratch[w + B0], wave.scratch[w + B1]
+        rise = y - sy
+        crossing = (sx * y - x * sy) / rise if rise > 0.0 else x
+        if b0 - gap <= crossing <= b1 + gap:
+            distance = math.hypot(x - sx, rise)
+        else:
+            crossing = min(max(crossing, b0), b1)
+            distance = math.hypot(crossing - sx, sy) + math.hypot(x - crossing, y)
+            distance *= 1.0 + BEND
+        improve_site(
+            wave,
+            node,
+            distance + wave.scratch[w + SIGMA],
+            h,
+            sx,
+            sy,
+            wave.scratch_ints[INTS * i + ROOT],
+            wave.scratch_ints[INTS * i + REFERENCE] if merging(wave) else -1,
+        )
+
+
+@kernel
+def improve_site(
+    wave: Any, node: int, distance: float, via: int, sx: float, sy: float, root: int, reference: int
+) -> None:
+    """Offer a site a distance and what gives it; of equal ones that of the lower source wins."""
+    known = wave.distance[node]
+    if not precedence(distance, wave.origin[root], known, wave.origin[node]):
+        return
+    wave.distance[node] = min(distance, known)
+    wave.winner[2 * node], wave.winner[2 * node + 1] = sx, sy
+    wave.winner_ints[WINNER * node + VIA] = via
+    wave.winner_ints[WINNER * node + FROM] = root
+    wave.origin[node] = wave.origin[root]
+    if merging(wave):
+        wave.reference[node] = reference
+
+
+@kernel
+def reach_sites_inside(topology: Any, wavefront: Any, bounds: Any, first: int) -> None:
+    """Offer the sites from row ``first`` on the paths that cross no edge, after the sweep.
+
+    They come from the corners of their faces, or from sources in the same face.
+    """
+    wave = view_of(topology, wavefront, bounds)
+    for k in range(first, wave.site_count):
+        node, face = wave.site_ints[SITE * k + NODE], wave.site_ints[SITE * k + FACE]
+        for h in range(3 * face, 3 * face + 3):
+            x, y = site_in_frame(wave, k, h)
+            corner = wave.links[ROW * h + TAIL]
+            distance = wave.distance[corner] + math.hypot(x, y)
+            if distance < math.inf:
+                improve_site(wave, node, distance, h, 0.0, 0.0, corner, -1 - corner)
+        h = 3 * face
+        x, y = site_in_frame(wave, k, h)
+        for source in range(first):
+            if wave.site_ints[SITE * source + FACE] == face:
+                root = wave.site_ints[SITE * source + NODE]
+                sx, sy = site_in_frame(wave, source, h)
+                distance = wave.distance[root] + math.hypot(x - sx, y - sy)
+                improve_site(wave, node, distance, h, sx, sy, root, -1 - root)

@@ -1,0 +1,111 @@
+"""From points to the nodes of a sweep: its vertices, and sites for what is no vertex."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints
+from geodesic_core.canonical import half_edges_around
+from geodesic_core.kernels.topology import HEAD, TAIL
+from geodesic_core.kernels.wavefront import SITE, Sites
+from geodesic_core.mesh import TriangleMesh
+from geodesic_core.surface_point import SurfacePoint
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """The nodes of the sources of a sweep, and of what it is to reach."""
+
+    sources: Ints
+    """(N,): an inner vertex, or a number beyond the vertices, for each source"""
+    targets: Ints
+    """(M,): the same for each target"""
+    sites: Sites
+    first_target: int
+    """Row of the first target among those of the sites."""
+    points: tuple[SurfacePoint, ...]
+    """Those that became sites, in the order of their nodes."""
+    positions: Floats
+    """(sites, 3), mesh units"""
+    components: tuple[int, ...]
+    """Those of the mesh with a source in them"""
+
+
+def nodes_of(
+    mesh: TriangleMesh, sources: Sequence[SurfacePoint], targets: Sequence[SurfacePoint]
+) -> Nodes:
+    """Return the nodes of canonical points."""
+    vertices = len(mesh.vertices)
+    sited: list[SurfacePoint] = []
+    rows: list[tuple[int, int, int]] = []
+    weights: list[tuple[float, ...]] = []
+
+    def nodes(points: Sequence[SurfacePoint]) -> Ints:
+        found = np.empty(len(points), np.int32)
+        for i, point in enumerate(points):
+            if point.vertex_index is not None:
+                found[i] = mesh.topology.inner_vertex[point.vertex_index]
+                continue
+            found[i] = vertices + len(sited)
+            sited.append(point)
+            for face, at_corners in _faces_of(mesh, point):
+                rows.append((int(found[i]), face, -1))
+                weights.append(at_corners)
+        return found
+
+    source_nodes = nodes(sources)
+    first_target = len(rows)
+    target_nodes = nodes(targets)
+    return Nodes(
+        sources=source_nodes,
+        targets=target_nodes,
+        sites=Sites(
+            len(sited),
+            np.array(rows, np.int32).reshape(-1, SITE),
+            np.array(weights).reshape(-1, 3),
+        ),
+        first_target=first_target,
+        points=tuple(sited),
+        positions=np.array([mesh.position(point) for point in sited]).reshape(-1, 3),
+        components=tuple({component_of(mesh, point) for point in sources}),
+    )
+
+
+def component_of(mesh: TriangleMesh, point: SurfacePoint) -> int:
+    """Return the connected component of a canonical point."""
+    vertex = point.vertex_index
+    if vertex is None:
+        vertex = int(mesh.faces[point.face_index, 0])
+    return int(mesh.components[vertex])
+
+
+def corners_of(mesh: TriangleMesh, point: SurfacePoint) -> tuple[Ints, Floats]:
+    """Return the inner vertices around a canonical point, or itself, and how far each is."""
+    inner = mesh.topology.inner_vertex
+    if point.vertex_index is not None:
+        return inner[[point.vertex_index]], np.zeros(1)
+    corners = mesh.faces[point.face_index]
+    away = mesh.vertices[corners] - mesh.position(point)
+    return inner[corners], np.linalg.norm(away, axis=1)
+
+
+def _faces_of(mesh: TriangleMesh, point: SurfacePoint) -> list[tuple[int, tuple[float, ...]]]:
+    """Return each inner face that a point belongs to, with its weights there."""
+    links = mesh.topology.links
+    face = int(mesh.inner_face[point.face_index])
+    if 0.0 not in point.barycentric:
+        return [(face, point.barycentric)]
+    zero = point.barycentric.index(0.0)
+    h = 3 * face + (zero + 1) % 3
+    share = {
+        int(links[h, TAIL]): point.barycentric[(zero + 1) % 3],
+        int(links[h, HEAD]): point.barycentric[(zero + 2) % 3],
+    }
+    found = []
+    for g in half_edges_around(links, h):
+        at_corners = [0.0, 0.0, 0.0]
+        at_corners[g % 3] = share[int(links[g, TAIL])]
+        at_corners[(g + 1) % 3] = share[int(links[g, HEAD])]
+        found.append((g // 3, tuple(at_corners)))
+    return found
