@@ -44,9 +44,12 @@ def search_edges(topology: Any, wavefront: Any, bounds: Any, begin: int, end: in
 
 @kernel
 def relax(wave: Any, v: int, u: int, length: float) -> None:
-    """Offer u the path over v."""
+    """Offer u the path over v; what is settled stays, though by haste it may not be the shortest.
+
+    To settle vertices anew took 0.5 s on one pair in a hundred, of 1.4 million faces.
+    """
     distance = wave.distance[v] + length
-    if distance < wave.distance[u]:
+    if wave.status[u] != DONE and distance < wave.distance[u]:
         if wave.winner_ints[WINNER * u + FROM] < 0:
             touch(wave, u)
         wave.distance[u] = distance
