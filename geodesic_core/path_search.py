@@ -31,7 +31,7 @@ from geodesic_core.landmarks import Landmarks
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.path import EXACT, GeodesicPath, SearchStep, StepName, length_of, traced_path
 from geodesic_core.run import Control, run_sweep
-from geodesic_core.tolerances import PATH_LENGTH, SEARCH_SLACK
+from geodesic_core.tolerances import PATH_LENGTH, SEARCH_SLACK, STRAIGHT
 
 GUIDE_ERROR = 1e-3
 """Relative error of the sweep that guides the exact one (the paper's)."""
@@ -78,14 +78,22 @@ class PathSearch:
         control.look_up(0.0)
         inner = self.mesh.topology.inner_vertex
         start, end = int(inner[source]), int(inner[target])
-        log = _Log(self, explain)
+        try:
+            return self._search(start, end, SEARCH_SLACK, control, _Log(self, explain))
+        except _LostError:
+            # Rounding on slivers can exceed any slack; without bounds there is nothing to lose.
+            return self._search(start, end, math.inf, control, _Log(self, explain))
+
+    def _search(
+        self, start: int, end: int, slack: float, control: Control, log: "_Log"
+    ) -> GeodesicPath:
         try:
             upper = self._search_edges(start, end, log)
-            upper, toward = self._sweep_toward(start, end, upper, control, log)
-            path = self._sweep_outward(start, end, upper, toward, control, log)
+            upper, toward = self._sweep_toward(start, end, upper, slack, control, log)
+            path = self._sweep_outward(start, end, upper, slack, toward, control, log)
         finally:
             self._forget()
-        return replace(path, steps=tuple(log.steps)) if explain else path
+        return replace(path, steps=log.steps)
 
     def add_landmark_if_due(self, beside: int, control: Control) -> None:
         """Add a landmark in the component of a vertex, once searches touched as much as it will.
@@ -115,15 +123,16 @@ class PathSearch:
         log.add("dijkstra", upper, wave)
         path = edge_path.vertices_to(wave.winner_ints[:, FROM], start)
         prune.forget(topology, wave, bounds)
-        upper = min(upper, straighten.shortened(topology, path))
+        # Unfolding rounds: by more than the slack of the searches, where faces are slivers.
+        upper = min(upper, straighten.shortened(topology, path) * (1.0 + STRAIGHT))
         log.add("shorten", upper)
         return upper
 
     def _sweep_toward(
-        self, start: int, end: int, upper: float, control: Control, log: "_Log"
+        self, start: int, end: int, upper: float, slack: float, control: Control, log: "_Log"
     ) -> tuple[float, Goal]:
         """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
-        limit = upper * (1.0 + SEARCH_SLACK) + self._margin
+        limit = upper * (1.0 + slack) + self._margin
         bounds = wavefront.merging_bounds(math.inf, GUIDE_ERROR, math.inf, self._goal(start, limit))
         self._toward = self._run(self._toward, end, bounds, control, _AFTER_EDGES)
         if math.isinf(self._toward.distance[start]):
@@ -134,17 +143,24 @@ class PathSearch:
         points = traced_path(self.mesh, winners, start, EXACT).points
         upper = min(upper, length_of(points))
         log.add("backtrace", upper)
-        known = self._goal(start, upper * (1.0 + SEARCH_SLACK))
+        known = self._goal(start, upper * (1.0 + slack))
         return upper, known._replace(known=self._toward.distance, ceiling=limit)
 
     def _sweep_outward(
-        self, start: int, end: int, upper: float, goal: Goal, control: Control, log: "_Log"
+        self,
+        start: int,
+        end: int,
+        upper: float,
+        slack: float,
+        goal: Goal,
+        control: Control,
+        log: "_Log",
     ) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
         bounds = wavefront.exact_bounds(math.inf, goal)
         self._outward = self._run(self._outward, start, bounds, control, _AFTER_APPROXIMATE)
         distance = float(self._outward.distance[end])
-        if not distance <= upper * (1.0 + SEARCH_SLACK):
+        if not distance <= upper * (1.0 + slack):
             raise self._lost(start, end, "by the exact sweep")
         log.add("exact", distance, self._outward)
         path = traced_path(self.mesh, self._winners(self._outward), end, EXACT)
@@ -178,25 +194,28 @@ class PathSearch:
         prune.forget(topology, self._toward, merging)
         prune.forget(topology, self._outward, wavefront.exact_bounds(math.inf))
 
-    def _lost(self, start: int, end: int, how: str) -> InternalError:
+    def _lost(self, start: int, end: int, how: str) -> "_LostError":
         source, target = self.mesh.topology.outer_vertex[[start, end]]
-        return InternalError(
+        return _LostError(
             f"vertex {target} was not reached {how} from vertex {source}, though the two are "
             f"connected; please report this mesh"
         )
+
+
+class _LostError(InternalError):
+    """A search did not reach its target."""
 
 
 class _Log:
     """Notes what each step did, where that is asked for."""
 
     def __init__(self, search: PathSearch, explain: bool) -> None:
-        self.steps: list[SearchStep] = []
+        self.steps: tuple[SearchStep, ...] | None = () if explain else None
         self._mesh = search.mesh
-        self._explain = explain
         self._began = time.perf_counter()
 
     def add(self, name: StepName, bound: float, wave: Wavefront | None = None) -> None:
-        if not self._explain:
+        if self.steps is None:
             return
         seconds = time.perf_counter() - self._began
         faces: Ints = np.empty(0, np.int32)
@@ -206,5 +225,5 @@ class _Log:
             prune.mark_visited(self._mesh.topology, wave.distance, touched, visited)
             faces = np.flatnonzero(visited).astype(np.int32)
         windows = 0 if wave is None else int(wave.counters[CREATED])
-        self.steps.append(SearchStep(0, name, seconds, bound, windows, faces))
+        self.steps += (SearchStep(0, name, seconds, bound, windows, faces),)
         self._began = time.perf_counter()
