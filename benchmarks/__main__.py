@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from benchmarks import approximate, exact, service, topology
+from benchmarks import approximate, exact, path, service, topology
 from benchmarks.inputs import Inputs
 from benchmarks.tables import keep
 
@@ -13,6 +13,9 @@ BENCHMARKS = {
     "approximate": approximate.run,
     "merging": approximate.run_merging,
     "growth": approximate.run_growth,
+    "path": path.run,
+    "path-peers": path.run_peers,
+    "landmarks": path.run_landmarks,
     "service": service.run,
 }
 ROOT = Path(__file__).parents[1]

@@ -9,7 +9,7 @@ import potpourri3d as peer
 
 import geodesic_core as gc
 from benchmarks.inputs import Inputs
-from benchmarks.tables import Section, verdict
+from benchmarks.tables import Section, rated
 from benchmarks.timing import by_turns
 from geodesic_core.arrays import Floats, Ints
 
@@ -93,16 +93,16 @@ def run(inputs: Inputs, runs: int) -> Section:
                 f"{len(faces):,}",
                 f"{cold_s:.4f}",
                 f"{heat_s:.3f}",
-                _rated(heat_s / cold_s, asked.heat, at_least=True),
+                rated(heat_s / cold_s, asked.heat, at_least=True),
                 f"{marching_s:.3f}",
-                _rated(marching_s / cold_s, asked.marching, at_least=True),
+                rated(marching_s / cold_s, asked.marching, at_least=True),
                 f"{100 * error:.4f}",
                 f"{100 * errors[0]:.2f}",
                 f"{100 * errors[1]:.2f}",
-                _rated(min(errors) / error, ACCURACY, at_least=True),
+                rated(min(errors) / error, ACCURACY, at_least=True),
                 f"{coarse_s:.4f}",
                 f"{query_s:.4f}",
-                _rated(coarse_s / query_s, asked.query, at_least=False),
+                rated(coarse_s / query_s, asked.query, at_least=False),
             ]
         )
     return Section(
@@ -147,24 +147,20 @@ def run_merging(inputs: Inputs, runs: int) -> Section:
         ]
         (exact_s, exact), (seconds, field), (_, kept) = by_turns(calls, runs, PATIENCE_S)
         errors = 100 * _errors(field.distances, exact.distances)
-        per_edge = f"{field.stats.windows_per_edge_kept:.2f}"
         asked = MERGING[name]
-        if asked.kept is not None:
-            target = verdict(field.stats.windows_per_edge_kept, asked.kept, at_least=False)
-            per_edge += f" ({target})"
         rows.append(
             [
                 name,
                 f"{len(faces):,}",
                 f"{exact_s:.4f}",
                 f"{seconds:.4f}",
-                _rated(exact_s / seconds, asked.faster, at_least=True),
-                per_edge,
+                rated(exact_s / seconds, asked.faster, at_least=True),
+                rated(field.stats.windows_per_edge_kept, asked.kept, at_least=False),
                 f"{field.stats.windows_per_edge_created:.2f}",
-                _rated(errors.mean(), MEAN_ERROR, at_least=False, digits=4),
+                rated(errors.mean(), MEAN_ERROR, at_least=False, digits=4),
                 f"{errors.max():.3f}",
                 f"{field.stats.peak_bytes / mesh.nbytes:.2f}",
-                _rated(kept.stats.peak_bytes / mesh.nbytes, PATHS_MEMORY, at_least=False),
+                rated(kept.stats.peak_bytes / mesh.nbytes, PATHS_MEMORY, at_least=False),
             ]
         )
     return Section(
@@ -212,7 +208,7 @@ def run_growth(inputs: Inputs, runs: int) -> Section:
                 f"{_exponent(sizes[-2:], times[-2:]):.2f}" if len(sizes) > 1 else "",
             ]
         )
-    fitted = _rated(_exponent(sizes, times), EXPONENT, at_least=False)
+    fitted = rated(_exponent(sizes, times), EXPONENT, at_least=False)
     rows.append(["all, fitted", "", "", "", "", fitted])
     return Section(
         "Growth of approximate distances",
@@ -249,7 +245,3 @@ def _errors(distances: Floats, exact: Floats) -> Floats:
 
 def _exponent(sizes: list[int], times: list[float]) -> float:
     return float(np.polyfit(np.log(sizes), np.log(times), 1)[0])
-
-
-def _rated(value: float, target: float, *, at_least: bool, digits: int = 2) -> str:
-    return f"{value:.{digits}f} ({verdict(value, target, at_least=at_least)})"

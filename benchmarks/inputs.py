@@ -5,9 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from trimesh.remesh import subdivide, subdivide_loop
 
 import geodesic_core as gc
 from geodesic_core.arrays import Floats, Ints
+
+REFINED = {"Loop": subdivide_loop, "split": subdivide}
+"""Ways to make four faces of each: smoothed, or in the planes of the old ones."""
 
 
 @dataclass(frozen=True)
@@ -17,13 +21,20 @@ class Inputs:
     folder: Path
 
     def arrays(self, names: Iterable[str]) -> Iterator[tuple[str, Floats, Ints]]:
-        """Yield name, vertices and faces; ``icosphere N`` is made, other names are files."""
+        """Yield name, vertices and faces; ``icosphere N`` is made, other names are files.
+
+        What follows a file's name, with commas, tells how the mesh is refined: see `REFINED`.
+        """
         for name in names:
+            file, *ways = name.split(", ")
             if name.startswith("icosphere "):
                 yield name, *icosphere(int(name.split()[1]))
-            elif (path := self.folder / name).exists():
+            elif (path := self.folder / file).exists():
                 mesh = gc.load_mesh(path)
-                yield name, mesh.vertices, mesh.faces
+                vertices, faces = mesh.vertices, mesh.faces
+                for way in ways:
+                    vertices, faces = REFINED[way](vertices, faces)
+                yield name, vertices, faces
             else:
                 print(f"{name}: not in the meshes folder, left out")
 

@@ -39,7 +39,7 @@ def keep(section: Section, path: Path) -> None:
 
 def machine() -> str:
     """Return the processor, its cores, and the versions that matter."""
-    names = ("numpy", "numba", "pygeodesic", "potpourri3d")
+    names = ("numpy", "numba", "pygeodesic", "potpourri3d", "meshlib")
     packages = [f"{name} {_version(name)}" for name in names]
     today = dt.datetime.now(dt.UTC).date().isoformat()
     parts = [
@@ -55,6 +55,12 @@ def verdict(value: float, target: float, *, at_least: bool, unit: str = "") -> s
     """Return the target and whether it is met, for a table's last column."""
     met = value >= target if at_least else value <= target
     return f"{'≥' if at_least else '≤'} {target:g}{unit} {'met' if met else '**missed**'}"
+
+
+def rated(value: float, target: float | None, *, at_least: bool, digits: int = 2) -> str:
+    """Return a value, and beside it its target and whether it is met, where there is one."""
+    beside = "" if target is None else f" ({verdict(value, target, at_least=at_least)})"
+    return f"{value:.{digits}f}{beside}"
 
 
 def _row(cells: Sequence[str]) -> str:

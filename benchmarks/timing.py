@@ -13,6 +13,7 @@ Result = TypeVar("Result")
 def timed(call: Callable[[], Result]) -> tuple[float, Result]:
     """Return the seconds a call took on the wall, and what it returned."""
     gc.collect()
+    gc.freeze()  # the next collection then leaves out all that is imported: 1 ms instead of 90
     start = time.perf_counter()
     result = call()
     return time.perf_counter() - start, result

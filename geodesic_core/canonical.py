@@ -18,7 +18,6 @@ from geodesic_core.kernels.topology import HEAD, OPPOSITE, TAIL, Topology, follo
 from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import EDGE_STEPS, WEIGHT, WEIGHT_ERROR
 
-
 ROUNDING = 4.0 * np.finfo(np.float64).eps
 """By how much the sum of three weights may differ from one."""
 

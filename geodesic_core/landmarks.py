@@ -34,8 +34,8 @@ class Landmarks:
     def goal(self, position: Floats, corners: Ints, reaches: Floats, limit: float) -> Goal:
         """Return the goal of paths through a point that lies ``reaches`` away from ``corners``."""
         least, most = np.zeros(LANDMARKS), np.zeros(LANDMARKS)
-        known = self.distances[corners, : self.count].astype(np.float64)
         if self.count > 0:
+            known = self.distances[corners, : self.count].astype(np.float64)
             least[: self.count] = (LEAST * known - reaches[:, None]).max(axis=0)
             most[: self.count] = (MOST * known + reaches[:, None]).min(axis=0)
         return goal_at(position, limit)._replace(

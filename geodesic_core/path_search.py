@@ -12,6 +12,7 @@ import math
 import time
 from contextlib import suppress
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,7 +25,6 @@ from geodesic_core.errors import (
     NotConverged,
 )
 from geodesic_core.kernels import edge_path, prune, straighten, wavefront
-from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.topology import LENGTH
 from geodesic_core.kernels.wavefront import (
     CREATED,
@@ -44,7 +44,7 @@ from geodesic_core.nodes import Nodes, corners_of, nodes_of
 from geodesic_core.path import EXACT, GeodesicPath, SearchStep, StepName, length_of, traced_path
 from geodesic_core.run import Control, sweep_nodes, winners_of
 from geodesic_core.surface_point import SurfacePoint
-from geodesic_core.tolerances import PATH_LENGTH, SEARCH_SLACK
+from geodesic_core.tolerances import PATH_LENGTH, SEARCH_SLACK, STRAIGHT
 
 GUIDE_ERROR = 1e-3
 """Relative error of the sweep that guides the exact one (the paper's)."""
@@ -93,14 +93,20 @@ class PathSearch:
         control.grant_memory(self.nbytes)
         control.look_up(0.0)
         start, end = _End(self.mesh, source), _End(self.mesh, target)
-        log = _Log(self, explain)
         try:
-            upper = self._search_edges(start, end, log)
-            upper, toward = self._sweep_toward(start, end, upper, control, log)
-            path = self._sweep_outward(start, end, upper, toward, control, log)
+            return self._search(_Leg(start, end, SEARCH_SLACK, control, _Log(self, explain)))
+        except _LostError:
+            # Rounding on slivers can exceed any slack; without bounds there is nothing to lose.
+            return self._search(_Leg(start, end, math.inf, control, _Log(self, explain)))
+
+    def _search(self, leg: "_Leg") -> GeodesicPath:
+        try:
+            upper = self._search_edges(leg)
+            upper, toward = self._sweep_toward(leg, upper)
+            path = self._sweep_outward(leg, upper, toward)
         finally:
             self._forget()
-        return replace(path, steps=tuple(log.steps)) if explain else path
+        return replace(path, steps=leg.log.steps)
 
     def add_landmark_if_due(self, beside: SurfacePoint, control: Control) -> None:
         """Add a landmark in the component of a point, once searches touched as much as it will.
@@ -115,103 +121,85 @@ class PathSearch:
                 corners, _ = corners_of(self.mesh, beside)
                 self._landmarks.add(int(corners[0]), self.nbytes, control)
 
-    def _goal(self, start: "_End", limit: float) -> Goal:
-        return self._landmarks.goal(start.position, start.corners, start.reaches, limit)
-
-    def _search_edges(self, start: "_End", end: "_End", log: "_Log") -> float:
+    def _search_edges(self, leg: "_Leg") -> float:
         """Return the length of a path along edges, shortened across faces (step 1).
 
-        From a point that is no vertex it begins at the nearest corner.
+        At an end that is no vertex it begins or ends at the nearest corner.
         """
         topology, wave = self.mesh.topology, self._outward
-        first, last = start.nearest_corner, end.nearest_corner
-        beside = start.reaches.min() + end.reaches.min()
-        there = np.array([first]), np.zeros(1)
-        goal = self._landmarks.goal(topology.positions[first].copy(), *there, math.inf)
-        bounds = wavefront.exact_bounds(math.inf, goal)
+        first, last = leg.start.nearest_corner, leg.end.nearest_corner
+        beside = float(leg.start.reaches.min() + leg.end.reaches.min())
+        corner = topology.positions[first].copy(), np.array([first]), np.zeros(1)
+        bounds = wavefront.exact_bounds(math.inf, self._landmarks.goal(*corner, math.inf))
         edge_path.search_edges(topology, wave, bounds, last, first)
         self._touched += int(wave.counters[TOUCHED])
         upper = float(wave.distance[first])
         if math.isinf(upper):
-            raise self._lost(start, end, "along edges")
-        log.add("dijkstra", upper + beside, wave)
+            raise leg.lost("along edges")
+        leg.log.add("dijkstra", upper + beside, wave)
         path = edge_path.vertices_to(wave.winner_ints[:, FROM], first)
         prune.forget(topology, wave, bounds)
-        upper = min(upper, straighten.shortened(topology, path)) + beside
-        if start.point.face_index == end.point.face_index:
-            upper = min(upper, float(np.linalg.norm(start.position - end.position)))
-        log.add("shorten", upper)
+        # Unfolding rounds: by more than the slack of the searches, where faces are slivers.
+        upper = min(upper, straighten.shortened(topology, path) * (1.0 + STRAIGHT)) + beside
+        if leg.start.point.face_index == leg.end.point.face_index:
+            upper = min(upper, float(np.linalg.norm(leg.start.position - leg.end.position)))
+        leg.log.add("shorten", upper)
         return upper
 
-    def _sweep_toward(
-        self, start: "_End", end: "_End", upper: float, control: Control, log: "_Log"
-    ) -> tuple[float, Goal]:
+    def _sweep_toward(self, leg: "_Leg", upper: float) -> tuple[float, Goal]:
         """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
-        limit = upper * (1.0 + SEARCH_SLACK) + self._margin
-        bounds = wavefront.merging_bounds(math.inf, GUIDE_ERROR, math.inf, self._goal(start, limit))
-        self._toward, nodes = self._run(self._toward, end, start, bounds, control, _AFTER_EDGES)
-        node = nodes.targets[0]
-        if math.isinf(self._toward.distance[node]):
-            raise self._lost(start, end, "by the merging sweep")
-        self._touched += int(self._toward.counters[TOUCHED])
-        log.add("approximate", upper, self._toward)
-        winners = self._winners(self._toward)
-        points = traced_path(self.mesh, winners, nodes, node, EXACT).points
-        upper = min(upper, length_of(points))
-        log.add("backtrace", upper)
-        known = self._goal(start, upper * (1.0 + SEARCH_SLACK))
-        return upper, known._replace(known=self._toward.distance, ceiling=limit)
+        limit = upper * (1.0 + leg.slack) + self._margin
+        goal = self._goal(leg.start, limit)
+        bounds = wavefront.merging_bounds(math.inf, GUIDE_ERROR, math.inf, goal)
+        nodes = nodes_of(self.mesh, [leg.end.point], [leg.start.point])
+        self._toward = with_sites(self._toward, nodes.sites)
+        wave = self._toward = self._run(self._toward, nodes, bounds, leg.control, _AFTER_EDGES)
+        node = int(nodes.targets[0])
+        if math.isinf(wave.distance[node]):
+            raise leg.lost("by the merging sweep")
+        self._touched += int(wave.counters[TOUCHED])
+        leg.log.add("approximate", upper, wave)
+        guide = traced_path(self.mesh, winners_of(wave, self._nearest), nodes, node, EXACT)
+        upper = min(upper, length_of(guide.points))
+        leg.log.add("backtrace", upper)
+        known = self._goal(leg.start, upper * (1.0 + leg.slack))
+        return upper, known._replace(known=wave.distance, ceiling=limit)
 
-    def _sweep_outward(
-        self, start: "_End", end: "_End", upper: float, goal: Goal, control: Control, log: "_Log"
-    ) -> GeodesicPath:
+    def _sweep_outward(self, leg: "_Leg", upper: float, goal: Goal) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
         bounds = wavefront.exact_bounds(math.inf, goal)
-        self._outward, nodes = self._run(
-            self._outward, start, end, bounds, control, _AFTER_APPROXIMATE
+        nodes = nodes_of(self.mesh, [leg.start.point], [leg.end.point])
+        self._outward = with_sites(self._outward, nodes.sites)
+        wave = self._outward = self._run(
+            self._outward, nodes, bounds, leg.control, _AFTER_APPROXIMATE
         )
-        node = nodes.targets[0]
-        distance = float(self._outward.distance[node])
-        if not distance <= upper * (1.0 + SEARCH_SLACK):
-            raise self._lost(start, end, "by the exact sweep")
-        log.add("exact", distance, self._outward)
-        path = traced_path(self.mesh, self._winners(self._outward), nodes, node, EXACT)
+        node = int(nodes.targets[0])
+        distance = float(wave.distance[node])
+        if not distance <= upper * (1.0 + leg.slack):
+            raise leg.lost("by the exact sweep")
+        leg.log.add("exact", distance, wave)
+        path = traced_path(self.mesh, winners_of(wave, self._nearest), nodes, node, EXACT)
         if abs(path.length - distance) > PATH_LENGTH * distance:
-            raise self._lost(start, end, f"by backtracing, at {path.length} for {distance},")
-        log.add("path", distance)
+            raise leg.lost(f"by backtracing, at {path.length} for {distance},")
+        leg.log.add("path", distance)
         return path
 
     def _run(
-        self,
-        wave: Wavefront,
-        begin: "_End",
-        end: "_End",
-        bounds: Bounds,
-        control: Control,
-        share: float,
-    ) -> tuple[Wavefront, Nodes]:
-        nodes = nodes_of(self.mesh, [begin.point], [end.point])
+        self, wave: Wavefront, nodes: Nodes, bounds: Bounds, control: Control, share: float
+    ) -> Wavefront:
         beside = self.nbytes - wavefront.bytes_of(wave)
-        wave = with_sites(wave, nodes.sites)
-        wave = sweep_nodes(
+        return sweep_nodes(
             self.mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: share, beside
         )
-        return wave, nodes
 
-    def _winners(self, wave: Wavefront) -> Winners:
-        return winners_of(wave, self._nearest)
+    def _goal(self, start: "_End", limit: float) -> Goal:
+        return self._landmarks.goal(start.position, start.corners, start.reaches, limit)
 
     def _forget(self) -> None:
         topology = self.mesh.topology
         merging = wavefront.merging_bounds(math.inf, GUIDE_ERROR, math.inf)
         prune.forget(topology, self._toward, merging)
         prune.forget(topology, self._outward, wavefront.exact_bounds(math.inf))
-
-    def _lost(self, start: "_End", end: "_End", how: str) -> InternalError:
-        return InternalError(
-            f"{end.point} was not reached {how} from {start.point}, though the two are connected; "
-            f"please report this mesh"
-        )
 
 
 class _End:
@@ -228,17 +216,38 @@ class _End:
         return int(self.corners[self.reaches.argmin()])
 
 
+class _Leg(NamedTuple):
+    """What a search is after, and who watches it."""
+
+    start: _End
+    end: _End
+    slack: float
+    """Relative amount by which it looks beyond its bounds"""
+    control: Control
+    log: "_Log"
+
+    def lost(self, how: str) -> "_LostError":
+        """Return the error of not having reached the end."""
+        return _LostError(
+            f"{self.end.point} was not reached {how} from {self.start.point}, though the two are "
+            f"connected; please report this mesh"
+        )
+
+
+class _LostError(InternalError):
+    """A search did not reach its target."""
+
+
 class _Log:
     """Notes what each step did, where that is asked for."""
 
     def __init__(self, search: PathSearch, explain: bool) -> None:
-        self.steps: list[SearchStep] = []
+        self.steps: tuple[SearchStep, ...] | None = () if explain else None
         self._mesh = search.mesh
-        self._explain = explain
         self._began = time.perf_counter()
 
     def add(self, name: StepName, bound: float, wave: Wavefront | None = None) -> None:
-        if not self._explain:
+        if self.steps is None:
             return
         seconds = time.perf_counter() - self._began
         faces: Ints = np.empty(0, np.int32)
@@ -248,5 +257,5 @@ class _Log:
             prune.mark_visited(self._mesh.topology, wave.distance, touched, visited)
             faces = np.flatnonzero(visited).astype(np.int32)
         windows = 0 if wave is None else int(wave.counters[CREATED])
-        self.steps.append(SearchStep(0, name, seconds, bound, windows, faces))
+        self.steps += (SearchStep(0, name, seconds, bound, windows, faces),)
         self._began = time.perf_counter()

@@ -302,7 +302,9 @@ def _sweep(
     keeps: bool,
 ) -> Wavefront:
     merges = bool(bounds.merging)
-    wave = wavefront.new_wavefront(mesh.topology, nodes.sites, merges=merges, paths=merges and keeps)
+    wave = wavefront.new_wavefront(
+        mesh.topology, nodes.sites, merges=merges, paths=merges and keeps
+    )
     control.grant_memory(wavefront.bytes_of(wave))
     reachable = int(np.isin(mesh.components, nodes.components).sum())
     share = share_of_vertices(reachable, bounds.max_distance)

@@ -123,6 +123,17 @@ def is_on_path(winners: Any, u: int, reach: float, here: float, target: int) -> 
 
 
 @kernel
+def nearer_end(winners: Any, u: int, to_u: float, w: int, to_w: float, target: int) -> int:
+    """End of a boundary edge over which a line that follows the boundary strays by rounding; or -1.
+
+    The path goes on by that end which lies nearer to the source on the way.
+    """
+    distance = winners.distance
+    end = u if distance[u] + to_u <= distance[w] + to_w else w
+    return end if distance[end] < distance[target] else -1
+
+
+@kernel
 def unmerge(
     winners: Any, reference: int, h: int, x: float, sx: float, sy: float, sigma: float
 ) -> tuple[int, float, float, float]:
@@ -184,7 +195,7 @@ def trace_path(
             h, x, sx, sy = links[h, OPPOSITE] >> 1, length - x, length - sx, -sy
         while stop < 0:
             # At (x, 0) on h, its face and the pseudosource ahead
-            if h < 0:
+            if h < 0:  # a window came from nowhere
                 return LOST, count
             if count >= len(nodes):
                 return NO_ROOM, count
@@ -218,6 +229,12 @@ def trace_path(
                     geometry[h, COS_LEFT],
                     geometry[h, SIN_LEFT],
                 )
+                if links[h, OUT_LEFT] < 0:
+                    to_apex = geometry[h, LENGTH_LEFT] - x
+                    stop = nearer_end(winners, links[h, TAIL], x, apex, to_apex, v)
+                    if stop < 0:
+                        return LOST, count
+                    break
                 h = links[h, OUT_LEFT]
             else:  # the same, in the mirror
                 length, reach = geometry[h, LENGTH], geometry[h, LENGTH_RIGHT]
@@ -230,6 +247,11 @@ def trace_path(
                     geometry[h, SIN_RIGHT],
                 )
                 x, sx = reach - x, reach - sx
+                if links[h, OUT_RIGHT] < 0:
+                    stop = nearer_end(winners, apex, x, links[h, HEAD], reach - x, v)
+                    if stop < 0:
+                        return LOST, count
+                    break
                 h = links[h, OUT_RIGHT]
         if count >= len(nodes):
             return NO_ROOM, count

@@ -315,6 +315,18 @@ def pass_beyond(
     else:
         h = links[previous(entered), OPPOSITE] >> 1
         goal = following(strip[last])
+    if h == goal:
+        # One face on both sides: what is left of the strip must begin and end where it did.
+        if (
+            last + 1 == size
+            and first > 0
+            and links[strip[first - 1], APEX] != links[strip[last], APEX]
+        ):
+            return -1
+        if first == 0 and last + 1 < size:
+            begin = links[strip[last + 1], OPPOSITE] >> 1
+            if links[begin, APEX] != links[entered, APEX]:
+                return -1
     is_end = first == 0
     while h >= 0:
         if h == goal and last + 1 == size:

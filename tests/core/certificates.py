@@ -11,19 +11,18 @@ LENGTH = 1e-10
 """Relative difference allowed between a path's length and the distance it stands for."""
 
 
-def check_path(mesh: gc.TriangleMesh, path: gc.GeodesicPath, source: int, target: int, distance):
+def check_path(mesh: gc.TriangleMesh, path: gc.GeodesicPath, source, target, distance):
     """A path from source to target, over the surface, of the given length."""
     points, locations, faces = path.points, path.locations, path.faces
     assert points.shape == (len(locations), 3)
     assert len(faces) == len(locations) - 1
-    assert tuple(points[0]) == tuple(mesh.vertices[source])
-    assert tuple(points[-1]) == tuple(mesh.vertices[target])
+    assert (locations[0], locations[-1]) == (mesh.point(source), mesh.point(target))
+    assert tuple(points[0]) == tuple(mesh.position(source))
+    assert tuple(points[-1]) == tuple(mesh.position(target))
     assert path.length == pytest.approx(distance, rel=LENGTH, abs=0)
     pieces = np.linalg.norm(np.diff(points, axis=0), axis=1)
     assert pieces.sum() == pytest.approx(path.length, rel=LENGTH, abs=0)
     carriers = [_check_location(mesh, *pair) for pair in zip(points, locations, strict=True)]
-    assert carriers[0] == {source}
-    assert carriers[-1] == {target}
     for face, start, end in zip(faces, carriers, carriers[1:], strict=False):
         # Both ends lie on the closed face: the piece between them does, a face is convex.
         assert start | end <= set(mesh.faces[face].tolist())

@@ -132,3 +132,13 @@ def test_shortest_path_between_components():
 def test_paths_carry_the_fields_error_bound():
     field = gc.exact_distance(mesh_of(zoo.SMALL["cube"]), 0)
     assert field.path_to(3).error_bound == field.error_bound
+
+
+@pytest.mark.jit
+def test_a_path_along_the_boundary_may_stray_by_rounding():
+    """It left the surface between two vertices of the boundary, and was given up."""
+    case = zoo.KNOWN["slivers_1e-05"].moved(1e9 * zoo.rotation(3), (1.0, 2.0, -3.0))
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    field = gc.exact_distance(mesh, 146)
+    for target in range(209, 441, 21):
+        check_path(mesh, field.path_to(target), 146, target, field.distances[target])

@@ -9,13 +9,15 @@ from hypothesis import strategies as st
 
 import geodesic_core as gc
 from geodesic_core import tolerances
-from geodesic_core.kernels import wavefront
+from geodesic_core.kernels import sweep, wavefront
 from geodesic_core.kernels.arrival import precedence
 from geodesic_core.kernels.backtrace import Winners, is_on_path
 from geodesic_core.kernels.lists import put_window
 from geodesic_core.kernels.merge import accuracy, directionality, merged
 from geodesic_core.kernels.planar import bisector
 from geodesic_core.kernels.propagate import collect, reach_apex
+from geodesic_core.kernels.prune import least_to_start
+from geodesic_core.kernels.straighten import LEFT, NEITHER, RIGHT, shortened_part
 from geodesic_core.kernels.topology import (
     APEX,
     COS_LEFT,
@@ -28,13 +30,24 @@ from geodesic_core.kernels.topology import (
     SIN_LEFT,
     TAIL,
 )
-from geodesic_core.kernels.wavefront import FIRST, LAST, SIZE, merging_bounds, new_wavefront
+from geodesic_core.kernels.wavefront import (
+    FIRST,
+    LAST,
+    SIZE,
+    exact_bounds,
+    goal_at,
+    merging_bounds,
+    new_wavefront,
+)
 from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
+from geodesic_core.landmarks import Landmarks
+from geodesic_core.run import Control, run_sweep
 from geodesic_core.tolerances import (
     BEND,
     DOUBLE_ROOT,
     GAP,
     GRAZING,
+    LANDMARK_ERROR,
     LOCAL_SHARE,
     LOOSE_OVERLAP,
     LOWER_BOUND,
@@ -43,14 +56,18 @@ from geodesic_core.tolerances import (
     PATH_LENGTH,
     RUNS,
     SADDLE_EXCESS,
+    SEARCH_SLACK,
     SECTOR_MARGIN,
     SLACK,
+    STRAIGHT,
     TIE,
     WIDEST_ERROR,
 )
 from tests import zoo
+from tests.core.approximation import MERGING
 from tests.core.kernels.invariants import windows_of
 from tests.core.kernels.stepping import started, steps, topology_of, view_of_arrays
+from tests.core.searches import spread
 from tests.oracles import closed_forms
 
 SCALES = pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
@@ -368,3 +385,83 @@ def test_widest_error_is_the_most_that_is_used():
         assert field.error_bound.value == error
     narrower = gc.approximate_distance(mesh, 0, WIDEST_ERROR / 2)
     assert (narrower.distances != widest.distances).any()
+
+
+# Searches between two points --------------------------------------------------------------------
+
+
+@SCALES
+@pytest.mark.parametrize(("share", "passes"), [(0.5, False), (2.0, True)])
+@pytest.mark.parametrize("side", [LEFT, RIGHT])
+def test_straight_is_the_least_turn_that_is_taken_out(scale, share, passes, side):
+    """A string bends around the middle of a flat kite, whose other side is a little shorter."""
+    turn = share * STRAIGHT
+    rise = math.tan(turn / 2) * (-1 if side == RIGHT else 1)
+    points = np.array([(-1, 0, 0), (0, rise, 0), (1, 0, 0), (0, 1, 0), (0, -1, 0)]) * scale
+    mesh = gc.TriangleMesh(points, [(0, 1, 3), (1, 2, 3), (1, 0, 4), (2, 1, 4)])
+    path = mesh.topology.inner_vertex[[0, 1, 2]].astype(np.int32)
+    length = shortened_part(mesh.topology, path, np.array([NEITHER, side, NEITHER], np.int8))
+    bent = 2.0 * math.hypot(1.0, rise)
+    assert length == pytest.approx((2.0 if passes else bent) * scale, rel=1e-14)
+    assert bent > 2.0 * (1 + 1e-13), "else the two could not be told apart"
+
+
+@zoo.each(MERGING)
+def test_landmark_error_is_all_that_landmarks_fall_short(case):
+    """Their bounds make up for it; taken as exact, their distances would bound too much."""
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    topology = mesh.topology
+    landmarks = Landmarks(mesh)
+    landmarks.add(0, 0, Control())
+    stored = landmarks.distances[:, 0].astype(float)
+    place = int(topology.outer_vertex[stored.argmin()])
+    exact = gc.exact_distance(mesh, place).distances[topology.outer_vertex]
+    assert (stored <= exact * (1 + 1e-7)).all()
+    assert (stored >= exact * (1 - LANDMARK_ERROR) * (1 - 1e-7)).all()
+    assert (stored < exact * (1 - 0.01 * LANDMARK_ERROR)).any(), "else nothing was merged"
+    naive = 0.0
+    for start in spread(case, 6):
+        goal = goal_at(start, math.inf, landmarks.distances, 1)
+        view = view_of_arrays(
+            topology, new_wavefront(topology, pruned=True), exact_bounds(math.inf, goal)
+        )
+        distances = gc.exact_distance(mesh, int(topology.outer_vertex[start])).distances
+        distances = distances[topology.outer_vertex]
+        bounds = np.array([least_to_start(view, v, 0.0) for v in range(len(distances))])
+        assert (bounds <= distances * (1 + 1e-12)).all()
+        naive = max(naive, (np.abs(stored - stored[start]) - distances).max())
+    assert naive > 0
+
+
+def sought(mesh, source, target, exact, limit) -> float:
+    """The distance that an exact sweep finds within a limit, bounded by exact distances itself."""
+    topology = mesh.topology
+    start, end = (int(topology.inner_vertex[v]) for v in (source, target))
+    goal = goal_at(start, limit, known=exact[topology.outer_vertex])
+    bounds = exact_bounds(math.inf, goal)
+    wave = new_wavefront(topology, pruned=True)
+    sweep.start_sweep(topology, wave, np.array([start], np.int32), np.zeros(1), bounds)
+    return float(run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0).distance[end])
+
+
+SEARCHED = {
+    name: zoo.SMALL[name]
+    for name in ("crags_with_holes", "crumpled_torus", "bow_tie_of_fans", "obstacles", "box_1x2x3")
+} | {name: zoo.KNOWN[name] for name in ("flat", "cone_ruffle", "prism_slivers", "caps")}
+
+
+@pytest.mark.jit
+@zoo.each(SEARCHED)
+def test_search_slack_keeps_the_path_itself(case):
+    """Under the tightest bounds there can be: no rounding prunes it, and anything less would."""
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    for target in spread(case, 6):
+        exact = gc.exact_distance(mesh, target).distances
+        for source in spread(case, 9):
+            if source == target:
+                continue
+            distance = exact[source]
+            found = sought(mesh, source, target, exact, distance * (1 + SEARCH_SLACK))
+            assert found == pytest.approx(distance, rel=0.1 * SEARCH_SLACK)
+            lost = sought(mesh, source, target, exact, distance * (1 - SEARCH_SLACK))
+            assert not lost <= distance * (1 - 0.1 * SEARCH_SLACK)

@@ -1,0 +1,101 @@
+"""What holds of paths between two points on any mesh, and what the oracle says."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import geodesic_core as gc
+from tests import zoo
+from tests.core.certificates import LENGTH
+from tests.core.searches import STEPS, check_search, random_pairs
+from tests.oracles import unfolding
+from tests.properties.meshes import cases
+from tests.properties.test_approximate import split_cases
+from tests.properties.test_exact import mesh_of, seeds
+
+EXACT = 1e-9
+"""Relative error allowed against the oracle, and where the mesh itself was rounded anew."""
+
+
+@given(cases(), seeds)
+def test_a_solver_agrees_with_the_oracle_again_and_again(case, seed):
+    solver = gc.Solver(mesh_of(case))
+    matrix = unfolding.distance_matrix(case.vertices, case.faces)
+    for source, target in random_pairs(solver.mesh, 12, seed):
+        path = solver.shortest_path(source, target)
+        assert path.length == pytest.approx(matrix[source, target], rel=EXACT, abs=0)
+
+
+@given(split_cases(), seeds)
+def test_paths_are_those_of_the_full_sweep_both_ways(case, seed):
+    solver = gc.Solver(mesh_of(case))
+    for source, target in random_pairs(solver.mesh, 6, seed):
+        distance = gc.exact_distance(solver.mesh, source).distances[target]
+        path = solver.shortest_path(source, target)
+        check_search(solver.mesh, path, source, target, distance)
+        back = solver.shortest_path(target, source)
+        check_search(solver.mesh, back, target, source, distance)
+
+
+@given(split_cases(), seeds)
+def test_no_pair_leaves_anything_behind_for_the_next(case, seed):
+    solver = gc.Solver(mesh_of(case))
+    for source, target in random_pairs(solver.mesh, 8, seed):
+        used = solver.shortest_path(source, target)
+        fresh = gc.shortest_path(solver.mesh, source, target)
+        assert used.length == pytest.approx(fresh.length, rel=1e-12, abs=0)
+
+
+@given(split_cases(), seeds)
+def test_bounds_tighten_and_stay_bounds(case, seed):
+    solver = gc.Solver(mesh_of(case))
+    for source, target in random_pairs(solver.mesh, 5, seed):
+        path = solver.shortest_path(source, target, explain=True)
+        assert [step.name for step in path.steps] == STEPS
+        bounds = np.array([step.bound for step in path.steps])
+        assert (bounds[1:] <= bounds[:-1] * (1 + LENGTH)).all()
+        assert (bounds >= path.length * (1 - LENGTH)).all()
+        assert set(path.faces.tolist()) <= set(path.steps[4].faces.tolist())
+
+
+@given(cases(), seeds)
+def test_waypoints_are_passed_and_a_detour_is_no_shorter(case, seed):
+    mesh = mesh_of(case)
+    source, target = random_pairs(mesh, 1, seed)[0]
+    connected = np.flatnonzero(mesh.components == mesh.components[source])
+    waypoints = np.random.default_rng(seed).choice(connected, 3).tolist()
+    path = gc.shortest_path(mesh, source, target, waypoints)
+    stops = [source, *waypoints, target]
+    matrix = unfolding.distance_matrix(case.vertices, case.faces)
+    assert path.length == pytest.approx(matrix[stops[:-1], stops[1:]].sum(), rel=EXACT, abs=0)
+    assert path.length >= matrix[source, target] * (1 - EXACT)
+    assert set(stops) <= {place.vertex_index for place in path.locations}
+
+
+@given(split_cases(), seeds, st.sampled_from([1e-9, 1e-3, 7.0, 1e9]))
+def test_names_place_and_scale_do_not_matter(case, seed, scale):
+    rng = np.random.default_rng(seed)
+    mesh = mesh_of(case)
+    names = rng.permutation(len(case.vertices))
+    moved = case.moved(scale * zoo.rotation(seed), scale * rng.normal(size=3))
+    vertices = np.empty_like(moved.vertices)
+    vertices[names] = moved.vertices
+    faces = rng.permutation(names[case.faces])
+    for winding in (faces, faces[:, ::-1]):
+        other = gc.Solver(gc.TriangleMesh(vertices, winding))
+        for source, target in random_pairs(mesh, 3, seed):
+            length = gc.shortest_path(mesh, source, target).length
+            found = other.shortest_path(int(names[source]), int(names[target])).length
+            assert found == pytest.approx(length * scale, rel=EXACT, abs=0)
+
+
+@given(cases(), seeds)
+def test_splitting_faces_in_their_planes_changes_nothing(case, seed):
+    mesh = mesh_of(case)
+    for split in (zoo.subdivide, zoo.split_at_centroids):
+        finer = gc.Solver(gc.TriangleMesh(*split(case.vertices, case.faces)))
+        for source, target in random_pairs(mesh, 3, seed):
+            length = gc.shortest_path(mesh, source, target).length
+            found = finer.shortest_path(source, target).length
+            assert found == pytest.approx(length, rel=EXACT, abs=0)
