@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from geodesic_core.arguments import is_index
 from geodesic_core.errors import InvalidPoint
 
 UNPLACED = -1
@@ -33,7 +34,15 @@ class SurfacePoint:
 
     @classmethod
     def vertex(cls, index: int) -> "SurfacePoint":
-        """Return the point at a vertex."""
+        """Return the point at a vertex.
+
+        Raises
+        ------
+        InvalidPoint
+            The index is not an integer.
+        """
+        if not is_index(index):
+            raise InvalidPoint(f"the vertex is {index!r}; it must be an integer")
         return cls(UNPLACED, (1.0, 0.0, 0.0), index)
 
     @classmethod

@@ -7,6 +7,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.kernels import edge_path, prune, wavefront
+from geodesic_core.landmarks import Landmarks
 from tests import zoo
 from tests.core.certificates import LENGTH, check_path
 
@@ -78,13 +79,25 @@ def answer(path: gc.GeodesicPath) -> tuple:
     return path.points.tobytes(), path.faces.tobytes(), path.locations, path.length, steps
 
 
+def goal_at_vertex(
+    mesh: gc.TriangleMesh,
+    v: int,
+    limit: float = np.inf,
+    landmarks: Landmarks | None = None,
+    **known: object,
+) -> wavefront.Goal:
+    """The goal of paths through inner vertex v."""
+    here = mesh.topology.positions[v].copy(), np.array([v]), np.zeros(1)
+    return (landmarks or Landmarks(mesh)).goal(*here, limit)._replace(**known)
+
+
 def edge_paths(mesh: gc.TriangleMesh, pairs) -> Iterator[tuple[int, int, np.ndarray, float]]:
     """For each pair, what the search along edges finds: inner vertices from start to end."""
     topology = mesh.topology
     wave = wavefront.new_wavefront(topology, pruned=True)
     for start, end in pairs:
         first, last = (int(topology.inner_vertex[v]) for v in (start, end))
-        bounds = wavefront.exact_bounds(np.inf, wavefront.goal_at(first, np.inf))
+        bounds = wavefront.exact_bounds(np.inf, goal_at_vertex(mesh, first))
         edge_path.search_edges(topology, wave, bounds, last, first)
         length = float(wave.distance[first])
         yield (

@@ -33,9 +33,9 @@ from geodesic_core.kernels.topology import (
 from geodesic_core.kernels.wavefront import (
     FIRST,
     LAST,
+    NO_SITES,
     SIZE,
     exact_bounds,
-    goal_at,
     merging_bounds,
     new_wavefront,
 )
@@ -45,6 +45,7 @@ from geodesic_core.run import Control, run_sweep
 from geodesic_core.tolerances import (
     BEND,
     DOUBLE_ROOT,
+    EDGE_STEPS,
     GAP,
     GRAZING,
     LANDMARK_ERROR,
@@ -59,15 +60,18 @@ from geodesic_core.tolerances import (
     SEARCH_SLACK,
     SECTOR_MARGIN,
     SLACK,
+    SNAP,
     STRAIGHT,
     TIE,
+    WEIGHT,
+    WEIGHT_ERROR,
     WIDEST_ERROR,
 )
 from tests import zoo
 from tests.core.approximation import MERGING
 from tests.core.kernels.invariants import windows_of
 from tests.core.kernels.stepping import started, steps, topology_of, view_of_arrays
-from tests.core.searches import spread
+from tests.core.searches import goal_at_vertex, spread
 from tests.oracles import closed_forms
 
 SCALES = pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
@@ -291,7 +295,15 @@ def winners(distance, nearest=(0, 0)) -> Winners:
     """Two vertices at these distances from these sources."""
     nothing, none = np.empty((0, 2)), np.empty((0, 2), np.int32)
     return Winners(
-        np.array(nearest, np.int32), distance, nothing, none, none[:, 0].copy(), nothing, none
+        np.array(nearest, np.int32),
+        distance,
+        nothing,
+        none,
+        none[:, 0].copy(),
+        nothing,
+        none,
+        NO_SITES.ints,
+        NO_SITES.weights,
     )
 
 
@@ -300,10 +312,11 @@ def winners(distance, nearest=(0, 0)) -> Winners:
 def test_path_length_is_the_most_that_a_path_may_differ_from_its_field(scale, sign):
     points, faces = zoo.grid(5, 4)
     field = gc.exact_distance(gc.TriangleMesh(points * scale, faces), gc.Source(0, scale))
-    honest = field.distances[-1]
-    field.distances[-1] = honest * (1 + 0.5 * sign * PATH_LENGTH)
+    last = field.mesh.topology.inner_vertex[-1]
+    honest = float(field.distances[-1])
+    field._node_distances[last] = honest * (1 + 0.5 * sign * PATH_LENGTH)
     assert field.path_to(len(points) - 1).length == pytest.approx(honest - scale, rel=1e-14)
-    field.distances[-1] = honest * (1 + 2.0 * sign * PATH_LENGTH)
+    field._node_distances[last] = honest * (1 + 2.0 * sign * PATH_LENGTH)
     with pytest.raises(gc.errors.InternalError, match="the field says"):
         field.path_to(len(points) - 1)
 
@@ -421,7 +434,7 @@ def test_landmark_error_is_all_that_landmarks_fall_short(case):
     assert (stored < exact * (1 - 0.01 * LANDMARK_ERROR)).any(), "else nothing was merged"
     naive = 0.0
     for start in spread(case, 6):
-        goal = goal_at(start, math.inf, landmarks.distances, 1)
+        goal = goal_at_vertex(mesh, start, landmarks=landmarks)
         view = view_of_arrays(
             topology, new_wavefront(topology, pruned=True), exact_bounds(math.inf, goal)
         )
@@ -437,7 +450,7 @@ def sought(mesh, source, target, exact, limit) -> float:
     """The distance that an exact sweep finds within a limit, bounded by exact distances itself."""
     topology = mesh.topology
     start, end = (int(topology.inner_vertex[v]) for v in (source, target))
-    goal = goal_at(start, limit, known=exact[topology.outer_vertex])
+    goal = goal_at_vertex(mesh, start, limit, known=exact[topology.outer_vertex])
     bounds = exact_bounds(math.inf, goal)
     wave = new_wavefront(topology, pruned=True)
     sweep.start_sweep(topology, wave, np.array([start], np.int32), np.zeros(1), bounds)
@@ -465,3 +478,58 @@ def test_search_slack_keeps_the_path_itself(case):
             assert found == pytest.approx(distance, rel=0.1 * SEARCH_SLACK)
             lost = sought(mesh, source, target, exact, distance * (1 - SEARCH_SLACK))
             assert not lost <= distance * (1 - 0.1 * SEARCH_SLACK)
+
+
+# Points -----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def cube() -> gc.TriangleMesh:
+    case = zoo.SMALL["cube"]
+    return gc.TriangleMesh(case.vertices, case.faces)
+
+
+def carrier(mesh, point) -> int:
+    """Of how many corners a point is made."""
+    return sum(weight > 0 for weight in mesh.point(point).barycentric)
+
+
+@pytest.mark.parametrize(("share", "corners"), [(0.9, 2), (1.1, 3)])
+def test_weight_divides_what_is_on_an_edge_from_what_is_inside(cube, share, corners):
+    small = share * WEIGHT
+    point = gc.SurfacePoint.face(1, (0.5 - small, small, 0.5))
+    assert carrier(cube, point) == corners
+
+
+@pytest.mark.parametrize(("share", "is_taken"), [(0.9, True), (1.1, False)])
+def test_weight_error_is_how_far_weights_may_be_off(cube, share, is_taken):
+    off = share * WEIGHT_ERROR
+    for weights in ((0.5, 0.5 + off, -off), (0.5, 0.3, 0.2 + off), (0.5, 0.3, 0.2 - off)):
+        if is_taken:
+            cube.point(gc.SurfacePoint.face(1, weights))
+        else:
+            with pytest.raises(gc.errors.InvalidPoint, match="weights"):
+                cube.point(gc.SurfacePoint.face(1, weights))
+
+
+def test_edge_steps_tell_points_on_an_edge_apart(cube):
+    step = 1 / EDGE_STEPS
+    at = lambda t: cube.point(gc.SurfacePoint.edge(0, 0, t))  # noqa: E731
+    assert at(0.25) == at(0.25 + 0.4 * step) == at(0.25 - 0.4 * step)
+    assert at(0.25) != at(0.25 + 0.6 * step)
+    assert at(0.4 * step) == at(0.0)
+    assert at(0.4 * step).vertex_index is not None
+    assert at(1.2 * step).vertex_index is None
+
+
+@SCALES
+@pytest.mark.parametrize(("share", "snaps"), [(0.5, True), (3.0, False)])
+def test_snap_is_how_near_a_position_must_be(scale, share, snaps):
+    case = zoo.SMALL["cube"]
+    mesh = gc.TriangleMesh(scale * case.vertices, case.faces)
+    a, b, c = mesh.vertices[mesh.faces[0]]
+    away = share * SNAP * mesh.diagonal
+    inward = away * (c - 0.5 * (a + b)) / np.linalg.norm(c - 0.5 * (a + b))
+    assert carrier(mesh, mesh.locate(0.6 * a + 0.4 * b + inward)) == (2 if snaps else 3)
+    along = away * (b - a) / np.linalg.norm(b - a)
+    assert carrier(mesh, mesh.locate(a + along)) == (1 if snaps else 2)

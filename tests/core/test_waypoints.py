@@ -76,7 +76,7 @@ def test_a_waypoint_in_another_component(waypoints):
 
 
 @pytest.mark.parametrize(
-    "bad", [-1, 10**6, 2.0, None, False, "3", gc.SurfacePoint(0, (0.2, 0.3, 0.5))]
+    "bad", [-1, 10**6, 2.0, None, False, "3", gc.SurfacePoint(0, (0.2, 0.3, 0.6))]
 )
 def test_a_bad_waypoint_is_named(bad):
     solver = solver_of(zoo.SMALL["crags"])

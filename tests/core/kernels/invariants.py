@@ -35,6 +35,7 @@ from geodesic_core.kernels.wavefront import (
     IN_RING,
     KEPT,
     LAST,
+    MARKS,
     SIZE,
     VIA,
 )
@@ -144,10 +145,12 @@ def ring_of(wave) -> np.ndarray:
 def check_ring(topology, wave) -> None:
     """The ring holds what is flagged, each once; and every list with an end that is done."""
     ring, sizes = ring_of(wave), wave.lists[:, SIZE]
-    np.testing.assert_array_equal(np.sort(ring), np.flatnonzero(wave.lists[:, IN_RING]))
+    np.testing.assert_array_equal(np.sort(ring), np.flatnonzero(wave.lists[:, MARKS] & IN_RING))
     assert (sizes[ring] > 0).all()
     ends_done = (wave.status[topology.links[:, [TAIL, HEAD]]] == DONE).any(axis=1)
-    assert wave.lists[(sizes > 0) & ends_done, IN_RING].all(), "a list that is due waits for nobody"
+    assert (wave.lists[(sizes > 0) & ends_done, MARKS] & IN_RING).all(), (
+        "a due list waits for nobody"
+    )
     apex_status = wave.status[topology.links[:, APEX]]
     assert ((wave.status[topology.links[ring, TAIL]] != FAR) | (apex_status[ring] != FAR)).all()
 

@@ -16,11 +16,10 @@ from geodesic_core.kernels.prune import (
     steepest_to_start,
 )
 from geodesic_core.kernels.wavefront import (
-    IN_RING,
+    MARKS,
     SIZE,
     TOUCHED,
     exact_bounds,
-    goal_at,
     merging_bounds,
     new_wavefront,
 )
@@ -30,7 +29,7 @@ from tests import expected, zoo
 from tests.conftest import WITHOUT_JIT
 from tests.core.approximation import MERGING
 from tests.core.kernels.stepping import view_of_arrays
-from tests.core.searches import random_pairs, spread
+from tests.core.searches import goal_at_vertex, random_pairs, spread
 
 ROUNDING = 1e-10
 GUIDE = 1e-3
@@ -57,7 +56,7 @@ def with_landmarks(case, count):
 def view_toward(mesh, landmarks, start, **goal):
     topology = mesh.topology
     wave = new_wavefront(topology, pruned=True)
-    goal = goal_at(start, math.inf, landmarks.distances, landmarks.count, **goal)
+    goal = goal_at_vertex(mesh, start, landmarks=landmarks, **goal)
     return view_of_arrays(topology, wave, exact_bounds(math.inf, goal))
 
 
@@ -128,7 +127,7 @@ def test_what_an_earlier_sweep_knows_bounds_the_rest(case, count):
         exact = gc.exact_distance(mesh, target).distances[topology.outer_vertex]
         for room in (1.0, 1.2, 2.0):
             limit = room * exact[start] * (1 + ROUNDING)
-            goal = goal_at(start, limit, landmarks.distances, landmarks.count)
+            goal = goal_at_vertex(mesh, start, limit, landmarks)
             bounds = merging_bounds(math.inf, GUIDE, math.inf, goal)
             wave = new_wavefront(topology, merges=True, pruned=True)
             sweep.start_sweep(topology, wave, np.array([end], np.int32), np.zeros(1), bounds)
@@ -145,7 +144,9 @@ def test_what_may_pass_lies_within_the_limit():
     wave = new_wavefront(mesh.topology, pruned=True)
     wave.distance[3], wave.toward[3] = 2.0, 1.5
     for limit, passes in ((3.5, True), (3.6, True), (3.4, False)):
-        view = view_of_arrays(mesh.topology, wave, exact_bounds(math.inf, goal_at(0, limit)))
+        view = view_of_arrays(
+            mesh.topology, wave, exact_bounds(math.inf, goal_at_vertex(mesh, 0, limit))
+        )
         assert may_pass(view, 3) == passes
     plain = new_wavefront(mesh.topology)
     assert may_pass(view_of_arrays(mesh.topology, plain), 3)
@@ -158,7 +159,7 @@ def state(wave) -> dict[str, bytes]:
     """All that a search builds upon; the rest of the arrays is written before it is read."""
     names = ("distance", "winner_ints", "status", "heap_place", "counters", "upper", "light")
     held = {name: getattr(wave, name).tobytes() for name in (*names, "reference", "runs", "origin")}
-    return held | {"lists": wave.lists[:, [SIZE, IN_RING]].tobytes()}
+    return held | {"lists": wave.lists[:, [SIZE, MARKS]].tobytes()}
 
 
 def after(mesh, start, end, *, merges, budget):
@@ -166,7 +167,7 @@ def after(mesh, start, end, *, merges, budget):
     topology = mesh.topology
     wave = new_wavefront(topology, merges=merges, paths=merges, pruned=True)
     straight = float(np.linalg.norm(topology.positions[start] - topology.positions[end]))
-    goal = goal_at(end, 1.5 * straight)
+    goal = goal_at_vertex(mesh, end, 1.5 * straight)
     bounds = (
         merging_bounds(math.inf, GUIDE, math.inf, goal) if merges else exact_bounds(math.inf, goal)
     )
@@ -197,7 +198,7 @@ def test_a_search_along_edges_is_forgotten_whole(name):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     wave = new_wavefront(mesh.topology, pruned=True)
     fresh = state(wave)
-    bounds = exact_bounds(math.inf, goal_at(30, math.inf))
+    bounds = exact_bounds(math.inf, goal_at_vertex(mesh, 30))
     edge_path.search_edges(mesh.topology, wave, bounds, 0, 30)
     assert state(wave) != fresh
     forget(mesh.topology, wave, bounds)
