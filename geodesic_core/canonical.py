@@ -14,7 +14,7 @@ import numpy as np
 from geodesic_core.arguments import is_index, is_number
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import InvalidPoint
-from geodesic_core.kernels.topology import HEAD, OPPOSITE, TAIL, Topology, following
+from geodesic_core.kernels.topology import HEAD, TAIL, Topology, next_around
 from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import EDGE_STEPS, WEIGHT, WEIGHT_ERROR
 
@@ -22,21 +22,19 @@ ROUNDING = 4.0 * np.finfo(np.float64).eps
 """By how much the sum of three weights may differ from one."""
 
 
-def at_vertex(topology: Topology, vertex: int) -> SurfacePoint:
+def at_vertex(topology: Topology, faces: Ints, vertex: int) -> SurfacePoint:
     """Return the point at a vertex, in the lowest of its faces."""
     v = topology.inner_vertex[vertex]
     corners = topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]]
     if len(corners) == 0:
         return SurfacePoint.vertex(vertex)
-    outer = 3 * topology.outer_face[corners // 3].astype(int) + corners % 3
-    lowest = int(outer.min())
-    weights = [0.0, 0.0, 0.0]
-    weights[lowest % 3] = 1.0
-    return SurfacePoint(lowest // 3, (weights[0], weights[1], weights[2]), vertex)
+    face = int(topology.outer_face[corners // 3].min())
+    u, v, w = (float(corner == vertex) for corner in faces[face])
+    return SurfacePoint(face, (u, v, w), vertex)
 
 
 def in_face(
-    topology: Topology, inner_face: Ints, face: int, weights: Sequence[float]
+    topology: Topology, faces: Ints, inner_face: Ints, face: int, weights: Sequence[float]
 ) -> SurfacePoint:
     """Return the point of a face that has these weights, which may be rounded."""
     kept = [float(weight) if weight > WEIGHT else 0.0 for weight in weights]
@@ -44,15 +42,15 @@ def in_face(
     if abs(total - 1.0) <= ROUNDING:
         total = 1.0  # else a canonical point would change each time it is asked for
     u, v, w = (weight / total for weight in kept)
-    h = 3 * int(inner_face[face])
-    match u > 0.0, v > 0.0, w > 0.0:
-        case True, True, True:
-            return SurfacePoint(face, (u, v, w))
-        case _, _, False:
-            return _on_edge(topology, h, u, v)
-        case False, _, _:
-            return _on_edge(topology, h + 1, v, w)
-    return _on_edge(topology, h + 2, w, u)
+    if u > 0.0 and v > 0.0 and w > 0.0:
+        return SurfacePoint(face, (u, v, w))
+    share = dict(zip(faces[face].tolist(), (u, v, w), strict=True))
+    for h in range(3 * int(inner_face[face]), 3 * int(inner_face[face]) + 3):
+        ends = (int(topology.outer_vertex[end]) for end in topology.links[h, [TAIL, HEAD]])
+        at_tail, at_head = (share[end] for end in ends)
+        if at_tail + at_head > 1.0 - ROUNDING:
+            break
+    return _on_edge(topology, faces, h, at_tail, at_head)
 
 
 def weights_of(point: Floats, corners: Floats, snap: float) -> list[float]:
@@ -118,20 +116,21 @@ def check_weights(weights: Any, face: int, name: str) -> None:
         )
 
 
-def _on_edge(topology: Topology, h: int, at_tail: float, at_head: float) -> SurfacePoint:
+def _on_edge(
+    topology: Topology, faces: Ints, h: int, at_tail: float, at_head: float
+) -> SurfacePoint:
     """Return the point of half-edge h with these weights of its ends, one of them above zero."""
     links, outer_vertex = topology.links, topology.outer_vertex
     tail, head = (int(outer_vertex[v]) for v in links[h, [TAIL, HEAD]])
-    upper = at_head if tail < head else at_tail
+    low, high = min(tail, head), max(tail, head)
+    upper = at_head if head == high else at_tail
     upper = round(upper / (at_tail + at_head) * EDGE_STEPS) / EDGE_STEPS
     if upper in (0.0, 1.0):
-        return at_vertex(topology, min(tail, head) if upper == 0.0 else max(tail, head))
-    outer, lowest = min((_outer_half_edge(topology, g), g) for g in half_edges_around(links, h))
-    from_tail = outer_vertex[links[lowest, TAIL]] < outer_vertex[links[lowest, HEAD]]
-    weights = [0.0, 0.0, 0.0]
-    weights[outer % 3] = 1.0 - upper if from_tail else upper
-    weights[following(outer) % 3] = upper if from_tail else 1.0 - upper
-    return SurfacePoint(outer // 3, (weights[0], weights[1], weights[2]))
+        return at_vertex(topology, faces, low if upper == 0.0 else high)
+    face = min(int(topology.outer_face[g // 3]) for g in half_edges_around(links, h))
+    share = {low: 1.0 - upper, high: upper}
+    u, v, w = (share.get(int(corner), 0.0) for corner in faces[face])
+    return SurfacePoint(face, (u, v, w))
 
 
 def half_edges_around(links: Ints, h: int) -> Iterator[int]:
@@ -139,10 +138,6 @@ def half_edges_around(links: Ints, h: int) -> Iterator[int]:
     g = h
     while True:
         yield g
-        g = int(links[g, OPPOSITE]) >> 1
+        g = int(next_around(links, g))
         if g < 0 or g == h:
             return
-
-
-def _outer_half_edge(topology: Topology, h: int) -> int:
-    return 3 * int(topology.outer_face[h // 3]) + h % 3

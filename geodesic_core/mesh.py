@@ -201,7 +201,7 @@ class TriangleMesh:
                 f"which is more than max_distance = {limit:g}"
             )
         weights = canonical.weights_of(point, self.vertices[self.faces[face]], SNAP * self.diagonal)
-        return canonical.in_face(self.topology, self.inner_face, face, weights)
+        return self._point_in_face(face, weights)
 
     def point(self, point: int | SurfacePoint, name: str = "point") -> SurfacePoint:
         """Return a point in its one spelling: all that name the same come out equal, to the bit.
@@ -216,12 +216,13 @@ class TriangleMesh:
             if point.vertex_index is None:
                 canonical.check_index(point.face_index, len(self.faces), "face", name)
                 canonical.check_weights(point.barycentric, point.face_index, name)
-                return canonical.in_face(
-                    self.topology, self.inner_face, point.face_index, point.barycentric
-                )
+                return self._point_in_face(point.face_index, point.barycentric)
             index = point.vertex_index
         canonical.check_index(index, len(self.vertices), "vertex", name)
-        return canonical.at_vertex(self.topology, int(index))
+        return canonical.at_vertex(self.topology, self.faces, int(index))
+
+    def _point_in_face(self, face: int, weights: Sequence[float]) -> SurfacePoint:
+        return canonical.in_face(self.topology, self.faces, self.inner_face, face, weights)
 
     def position(self, point: int | SurfacePoint) -> Floats:
         """Return the (3,) position of a point, mesh units; of a vertex exactly the mesh's own.
@@ -242,8 +243,7 @@ class TriangleMesh:
     @cached_property
     def edge_count(self) -> int:
         """Number of edges."""
-        opposite = self.topology.links[:, kernels.OPPOSITE]
-        return int(np.count_nonzero(opposite >> 1 < np.arange(len(opposite))))
+        return int(kernels.count_edges(self.topology.links))
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
@@ -389,35 +389,16 @@ def _refuse_bad_elements(vertices: Floats, faces: Longs) -> None:
 def _prepare(vertices: Floats, faces: Longs) -> Topology:
     topology = kernels.empty_topology(len(vertices), len(faces))
     triangles = faces.astype(np.int32)
-    outcome, count, bad = kernels.build_topology(vertices, triangles, topology)
-    if outcome == kernels.SOUND:
-        return topology
+    outcome, bad = kernels.build_topology(vertices, triangles, topology)
     if outcome == kernels.TOO_SHORT:
-        face = int(topology.outer_face[bad[0]])
+        face = int(topology.outer_face[bad])
         raise InvalidMesh(
             f"face {face} is {faces[face].tolist()} and has an edge of length zero (or below "
             f"{kernels.SHORTEST_EDGE:g}): two of its vertices lie at one position; remove the face",
             kind="face",
             elements=[face],
         )
-    outer = [kernels.outer_half_edge(topology.outer_face, int(h)) for h in bad]
-    edges = _edges_of(triangles, outer)
-    if outcome == kernels.NON_MANIFOLD:
-        what = "belongs to three or more faces (a non-manifold edge)"
-    else:
-        what = "is run in the same direction by both its faces: their winding is inconsistent"
-    raise InvalidMesh(
-        f"the edge between the vertices {edges[0][0]} and {edges[0][1]} {what}"
-        f"{_and_more(range(count))}",
-        kind="edge",
-        elements=edges,
-    )
-
-
-def _edges_of(faces: Ints, half_edges: list[int]) -> list[tuple[int, int]]:
-    flat = faces.reshape(-1)
-    ends = [(int(flat[h]), int(flat[kernels.following(h)])) for h in half_edges]
-    return sorted((min(pair), max(pair)) for pair in ends)
+    return topology
 
 
 def _and_more(bad: Sequence[Any] | NDArray[Any]) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.canonical import half_edges_around
-from geodesic_core.kernels.topology import HEAD, TAIL
+from geodesic_core.kernels.topology import APEX, TAIL
 from geodesic_core.kernels.wavefront import SITE, Sites
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.surface_point import SurfacePoint
@@ -64,12 +64,19 @@ def nodes_of(
             len(sited),
             np.array(rows, np.int32).reshape(-1, SITE),
             np.array(weights).reshape(-1, 3),
+            sum(_edge_faces(mesh, face) for _, face, _ in rows),
         ),
         first_target=first_target,
         points=tuple(sited),
         positions=np.array([mesh.position(point) for point in sited]).reshape(-1, 3),
         components=tuple({component_of(mesh, point) for point in sources}),
     )
+
+
+def _edge_faces(mesh: TriangleMesh, face: int) -> int:
+    """Return how many faces the three edges of an inner face have, each edge's counted."""
+    links = mesh.topology.links
+    return sum(len(list(half_edges_around(links, h))) for h in range(3 * face, 3 * face + 3))
 
 
 def component_of(mesh: TriangleMesh, point: SurfacePoint) -> int:
@@ -92,20 +99,16 @@ def corners_of(mesh: TriangleMesh, point: SurfacePoint) -> tuple[Ints, Floats]:
 
 def _faces_of(mesh: TriangleMesh, point: SurfacePoint) -> list[tuple[int, tuple[float, ...]]]:
     """Return each inner face that a point belongs to, with its weights there."""
-    links = mesh.topology.links
+    topology = mesh.topology
+    corners = topology.inner_vertex[mesh.faces[point.face_index]].tolist()
+    share = dict(zip(corners, point.barycentric, strict=True))
+
+    def weights_in(face: int) -> tuple[float, ...]:
+        inner_corners = topology.links[3 * face : 3 * face + 3, TAIL].tolist()
+        return tuple(share.get(corner, 0.0) for corner in inner_corners)
+
     face = int(mesh.inner_face[point.face_index])
     if 0.0 not in point.barycentric:
-        return [(face, point.barycentric)]
-    zero = point.barycentric.index(0.0)
-    h = 3 * face + (zero + 1) % 3
-    share = {
-        int(links[h, TAIL]): point.barycentric[(zero + 1) % 3],
-        int(links[h, HEAD]): point.barycentric[(zero + 2) % 3],
-    }
-    found = []
-    for g in half_edges_around(links, h):
-        at_corners = [0.0, 0.0, 0.0]
-        at_corners[g % 3] = share[int(links[g, TAIL])]
-        at_corners[(g + 1) % 3] = share[int(links[g, HEAD])]
-        found.append((g // 3, tuple(at_corners)))
-    return found
+        return [(face, weights_in(face))]
+    (h,) = (h for h in range(3 * face, 3 * face + 3) if share[topology.links[h, APEX]] == 0.0)
+    return [(g // 3, weights_in(g // 3)) for g in half_edges_around(topology.links, h)]

@@ -129,6 +129,12 @@ SEARCH_SLACK = 1e-10
 The path itself must not be pruned by rounding.
 """
 
+SAME_PLACE = 1e-9
+"""Relative difference up to which a vertex counts as where a path unfolds its pseudosource to.
+
+Asked only where several faces may be behind an edge, of which the others lead elsewhere.
+"""
+
 WEIGHT = 1e-12
 """Barycentric weight up to which a point counts as lying on the opposite edge: rounding."""
 

@@ -14,22 +14,27 @@ surface, no shorter than the exact one, and longer than the field says by ξ at 
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.topology import (
     APEX,
+    AROUND,
     COS_LEFT,
     COS_RIGHT,
     HEAD,
+    IRREGULAR,
     LENGTH,
     LENGTH_LEFT,
     LENGTH_RIGHT,
+    NO_FACE,
     OPPOSITE,
-    OUT_LEFT,
-    OUT_RIGHT,
     SIN_LEFT,
     SIN_RIGHT,
     TAIL,
+    following,
+    previous,
 )
 from geodesic_core.kernels.wavefront import (
     FACE,
@@ -43,7 +48,7 @@ from geodesic_core.kernels.wavefront import (
     SPLIT,
     VIA,
 )
-from geodesic_core.tolerances import ON_PATH
+from geodesic_core.tolerances import ON_PATH, SAME_PLACE
 
 
 class Winners(NamedTuple):
@@ -65,6 +70,9 @@ class Winners(NamedTuple):
 TRACED = 0
 NO_ROOM = 1  # the path has more points than the arrays hold: grow, and call again
 LOST = 2  # the line left the surface: a defect
+
+FORKS = 64
+"""Irregular edges on a straight piece where other faces are still to be tried, at most."""
 
 
 @kernel
@@ -148,6 +156,35 @@ def unmerge(
 
 
 @kernel
+def is_inside(geometry: Floats, h: int, x: float, y: float) -> bool:
+    """Whether a point ahead of h, in its frame, lies before the other edges of the face."""
+    left = x * geometry[h, SIN_LEFT] - y * geometry[h, COS_LEFT]
+    right = (geometry[h, LENGTH] - x) * geometry[h, SIN_RIGHT] - y * geometry[h, COS_RIGHT]
+    return left > 0.0 and right > 0.0
+
+
+@kernel
+def next_face(links: Ints, m: int, after: int) -> tuple[int, bool]:
+    """Half-edge across that of m, and whether it runs the same way; -1 if there is none.
+
+    Across an irregular edge the first is returned, or that which follows ``after``.
+    """
+    if links[m, OPPOSITE] != IRREGULAR:
+        return (links[m, OPPOSITE] if after < 0 else -1), False
+    same, h, passed = True, m, after < 0
+    while True:
+        code = links[h, AROUND]
+        h = code >> 1
+        if code & 1 == 0:
+            same = not same
+        if h == m:
+            return -1, False
+        if passed:
+            return h, same
+        passed = h == after
+
+
+@kernel
 def trace_path(
     topology: Any,
     winners: Any,
@@ -163,99 +200,122 @@ def trace_path(
     of its length, or -1 - v for a vertex or site v. ``faces[i]`` is crossed between the nodes i and
     i + 1. O(faces crossed).
     """
-    links, geometry = topology.links, topology.geometry
-    distance, winner_ints = winners.distance, winners.winner_ints
     nodes[0], parameters[0] = -1 - target, 0.0
-    count = 1
-    v = target
-    while winner_ints[v, VIA] >= 0:
-        h, root = winner_ints[v, VIA], winner_ints[v, FROM]
-        sx, sy, sigma = winners.winner[v, 0], winners.winner[v, 1], 0.0
-        reference = winners.reference[v] if len(winners.reference) > 0 else -1 - root
+    count, v = 1, target
+    while winners.winner_ints[v, VIA] >= 0:
+        outcome, count, v = trace_line(topology, winners, v, nodes, parameters, faces, count)
+        if outcome != TRACED:
+            return outcome, count
+        if count >= len(nodes):
+            return NO_ROOM, count
+        nodes[count], parameters[count] = -1 - v, 0.0
+        count += 1
+    return TRACED, count
+
+
+@kernel
+def trace_line(
+    topology: Any,
+    winners: Any,
+    v: int,
+    nodes: Ints,
+    parameters: Floats,
+    faces: Ints,
+    count: int,
+) -> tuple[int, int, int]:
+    """Trace the straight piece that ends at node v; return (outcome, nodes so far, its beginning).
+
+    Across an irregular edge it is not known from which face the path came: the faces are tried in
+    turn. Of several that lead to the pseudosource, straight and at the right distance, any will do.
+    """
+    links, geometry, distance = topology.links, topology.geometry, winners.distance
+    m, root = winners.winner_ints[v, VIA], winners.winner_ints[v, FROM]
+    sx, sy, sigma = winners.winner[v, 0], winners.winner[v, 1], 0.0
+    reference = winners.reference[v] if len(winners.reference) > 0 else -1 - root
+    if reference >= 0:
+        root = -1  # not known before the merges are undone
+    face, length = m // 3, geometry[m, LENGTH]
+    ax, ay = target_in_frame(topology, winners, v, m)
+    faces[count - 1] = face
+    if row_in_face(winners, root, face) >= 0:
+        return TRACED, count, root
+    tail, head = links[m, TAIL], links[m, HEAD]
+    if tail == root or is_on_path(winners, tail, math.hypot(ax, ay), distance[v], v):
+        return TRACED, count, tail
+    if head == root or is_on_path(winners, head, math.hypot(ax - length, ay), distance[v], v):
+        return TRACED, count, head
+    # From there back over m itself
+    x = sx if ay <= sy else (sx * ay - ax * sy) / (ay - sy)
+    x = min(max(x, 0.0), length)
+    sigma = distance[v] - math.hypot(ax - x, ay) - math.hypot(sx - x, sy)
+    # Where other faces may be tried: what was known there, and which one was the last
+    forks, fork_ints = np.empty((FORKS, 4)), np.empty((FORKS, 4), np.int32)
+    fork_count, after = 0, -1
+    while True:
+        # At (x, 0) on m, whose face lies ahead; the pseudosource is behind
         if reference >= 0:
-            root = -1  # not known before the merges are undone
-        face, length = h // 3, geometry[h, LENGTH]
-        ax, ay = target_in_frame(topology, winners, v, h)
-        to_tail, to_head = math.hypot(ax, ay), math.hypot(ax - length, ay)
-        tail, head, stop = links[h, TAIL], links[h, HEAD], -1
-        if row_in_face(winners, root, face) >= 0:
-            stop = root
-        elif tail == root or is_on_path(winners, tail, to_tail, distance[v], v):
-            stop = tail
-        elif head == root or is_on_path(winners, head, to_head, distance[v], v):
-            stop = head
-        else:
-            # From there back over h itself
-            x = sx if ay <= sy else (sx * ay - ax * sy) / (ay - sy)
-            x = min(max(x, 0.0), length)
-            sigma = distance[v] - math.hypot(ax - x, ay) - math.hypot(sx - x, sy)
-            if reference >= 0:
-                reference, sx, sy, sigma = unmerge(winners, reference, h, x, sx, sy, sigma)
-                root = -1 - reference if reference < 0 else -1
-            h, x, sx, sy = links[h, OPPOSITE] >> 1, length - x, length - sx, -sy
-        while stop < 0:
-            # At (x, 0) on h, its face and the pseudosource ahead
-            if h < 0:  # a window came from nowhere
-                return LOST, count
+            reference, sx, sy, sigma = unmerge(winners, reference, m, x, sx, sy, sigma)
+            root = -1 - reference if reference < 0 else -1
+        h, same = next_face(links, m, after)
+        is_lost = h < 0
+        if is_lost and after < 0 and fork_count == 0 and links[m, OPPOSITE] == NO_FACE:
+            length = geometry[m, LENGTH]
+            stop = nearer_end(winners, links[m, TAIL], x, links[m, HEAD], length - x, v)
+            return (TRACED if stop >= 0 else LOST), count, stop
+        if not is_lost:
+            if links[m, OPPOSITE] == IRREGULAR and fork_count < FORKS:
+                forks[fork_count, 0], forks[fork_count, 1] = x, sx
+                forks[fork_count, 2], forks[fork_count, 3] = sy, sigma
+                fork_ints[fork_count, 0], fork_ints[fork_count, 1] = m, h
+                fork_ints[fork_count, 2], fork_ints[fork_count, 3] = reference, count
+                fork_count += 1
+            length = geometry[m, LENGTH]
+            sy = -sy
+            if not same:
+                x, sx = length - x, length - sx
             if count >= len(nodes):
-                return NO_ROOM, count
-            faces[count - 1], nodes[count], parameters[count] = face, h, x / geometry[h, LENGTH]
+                return NO_ROOM, count, -1
+            nodes[count], parameters[count], face = h, x / length, h // 3
+            faces[count] = face
             count += 1
-            if reference >= 0:
-                length = geometry[h, LENGTH]
-                # As the windows see it that were merged here: from the other side
-                reference, sx, sy, sigma = unmerge(
-                    winners, reference, links[h, OPPOSITE] >> 1, length - x, length - sx, -sy, sigma
-                )
-                sx, sy = length - sx, -sy
-                root = -1 - reference if reference < 0 else -1
-            face, apex = h // 3, links[h, APEX]
+            # At (x, 0) on h, its face and the pseudosource ahead
             if row_in_face(winners, root, face) >= 0:
-                stop = root
-                break
+                return TRACED, count, root
+            apex = links[h, APEX]
             ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
             ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
             reach = math.sqrt((ax - x) * (ax - x) + ay * ay)
-            here = sigma + math.sqrt((sx - x) * (sx - x) + sy * sy)
-            if apex == root or is_on_path(winners, apex, reach, here, v):
-                stop = apex
-                break
-            if (ax - x) * sy - ay * (sx - x) >= 0.0:  # s is left of the apex
-                x, sx, sy = cross_edge(
-                    x,
-                    sx,
-                    sy,
-                    geometry[h, LENGTH_LEFT],
-                    geometry[h, COS_LEFT],
-                    geometry[h, SIN_LEFT],
-                )
-                if links[h, OUT_LEFT] < 0:
-                    to_apex = geometry[h, LENGTH_LEFT] - x
-                    stop = nearer_end(winners, links[h, TAIL], x, apex, to_apex, v)
-                    if stop < 0:
-                        return LOST, count
-                    break
-                h = links[h, OUT_LEFT]
-            else:  # the same, in the mirror
-                length, reach = geometry[h, LENGTH], geometry[h, LENGTH_RIGHT]
-                x, sx, sy = cross_edge(
-                    length - x,
-                    length - sx,
-                    sy,
-                    reach,
-                    geometry[h, COS_RIGHT],
-                    geometry[h, SIN_RIGHT],
-                )
-                x, sx = reach - x, reach - sx
-                if links[h, OUT_RIGHT] < 0:
-                    stop = nearer_end(winners, apex, x, links[h, HEAD], reach - x, v)
-                    if stop < 0:
-                        return LOST, count
-                    break
-                h = links[h, OUT_RIGHT]
-        if count >= len(nodes):
-            return NO_ROOM, count
-        faces[count - 1], nodes[count], parameters[count] = face, -1 - stop, 0.0
-        count += 1
-        v = stop
-    return TRACED, count
+            rest = math.sqrt((sx - x) * (sx - x) + sy * sy)
+            # The apex may be the root, but elsewhere, where the path did not come from this face.
+            is_root = apex == root and (fork_count == 0 or reach <= rest * (1.0 + SAME_PLACE))
+            if is_root or is_on_path(winners, apex, reach, sigma + rest, v):
+                return TRACED, count, apex
+            is_lost = fork_count > 0 and is_inside(geometry, h, sx, sy)
+            if not is_lost:
+                after = -1
+                if (ax - x) * sy - ay * (sx - x) >= 0.0:  # s is left of the apex
+                    side = geometry[h, LENGTH_LEFT]
+                    x, sx, sy = cross_edge(
+                        x, sx, sy, side, geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
+                    )
+                    m, x, sx, sy = previous(h), side - x, side - sx, -sy
+                else:  # the same, in the mirror
+                    side = geometry[h, LENGTH_RIGHT]
+                    x, sx, sy = cross_edge(
+                        length - x,
+                        length - sx,
+                        sy,
+                        side,
+                        geometry[h, COS_RIGHT],
+                        geometry[h, SIN_RIGHT],
+                    )
+                    m, sy = following(h), -sy
+        if is_lost:
+            if fork_count == 0:
+                return LOST, count, -1
+            fork_count -= 1
+            x, sx = forks[fork_count, 0], forks[fork_count, 1]
+            sy, sigma = forks[fork_count, 2], forks[fork_count, 3]
+            m, after = fork_ints[fork_count, 0], fork_ints[fork_count, 1]
+            reference, count = fork_ints[fork_count, 2], fork_ints[fork_count, 3]
+            root = -1 - reference if reference < 0 else -1

@@ -4,8 +4,9 @@ from typing import Any
 
 from geodesic_core.kernels.jit import kernel, prefetch
 from geodesic_core.kernels.queue import ring_push
-from geodesic_core.kernels.topology import ROW
+from geodesic_core.kernels.topology import AROUND, HEAD, LENGTH, ROW, TAIL
 from geodesic_core.kernels.wavefront import (
+    CREATED,
     DONE,
     FIRST,
     FREE_FIRST,
@@ -105,6 +106,53 @@ def queue_if_due(wave: Any, h: int, u: int, v: int) -> None:
     """Queue the list of h if an end of its edge (u, v) is done; else it waits for more windows."""
     if wave.status[u] == DONE or wave.status[v] == DONE:
         queue_list(wave, h)
+
+
+@kernel
+def send_across(wave: Any, g: int, slot: int) -> None:
+    """Move a window over the irregular edge of g, which it leaves, into each other of its faces.
+
+    It comes in the frame of a half-edge that runs the other way than g; where one runs the same
+    way, its face is seen in the mirror.
+    """
+    links, w = wave.links, WIDTH * slot
+    length = wave.geometry[ROW * g + LENGTH]
+    b0, b1 = wave.windows[w + B0], wave.windows[w + B1]
+    sx, sy, sigma = wave.windows[w + SX], wave.windows[w + SY], wave.windows[w + SIGMA]
+    root, xi, reference = wave.window_ints[INTS * slot + ROOT], 0.0, -1
+    if merging(wave):
+        xi, reference = wave.windows[w + XI], wave.window_ints[INTS * slot + REFERENCE]
+    same, h = True, g
+    while True:
+        code = links[ROW * h + AROUND]
+        h = code >> 1
+        if code & 1 == 0:
+            same = not same
+        if h == g:
+            break
+        if same:
+            copy = put_window(
+                wave, length - b1, length - b0, length - sx, sy, sigma, root, xi, reference
+            )
+        else:
+            copy = put_window(wave, b0, b1, sx, sy, sigma, root, xi, reference)
+        insert_sorted(wave, h, copy)
+        wave.counters[CREATED] += 1
+        queue_if_due(wave, h, links[ROW * h + TAIL], links[ROW * h + HEAD])
+    wave.counters[CREATED] -= 1
+    wave.window_ints[INTS * slot + NEXT] = wave.counters[FREE_FIRST]
+    wave.counters[FREE_FIRST] = slot
+    wave.counters[FREE_SIZE] += 1
+
+
+@kernel
+def faces_beyond(wave: Any, g: int) -> int:
+    """Return how many other faces the irregular edge of g has."""
+    count, h = 0, wave.links[ROW * g + AROUND] >> 1
+    while h != g:
+        count += 1
+        h = wave.links[ROW * h + AROUND] >> 1
+    return count
 
 
 @kernel

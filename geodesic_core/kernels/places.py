@@ -4,7 +4,7 @@ from typing import Any
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs
 from geodesic_core.kernels.jit import kernel
-from geodesic_core.kernels.topology import HEAD, OPPOSITE, TAIL, outer_half_edge
+from geodesic_core.kernels.topology import HEAD, TAIL, next_around
 
 
 @kernel
@@ -36,27 +36,36 @@ def place_nodes(
             points[i] = topology.positions[v]
             lowest = -1
             for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
-                outer = outer_half_edge(topology.outer_face, topology.corners[c])
-                if lowest < 0 or outer < lowest:
-                    lowest = outer
-            face_of[i] = lowest // 3
-            weights[i, max(lowest, 0) % 3] = 1.0
+                face = topology.outer_face[topology.corners[c] // 3]
+                if lowest < 0 or face < lowest:
+                    lowest = face
+            face_of[i] = lowest
+            weights[i, corner_of(topology, faces, lowest, v) if lowest >= 0 else 0] = 1.0
             continue
-        outer = outer_half_edge(topology.outer_face, nodes[i])
-        across = topology.links[nodes[i], OPPOSITE] >> 1
-        if across >= 0:
-            other = outer_half_edge(topology.outer_face, across)
-            if other < outer:
-                outer, t = other, 1.0 - t
-        face, corner = outer // 3, outer % 3
-        vertex_of[i], face_of[i] = -1, face
-        weights[i, corner], weights[i, (corner + 1) % 3] = 1.0 - t, t
-        u = topology.inner_vertex[faces[face, corner]]
-        w = topology.inner_vertex[faces[face, (corner + 1) % 3]]
+        h = nodes[i]
+        u, w = topology.links[h, TAIL], topology.links[h, HEAD]
+        lowest, g = topology.outer_face[h // 3], h
+        while True:
+            g = next_around(topology.links, g)
+            if g < 0 or g == h:
+                break
+            lowest = min(lowest, topology.outer_face[g // 3])
+        vertex_of[i], face_of[i] = -1, lowest
+        weights[i, corner_of(topology, faces, lowest, u)] = 1.0 - t
+        weights[i, corner_of(topology, faces, lowest, w)] = t
         for axis in range(3):
             points[i, axis] = (1.0 - t) * topology.positions[u, axis] + t * topology.positions[
                 w, axis
             ]
+
+
+@kernel
+def corner_of(topology: Any, faces: Ints, face: int, v: int) -> int:
+    """Return which corner of a face inner vertex v is; both as the caller has them."""
+    for k in range(2):
+        if topology.inner_vertex[faces[face, k]] == v:
+            return k
+    return 2
 
 
 @kernel

@@ -106,6 +106,8 @@ def bisector(
     a, b = m2 - v * v, m2 * x0 + u * v
     c = m2 * (x0 * x0 + s0y * s0y) - u * u
     t = b + math.copysign(math.sqrt(max(b * b - a * c, 0.0)), b)
+    if abs(t) <= DOUBLE_ROOT * (m2 * abs(x0) + abs(u * v)):  # both roots at lo, in the rounding
+        return bracketed(lo, hi, s0x, s0y, s1x, s1y, delta)
     near = c / t if t != 0.0 else 0.0
     far = t / a if a != 0.0 else 0.0
     depth_near = root_depth(near, width, delta, u, v)

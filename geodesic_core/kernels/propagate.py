@@ -5,7 +5,14 @@ from typing import Any
 
 from geodesic_core.kernels.arrival import bound_vertex, improve_vertex, light_vertex, precedence
 from geodesic_core.kernels.jit import inlined, kernel, prefetch
-from geodesic_core.kernels.lists import free_windows, put_window, queue_if_due, release_list
+from geodesic_core.kernels.lists import (
+    faces_beyond,
+    free_windows,
+    put_window,
+    queue_if_due,
+    release_list,
+    send_across,
+)
 from geodesic_core.kernels.merge import merged
 from geodesic_core.kernels.overlap import leaves_gap, trim
 from geodesic_core.kernels.planar import hit_left
@@ -15,15 +22,19 @@ from geodesic_core.kernels.topology import (
     COS_LEFT,
     COS_RIGHT,
     HEAD,
+    IRREGULAR,
     LENGTH,
     LENGTH_LEFT,
     LENGTH_RIGHT,
+    NO_FACE,
     OUT_LEFT,
     OUT_RIGHT,
     ROW,
     SIN_LEFT,
     SIN_RIGHT,
     TAIL,
+    following,
+    previous,
 )
 from geodesic_core.kernels.wavefront import (
     CREATED,
@@ -342,7 +353,7 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
                     continue
             elif b1 <= crossing and bent_distance(wave, w, ax, ay)[0] >= least:
                 continue
-        if goes_left and left >= 0:
+        if goes_left and left != NO_FACE:
             s_left = sy * cos_left - sx * sin_left
             u0 = hit_left(b0, sy, s_left, sin_left, length_left)
             u1 = length_left
@@ -358,7 +369,7 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
                     left_first = slot
                 left_last = slot
                 left_size += 1
-        if goes_right and right >= 0:
+        if goes_right and right != NO_FACE:
             s_right = (sx - length) * sin_right + sy * cos_right
             u0 = hit_left(length - b1, sy, s_right, sin_right, length_right)
             u1 = length_right
@@ -376,7 +387,9 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
                 right_last = slot
                 right_size += 1
     wave.counters[CREATED] += left_size + right_size
-    if left_size > 0:  # they come in at the tail: before what is there
+    if left == IRREGULAR:
+        send_chain(wave, previous(h), left_first, left_size)
+    elif left_size > 0:  # they come in at the tail: before what is there
         r = LIST * left
         if wave.lists[r + SIZE] > 0:
             wave.window_ints[INTS * left_last + NEXT] = wave.lists[r + FIRST]
@@ -385,7 +398,9 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
         wave.lists[r + FIRST] = left_first
         wave.lists[r + SIZE] += left_size
         queue_if_due(wave, left, tail, apex)
-    if right_size > 0:  # they come in at the head: after what is there
+    if right == IRREGULAR:
+        send_chain(wave, following(h), right_first, right_size)
+    elif right_size > 0:  # they come in at the head: after what is there
         r = LIST * right
         if wave.lists[r + SIZE] > 0:
             wave.window_ints[INTS * wave.lists[r + LAST] + NEXT] = right_first
@@ -397,13 +412,33 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
 
 
 @kernel
+def send_chain(wave: Any, g: int, slot: int, size: int) -> None:
+    """Move windows, linked one to the next, over the irregular edge of g."""
+    for _ in range(size):
+        after = wave.window_ints[INTS * slot + NEXT]
+        send_across(wave, g, slot)
+        slot = after
+
+
+@kernel
+def room_to_spread(wave: Any, h: int, size: int) -> int:
+    """How many windows may be made of ``size`` that cross the face of h, at most."""
+    room = 2 * size
+    if wave.links[ROW * h + OUT_LEFT] == IRREGULAR:
+        room += size * faces_beyond(wave, previous(h))
+    if wave.links[ROW * h + OUT_RIGHT] == IRREGULAR:
+        room += size * faces_beyond(wave, following(h))
+    return room
+
+
+@kernel
 def propagate_list(wave: Any, h: int) -> int:
     """Propagate the windows of h across its face (section 3.2)."""
     size = wave.lists[LIST * h + SIZE]
     prefetch(wave.lists, LIST * wave.links[ROW * h + OUT_LEFT])
     prefetch(wave.lists, LIST * wave.links[ROW * h + OUT_RIGHT])
     prefetch(wave.distance, wave.links[ROW * h + APEX])
-    if 2 * size > free_windows(wave):
+    if room_to_spread(wave, h, size) > free_windows(wave):
         return POOL_FULL
     if size > wave.scratch_size:
         return SCRATCH_FULL

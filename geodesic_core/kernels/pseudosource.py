@@ -10,7 +10,7 @@ from geodesic_core.kernels.arrival import (
     light_vertex,
 )
 from geodesic_core.kernels.jit import kernel
-from geodesic_core.kernels.lists import insert_sorted, put_window, queue_if_due
+from geodesic_core.kernels.lists import insert_sorted, put_window, queue_if_due, send_across
 from geodesic_core.kernels.prune import may_pass
 from geodesic_core.kernels.topology import (
     APEX,
@@ -18,13 +18,16 @@ from geodesic_core.kernels.topology import (
     COS_RIGHT,
     FANS,
     HEAD,
+    IRREGULAR,
     LENGTH,
     LENGTH_LEFT,
     LENGTH_RIGHT,
+    NO_FACE,
     OUT_LEFT,
     OUT_RIGHT,
     ROW,
     SIN_RIGHT,
+    following,
     previous,
 )
 from geodesic_core.kernels.wavefront import (
@@ -172,7 +175,7 @@ def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) 
         return
     row = ROW * h
     across = wave.links[row + OUT_RIGHT]
-    if across < 0:
+    if across == NO_FACE:
         return
     length = wave.geometry[row + LENGTH_RIGHT]
     b0, b1 = 0.0, length
@@ -188,8 +191,12 @@ def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) 
     sigma, xi = wave.distance[v], 0.0
     if merging(wave):
         xi = wave.upper[v] - sigma
-    insert_sorted(wave, across, put_window(wave, b0, b1, sx, sy, sigma, v, xi, -1 - v))
+    slot = put_window(wave, b0, b1, sx, sy, sigma, v, xi, -1 - v)
     wave.counters[CREATED] += 1
+    if across == IRREGULAR:
+        send_across(wave, following(h), slot)
+        return
+    insert_sorted(wave, across, slot)
     queue_if_due(wave, across, wave.links[row + HEAD], wave.links[row + APEX])
 
 

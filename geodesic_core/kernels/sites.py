@@ -11,12 +11,14 @@ from typing import Any
 
 from geodesic_core.kernels.arrival import bound_vertex, improve_vertex, light_vertex, precedence
 from geodesic_core.kernels.jit import kernel
-from geodesic_core.kernels.lists import insert_sorted, put_window
+from geodesic_core.kernels.lists import insert_sorted, put_window, send_across
 from geodesic_core.kernels.topology import (
     APEX,
     COS_LEFT,
+    IRREGULAR,
     LENGTH,
     LENGTH_LEFT,
+    NO_FACE,
     OPPOSITE,
     ROW,
     SIN_LEFT,
@@ -61,11 +63,14 @@ def emit_site(wave: Any, k: int) -> None:
         x, y = site_in_frame(wave, k, h)
         row = ROW * h
         length = wave.geometry[row + LENGTH]
-        across = wave.links[row + OPPOSITE] >> 1
-        if across >= 0 and y > 0.0:
+        across = wave.links[row + OPPOSITE]
+        if across != NO_FACE and y > 0.0:
             slot = put_window(wave, 0.0, length, length - x, -y, sigma, node, 0.0, -1 - node)
-            insert_sorted(wave, across, slot)
             wave.counters[CREATED] += 1
+            if across == IRREGULAR:
+                send_across(wave, h, slot)
+            else:
+                insert_sorted(wave, across, slot)
         ax = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
         ay = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
         distance = sigma + math.hypot(ax - x, ay - y)

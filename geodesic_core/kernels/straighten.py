@@ -23,6 +23,7 @@ from geodesic_core.kernels.topology import (
     OPPOSITE,
     OUT_LEFT,
     OUT_RIGHT,
+    SEAM,
     SIN_LEFT,
     TAIL,
     following,
@@ -100,7 +101,12 @@ def corner_toward(topology: Any, v: int, u: int, column: int) -> int:
 
 @kernel
 def side_to_pass(topology: Any, before: int, v: int, after: int) -> int:
-    """Side of v with the lesser angle between two of its neighbours, of those without a hole."""
+    """Side of v with the lesser angle between two of its neighbours, of those without a hole.
+
+    On an irregular edge there are more sides than two, and none is taken.
+    """
+    if topology.flags[v] & SEAM:
+        return NEITHER
     right = angle_on_right(topology, before, v, after)
     left = angle_on_right(topology, after, v, before)
     if right == math.inf and left == math.inf:
@@ -149,7 +155,7 @@ def strip_along(topology: Any, path: Ints, sides: Any) -> tuple[Ints, int]:
                 strip[size] = previous(h)
                 size += 1
             while links[h, HEAD] != after:
-                across = links[h, OPPOSITE] >> 1
+                across = links[h, OPPOSITE]
                 strip[size] = across
                 size += 1
                 h = following(across)
@@ -163,7 +169,7 @@ def unfold_strip(topology: Any, strip: Ints, size: int, ends: Floats) -> None:
     The start is the vertex before the first portal, at the origin; row i + 1 is portal i.
     """
     geometry = topology.geometry
-    h = topology.links[strip[0], OPPOSITE] >> 1
+    h = topology.links[strip[0], OPPOSITE]
     ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
     ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
     lx, ly, rx, ry = geometry[h, LENGTH] - ax, -ay, -ax, -ay
@@ -308,12 +314,12 @@ def pass_beyond(
     there is no room. An edge that starts or ends at an end of the path is none.
     """
     links = topology.links
-    entered = links[strip[first], OPPOSITE] >> 1
+    entered = links[strip[first], OPPOSITE]
     if side == LEFT:
-        h = links[following(entered), OPPOSITE] >> 1
+        h = links[following(entered), OPPOSITE]
         goal = previous(strip[last])
     else:
-        h = links[previous(entered), OPPOSITE] >> 1
+        h = links[previous(entered), OPPOSITE]
         goal = following(strip[last])
     if h == goal:
         # One face on both sides: what is left of the strip must begin and end where it did.
@@ -324,7 +330,7 @@ def pass_beyond(
         ):
             return -1
         if first == 0 and last + 1 < size:
-            begin = links[strip[last + 1], OPPOSITE] >> 1
+            begin = links[strip[last + 1], OPPOSITE]
             if links[begin, APEX] != links[entered, APEX]:
                 return -1
     is_end = first == 0

@@ -8,7 +8,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.arrival import bound_vertex, improve_vertex
 from geodesic_core.kernels.jit import inlined, kernel, prefetch
-from geodesic_core.kernels.lists import free_windows, queue_list
+from geodesic_core.kernels.lists import faces_beyond, free_windows, queue_list
 from geodesic_core.kernels.propagate import POOL_FULL, PROPAGATED, propagate_list
 from geodesic_core.kernels.prune import touch
 from geodesic_core.kernels.pseudosource import emit_pseudosource, is_pseudosource
@@ -16,10 +16,14 @@ from geodesic_core.kernels.queue import HEAP_SIZE, RING_HEAD, RING_SIZE, pop_nea
 from geodesic_core.kernels.sites import emit_site
 from geodesic_core.kernels.topology import (
     APEX,
+    AROUND,
     HEAD,
+    IRREGULAR,
     OUT_LEFT,
     OUT_RIGHT,
     ROW,
+    SEAM,
+    following,
     previous,
 )
 from geodesic_core.kernels.wavefront import (
@@ -94,7 +98,7 @@ def settle_nearest(wave: Any) -> int:
     v = wave.heap[0]
     emits = is_pseudosource(wave, v)
     first, last = wave.first_corner[v], wave.first_corner[v + 1]
-    if emits and 6 * (last - first) > free_windows(wave):
+    if emits and room_to_emit(wave, v) > free_windows(wave):
         return POOL_FULL
     pop_nearest(wave)
     if wave.counters[HEAP_SIZE] > 0:
@@ -119,7 +123,32 @@ def settle_nearest(wave: Any) -> int:
             far = wave.links[ROW * across + APEX]
             if wave.status[far] != FAR:
                 queue_list(wave, across)
+        elif across == IRREGULAR:
+            queue_lists_beyond(wave, following(h))
     return FINISHED
+
+
+@kernel
+def room_to_emit(wave: Any, v: int) -> int:
+    """How many windows v may emit, at most."""
+    first, last = wave.first_corner[v], wave.first_corner[v + 1]
+    room = 6 * (last - first)
+    if wave.flags[v] & SEAM:
+        for c in range(first, last):
+            h = wave.corners[c]
+            if wave.links[ROW * h + OUT_RIGHT] == IRREGULAR:
+                room += 2 * faces_beyond(wave, following(h))
+    return room
+
+
+@kernel
+def queue_lists_beyond(wave: Any, g: int) -> None:
+    """Queue the lists beyond the irregular edge of g whose far vertex is in front, or done."""
+    h = wave.links[ROW * g + AROUND] >> 1
+    while h != g:
+        if wave.status[wave.links[ROW * h + APEX]] != FAR:
+            queue_list(wave, h)
+        h = wave.links[ROW * h + AROUND] >> 1
 
 
 @inlined

@@ -127,9 +127,11 @@ class Sites(NamedTuple):
     """(S, 3): NODE, FACE, NEXT_SITE; a site's rows follow each other, in the order of the nodes"""
     weights: Floats
     """(S, 3): barycentric, at the corners of the face"""
+    windows: int
+    """How many windows they may emit, at most"""
 
 
-NO_SITES = Sites(0, np.empty((0, SITE), np.int32), np.empty((0, 3)))
+NO_SITES = Sites(0, np.empty((0, SITE), np.int32), np.empty((0, 3)), 0)
 
 
 class Bounds(NamedTuple):
@@ -358,7 +360,7 @@ def new_wavefront(
         heap_place=np.full(vertices, -1, np.int32),
         ring=np.empty(half_edges, np.int32),
         lists=np.zeros((half_edges, LIST), np.int32),
-        windows=aligned_rows(1024 + 3 * len(sites.ints), WIDTH, np.float64),
+        windows=aligned_rows(1024 + sites.windows, WIDTH, np.float64),
         scratch=aligned_rows(256, WIDTH, np.float64),
         counters=counters,
         site_ints=sites.ints.copy(),
