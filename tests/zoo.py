@@ -2,7 +2,7 @@
 
 ``SMALL``     at most 150 faces, of every kind: the oracles solve them whole, from every vertex
 ``KNOWN``     up to a few thousand faces, slivers among them, whose distances are closed forms
-``REFUSED``   not to be accepted: a mesh, and the edges that the refusal has to name
+``IRREGULAR`` with edges of three faces or more, or wound the same way by both their faces
 """
 
 import itertools
@@ -496,36 +496,93 @@ def _pleats() -> Iterable[Case]:
         yield _planar(name, folded, faces, flat)
 
 
-# Meshes to refuse -------------------------------------------------------------------------------
+# Meshes with edges that are not simply crossed ---------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
-class Refused:
-    """A mesh that is not accepted yet, and the edges (low, high) at fault."""
+class Irregular(Case):
+    """A mesh, its edges (low, high) of three faces or more, and those wound the same way twice."""
 
-    name: str
-    vertices: np.ndarray
-    faces: np.ndarray
-    edges: tuple[tuple[int, int], ...]
+    non_manifold: tuple[tuple[int, int], ...] = ()
+    misoriented: tuple[tuple[int, int], ...] = ()
 
 
-def _refused() -> Iterable[Refused]:
+def _irregular() -> Iterable[Irregular]:
     corners = np.array([(0.0, 0, 0), (1, 0, 0), (0.2, 1, 0), (0.5, 0, 1), (0.8, -1, 0)])
-    yield Refused(
-        "three_faces_at_an_edge", corners, np.array([(0, 1, 2), (1, 0, 3), (0, 1, 4)]), ((0, 1),)
-    )
-    yield Refused("misoriented", corners[:4], np.array([(0, 1, 2), (0, 1, 3)]), ((0, 1),))
-    yield Refused(
-        "face_twice", corners[:3], np.array([(0, 1, 2), (0, 1, 2)]), ((0, 1), (0, 2), (1, 2))
-    )
+    pages = np.array([(0, 1, 2), (1, 0, 3), (0, 1, 4)])
+    yield Irregular("three_faces_at_an_edge", corners, pages, non_manifold=((0, 1),))
+    two = np.array([(0, 1, 2), (0, 1, 3)])
+    yield Irregular("misoriented", corners[:4], two, misoriented=((0, 1),))
+    twice = np.array([(0, 1, 2), (0, 1, 2)])
+    yield Irregular("face_twice", corners[:3], twice, misoriented=((0, 1), (0, 2), (1, 2)))
     vertices, faces = tetrahedron()
     flipped = faces.copy()
     flipped[2] = flipped[2, ::-1]
-    yield Refused("flipped_face", vertices, flipped, ((0, 2), (0, 3), (2, 3)))
-    yield Refused("moebius", *_moebius(9))
+    yield Irregular("flipped_face", vertices, flipped, misoriented=((0, 2), (0, 3), (2, 3)))
+    vertices, faces = _moebius(9)
+    yield Irregular("moebius", vertices, faces, misoriented=((0, 9),))
+    faces, many, same = _wound_at_random(faces, 1)
+    yield Irregular("moebius_wound_at_random", vertices, faces, None, many, same)
     vertices, faces = voxels([(0, 0, 0), (1, 1, 0)])
     low, high = (int(np.flatnonzero((vertices == (1, 1, z)).all(axis=1))[0]) for z in (0, 1))
-    yield Refused("cubes_at_an_edge", vertices, faces, ((min(low, high), max(low, high)),))
+    edge = (min(low, high), max(low, high))
+    yield Irregular("cubes_at_an_edge", vertices, faces, non_manifold=(edge,))
+    for count in (3, 5):
+        vertices, faces, spine = _book(count, 3)
+        yield Irregular(f"book_of_{count}", vertices, faces, non_manifold=spine)
+    vertices, faces = _crumpled(torus(9, 6), 0.3, 3)
+    faces, many, same = _wound_at_random(faces, 2)
+    yield Irregular("torus_wound_at_random", vertices, faces, None, many, same)
+    for seed in range(6):
+        yield _complex(7, 14, seed)
+
+
+def _wound_at_random(faces, seed):
+    """The faces, half of them turned over; no edges of three; those that run the same way twice."""
+    faces = faces.copy()
+    turned = np.random.default_rng(seed).random(len(faces)) < 0.5
+    faces[turned] = faces[turned][:, ::-1]
+    return faces, *_irregular_edges(faces)
+
+
+def _irregular_edges(faces):
+    runs: dict[tuple[int, int], list[bool]] = {}
+    for face in np.asarray(faces).tolist():
+        for a, b in itertools.pairwise([*face, face[0]]):
+            runs.setdefault((min(a, b), max(a, b)), []).append(a < b)
+    many = tuple(sorted(edge for edge, ways in runs.items() if len(ways) > 2))
+    same = tuple(sorted(edge for edge, ways in runs.items() if ways in ([True] * 2, [False] * 2)))
+    return many, same
+
+
+def _book(pages, rows):
+    """Uneven pages, two columns of quads each, that share a spine of several edges."""
+    rng = np.random.default_rng(pages)
+    points = [(0.0, 0.0, float(z)) for z in range(rows + 1)]
+    faces = []
+    for page in range(pages):
+        turn = 2 * math.pi * page / pages
+        columns = [list(range(rows + 1))]
+        for i in (1, 2):
+            columns.append([len(points) + z for z in range(rows + 1)])
+            for z in range(rows + 1):
+                x, y, up = rng.random(3)
+                points.append(
+                    (i * math.cos(turn) + 0.1 * x, i * math.sin(turn) + 0.1 * y, z + 0.2 * up)
+                )
+        for (left, right), z in itertools.product(itertools.pairwise(columns), range(rows)):
+            a, b, c, d = left[z], right[z], right[z + 1], left[z + 1]
+            faces += [(a, b, c), (a, c, d)] if rng.random() < 0.5 else [(a, b, d), (b, c, d)]
+    return np.array(points), np.array(faces), tuple(itertools.pairwise(range(rows + 1)))
+
+
+def _complex(vertex_count, face_count, seed) -> Irregular:
+    """Random triangles between a few points: edges of many faces, wound at random."""
+    rng = np.random.default_rng(seed)
+    every = list(itertools.combinations(range(vertex_count), 3))
+    chosen = [every[k] for k in rng.choice(len(every), face_count, replace=False)]
+    faces, many, same = _wound_at_random(np.array(chosen), seed)
+    return Irregular(f"complex_{seed}", rng.random((vertex_count, 3)), faces, None, many, same)
 
 
 def _moebius(count):
@@ -542,9 +599,9 @@ def _moebius(count):
         a, b = k, k + count
         c, d = (k + 1, k + 1 + count) if k + 1 < count else (count, 0)
         faces += [(a, c, d), (a, d, b)]
-    return vertices, np.array(faces), ((0, count),)
+    return vertices, np.array(faces)
 
 
 SMALL = {case.name: case for case in _small()}
 KNOWN = {case.name: case for case in _known()}
-REFUSED = {case.name: case for case in _refused()}
+IRREGULAR = {case.name: case for case in _irregular()}

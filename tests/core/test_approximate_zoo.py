@@ -12,7 +12,7 @@ MANY, FEW = (2, 1) if WITHOUT_JIT else (12, 4)
 """Sources a mesh."""
 
 
-@zoo.each(zoo.SMALL)
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_against_the_oracle(case):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     for source in some_sources(case, MANY):
@@ -25,7 +25,7 @@ def test_small_meshes_against_the_oracle(case):
 
 @pytest.mark.full
 @pytest.mark.jit
-@zoo.each(zoo.SMALL)
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_from_every_vertex(case):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     for source, exact in enumerate(expected.matrix(case)):

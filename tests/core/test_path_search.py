@@ -23,7 +23,7 @@ EXACT = 1e-9
 """Relative error allowed against an oracle, as of exact fields."""
 
 
-@zoo.each(zoo.SMALL)
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_between_vertices_everywhere(case):
     solver = solver_of(case)
     for source in spread(case, 2 if WITHOUT_JIT else 8):
@@ -31,7 +31,7 @@ def test_small_meshes_between_vertices_everywhere(case):
     assert landmark_count(solver) > 0, "else only searches without landmarks were tried"
 
 
-@zoo.each(zoo.SMALL)
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_against_unfolding(case):
     solver = solver_of(case)
     for source in spread(case, 2 if WITHOUT_JIT else 10):

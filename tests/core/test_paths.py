@@ -25,7 +25,7 @@ def check_paths(case, sources, at_most=10**9):
                 check_path(mesh, path, source, target, field.distances[target])
 
 
-@zoo.each(zoo.SMALL)
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_paths_to_every_vertex(case):
     last = int(case.faces.max())
     check_paths(case, [last] if WITHOUT_JIT else [0, last // 2, last])

@@ -313,7 +313,7 @@ class Watch:
     def _check_edges(self, wave) -> None:
         """Every point of an edge had its distance from a window of one side, or along the edge."""
         links, shares = self.topology.links, self.exact.shares
-        opposite = links[:, OPPOSITE] >> 1
+        opposite = links[:, OPPOSITE]
         inside = opposite >= 0  # there are no windows on a boundary edge
         length = self.topology.geometry[:, LENGTH, None]
         tail, head = (wave.distance[links[:, column], None] for column in (TAIL, HEAD))
