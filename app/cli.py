@@ -124,7 +124,7 @@ _INDEX = re.compile(r"-?[0-9]+")
 
 def _position(text: str) -> _Point:
     try:
-        return _Point.parse(f"p{text}")
+        return _Point(text, _Point.parse(f"p{text}").point)
     except typer.BadParameter:
         raise typer.BadParameter(f"{text!r} is not a position: write it as x,y,z") from None
 

@@ -139,11 +139,14 @@ def _headers(answer: Answer, array: NDArray[Any]) -> dict[str, str]:
         if name == answer.array:
             continue
         text = value if isinstance(value, str) else _ascii(value)
-        if len(text) <= _LONGEST_HEADER:
+        if text is not None and len(text) <= _LONGEST_HEADER:
             headers["Geodesic-" + name.replace("_", "-").title()] = text
     return headers
 
 
-def _ascii(value: Any) -> str:
-    # Headers are Latin-1; json writes everything else with escapes.
-    return json.dumps(orjson.loads(_dump(value)), separators=(",", ":"))
+def _ascii(value: Any) -> str | None:
+    """Return JSON as headers have it, None where it is too long: json is slow, and adds escapes."""
+    dumped = _dump(value)
+    if len(dumped) > _LONGEST_HEADER:
+        return None
+    return json.dumps(orjson.loads(dumped), separators=(",", ":"))  # headers are Latin-1
