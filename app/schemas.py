@@ -297,7 +297,7 @@ class ErrorBound(BaseModel):
 
 
 class ResolvedPoint(BaseModel):
-    """A point as it was understood: the same, to the bit, however it was written."""
+    """A point as it was understood: in one spelling, however it was written."""
 
     vertex: int | None = Field(default=None, description="Where the point is a vertex")
     face: int | None = Field(
