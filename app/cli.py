@@ -4,6 +4,7 @@ What is slow to import (the kernels, the server) is imported by the command that
 """
 
 # ruff: noqa: PLC0415
+import re
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -20,7 +21,7 @@ from typer.exceptions import TyperException
 from app import __version__
 
 if TYPE_CHECKING:
-    from geodesic_core import DistanceField, ErrorBound, GeodesicPath, TriangleMesh
+    from geodesic_core import DistanceField, ErrorBound, GeodesicPath, SurfacePoint, TriangleMesh
 
 FAILED, INTERRUPTED = 1, 130
 """Exit codes: the work failed, Ctrl-C; typer's own for a wrong command line is 2."""
@@ -102,6 +103,32 @@ class _SampleName(StrEnum):
     PLANE = "plane"
 
 
+class _Point(NamedTuple):
+    """A point of the mesh, as it was written."""
+
+    text: str
+    point: Any
+
+    @classmethod
+    def parse(cls, text: str) -> "_Point":
+        from app.point_text import parse
+
+        try:
+            return cls(text, parse(f"v{text}" if _INDEX.fullmatch(text) else text))
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+
+
+_INDEX = re.compile(r"-?[0-9]+")
+
+
+def _position(text: str) -> _Point:
+    try:
+        return _Point(text, _Point.parse(f"p{text}").point)
+    except typer.BadParameter:
+        raise typer.BadParameter(f"{text!r} is not a position: write it as x,y,z") from None
+
+
 def _writable(*suffixes: str) -> Callable[[Path], Path]:
     """Return a check of an output path, made before any work begins."""
 
@@ -114,6 +141,8 @@ def _writable(*suffixes: str) -> Callable[[Path], Path]:
 
     return check
 
+
+_SPELLINGS = "as 12 (a vertex), e12-13:0.3 (edge), f7:0.2,0.3,0.5 (face) or p1,2,3 (position)"
 
 _MeshFile = Annotated[
     Path, typer.Argument(metavar="MESH", help="An OBJ, OFF, PLY, STL or GLB file.")
@@ -190,7 +219,14 @@ def info(mesh_file: _MeshFile, merge: _MergeOption = _Merge.NONE) -> None:
 @cli.command()
 def distance(
     mesh_file: _MeshFile,
-    source: Annotated[list[int], typer.Option(help="A source vertex; may be given again.")],
+    source: Annotated[
+        list[_Point],
+        typer.Option(
+            parser=_Point.parse,
+            metavar="POINT",
+            help=f"A source, {_SPELLINGS}; may be given again.",
+        ),
+    ],
     out: Annotated[
         Path,
         typer.Option(
@@ -213,11 +249,12 @@ def distance(
 
     from geodesic_core import approximate_distance, exact_distance
 
+    sources = [_found(mesh, "--source", written) for written in source]
     with _step("Computing distances") as step:
         if granted is None:
-            field = exact_distance(mesh, source, max_distance, **step._asdict())
+            field = exact_distance(mesh, sources, max_distance, **step._asdict())
         else:
-            field = approximate_distance(mesh, source, *granted, max_distance, **step._asdict())
+            field = approximate_distance(mesh, sources, *granted, max_distance, **step._asdict())
     _write(out, _DISTANCE_WRITERS[out.suffix.lower()], field)
     reached = np.isfinite(field.distances)
     farthest = int(np.argmax(np.where(reached, field.distances, -1.0)))
@@ -232,8 +269,16 @@ def distance(
 @cli.command()
 def path(
     mesh_file: _MeshFile,
-    source: Annotated[int, typer.Option(help="The vertex to start from.")],
-    target: Annotated[int, typer.Option(help="The vertex to go to.")],
+    source: Annotated[
+        _Point,
+        typer.Option(
+            parser=_Point.parse, metavar="POINT", help=f"The point to start from, {_SPELLINGS}."
+        ),
+    ],
+    target: Annotated[
+        _Point,
+        typer.Option(parser=_Point.parse, metavar="POINT", help="The point to go to."),
+    ],
     out: Annotated[
         Path,
         typer.Option(
@@ -242,8 +287,12 @@ def path(
         ),
     ],
     via: Annotated[
-        list[int] | None,
-        typer.Option(help="A vertex to pass on the way; may be given again, in order."),
+        list[_Point] | None,
+        typer.Option(
+            parser=_Point.parse,
+            metavar="POINT",
+            help="A point to pass on the way; may be given again, in order.",
+        ),
     ] = None,
     explain: Annotated[
         bool,
@@ -254,7 +303,7 @@ def path(
     absolute_error: _AbsoluteError = None,
     merge: _MergeOption = _Merge.NONE,
 ) -> None:
-    """Compute a shortest path over the surface between two vertices."""
+    """Compute a shortest path over the surface between two points."""
     granted = _granted(method, relative_error, absolute_error)
     if granted is not None and (via or explain):
         name = "--via" if via else "--explain"
@@ -262,16 +311,17 @@ def path(
     mesh, seconds = _read(mesh_file, merge)
     from geodesic_core import approximate_distance, shortest_path
 
+    first, last = _found(mesh, "--source", source), _found(mesh, "--target", target)
+    between = [_found(mesh, "--via", written) for written in via or ()]
     with _step("Computing the path") as step:
         start = perf_counter()
         if granted is None:
-            stops = (source, target, via or ())
-            found = shortest_path(mesh, *stops, explain=explain, **step._asdict())
+            found = shortest_path(mesh, first, last, between, explain=explain, **step._asdict())
         else:
             field = approximate_distance(
-                mesh, source, *granted, keep_windows=True, **step._asdict()
+                mesh, first, *granted, targets=[last], keep_windows=True, **step._asdict()
             )
-            found = field.path_to(target)
+            found = field.path_to(last)
         solved = perf_counter() - start
     _write(out, _PATH_WRITERS[out.suffix.lower()], found)
     typer.echo(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
@@ -285,6 +335,27 @@ def path(
             f"{part.windows} windows, {len(part.faces)} faces"
         )
     typer.echo(f"written     {out}")
+
+
+@cli.command()
+def locate(
+    mesh_file: _MeshFile,
+    at: Annotated[
+        _Point, typer.Option(parser=_position, metavar="X,Y,Z", help="The position, mesh units.")
+    ],
+    merge: _MergeOption = _Merge.NONE,
+) -> None:
+    """Find the point of the surface that is nearest to a position."""
+    mesh, _ = _read(mesh_file, merge)
+    import numpy as np
+
+    with _step("Looking for the point"):
+        place = _found(mesh, "--at", at)
+    position = mesh.position(place)
+    away = float(np.linalg.norm(position - at.point.position))
+    typer.echo(f"point       {_written(place)}")
+    typer.echo(f"position    {','.join(map(repr, position.tolist()))}")
+    typer.echo(f"distance    {away!r}")
 
 
 @cli.command()
@@ -319,6 +390,17 @@ def _read(mesh_file: Path, merge: _Merge) -> "tuple[TriangleMesh, float]":
         mesh = load_mesh(mesh_file, merge=merge.value)
         seconds = perf_counter() - start
     return mesh, seconds
+
+
+def _found(mesh: "TriangleMesh", option: str, written: _Point) -> "SurfacePoint":
+    """Return the point of the mesh that an option names."""
+    from app.points import resolve
+    from geodesic_core.errors import InvalidPoint
+
+    try:
+        return resolve(mesh, written.point)
+    except InvalidPoint as error:
+        raise _Failure(f"{option} {written.text}: {error}") from None
 
 
 class _Step(NamedTuple):
@@ -379,6 +461,13 @@ def _in_words(value: Any) -> str:
             return repr(value)
 
 
+def _written(place: "SurfacePoint") -> str:
+    """Return a point as options take it."""
+    if place.vertex_index is not None:
+        return f"v{place.vertex_index}"
+    return f"f{place.face_index}:{','.join(map(repr, place.barycentric))}"
+
+
 def _bound_in_words(bound: "ErrorBound") -> str:
     return f"{bound.value!r} ({bound.type}, {bound.kind})"
 
@@ -415,10 +504,14 @@ def _distances_to_csv(file: IO[bytes], field: "DistanceField") -> None:
 
 
 def _distances_to_json(file: IO[bytes], field: "DistanceField") -> None:
+    from app.points import described
+
     _dump_json(
         file,
         {
-            "sources": [source.point for source in field.sources],
+            "sources": [
+                described(field.mesh, field.mesh.point(source.point)) for source in field.sources
+            ],
             "distances": field.distances,  # infinity becomes null
             "nearest_source": field.nearest_source,
             "error_bound": field.error_bound,

@@ -2,7 +2,7 @@
 
 import asyncio
 import re
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Sequence
 from typing import Annotated, Any, TypeVar
 
 from fastapi import Depends, Header, Request
@@ -47,11 +47,13 @@ def require_json(request: Request) -> None:
         raise refuse("unsupported_media_type", detail, hint=hint)
 
 
-def media_type_of(request: Request, name: str | None) -> str:
-    """Return the media type to answer in."""
-    media_type = negotiate(request.headers.get("accept"), name)
+def media_type_of(
+    request: Request, name: str | None, offers: Sequence[str] = tuple(FORMATS.values())
+) -> str:
+    """Return the media type to answer in, one of the ``offers``."""
+    media_type = negotiate(request.headers.get("accept"), name, offers)
     if media_type is None:
-        raise refuse("not_acceptable", f"this answer comes as {', '.join(FORMATS.values())}")
+        raise refuse("not_acceptable", f"this answer comes as {', '.join(offers)}")
     return media_type
 
 

@@ -29,13 +29,13 @@ class Answer:
         In the order of the JSON object; arrays where they are large.
     array
         Name of the member that is the body in binary formats (empty where that is ``None``); the
-        small ones become headers.
+        small ones become headers. No name for an answer that comes as JSON only.
     values
         How many values its JSON has, where the query did not tell before it was answered.
     """
 
     members: Mapping[str, Any]
-    array: str
+    array: str = ""
     values: int = 0
 
 
@@ -78,14 +78,19 @@ def encode(answer: Answer, media_type: str) -> Encoded:
     return ENCODERS[media_type](answer)
 
 
-def negotiate(accept: str | None, name: str | None) -> str | None:
-    """Return the media type for ``Accept``, or for ``name`` of ``FORMATS``, which overrides it."""
+def negotiate(
+    accept: str | None, name: str | None, offers: Sequence[str] = tuple(FORMATS.values())
+) -> str | None:
+    """Return the media type for ``Accept``, or for ``name`` of ``FORMATS``, which overrides it.
+
+    None where it is not one of the ``offers``.
+    """
     if name is not None:
-        return FORMATS[name]
+        return FORMATS[name] if FORMATS[name] in offers else None
     wanted = sorted(_accepted(accept or "*/*"), key=lambda item: -item[1])
     refused = {media for media, quality in wanted if quality <= 0}
     for media, quality in wanted:
-        for offered in ENCODERS:
+        for offered in offers:
             if quality > 0 and offered not in refused and _matches(media, offered):
                 return offered
     return None
@@ -134,11 +139,14 @@ def _headers(answer: Answer, array: NDArray[Any]) -> dict[str, str]:
         if name == answer.array:
             continue
         text = value if isinstance(value, str) else _ascii(value)
-        if len(text) <= _LONGEST_HEADER:
+        if text is not None and len(text) <= _LONGEST_HEADER:
             headers["Geodesic-" + name.replace("_", "-").title()] = text
     return headers
 
 
-def _ascii(value: Any) -> str:
-    # Headers are Latin-1; json writes everything else with escapes.
-    return json.dumps(orjson.loads(_dump(value)), separators=(",", ":"))
+def _ascii(value: Any) -> str | None:
+    """Return JSON as headers have it, None where it is too long: json is slow, and adds escapes."""
+    dumped = _dump(value)
+    if len(dumped) > _LONGEST_HEADER:
+        return None
+    return json.dumps(orjson.loads(dumped), separators=(",", ":"))  # headers are Latin-1

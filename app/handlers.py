@@ -13,6 +13,7 @@ from starlette.routing import compile_path
 from app.errors import Fault, Problem, ProblemError, pointer, problem_of_status
 from app.middleware import body_too_large
 from app.responses import problem_response
+from app.schemas import POINT_TAGS
 from app.settings import Settings
 
 
@@ -66,7 +67,8 @@ def validation_problem(errors: Sequence[Any]) -> Problem:
 
 
 def _place(location: Sequence[str | int]) -> str:
-    return pointer(*(location[1:] if location[0] == "body" else location))
+    named = [part for part in location if part not in POINT_TAGS.values()]
+    return pointer(*(named[1:] if named[0] == "body" else named))
 
 
 def _respond(request: Request, problem: Problem) -> Response:

@@ -5,11 +5,13 @@ from typing import Annotated, Any, Literal
 from pydantic import (
     BaseModel,
     ConfigDict,
+    Discriminator,
     Field,
     FiniteFloat,
     PositiveInt,
     StrictBool,
     StrictInt,
+    Tag,
 )
 
 Merge = Literal["none", "exact"]
@@ -18,6 +20,8 @@ SampleName = Literal["knot", "sphere", "plane"]
 Method = Literal["exact", "approximate"]
 StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
 NonNegative = Annotated[FiniteFloat, Field(ge=0)]
+Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Triple = tuple[Coordinate, Coordinate, Coordinate]
 
 
 class Wire(BaseModel):
@@ -29,16 +33,100 @@ class Wire(BaseModel):
 # Requests
 
 
-class Point(Wire):
-    """A point of the mesh, written as one of its vertices."""
+class VertexPoint(Wire):
+    """A vertex."""
 
     vertex: StrictInt = Field(description="Index of a vertex, from 0", examples=[0])
 
 
-class Source(Point):
-    """A point where distances start, at ``start_distance``."""
+class EdgePoint(Wire):
+    """A point of an edge."""
 
-    start_distance: NonNegative = 0.0
+    edge: tuple[StrictInt, StrictInt] = Field(
+        description="The two vertices that the edge joins", examples=[[0, 1]]
+    )
+    t: Coordinate = Field(
+        description="Share of the way from the first of them to the second, 0 to 1", examples=[0.3]
+    )
+
+
+class FacePoint(Wire):
+    """A point of a face."""
+
+    face: StrictInt = Field(description="Index of a face, from 0", examples=[7])
+    barycentric: Triple = Field(
+        description="Weights of the corners in their order: 0 or more, 1 in all, but for rounding",
+        examples=[[0.2, 0.3, 0.5]],
+    )
+
+
+class PositionPoint(Wire):
+    """The point of the surface that is nearest to a position."""
+
+    position: Triple = Field(description="x, y, z in mesh units", examples=[[1.0, 2.0, 3.0]])
+    max_distance: NonNegative | None = Field(
+        default=None, description="How far the surface may be from there"
+    )
+
+
+class Start(Wire):
+    """What a source adds to a point."""
+
+    start_distance: NonNegative = Field(
+        default=0.0, description="What distances count from, instead of 0"
+    )
+
+
+class VertexSource(VertexPoint, Start):
+    """A source at a vertex."""
+
+
+class EdgeSource(EdgePoint, Start):
+    """A source on an edge."""
+
+
+class FaceSource(FacePoint, Start):
+    """A source in a face."""
+
+
+class PositionSource(PositionPoint, Start):
+    """A source at the point of the surface that is nearest to a position."""
+
+
+POINT_TAGS = {name: f"by {name}" for name in ("vertex", "edge", "face", "position")}
+"""What tells the ways to write a point apart: a field that each has, and what pydantic calls it."""
+
+
+def _tag(written: Any) -> str | None:
+    if isinstance(written, Wire):
+        written = written.model_fields_set
+    fields = written if isinstance(written, dict | set) else ()
+    return next((tag for name, tag in POINT_TAGS.items() if name in fields), None)
+
+
+_BY_FIELD = Discriminator(
+    _tag,
+    custom_error_type="point",
+    custom_error_message="A point has vertex, edge and t, face and barycentric, or position",
+)
+
+Point = Annotated[
+    Annotated[VertexPoint, Tag(POINT_TAGS["vertex"])]
+    | Annotated[EdgePoint, Tag(POINT_TAGS["edge"])]
+    | Annotated[FacePoint, Tag(POINT_TAGS["face"])]
+    | Annotated[PositionPoint, Tag(POINT_TAGS["position"])],
+    _BY_FIELD,
+]
+"""A point of the surface, in any of four ways."""
+
+Source = Annotated[
+    Annotated[VertexSource, Tag(POINT_TAGS["vertex"])]
+    | Annotated[EdgeSource, Tag(POINT_TAGS["edge"])]
+    | Annotated[FaceSource, Tag(POINT_TAGS["face"])]
+    | Annotated[PositionSource, Tag(POINT_TAGS["position"])],
+    _BY_FIELD,
+]
+"""A point where distances start, at ``start_distance``."""
 
 
 class Accuracy(Wire):
@@ -60,12 +148,22 @@ class Accuracy(Wire):
 class DistancesRequest(Accuracy):
     """Distances from the nearest of ``sources`` to all vertices, or to ``targets`` only."""
 
-    model_config = ConfigDict(json_schema_extra={"examples": [{"sources": [{"vertex": 0}]}]})
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"sources": [{"vertex": 0}]},
+                {
+                    "sources": [{"position": [1.0, 2.0, 3.0]}],
+                    "targets": [{"face": 7, "barycentric": [0.2, 0.3, 0.5]}],
+                },
+            ]
+        }
+    )
 
     sources: list[Source] = Field(min_length=1)
     targets: list[Point] | None = Field(default=None, min_length=1)
     max_distance: NonNegative | None = Field(
-        default=None, description="Vertices farther than this are left unreached"
+        default=None, description="What is farther than this is left unreached"
     )
     include: list[Literal["nearest_source"]] = []
 
@@ -95,6 +193,19 @@ class PathRequest(Accuracy):
     )
 
 
+class LocateRequest(Wire):
+    """The points of the surface that are nearest to some positions."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"points": [[1.0, 2.0, 3.0]], "max_distance": 0.5}]}
+    )
+
+    points: list[Triple] = Field(min_length=1, description="Positions: x, y, z in mesh units")
+    max_distance: NonNegative | None = Field(
+        default=None, description="How far the surface may be from each"
+    )
+
+
 AnswerFormat = Literal["json", "npy", "octets"]
 
 
@@ -112,13 +223,25 @@ class PathAnswerParameters(AnswerParameters):
     )
 
 
-class PathParameters(PathAnswerParameters, Accuracy):
-    """The stops of a path, each a vertex as ``v`` and its index."""
+_WRITTEN = (
+    "A vertex as `v12`, a point of the edge between two vertices as `e12-13:0.3`, of a face as "
+    "`f7:0.2,0.3,0.5`, or what is nearest to a position as `p1,2,3`"
+)
 
-    source: str = Field(alias="from", examples=["v0"])
-    target: str = Field(alias="to", examples=["v99"])
+
+class PathParameters(PathAnswerParameters, Accuracy):
+    """The stops of a path.
+
+    Each is a vertex as ``v12``, a point of an edge as ``e12-13:0.3``, of a face as
+    ``f7:0.2,0.3,0.5``, or a position as ``p1,2,3``.
+    """
+
+    source: str = Field(alias="from", description=_WRITTEN, examples=["v0"])
+    target: str = Field(alias="to", description=_WRITTEN, examples=["f7:0.2,0.3,0.5"])
     via: list[str] = Field(
-        default=[], description="A waypoint; may be given again, in order", examples=[["v7"]]
+        default=[],
+        description="A waypoint, written likewise; may be given again, in order",
+        examples=[["v7"]],
     )
 
 
@@ -174,9 +297,15 @@ class ErrorBound(BaseModel):
 
 
 class ResolvedPoint(BaseModel):
-    """A point as it was understood."""
+    """A point as it was understood: in one spelling, however it was written."""
 
-    vertex: int
+    vertex: int | None = Field(default=None, description="Where the point is a vertex")
+    face: int | None = Field(
+        default=None, description="Where it is none: the lowest face that it is in"
+    )
+    barycentric: tuple[float, float, float] | None = Field(
+        default=None, description="The weights of that face's corners"
+    )
     position: tuple[float, float, float]
 
 
@@ -201,6 +330,7 @@ class DistancesAnswer(BaseModel):
     exact: bool
     error_bound: ErrorBound
     sources: list[ResolvedSource]
+    targets: list[ResolvedPoint] | None = Field(default=None, description="Where given")
     distances: list[float | None]
     nearest_source: list[int | None] | None = Field(
         default=None, description="Index into `sources` for each distance, where asked for"
@@ -252,6 +382,20 @@ class PathAnswer(BaseModel):
         default=None, description="Of the search, leg by leg, where asked for by `explain`"
     )
     error_bound: ErrorBound
+    warnings: list[str]
+
+
+class LocatedPoint(ResolvedPoint):
+    """The point of the surface that is nearest to a position."""
+
+    distance: float = Field(description="How far it is from there")
+
+
+class LocateAnswer(BaseModel):
+    """The nearest points, ``null`` for each position that is farther away than allowed."""
+
+    mesh_id: str
+    points: list[LocatedPoint | None]
     warnings: list[str]
 
 

@@ -20,7 +20,14 @@ from app.engine import (
 )
 from app.errors import Fault, ProblemError, refuse
 from app.mesh_store import PUBLIC_ARRAYS, MeshStore
-from app.queries import DistancesQuery, Query, refuse_large_json, result_key, value_count
+from app.queries import (
+    DistancesQuery,
+    MeshSize,
+    Query,
+    refuse_large_json,
+    result_key,
+    value_count,
+)
 from app.result_store import Result, ResultStore, result_name
 from app.settings import Settings, variable_of
 
@@ -76,9 +83,10 @@ class Service:
             "arrays": {name: f"/v1/meshes/{mesh_id}/arrays/{name}" for name in names},
         }
 
-    def vertex_count(self, mesh_id: str) -> int:
-        """Return the number of vertices of a mesh."""
-        return int(self.meshes.manifest(mesh_id)["report"]["vertices"])
+    def size(self, mesh_id: str) -> MeshSize:
+        """Return how many vertices and faces a mesh has."""
+        report = self.meshes.manifest(mesh_id)["report"]
+        return MeshSize(report["vertices"], report["faces"])
 
     async def list_meshes(self, limit: int, after: str) -> tuple[list[dict[str, Any]], str | None]:
         """Return the reports of ``limit`` meshes after an id, and where to go on, if anywhere."""
@@ -111,7 +119,7 @@ class Service:
 
     def _refuse_format(self, query: Query, media_type: str) -> None:
         if media_type == JSON:
-            values = value_count(query, self.vertex_count(query.mesh_id))
+            values = value_count(query, self.size(query.mesh_id).vertices)
             refuse_large_json(query, values, self.settings)
         elif isinstance(query, DistancesQuery) and query.nearest_source:
             fault = Fault("/include", "nearest_source comes with JSON only")

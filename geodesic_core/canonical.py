@@ -53,6 +53,22 @@ def in_face(
     return _on_edge(topology, faces, h, at_tail, at_head)
 
 
+def on_edge(topology: Topology, start: int, end: int, t: float) -> SurfacePoint | None:
+    """Return the point at share ``t`` of the edge between two vertices; None where there is none.
+
+    Its weights are as given, not canonical.
+    """
+    links = topology.links
+    v, u = topology.inner_vertex[start], topology.inner_vertex[end]
+    for h in topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]].tolist():
+        before = h - h % 3 + (h + 2) % 3  # the half-edge that leads to v in this face
+        if links[h, HEAD] == u:
+            return SurfacePoint.edge(_outer_half_edge(topology, h) // 3, h % 3, t)
+        if links[before, TAIL] == u:
+            return SurfacePoint.edge(_outer_half_edge(topology, h) // 3, before % 3, 1.0 - t)
+    return None
+
+
 def weights_of(point: Floats, corners: Floats, snap: float) -> list[float]:
     """Return the weights of a point of a face, zero where it is nearer than ``snap`` to an edge.
 

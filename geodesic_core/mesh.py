@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core import canonical
-from geodesic_core.arguments import as_limit
+from geodesic_core.arguments import as_limit, is_number
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 from geodesic_core.kernels import topology as kernels
 from geodesic_core.kernels.topology import Topology
 from geodesic_core.nearest_face import NearestFace
 from geodesic_core.surface_point import SurfacePoint
-from geodesic_core.tolerances import SNAP
+from geodesic_core.tolerances import SNAP, WEIGHT_ERROR
 
 Merge = Literal["none", "exact"]
 
@@ -178,7 +178,8 @@ class TriangleMesh:
         Raises
         ------
         InvalidPoint
-            The position is not three finite numbers, or the surface is farther away.
+            The position is not three numbers of a size that vertices may have, or the surface is
+            farther away.
         InvalidArgument
             The distance is not a number, 0 or more.
 
@@ -191,8 +192,12 @@ class TriangleMesh:
             place = np.asarray(position, dtype=np.float64)
         except (TypeError, ValueError):
             place = np.empty(0)
-        if place.shape != (3,) or not np.isfinite(place).all():
-            raise InvalidPoint(f"the position is {position!r}; it must be three finite numbers")
+        largest = kernels.LARGEST_COORDINATE
+        if place.shape != (3,) or not (np.abs(place) <= largest).all():
+            raise InvalidPoint(
+                f"the position is {position!r}; it must be three finite numbers, at most "
+                f"{largest:g} in size"
+            )
         limit = as_limit(max_distance)
         face, point, distance = self._nearest_face(place)
         if distance > limit:
@@ -223,6 +228,23 @@ class TriangleMesh:
 
     def _point_in_face(self, face: int, weights: Sequence[float]) -> SurfacePoint:
         return canonical.in_face(self.topology, self.faces, self.inner_face, face, weights)
+
+    def point_on_edge(self, start: int, end: int, t: float) -> SurfacePoint:
+        """Return the canonical point at share ``t`` of the way between the ends of an edge.
+
+        Raises
+        ------
+        InvalidPoint
+            The two are no vertices, no edge joins them, or ``t`` is not from 0 to 1.
+        """
+        for vertex in (start, end):
+            canonical.check_index(vertex, len(self.vertices), "vertex", "end of the edge")
+        if not is_number(t) or not -WEIGHT_ERROR <= t <= 1.0 + WEIGHT_ERROR:
+            raise InvalidPoint(f"t is {t!r}; it must be a number from 0 to 1")
+        point = canonical.on_edge(self.topology, start, end, float(t))
+        if point is None:
+            raise InvalidPoint(f"no edge joins the vertices {start} and {end}")
+        return self.point(point)
 
     def position(self, point: int | SurfacePoint) -> Floats:
         """Return the (3,) position of a point, mesh units; of a vertex exactly the mesh's own.

@@ -22,8 +22,10 @@ from geodesic_core.tolerances import SEARCH_SLACK, TIE
 
 
 class NearestSource(NamedTuple):
-    """The exact distance of a point from the nearest source, and the path from there."""
+    """The source nearest to a point, its exact distance, and the path from there."""
 
+    source: int
+    """Index into the sources of the field; -1 where there is no path"""
     distance: float
     """Mesh units, the source's start distance counted; infinite where there is no path"""
     path: GeodesicPath | None
@@ -47,7 +49,7 @@ def find_nearest_source(
     upper = float((_most(least[corners], bounds) + reaches).min())
     upper = min(upper, _within_face(mesh, sources, start_distances, point), bounds.max_distance)
     if math.isinf(upper):
-        return NearestSource(math.inf, None)
+        return NearestSource(-1, math.inf, None)
     # Whatever is farther than the field was to look is as far as that, at least.
     rest = np.minimum(least, bounds.max_distance)
     goal = goal_at(np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
@@ -64,11 +66,11 @@ def find_nearest_source(
     totals = wave.distance[nodes.targets] + start_distances
     distance = float(totals.min())
     if distance > bounds.max_distance:
-        return NearestSource(math.inf, None)
+        return NearestSource(-1, math.inf, None)
     nearest = int(np.flatnonzero(totals <= distance * (1.0 + TIE))[0])
     winners = winners_of(wave, np.zeros(len(wave.distance), np.int32))
     path = traced_path(mesh, winners, nodes, int(nodes.targets[nearest]), EXACT)
-    return NearestSource(float(totals[nearest]), turned_round(path))
+    return NearestSource(nearest, float(totals[nearest]), turned_round(path))
 
 
 def _most(least: Floats, bounds: Bounds) -> Floats:

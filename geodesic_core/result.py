@@ -71,6 +71,8 @@ class DistanceField:
     """The nodes of the targets that the sweep was told of"""
     _node_distances: Floats
     """(N,) by node"""
+    _node_nearest: Ints
+    """(N,) the same of `nearest_source`"""
     _winners: Winners | None
     """For backtracing; None where the sweep kept nothing for it."""
     _find_winners: Callable[[], Winners]
@@ -96,6 +98,22 @@ class DistanceField:
         if node is not None:
             return float(self._node_distances[node])
         return self._nearest_to(place).distance
+
+    def nearest_source_at(self, point: Point) -> int:
+        """Return the index of the source nearest to any point of the surface; -1 for none.
+
+        Found as `distance_at` finds the distance.
+
+        Raises
+        ------
+        InvalidPoint
+            It is not a point of the mesh.
+        """
+        place = self.mesh.point(point)
+        node = self._node(place)
+        if node is not None:
+            return int(self._node_nearest[node])
+        return self._nearest_to(place).source
 
     def path_to(self, target: Point) -> GeodesicPath:
         """Return a path from the nearest source to any point of the surface (sections 3.5 and 4.3).

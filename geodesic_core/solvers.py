@@ -272,6 +272,7 @@ def _solve(
         _nodes=nodes,
         _node_of=dict(zip(ends, nodes.targets.tolist(), strict=True)),
         _node_distances=wave.distance,
+        _node_nearest=winners.nearest,
         _winners=winners if keeps else None,
         _find_winners=partial(_find_winners, mesh, nodes, distances, bounds),
     )

@@ -118,7 +118,7 @@ def test_distance_writes_npy_csv_and_json(run: Run, plane: Path) -> None:
     assert table[:, 1].tolist() == expected.distances.tolist()
     assert table[:, 2].tolist() == expected.nearest_source.tolist()
     answer = json.loads(Path("d.json").read_text())
-    assert answer["sources"] == [0, 120]
+    assert [source["vertex"] for source in answer["sources"]] == [0, 120]
     assert answer["distances"] == expected.distances.tolist()
     assert answer["nearest_source"] == expected.nearest_source.tolist()
     farthest = int(np.argmax(expected.distances))
@@ -265,6 +265,64 @@ def test_a_path_by_way_of_others_tells_its_steps(run: Run, plane: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("method", ["exact", "approximate"])
+def test_paths_between_points_that_are_no_vertices(run: Run, knot: Path, method: str) -> None:
+    mesh = gc.load_mesh(knot)
+    start, end = mesh.faces[900, :2].tolist()
+    source, target = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), mesh.point_on_edge(start, end, 0.3)
+    if method == "exact":
+        expected = gc.shortest_path(mesh, source, target)
+    else:
+        field = gc.approximate_distance(mesh, source, targets=[target], keep_windows=True)
+        expected = field.path_to(target)
+
+    ends = ["--source", "f40:0.2,0.3,0.5", "--target", f"e{start}-{end}:0.3"]
+    ran = run("path", knot, *ends, "--method", method, "--out", "p.json")
+
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("length") == repr(expected.length)
+    assert json.loads(Path("p.json").read_text())["points"] == expected.points.tolist()
+
+
+def test_all_spellings_of_a_point_give_one_answer(run: Run, knot: Path) -> None:
+    mesh = gc.load_mesh(knot)
+    start, end = mesh.faces[900, :2].tolist()
+    at_start = ",".join(map(repr, mesh.vertices[start].tolist()))
+    one = ["--out", "d.json", "--source", "f40:0.2,0.3,0.5", "--source"]
+    answers, paths = set(), set()
+    for text in (start, f"v{start}", f"e{start}-{end}:0", f"e{end}-{start}:1", f"p{at_start}"):
+        assert run("distance", knot, *one, text).code == 0
+        answer = json.loads(Path("d.json").read_text())
+        del answer["stats"]["seconds"]
+        answers.add(json.dumps(answer))
+        stops = ["--source", text, "--target", 7, "--via", "v30", "--via", text]
+        assert run("path", knot, *stops, "--out", "p.obj").code == 0
+        paths.add(Path("p.obj").read_text())
+    assert (len(answers), len(paths)) == (1, 1)
+    assert answer["sources"][1] == {"vertex": start, "position": mesh.vertices[start].tolist()}
+    assert answer["sources"][0]["face"] == 40
+    assert answer["sources"][0]["barycentric"] == [0.2, 0.3, 0.5]
+    sources = [gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), start]
+    assert answer["distances"] == gc.exact_distance(mesh, sources).distances.tolist()
+
+
+def test_locate_prints_a_point_that_others_take(run: Run, knot: Path) -> None:
+    mesh = gc.load_mesh(knot)
+    for at in ("1,2,0.5", "-1e1,.5,+2", ",".join(map(repr, mesh.vertices[5].tolist()))):
+        ran = run("locate", knot, "--at", at)
+        assert (ran.code, ran.err) == (0, "")
+        position = np.array([float(x) for x in at.split(",")])
+        place = mesh.locate(position)
+        found = mesh.position(place)
+        assert [float(x) for x in ran.figure("position").split(",")] == found.tolist()
+        assert float(ran.figure("distance")) == np.linalg.norm(found - position)
+        ends = ["--source", ran.figure("point"), "--target", 7]
+        path = run("path", knot, *ends, "--out", "p.obj")
+        assert path.figure("length") == repr(gc.shortest_path(mesh, place, 7).length)
+    assert ran.figure("point") == "v5"
+    assert float(ran.figure("distance")) == 0
+
+
 def test_a_path_to_its_own_source_is_a_point(run: Run, plane: Path) -> None:
     assert run("path", plane, "--source", 7, "--target", 7, "--out", "p.obj").code == 0
     assert Path("p.obj").read_text().splitlines()[-1] == "p 1"
@@ -297,6 +355,26 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
         ("distance plane.ply --source 0 --max-distance nan --out d.npy", "max_distance"),
         ("path plane.ply --source 0 --target 999 --out p.obj", "target"),
         ("path plane.ply --method approximate --source 0 --target 999 --out p.obj", "target"),
+        *(
+            (f"path plane.ply {option} {text} {others} --out p.obj", f"{option} {text}: {message}")
+            for option, others in (
+                ("--source", "--target 1"),
+                ("--target", "--source 1"),
+                ("--via", "--source 1 --target 2"),
+            )
+            for text, message in (
+                ("-1", "the point is vertex -1, but vertices are numbered 0 to 120"),
+                ("v121", "the point is vertex 121"),
+                ("e0-120:0.5", "no edge joins the vertices 0 and 120"),
+                ("e0-121:0.5", "the end of the edge is vertex 121"),
+                ("e0-1:1.5", "t is 1.5"),
+                ("f200:1,0,0", "the point is face 200"),
+                ("f0:1,1,0", "the point has the weights (1.0, 1.0, 0.0) in face 0"),
+                ("p0,0,1e99", "the position is"),
+            )
+        ),
+        ("locate plane.ply --at 0,0,-1e99", "--at 0,0,-1e99: the position is"),
+        ("locate nowhere.ply --at 0,0,0", "cannot read nowhere.ply"),
         *(
             (f"{command} --method approximate {option} {value}", f"{name} is")
             for command in (
@@ -336,7 +414,15 @@ def test_what_fails_says_why_in_one_line(
         ("info plane.ply --merge some", "some"),
         ("distance plane.ply --out d.npy", "--source"),
         ("distance plane.ply --source 0", "--out"),
-        ("distance plane.ply --source x --out d.npy", "--source"),
+        ("distance plane.ply --source x --out d.npy", "'--source': 'x' is not a point: write a"),
+        ("distance plane.ply --source f0:1,0 --out d.npy", "'f0:1,0' is not a point"),
+        ("distance plane.ply --source 1.5 --out d.npy", "'1.5' is not a point"),
+        ("path plane.ply --source 0 --target p1,2 --out p.obj", "'--target': 'p1,2' is not"),
+        ("path plane.ply --source 0 --target 1 --via 1-2 --out p.obj", "'--via': '1-2' is not"),
+        ("path plane.ply --source p0,0,1e999 --target 1 --out p.obj", "1e999 is too large"),
+        ("locate plane.ply", "--at"),
+        ("locate plane.ply --at 1,2", "'1,2' is not a position: write it as x,y,z"),
+        ("locate plane.ply --at 1,2,nan", "'1,2,nan' is not a position"),
         ("distance plane.ply --source 0 --out d.txt", "d.txt must end in .npy or .csv or .json"),
         ("distance plane.ply --source 0 --out no/d.npy", "folder"),
         ("path plane.ply --source 0 --target 1 --out p.npy", ".obj or .json"),
@@ -455,7 +541,7 @@ def test_version_and_help(run: Run) -> None:
     assert run("--version").out == f"geodesic {__version__}\n"
     usage = run("--help")
     assert usage.code == 0
-    for command in ("serve", "info", "distance", "path", "sample"):
+    for command in ("serve", "info", "distance", "path", "locate", "sample"):
         assert command in usage.out
         assert "--help" in run(command, "--help").out
 

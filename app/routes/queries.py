@@ -1,4 +1,4 @@
-"""Queries on a mesh: distances and paths."""
+"""Queries on a mesh: distances, paths, and where positions are on it."""
 
 from typing import Annotated, Any
 
@@ -11,14 +11,23 @@ from app.dependencies import (
     require_json,
     while_connected,
 )
-from app.encoding import NPY, OCTETS
+from app.encoding import JSON, NPY, OCTETS
 from app.queries import Query as ValidQuery
-from app.queries import distances_query, path_query, result_key, written_path_query
+from app.queries import (
+    distances_query,
+    locate_query,
+    naming_parameters,
+    path_query,
+    result_key,
+    written_request,
+)
 from app.responses import CACHED, ResultResponse, etag_of, not_modified, problems
 from app.schemas import (
     AnswerParameters,
     DistancesAnswer,
     DistancesRequest,
+    LocateAnswer,
+    LocateRequest,
     PathAnswer,
     PathAnswerParameters,
     PathParameters,
@@ -72,7 +81,7 @@ async def compute_distances(
     deadline: Deadline,
 ) -> Response:
     """Return the distance along the surface from the nearest source to each vertex."""
-    query = distances_query(mesh_id, service.vertex_count(mesh_id), body, service.settings)
+    query = distances_query(mesh_id, service.size(mesh_id), body, service.settings)
     media_type = media_type_of(request, parameters.format)
     return await _respond(service, request, query, media_type, deadline)
 
@@ -94,8 +103,7 @@ async def compute_path(
     deadline: Deadline,
 ) -> Response:
     """Return the points of the path, from source to target, and the faces it crosses."""
-    vertices = service.vertex_count(mesh_id)
-    query = path_query(mesh_id, vertices, body, parameters, service.settings)
+    query = path_query(mesh_id, service.size(mesh_id), body, parameters, service.settings)
     media_type = media_type_of(request, parameters.format)
     return await _respond(service, request, query, media_type, deadline)
 
@@ -114,12 +122,41 @@ async def get_path(
     service: ServiceDep,
     deadline: Deadline,
 ) -> Response:
-    """Return the same as `POST`, for points written as `v0`."""
-    vertices = service.vertex_count(mesh_id)
-    query = written_path_query(mesh_id, vertices, parameters, service.settings)
-    media_type = media_type_of(request, parameters.format)
-    unchanged = not_modified(request, etag_of(result_key(query, media_type)), CACHED)
-    return unchanged or await _respond(service, request, query, media_type, deadline)
+    """Return the same as `POST`, for points written as `v12` or `f7:0.2,0.3,0.5`."""
+    with naming_parameters():
+        body = written_request(parameters)
+        query = path_query(mesh_id, service.size(mesh_id), body, parameters, service.settings)
+        media_type = media_type_of(request, parameters.format)
+        unchanged = not_modified(request, etag_of(result_key(query, media_type)), CACHED)
+        return unchanged or await _respond(service, request, query, media_type, deadline)
+
+
+@router.post(
+    "/locate",
+    operation_id="locatePoints",
+    summary="The points of the surface that are nearest to positions",
+    response_class=Response,
+    responses={
+        200: {"model": LocateAnswer, "description": "The points, in the order of the positions"},
+        **_BODY_PROBLEMS,
+    },
+    dependencies=[Depends(require_json)],
+)
+async def locate_points(
+    mesh_id: str,
+    body: LocateRequest,
+    parameters: Annotated[AnswerParameters, Query()],
+    request: Request,
+    service: ServiceDep,
+    deadline: Deadline,
+) -> Response:
+    """Return the nearest point for each position, `null` where it is farther than `max_distance`.
+
+    A point that is nearer to a vertex or an edge than 1e-12 of the bounding box is on it.
+    """
+    media_type = media_type_of(request, parameters.format, [JSON])
+    query = locate_query(mesh_id, body)
+    return await _respond(service, request, query, media_type, deadline)
 
 
 async def _respond(

@@ -19,6 +19,7 @@ from app.errors import Problem
 from app.main import create_app
 from app.mesh_store import MeshStore
 from app.queries import Approximation, PathQuery
+from app.schemas import VertexPoint
 from app.settings import Settings
 from geodesic_core import TriangleMesh, samples
 
@@ -347,7 +348,8 @@ def test_work_that_was_asked_to_stop_stops(
     state.store.prepare()
     mesh_id, _ = state.store.add(TriangleMesh(*samples.sphere(100_000)))
     monkeypatch.setattr(worker, "_worker", state)
-    work = Answering(PathQuery(mesh_id, 0, 1, approximation), "application/json", f"{mesh_id}/key")
+    query = PathQuery(mesh_id, VertexPoint(vertex=0), VertexPoint(vertex=1), approximation)
+    work = Answering(query, "application/json", f"{mesh_id}/key")
     (tmp_path / "results").mkdir()
 
     asked.value = 2

@@ -6,7 +6,8 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.queries import DistancesQuery, Source, result_key
+from app.queries import DistancesQuery, result_key
+from app.schemas import VertexPoint, VertexSource
 
 from .conftest import NPY, check_problem, distances, mesh_of, serving, upload_sample
 
@@ -90,9 +91,16 @@ def test_the_same_query_is_not_solved_again(client: TestClient, plane: str) -> N
 
 
 def test_the_hash_of_a_query_is_stable(monkeypatch: pytest.MonkeyPatch) -> None:
-    query = DistancesQuery("m", (Source(1, 0.0),), (2,), None, nearest_source=False)
-    twin = DistancesQuery("m", (Source(1, 0.0),), (2,), None, nearest_source=False)
-    other = DistancesQuery("m", (Source(1, 0.0),), None, None, nearest_source=False)
+    source, target = VertexSource(vertex=1), VertexPoint(vertex=2)
+    query = DistancesQuery("m", (source,), (target,), None, nearest_source=False)
+    twin = DistancesQuery(
+        "m",
+        (VertexSource(vertex=1, start_distance=0.0),),
+        (VertexPoint(vertex=2),),
+        None,
+        nearest_source=False,
+    )
+    other = DistancesQuery("m", (source,), None, None, nearest_source=False)
     key = result_key(query, "a/b")
 
     assert key == result_key(twin, "a/b")
@@ -203,9 +211,9 @@ def test_limits_of_queries(tmp_path: Path) -> None:
         large = check_problem(distances(client, mesh_id), 413, "result_too_large")
         assert large["setting"] == "GEODESIC_MAX_JSON_VALUES"
         assert "application/x-npy" in large["hint"]
-        twice = {"targets": [{"vertex": 0}] * 26, "include": ["nearest_source"]}
+        twice = {"targets": [{"vertex": 0}] * 6, "include": ["nearest_source"]}
         large = check_problem(distances(client, mesh_id, **twice), 413, "result_too_large")
-        assert large["actual"] == 52
+        assert large["actual"] == 6 * (2 + 8)
 
         for method in ("exact", "approximate"):
             response = distances(client, mesh_id, NPY, method=method)

@@ -256,3 +256,68 @@ def test_max_distance_counts_for_points_as_for_vertices(case):
         else:
             assert told.distance_at(target) == pytest.approx(distance, rel=SAME, abs=1e-14)
             assert near.distance_at(target) == pytest.approx(distance, rel=EXACT, abs=1e-14)
+
+
+@zoo.each(zoo.SMALL)
+def test_points_of_an_edge_by_its_ends(case):
+    mesh = mesh_of(case)
+    for face, corners in list(enumerate(mesh.faces.tolist()))[:30]:
+        for corner in range(3):
+            start, end = corners[corner], corners[(corner + 1) % 3]
+            for t in (0.0, 0.3, 1 / 3, 1.0, 1 + 1e-16, -5e-17):
+                point = mesh.point_on_edge(start, end, t)
+                assert point == mesh.point(gc.SurfacePoint.edge(face, corner, t))
+                assert point == mesh.point_on_edge(end, start, 1.0 - t)
+
+
+@pytest.mark.parametrize(
+    ("ends", "t", "message"),
+    [
+        ((0, 5), 0.5, "no edge joins the vertices 0 and 5"),
+        ((0, 0), 0.5, "no edge joins"),
+        ((0, -1), 0.5, "end of the edge is vertex -1"),
+        ((6, 0), 0.5, "end of the edge is vertex 6"),
+        ((0, 1.0), 0.5, "end of the edge is 1.0"),
+        ((0, 1), 1.5, "t is 1.5"),
+        ((0, 1), -1e-6, "t is -1e-06"),
+        ((0, 1), math.nan, "t is nan"),
+        ((0, 1), "0.5", "t is '0.5'"),
+    ],
+)
+def test_edges_and_shares_that_there_are_not(ends, t, message):
+    vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 2, 2], [3, 3, 3]]
+    mesh = gc.TriangleMesh(vertices, [[0, 1, 2], [0, 2, 3]])
+
+    with pytest.raises(gc.errors.InvalidPoint, match=message):
+        mesh.point_on_edge(*ends, t)
+
+
+@zoo.each(zoo.SMALL)
+@pytest.mark.parametrize("approximate", [False, True])
+def test_the_nearest_source_of_points(case, approximate):
+    """By a sweep from each source alone; where two are as near, either will do."""
+    mesh = mesh_of(case)
+    points = random_points(mesh, 4 if WITHOUT_JIT else 8, seed=7)
+    sources = [gc.Source(point, 0.1 * i * mesh.diagonal) for i, point in enumerate(points[:3])]
+    alone = [
+        [source.start_distance + gc.exact_distance(mesh, source.point).distance_at(point)
+         for source in sources]
+        for point in points
+    ]  # fmt: skip
+    solve = gc.approximate_distance if approximate else gc.exact_distance
+    for targets in ((), points):
+        field = solve(mesh, sources, targets=targets)
+        for point, distances in zip(points, alone, strict=True):
+            nearest = field.nearest_source_at(point)
+            if math.isinf(min(distances)):
+                assert nearest == -1
+            else:
+                assert distances[nearest] <= min(distances) * (1 + 3e-3) + 1e-14
+        nearest = [field.nearest_source_at(v) for v in range(len(mesh.vertices))]
+        np.testing.assert_array_equal(nearest, field.nearest_source)
+
+
+@pytest.mark.parametrize("position", [(1e51, 0, 0), (0, -1e160, 0), (0, 0, 1.7e308)])
+def test_positions_too_large_for_vertices(position):
+    with pytest.raises(gc.errors.InvalidPoint, match=r"at most 1e\+50 in size"):
+        mesh_of(zoo.SMALL["octahedron"]).locate(position)
