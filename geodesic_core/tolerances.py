@@ -144,3 +144,10 @@ One spelling of a point differs from another by rounding: by 1e-16 of the edge a
 
 SNAP = 1e-12
 """Share of the bounding box's diagonal within which a position counts as on a vertex or an edge."""
+
+FAN = 1e-9
+"""Share of a polygon's area that each triangle of a fan must have for the fan to be taken.
+
+Less is a sliver or rounding, where three corners lie on one line: another way to cut the polygon is
+looked for. The surface of a flat polygon is the same either way.
+"""
