@@ -116,22 +116,55 @@ def _is_fan(flat: Floats, start: int) -> Flags:
 def _earcut(flat: Floats) -> list[tuple[int, int, int]]:
     """Return triangles of a polygon, counter-clockwise.
 
-    earcut may leave out corners in line with their neighbours; each is put back on its edge, which
-    a neighbouring face ends at.
+    earcut leaves out some corners in line with their neighbours, and makes slivers of others. The
+    former are put back as slivers; slivers then take in the triangle beyond their longest edge.
     """
     count = len(flat)
     cut = mapbox_earcut.triangulate_float64(flat, np.array([count], np.uint32)).reshape(-1, 3)
-    left = [(int(a), int(b), int(c)) for a, b, c in cut]
-    edges = {(tip[i], tip[i - 2]) for tip in left for i in range(3)}
-    whole: list[tuple[int, int, int]] = []
-    while left and len(left) + len(whole) <= count - 2:
-        a, b, c = left.pop()
-        for i, j, k in ((a, b, c), (b, c, a), (c, a, b)):
-            between = (i + 1) % count
-            if between != j and (j, i) not in edges:
-                edges |= {(between, k), (k, between)}
-                left += [(i, between, k), (between, j, k)]
-                break
-        else:
-            whole.append((a, b, c))
-    return whole[::-1]
+    apex: dict[tuple[int, int], int] = {}  # of the triangle on the left of each directed edge
+    for a, b, c in cut.tolist():
+        apex[a, b], apex[b, c], apex[c, a] = c, a, b
+    for a, b in [edge for edge in apex if edge[::-1] not in apex]:
+        corner = a
+        while (following := (corner + 1) % count) != b and len(apex) < 3 * count:
+            _put(apex, (b, corner, following))
+            corner = following
+    _without_slivers(apex, flat)
+    return [(a, b, c) for (a, b), c in apex.items() if a < min(b, c)]
+
+
+def _put(apex: dict[tuple[int, int], int], triangle: tuple[int, int, int]) -> None:
+    a, b, c = triangle
+    apex[a, b], apex[b, c], apex[c, a] = c, a, b
+
+
+def _without_slivers(apex: dict[tuple[int, int], int], flat: Floats) -> None:
+    """Flip the longest edge of each triangle of no area, where it is no side of the polygon."""
+    points = [complex(x, y) for x, y in flat]
+
+    def is_sliver(triangle: tuple[int, int, int]) -> bool:
+        a, b, c = (points[i] for i in triangle)
+        u, w = b - a, c - a
+        return u.real * w.imag - u.imag * w.real <= FAN * whole
+
+    x, y = flat.T
+    whole = float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    slivers = [
+        t for t in ((a, b, c) for (a, b), c in apex.items() if a < min(b, c)) if is_sliver(t)
+    ]
+    for _ in range(4 * len(points)):  # slivers beside slivers take a few turns
+        if not slivers:
+            return
+        a, b, c = slivers.pop()
+        if apex.get((a, b)) != c:
+            continue  # gone meanwhile
+        sides = ((a, b, c), (b, c, a), (c, a, b))
+        a, b, c = max(sides, key=lambda side: abs(points[side[1]] - points[side[0]]))
+        beyond = apex.get((b, a))
+        if beyond is None:
+            continue
+        del apex[a, b], apex[b, a]
+        for triangle in ((a, beyond, c), (beyond, b, c)):
+            _put(apex, triangle)
+            if is_sliver(triangle):
+                slivers.append(triangle)

@@ -54,7 +54,7 @@ class MeshReport:
     isolated_vertices: Sample
     """Vertices of no face of the surface."""
     duplicate_vertices: Sample
-    """Vertices at the position of an earlier one."""
+    """Vertices of the surface at the position of an earlier one."""
     repeated_vertex_faces: Sample
     """Faces that repeat a vertex: they have a number, but are no part of the surface."""
     duplicate_faces: Sample
@@ -107,7 +107,7 @@ def report_of(
         boundary_vertices=int(np.count_nonzero(flags & kernels.BOUNDARY)),
         bow_tie_vertices=Sample.of(np.flatnonzero(flags & kernels.FANS)),
         isolated_vertices=Sample.of(np.flatnonzero(~is_used)),
-        duplicate_vertices=Sample.of(repeated(vertices)),
+        duplicate_vertices=Sample.of(used[repeated(vertices[used])]),
         repeated_vertex_faces=Sample.of(np.setdiff1d(np.arange(len(faces)), surface)),
         duplicate_faces=Sample.of(surface[repeated(np.sort(faces[surface], axis=1))]),
         degenerate_faces=Sample.of(np.sort(topology.outer_face[flat])),
