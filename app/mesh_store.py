@@ -8,7 +8,7 @@
         results/                       see ``result_store``
         tmp/                           what is being written; swept when the service starts
 
-The id is a hash over the canonical arrays (vertices, faces, the two maps), not over the bytes of the
+The id is a hash over the canonical arrays (vertices, faces, both maps), not over the bytes of the
 upload: the same mesh as PLY, as JSON or as a sample is one entry with one set of results; and a
 later reader that gets other arrays out of the same file also gets another id, so that no kept
 result can be taken for one of another mesh.

@@ -326,12 +326,15 @@ def _as_faces(faces: ArrayLike) -> Longs:
 
 
 def _as_polygons(corners: ArrayLike, sizes: ArrayLike) -> tuple[Longs, Longs]:
-    flat, counts = np.asarray(corners), np.asarray(sizes)
+    try:
+        flat, counts = np.asarray(corners), np.asarray(sizes)
+    except ValueError as error:
+        raise InvalidMesh(f"polygons are not rows of corners: {error}", kind="face") from error
+    if counts.size == 0:
+        raise InvalidMesh("the mesh has no faces", kind="face")
     for name, array in (("corners", flat), ("sizes", counts)):
         if array.ndim != 1 or array.dtype.kind not in "iu":
             raise InvalidMesh(f"{name} must be one row of integers", kind="face")
-    if len(counts) == 0:
-        raise InvalidMesh("the mesh has no faces", kind="face")
     empty = np.flatnonzero(counts < 1)
     if len(empty):
         raise InvalidMesh(

@@ -106,8 +106,8 @@ async def create_mesh(
     """Read, check and store a mesh; the id is a hash of its content.
 
     The body is the file itself (with its format in `Content-Type` or `?format=`), a form with one
-    file, or JSON. Vertices keep the numbers they have in the file, and so do faces, unless there are
-    polygons: these become triangles in their place, and `face_map` leads back to them.
+    file, or JSON. Vertices and triangles keep the order they have in the file; polygons become
+    triangles in their place, and `face_map` leads back to them.
     """
     if parameters.sample is None:
         stored, seconds = await _add_upload(service, parameters, request, deadline)

@@ -147,6 +147,7 @@ def test_an_edge_of_no_length_is_refused():
         ([[0, 1, 2]], [3], "integers"),
         (["0", "1", "2"], [3], "integers"),
         ([0, 1, 2], [3.0], "integers"),
+        ([[0, 1, 2], [0, 1]], [3, 2], "rows of corners"),
         ([0, 0, 1, 1, 1], [4, 1], "repeats a vertex"),
     ],
 )
