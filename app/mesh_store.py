@@ -8,7 +8,7 @@
         results/                       see ``result_store``
         tmp/                           what is being written; swept when the service starts
 
-The id is a hash over the canonical arrays (vertices, faces, vertex map), not over the bytes of the
+The id is a hash over the canonical arrays (vertices, faces, both maps), not over the bytes of the
 upload: the same mesh as PLY, as JSON or as a sample is one entry with one set of results; and a
 later reader that gets other arrays out of the same file also gets another id, so that no kept
 result can be taken for one of another mesh.
@@ -33,17 +33,18 @@ from numpy.typing import NDArray
 from app.errors import ProblemError, refuse
 from geodesic_core import Solver, TriangleMesh
 
-VERSION = 2
+VERSION = 3
 PUBLIC_ARRAYS = {
     "vertices": "vertices",
     "faces": "faces",
     "vertex_map": "vertex_map",
+    "face_map": "face_map",
     "components": "component",
 }
 """The names under which clients read arrays, and those that ``TriangleMesh.arrays`` gives them."""
 
 _ID_BYTES = 16
-_DEFINING_ARRAYS = ("vertices", "faces", "vertex_map")
+_DEFINING_ARRAYS = ("vertices", "faces", "vertex_map", "face_map")
 
 
 @dataclass(frozen=True)
@@ -137,8 +138,9 @@ class MeshStore:
             raise refuse("not_found", f"there is no array {name!r}, but {', '.join(PUBLIC_ARRAYS)}")
         path = folder / f"{PUBLIC_ARRAYS[name]}.npy"
         if not path.is_file():
-            # TriangleMesh has no vertex map where it is the identity.
-            raise refuse("not_found", f"the mesh has no {name}: it keeps the vertices of its file")
+            # TriangleMesh has no map where it is the identity.
+            kept = "vertices" if name == "vertex_map" else "faces"
+            raise refuse("not_found", f"the mesh has no {name}: it keeps the {kept} of its file")
         return path
 
     def page(self, after: str, limit: int) -> tuple[list[str], bool]:

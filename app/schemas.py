@@ -264,17 +264,47 @@ class ListParameters(Wire):
 # Answers
 
 
+class Sample(BaseModel):
+    """How many elements of a kind there are, and the ids of the first ten; an edge has two."""
+
+    count: int
+    ids: list[int | tuple[int, int]]
+
+
 class MeshDocument(BaseModel):
     """The report of a mesh in the store."""
 
-    model_config = ConfigDict(extra="allow")
-
     id: str
     vertices: int
-    faces: int
-    warnings: list[str]
+    faces: int = Field(description="All of them, those that repeat a vertex as well")
+    warnings: list[str] = Field(description="A sentence or two each, with the remedy")
     created: str = Field(description="When it was stored, RFC 3339")
     arrays: dict[str, str] = Field(description="Where its arrays can be read, by name")
+    edges: int
+    triangulated_polygons: int = Field(
+        description="Polygons that became several faces; the array `face_map` leads back to them"
+    )
+    components: int
+    component_vertices: Sample = Field(description="The lowest vertex of each component")
+    boundary_loops: int
+    euler_characteristic: int
+    saddle_vertices: int
+    boundary_vertices: int
+    bow_tie_vertices: Sample = Field(description="Where several fans of faces meet")
+    isolated_vertices: Sample = Field(description="Of no face of the surface")
+    duplicate_vertices: Sample = Field(
+        description="At the position of an earlier one; `merge=exact` joins them"
+    )
+    repeated_vertex_faces: Sample = Field(
+        description="Made of fewer than three different vertices: no part of the surface"
+    )
+    duplicate_faces: Sample = Field(description="Of the same three vertices as an earlier one")
+    degenerate_faces: Sample = Field(description="Of the surface, but without area")
+    non_manifold_edges: Sample
+    inconsistent_orientation: bool
+    misoriented_edges: Sample
+    bounds: tuple[tuple[float, float, float], tuple[float, float, float]]
+    mean_edge_length: float
 
 
 class MeshList(BaseModel):

@@ -7,9 +7,10 @@ Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then
 
 from geodesic_core import errors, samples
 from geodesic_core.errors import GeodesicError
-from geodesic_core.mesh import MeshReport, Sample, TriangleMesh
+from geodesic_core.mesh import TriangleMesh
 from geodesic_core.mesh_io import load_mesh
 from geodesic_core.path import ErrorBound, GeodesicPath, SearchStep
+from geodesic_core.report import MeshReport, Sample
 from geodesic_core.result import DistanceField, Source, SweepStats
 from geodesic_core.solvers import (
     Solver,

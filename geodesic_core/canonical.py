@@ -14,7 +14,7 @@ import numpy as np
 from geodesic_core.arguments import is_index, is_number
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import InvalidPoint
-from geodesic_core.kernels.topology import HEAD, TAIL, Topology, next_around
+from geodesic_core.kernels.topology import HEAD, TAIL, Topology, next_around, previous
 from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import EDGE_STEPS, WEIGHT, WEIGHT_ERROR
 
@@ -53,19 +53,15 @@ def in_face(
     return _on_edge(topology, faces, h, at_tail, at_head)
 
 
-def on_edge(topology: Topology, start: int, end: int, t: float) -> SurfacePoint | None:
-    """Return the point at share ``t`` of the edge between two vertices; None where there is none.
-
-    Its weights are as given, not canonical.
-    """
-    links = topology.links
+def on_edge(topology: Topology, faces: Ints, start: int, end: int, t: float) -> SurfacePoint | None:
+    """Return the point at share ``t`` of the edge between two vertices; None if there is none."""
     v, u = topology.inner_vertex[start], topology.inner_vertex[end]
-    for h in topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]].tolist():
-        before = h - h % 3 + (h + 2) % 3  # the half-edge that leads to v in this face
-        if links[h, HEAD] == u:
-            return SurfacePoint.edge(_outer_half_edge(topology, h) // 3, h % 3, t)
-        if links[before, TAIL] == u:
-            return SurfacePoint.edge(_outer_half_edge(topology, h) // 3, before % 3, 1.0 - t)
+    share = {v: 1.0 - t, u: t}
+    for corner in topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]]:
+        for h in (int(corner), int(previous(corner))):
+            ends = topology.links[h, [TAIL, HEAD]]
+            if u in ends:
+                return _on_edge(topology, faces, h, share[ends[0]], share[ends[1]])
     return None
 
 

@@ -1,7 +1,6 @@
 """The triangle mesh: validated, frozen, with its topology."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any, Literal
 
@@ -11,62 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 from geodesic_core import canonical
 from geodesic_core.arguments import as_limit, is_number
 from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.equal_rows import merged
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 from geodesic_core.kernels import topology as kernels
 from geodesic_core.kernels.topology import Topology
 from geodesic_core.nearest_face import NearestFace
+from geodesic_core.polygons import triangulated
+from geodesic_core.report import NAMED, MeshReport, report_of, warnings_of
 from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import SNAP, WEIGHT_ERROR
 
 Merge = Literal["none", "exact"]
-
-_SAMPLE = 10
-"""Ids named in a message or a report, at most."""
-
-
-@dataclass(frozen=True, slots=True)
-class Sample:
-    """How many elements of a kind there are, and the ids of the first ten."""
-
-    count: int
-    ids: tuple[int, ...]
-
-    @classmethod
-    def of(cls, ids: NDArray[Any]) -> "Sample":
-        """Return the sample of an array of ids."""
-        return cls(len(ids), tuple(ids[:_SAMPLE].tolist()))
-
-
-@dataclass(frozen=True, slots=True)
-class MeshReport:
-    """What was found in a mesh: the counts a user checks before trusting an answer."""
-
-    vertices: int
-    faces: int
-    edges: int
-    components: int
-    """Connected components with at least one face."""
-    boundary_loops: int
-    euler_characteristic: int
-    """V - E + F, isolated vertices not counted."""
-    saddle_vertices: int
-    boundary_vertices: int
-    bow_tie_vertices: Sample
-    """Vertices where several fans of faces meet."""
-    isolated_vertices: Sample
-    """Vertices of no face."""
-    degenerate_faces: Sample
-    """Faces of zero area."""
-    non_manifold_edges: Sample
-    inconsistent_orientation: bool
-    bounds: tuple[tuple[float, ...], tuple[float, ...]]
-    """Lowest and highest corner of the bounding box, mesh units."""
-    mean_edge_length: float
-    """Mesh units."""
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the report as what JSON can hold."""
-        return asdict(self)
 
 
 class TriangleMesh:
@@ -77,7 +31,8 @@ class TriangleMesh:
     vertices
         (V, 3) positions, mesh units; finite.
     faces
-        (F, 3) vertex indices, integers; counter-clockwise seen from outside.
+        (F, 3) vertex indices, integers. Neighbours may be wound differently, and an edge may have
+        any number of faces.
     merge
         ``"exact"`` merges vertices at equal positions, in order of first appearance;
         `vertex_map` then leads from given to merged vertices. ``"none"`` keeps them apart.
@@ -85,31 +40,90 @@ class TriangleMesh:
     Raises
     ------
     InvalidMesh
-        Naming the elements at fault: wrong shape or type, NaN or infinity, an index out of range, a
-        face that repeats a vertex or has an edge of no length, an edge of three faces or more,
-        neighbours of inconsistent orientation.
+        Naming the elements at fault: wrong shape or type, NaN or infinity, an index out of range,
+        no face of three different vertices, a face with an edge of no length.
 
     Notes
     -----
     The arrays are copied once, and read-only. Vertices and faces keep the caller's order: the
-    topology's own, nearer in memory, shows nowhere. Preparing costs O(V + F) time, and memory of
-    about 365 bytes a face.
+    topology's own, nearer in memory, shows nowhere. A face that repeats a vertex keeps its number,
+    but is no part of the surface: it joins nothing, and no point lies in it. Preparing costs
+    O(V + F) time, and memory of about 365 bytes a face.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, merge: Merge = "none") -> None:
-        points, triangles = _as_vertices(vertices), _as_faces(faces)
-        _refuse_bad_elements(points, triangles)
+        self._build(_as_vertices(vertices), _as_faces(faces), None, merge, ())
+
+    @classmethod
+    def from_polygons(
+        cls,
+        vertices: ArrayLike,
+        corners: ArrayLike,
+        sizes: ArrayLike,
+        merge: Merge = "none",
+        notes: Sequence[str] = (),
+    ) -> "TriangleMesh":
+        """Return the mesh of polygons, each cut into triangles in its place.
+
+        `face_map` leads from faces to polygons. One of fewer than three different corners becomes
+        one face that repeats a vertex.
+
+        Parameters
+        ----------
+        vertices
+            (V, 3) positions, mesh units; finite.
+        corners
+            (C,) vertex indices of all polygons, one polygon after the other.
+        sizes
+            (P,) how many corners each polygon has, 1 or more.
+        merge
+            As `TriangleMesh` takes it.
+        notes
+            What `warnings` begin with.
+
+        Raises
+        ------
+        InvalidMesh
+            As `TriangleMesh` does.
+        """
+        points = _as_vertices(vertices)
+        _refuse_bad_vertices(points)
+        flat, counts = _as_polygons(corners, sizes)
+        _refuse_out_of_range(flat, counts, len(points))
+        faces, face_map = triangulated(points, flat, counts)
+        mesh = cls.__new__(cls)
+        mesh._build(points, faces, face_map, merge, notes)
+        return mesh
+
+    def _build(
+        self,
+        points: Floats,
+        triangles: Longs,
+        face_map: Longs | None,
+        merge: Merge,
+        notes: Sequence[str],
+    ) -> None:
+        outcome, _ = kernels.check_arrays(points, triangles)
+        if outcome != kernels.SOUND:
+            _refuse_bad_vertices(points)
+            _refuse_out_of_range(triangles.reshape(-1), np.full(len(triangles), 3), len(points))
         vertex_map: Longs | None = None
         if merge == "exact":
-            points, vertex_map = _merge_equal(points)
+            points, vertex_map = merged(points)
             triangles = vertex_map[triangles]
-            _refuse_bad_elements(points, triangles)
         elif merge != "none":
             raise InvalidArgument(f"merge is {merge!r}; it must be 'none' or 'exact'")
-        self._hold(points, triangles.astype(np.int32), vertex_map, _prepare(points, triangles))
+        topology = _prepare(points, triangles)
+        self._hold(points, triangles.astype(np.int32), vertex_map, face_map, topology, notes)
 
     def _hold(
-        self, vertices: Floats, faces: Ints, vertex_map: Longs | None, topology: Topology
+        self,
+        vertices: Floats,
+        faces: Ints,
+        vertex_map: Longs | None,
+        face_map: Longs | None,
+        topology: Topology,
+        notes: Sequence[str] = (),
     ) -> None:
         self.vertices = _frozen(vertices)
         """(V, 3) float64, read-only; mesh units."""
@@ -117,8 +131,11 @@ class TriangleMesh:
         """(F, 3) int32, read-only."""
         self.vertex_map = None if vertex_map is None else _frozen(vertex_map)
         """(given vertices,) int64: the vertex that each given one became; None where none moved."""
+        self.face_map = None if face_map is None else _frozen(face_map)
+        """(F,) int64: the polygon that each face came from; None where each polygon is one face."""
         self.topology = Topology(*(_frozen(array) for array in topology))
         """Half-edges and flat geometry, see `geodesic_core.kernels.topology`."""
+        self._notes = tuple(notes)
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "TriangleMesh":
@@ -128,6 +145,7 @@ class TriangleMesh:
             arrays["vertices"],
             arrays["faces"],
             arrays.get("vertex_map"),
+            arrays.get("face_map"),
             Topology(**{name: arrays[name] for name in Topology._fields}),
         )
         return mesh
@@ -137,6 +155,8 @@ class TriangleMesh:
         arrays: dict[str, NDArray[Any]] = {"vertices": self.vertices, "faces": self.faces}
         if self.vertex_map is not None:
             arrays["vertex_map"] = self.vertex_map
+        if self.face_map is not None:
+            arrays["face_map"] = self.face_map
         return arrays | self.topology._asdict()
 
     @property
@@ -151,9 +171,10 @@ class TriangleMesh:
 
     @cached_property
     def inner_face(self) -> Ints:
-        """(F,) int32: the topology's number of each face."""
-        inner = np.empty(len(self.faces), np.int32)
-        inner[self.topology.outer_face] = np.arange(len(inner), dtype=np.int32)
+        """(F,) int32: the topology's number of each face; -1 of one that repeats a vertex."""
+        inner = np.full(len(self.faces), -1, np.int32)
+        outer = self.topology.outer_face
+        inner[outer] = np.arange(len(outer), dtype=np.int32)
         return inner
 
     @cached_property
@@ -163,7 +184,7 @@ class TriangleMesh:
 
     @cached_property
     def _nearest_face(self) -> NearestFace:
-        return NearestFace(self.vertices, self.faces)
+        return NearestFace(self.vertices, self.faces, np.flatnonzero(self.inner_face >= 0))
 
     def locate(self, position: ArrayLike, max_distance: float | None = None) -> SurfacePoint:
         """Return the point of the surface nearest to a position.
@@ -220,6 +241,11 @@ class TriangleMesh:
         if isinstance(point, SurfacePoint):
             if point.vertex_index is None:
                 canonical.check_index(point.face_index, len(self.faces), "face", name)
+                if self.inner_face[point.face_index] < 0:
+                    raise InvalidPoint(
+                        f"the {name} is in face {point.face_index}, which repeats a vertex and is "
+                        f"no part of the surface"
+                    )
                 canonical.check_weights(point.barycentric, point.face_index, name)
                 return self._point_in_face(point.face_index, point.barycentric)
             index = point.vertex_index
@@ -241,10 +267,11 @@ class TriangleMesh:
             canonical.check_index(vertex, len(self.vertices), "vertex", "end of the edge")
         if not is_number(t) or not -WEIGHT_ERROR <= t <= 1.0 + WEIGHT_ERROR:
             raise InvalidPoint(f"t is {t!r}; it must be a number from 0 to 1")
-        point = canonical.on_edge(self.topology, start, end, float(t))
+        share = min(max(float(t), 0.0), 1.0)
+        point = canonical.on_edge(self.topology, self.faces, start, end, share)
         if point is None:
             raise InvalidPoint(f"no edge joins the vertices {start} and {end}")
-        return self.point(point)
+        return point
 
     def position(self, point: int | SurfacePoint) -> Floats:
         """Return the (3,) position of a point, mesh units; of a vertex exactly the mesh's own.
@@ -268,68 +295,14 @@ class TriangleMesh:
         return int(kernels.count_edges(self.topology.links))
 
     @cached_property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user should know of this mesh, a sentence each, with the remedy."""
-        report = self.report
-        found = []
-        if report.components > 1:
-            found.append(
-                f"The mesh has {report.components} connected components: vertices of other "
-                f"components than the source's are unreachable."
-            )
-            if self.vertex_map is None and len(_merge_equal(self.vertices)[0]) < report.vertices:
-                found.append(
-                    "Some vertices lie at equal positions but are kept apart, which may be what "
-                    "disconnects the mesh; merge='exact' joins them."
-                )
-        if report.isolated_vertices.count:
-            found.append(
-                f"{report.isolated_vertices.count} vertices belong to no face and are unreachable; "
-                f"the first is vertex {report.isolated_vertices.ids[0]}."
-            )
-        if report.degenerate_faces.count:
-            found.append(
-                f"{report.degenerate_faces.count} faces have no area; the first is face "
-                f"{report.degenerate_faces.ids[0]}."
-            )
-        if report.bow_tie_vertices.count:
-            found.append(
-                f"At {report.bow_tie_vertices.count} vertices several fans of faces meet; the "
-                f"first is vertex {report.bow_tie_vertices.ids[0]}. Paths may pass through them."
-            )
-        return tuple(found)
+    def report(self) -> MeshReport:
+        """Counts and defects; O(V log V + F log F), computed once."""
+        return report_of(self.vertices, self.faces, self.face_map, self.topology)
 
     @cached_property
-    def report(self) -> MeshReport:
-        """Counts and defects; O(V + F), computed once."""
-        topology = self.topology
-        inner = topology.inner_vertex
-        used = (np.diff(topology.first_corner) > 0)[inner]
-        flags = topology.flags[inner]
-        edges = self.edge_count
-        lengths = topology.geometry[:, kernels.LENGTH]
-        shared = topology.links[:, kernels.OPPOSITE] >= 0
-        flat = topology.geometry[::3, kernels.SIN_LEFT] == 0.0
-        return MeshReport(
-            vertices=len(self.vertices),
-            faces=len(self.faces),
-            edges=edges,
-            components=len(np.unique(topology.component[used])),
-            boundary_loops=int(kernels.count_boundary_loops(topology.links)),
-            euler_characteristic=int(np.count_nonzero(used)) - edges + len(self.faces),
-            saddle_vertices=int(np.count_nonzero(flags & kernels.SADDLE)),
-            boundary_vertices=int(np.count_nonzero(flags & kernels.BOUNDARY)),
-            bow_tie_vertices=Sample.of(np.flatnonzero(flags & kernels.FANS)),
-            isolated_vertices=Sample.of(np.flatnonzero(~used)),
-            degenerate_faces=Sample.of(np.sort(topology.outer_face[flat])),
-            non_manifold_edges=Sample(0, ()),  # refused, until the sweep can cross them
-            inconsistent_orientation=False,  # likewise
-            bounds=(
-                tuple(self.vertices.min(axis=0).tolist()),
-                tuple(self.vertices.max(axis=0).tolist()),
-            ),
-            mean_edge_length=float((lengths.sum() - 0.5 * lengths[shared].sum()) / edges),
-        )
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know of this mesh, a sentence each, with the remedy."""
+        return (*self._notes, *warnings_of(self.report))
 
     def __repr__(self) -> str:
         return f"TriangleMesh({len(self.vertices)} vertices, {len(self.faces)} faces)"
@@ -376,42 +349,70 @@ def _as_faces(faces: ArrayLike) -> Longs:
     return np.array(array, dtype=np.int64, order="C")
 
 
-def _refuse_bad_elements(vertices: Floats, faces: Longs) -> None:
-    outcome, _ = kernels.check_arrays(vertices, faces)
-    if outcome == kernels.SOUND:
-        return
-    if outcome in (kernels.NOT_FINITE, kernels.TOO_LARGE):
-        with np.errstate(invalid="ignore"):
-            bad = np.flatnonzero(~(np.abs(vertices) <= kernels.LARGEST_COORDINATE).all(axis=1))
-        first = vertices[bad[0]].tolist()
+def _as_polygons(corners: ArrayLike, sizes: ArrayLike) -> tuple[Longs, Longs]:
+    try:
+        flat, counts = np.asarray(corners), np.asarray(sizes)
+    except ValueError as error:
+        raise InvalidMesh(f"polygons are not rows of corners: {error}", kind="face") from error
+    if counts.size == 0:
+        raise InvalidMesh("the mesh has no faces", kind="face")
+    for name, array in (("corners", flat), ("sizes", counts)):
+        if array.ndim != 1 or array.dtype.kind not in "iu":
+            raise InvalidMesh(f"{name} must be one row of integers", kind="face")
+    empty = np.flatnonzero(counts < 1)
+    if len(empty):
         raise InvalidMesh(
-            f"vertex {bad[0]} is at {first}: coordinates must be finite and at most "
-            f"{kernels.LARGEST_COORDINATE:g} in size{_and_more(bad)}",
-            kind="vertex",
-            elements=bad[:_SAMPLE].tolist(),
-        )
-    if outcome == kernels.OUT_OF_RANGE:
-        bad = np.flatnonzero(((faces < 0) | (faces >= len(vertices))).any(axis=1))
-        raise InvalidMesh(
-            f"face {bad[0]} is {faces[bad[0]].tolist()}, but vertices are numbered 0 to "
-            f"{len(vertices) - 1}{_and_more(bad)}",
+            f"face {empty[0]} has no corners{_and_more(empty)}",
             kind="face",
-            elements=bad[:_SAMPLE].tolist(),
+            elements=empty[:NAMED].tolist(),
         )
-    a, b, c = faces.T
-    bad = np.flatnonzero((a == b) | (b == c) | (c == a))
+    if counts.sum() != len(flat):
+        raise InvalidMesh(
+            f"the sizes sum to {counts.sum()}, but there are {len(flat)} corners", kind="face"
+        )
+    return flat.astype(np.int64), counts.astype(np.int64)
+
+
+def _refuse_bad_vertices(vertices: Floats) -> None:
+    with np.errstate(invalid="ignore"):
+        bad = np.flatnonzero(~(np.abs(vertices) <= kernels.LARGEST_COORDINATE).all(axis=1))
+    if len(bad):
+        raise InvalidMesh(
+            f"vertex {bad[0]} is at {vertices[bad[0]].tolist()}: coordinates must be finite and at "
+            f"most {kernels.LARGEST_COORDINATE:g} in size{_and_more(bad)}",
+            kind="vertex",
+            elements=bad[:NAMED].tolist(),
+        )
+
+
+def _refuse_out_of_range(corners: Longs, sizes: Longs, vertex_count: int) -> None:
+    """Refuse faces, given as rows of corners one after the other, that name no vertex."""
+    is_bad = (corners < 0) | (corners >= vertex_count)
+    if not is_bad.any():
+        return
+    bad = np.unique(np.repeat(np.arange(len(sizes)), sizes)[is_bad])
+    start = int(sizes[: bad[0]].sum())
     raise InvalidMesh(
-        f"face {bad[0]} is {faces[bad[0]].tolist()} and repeats a vertex: remove it"
-        f"{_and_more(bad)}",
+        f"face {bad[0]} is {corners[start : start + sizes[bad[0]]].tolist()}, but vertices are "
+        f"numbered 0 to {vertex_count - 1}{_and_more(bad)}",
         kind="face",
-        elements=bad[:_SAMPLE].tolist(),
+        elements=bad[:NAMED].tolist(),
     )
 
 
 def _prepare(vertices: Floats, faces: Longs) -> Topology:
-    topology = kernels.empty_topology(len(vertices), len(faces))
+    a, b, c = faces.T
+    surface = np.flatnonzero((a != b) & (b != c) & (c != a))
+    if len(surface) == 0:
+        raise InvalidMesh(
+            "each face repeats a vertex: there is no surface",
+            kind="face",
+            elements=list(range(min(len(faces), NAMED))),
+        )
+    topology = kernels.empty_topology(len(vertices), len(surface))
     triangles = faces.astype(np.int32)
-    outcome, bad = kernels.build_topology(vertices, triangles, topology)
+    outcome, bad = kernels.build_topology(vertices, triangles[surface], topology)
+    topology.outer_face[:] = surface[topology.outer_face]
     if outcome == kernels.TOO_SHORT:
         face = int(topology.outer_face[bad])
         raise InvalidMesh(
@@ -425,19 +426,3 @@ def _prepare(vertices: Floats, faces: Longs) -> Topology:
 
 def _and_more(bad: Sequence[Any] | NDArray[Any]) -> str:
     return f" (and {len(bad) - 1} more)" if len(bad) > 1 else ""
-
-
-def _merge_equal(vertices: Floats) -> tuple[Floats, Longs]:
-    """Return the distinct positions in order of first appearance, and where each vertex went."""
-    points = vertices + 0.0  # -0.0 equals 0.0
-    order = np.lexsort(points.T)
-    new = np.ones(len(points), bool)
-    new[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
-    group = np.cumsum(new) - 1
-    # lexsort is stable: the first of a group is the lowest vertex.
-    first = order[new]
-    rank = np.empty(len(first), np.int64)
-    rank[np.argsort(first)] = np.arange(len(first))
-    vertex_map = np.empty(len(points), np.int64)
-    vertex_map[order] = rank[group]
-    return vertices[np.sort(first)], vertex_map

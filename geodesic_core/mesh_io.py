@@ -1,36 +1,43 @@
-"""Mesh files: their bytes become vertex and face arrays in the file's own numbering.
+"""Mesh files: their bytes become vertices and polygons in the file's own numbering.
 
-trimesh reads the numbers. What a file claims is checked here first, since trimesh (5.2) trusts it:
-
-- It splits OBJ and PLY vertices at texture seams, groups OBJ faces by material in reverse, groups
-  polygons by their number of corners, and asks for Pillow once there is a texture. So it is given
-  positions and polygons alone, in order.
-- It takes OBJ index 0 for 1, counts OBJ's relative indices from the end of the file, and drops
-  faces of two corners and rows missing at the end. So rows and counts are checked.
-- It reads sparse or compressed glTF positions as zeros. So they are refused.
-
-It never sees a path, nor gets a resolver: a file cannot make it read another one.
+OBJ, OFF and PLY are read here: the reader of trimesh (5.2) splits vertices at texture seams, groups
+faces by material or by their number of corners, refuses binary PLY files that mix these, drops what
+is too short and trusts what a file claims. trimesh reads STL and GLB; what such a file claims is
+checked first, and sparse or compressed glTF positions are refused, which it would read as zeros. It
+never sees a path, nor gets a resolver: a file cannot make it read another one.
 """
 
+import codecs
 import io
 import json
 import re
-from collections.abc import Callable
+import struct
+from collections import Counter
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
-from trimesh.exchange.obj import load_obj
-from trimesh.exchange.off import load_off
-from trimesh.exchange.ply import load_ply
+from numpy.typing import NDArray
 from trimesh.exchange.stl import load_stl
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.mesh import Merge, TriangleMesh
 
-Arrays = tuple[Floats, Longs]
+
+class Read(NamedTuple):
+    """What a file holds."""
+
+    vertices: Floats
+    """(V, 3)"""
+    corners: Longs
+    """(C,): vertices of all polygons, one polygon after the other"""
+    sizes: Longs
+    """(P,): how many corners each polygon has"""
+    notes: tuple[str, ...] = ()
+    """A sentence on what was left out."""
 
 
 def load_mesh(
@@ -40,10 +47,12 @@ def load_mesh(
 ) -> TriangleMesh:
     """Read a mesh file: OBJ, OFF, PLY, STL or GLB.
 
-    Vertices keep the file's numbering and faces its order; polygons become fans from their first
-    corner, in place. The parts of a GLB scene are placed by its nodes and put one after the other,
-    in the order of its meshes. An STL file has no numbering: its equal corners are always merged,
-    in order of first appearance, and ``mesh.vertex_map[3 * face + corner]`` is the vertex.
+    Vertices keep the file's numbering and faces its order; polygons become triangles, in place, and
+    ``mesh.face_map`` leads from these to the polygon. What is no surface (lines, points, curves) is
+    left out, and ``mesh.warnings`` say so. The parts of a GLB scene are placed by its nodes and put
+    one after the other, in the order of its meshes. An STL file has no numbering: its equal corners
+    are always merged, in order of first appearance, and
+    ``mesh.vertex_map[3 * face + corner]`` is the vertex.
 
     Parameters
     ----------
@@ -69,15 +78,17 @@ def load_mesh(
     if not data:
         raise InvalidMesh(f"the {kind.upper()} file is empty")
     try:
-        vertices, faces = _READERS[kind](data)
+        read = _READERS[kind](data.removeprefix(codecs.BOM_UTF8))
     except InvalidMesh:
         raise
-    except Exception as error:  # trimesh raises whatever its parsing stumbles over
+    except Exception as error:  # whatever parsing stumbles over
         what = " ".join(str(error).split())[:200] or type(error).__name__
         raise InvalidMesh(f"the {kind.upper()} file is damaged: {what}") from error
-    if len(faces) == 0:
+    if len(read.sizes) == 0:
         raise InvalidMesh(f"the {kind.upper()} file holds no faces", kind="face")
-    return TriangleMesh(vertices, faces, merge="exact" if kind == "stl" else merge)
+    return TriangleMesh.from_polygons(
+        read.vertices, read.corners, read.sizes, "exact" if kind == "stl" else merge, read.notes
+    )
 
 
 def _known_kind(file_type: str) -> str:
@@ -99,34 +110,46 @@ def _bytes_of(path: Path) -> bytes:
 
 # OBJ ---------------------------------------------------------------------------------------------
 
-_CONTINUATION = re.compile(rb"\\\r?\n")
-_OBJ_ROW = re.compile(rb"^[ \t]*([vf])[ \t]+([^#\r\n]*)", re.MULTILINE)
+_COMMENT = re.compile(rb"#.*")
+_CONTINUATION = re.compile(rb"\\[ \t]*\r?\n")
+_OBJ_ROW = re.compile(rb"^[ \t]*(v|f|l|p|curv2?|surf)[ \t]+([^#\r\n]*)", re.MULTILINE)
 _NUMBER = rb"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|(?i:nan|inf(?:inity)?))"
 _CORNER = rb"-?0*[1-9]\d{0,17}(?:/-?\d*){0,2}"
-_VERTEX_ROW = re.compile(rb"[ \t]*" + _NUMBER + rb"(?:[ \t]+" + _NUMBER + rb"){2,}[ \t]*")
-_OBJ_FACE = re.compile(_CORNER + rb"(?:[ \t]+" + _CORNER + rb"){2,}[ \t]*")
+_VERTEX_ROW = re.compile(rb"[ \t]*" + _NUMBER + rb"(?:[ \t]+" + _NUMBER + rb"){2,}[ \t\r]*")
+_VERTEX_RULE = "it must have three numbers"
+_OBJ_FACE = re.compile(rb"[ \t]*" + _CORNER + rb"(?:[ \t]+" + _CORNER + rb")*[ \t]*")
 _NOT_POSITION = re.compile(rb"/\S*")
+_OBJ_IGNORED = {b"l": "lines", b"p": "points", b"surf": "surfaces"}
 
 
-def _read_obj(data: bytes) -> Arrays:
-    rows = _OBJ_ROW.findall(_CONTINUATION.sub(b" ", data))
+def _read_obj(data: bytes) -> Read:
+    if b"\n" not in data:
+        data = data.replace(b"\r", b"\n")
+    if b"\\" in data:  # a comment may end in one
+        data = _CONTINUATION.sub(b" ", _COMMENT.sub(b"", data))
+    rows = _OBJ_ROW.findall(data)
     vertex_rows = [row for keyword, row in rows if keyword == b"v"]
     face_rows = [row for keyword, row in rows if keyword == b"f"]
-    _refuse_row(vertex_rows, _VERTEX_ROW, "vertex", "it must have three numbers")
-    _refuse_row(face_rows, _OBJ_FACE, "face", "it must have three vertices or more, from 1")
+    _refuse_row(vertex_rows, _VERTEX_ROW, "vertex", _VERTEX_RULE)
+    _refuse_row(face_rows, _OBJ_FACE, "face", "it must have vertices, which are numbered from 1")
     if not face_rows:
         raise InvalidMesh("the OBJ file holds no faces", kind="face")
-    if any(b"-" in row for row in face_rows):
-        face_rows = _absolute(rows)
-    face_rows = _NOT_POSITION.sub(b"", b"\n".join(face_rows)).split(b"\n")
-    _refuse_out_of_range(face_rows, 1, len(vertex_rows))
-    triangles = _fans([row.split() for row in face_rows])
-    text = b"".join(
-        [b"v %b\n" % row for row in vertex_rows] + [b"f %b\n" % row for row in triangles]
-    )
-    read = load_obj(io.BytesIO(text), skip_materials=True, maintain_order=True)
-    (geometry,) = read["geometry"].values()
-    return geometry["vertices"], geometry["faces"]
+    so_far = np.cumsum([keyword == b"v" for keyword, _ in rows])
+    so_far = so_far[[keyword == b"f" for keyword, _ in rows]]
+    corners, sizes = _corners(_NOT_POSITION.sub(b"", b"\n".join(face_rows)).split(b"\n"))
+    # -1 is the last vertex so far.
+    corners = np.where(corners < 0, corners + np.repeat(so_far, sizes), corners - 1)
+    bad = np.flatnonzero((corners < 0) | (corners >= len(vertex_rows)))
+    if len(bad):
+        face = int(np.searchsorted(np.cumsum(sizes), bad[0], side="right"))
+        raise InvalidMesh(
+            f"face {face} reads {_clip(face_rows[face])}, but the file's vertices are numbered 1 "
+            f"to {len(vertex_rows)}, and {so_far[face]} precede the face",
+            kind="face",
+            elements=[face],
+        )
+    ignored = Counter(_OBJ_IGNORED.get(k, "curves") for k, _ in rows if k not in (b"v", b"f"))
+    return Read(_table(vertex_rows, 3), corners, sizes, _notes("OBJ", ignored))
 
 
 def _refuse_row(rows: list[bytes], pattern: re.Pattern[bytes], kind: str, rule: str) -> None:
@@ -142,47 +165,34 @@ def _clip(row: bytes) -> str:
     return repr(text if len(text) <= 60 else text[:57] + "...")
 
 
-def _absolute(rows: list[tuple[bytes, bytes]]) -> list[bytes]:
-    """Return the face rows with relative indices (-1 is the last vertex so far) made absolute."""
-    so_far = 0
-    absolute: list[bytes] = []
-    for keyword, row in rows:
-        if keyword == b"v":
-            so_far += 1
-            continue
-        corners = [int(corner.partition(b"/")[0]) for corner in row.split()]
-        if min(corners) < -so_far:
-            raise InvalidMesh(
-                f"face {len(absolute)} reads {_clip(row)}, but only {so_far} vertices precede it",
-                kind="face",
-                elements=[len(absolute)],
-            )
-        absolute.append(b" ".join(b"%d" % (c if c > 0 else c + so_far + 1) for c in corners))
-    return absolute
+def _table(rows: list[bytes], columns: int) -> Floats:
+    """Return the first numbers of rows that have as many, or more."""
+    words = b" ".join(rows).split()
+    if len(words) != columns * len(rows):
+        words = [word for row in rows for word in row.split(None, columns)[:columns]]
+    return np.array(words, dtype=np.float64).reshape(-1, columns)
 
 
-def _refuse_out_of_range(rows: list[bytes], first: int, count: int) -> None:
-    """Refuse rows of vertex indices outside ``first`` to ``first + count - 1``."""
-    indices = np.array(b" ".join(rows).split(), dtype=np.int64)
-    if indices.min() >= first and indices.max() < first + count:
-        return
-    valid = range(first, first + count)
-    bad = next(i for i, row in enumerate(rows) if any(int(c) not in valid for c in row.split()))
-    raise InvalidMesh(
-        f"face {bad} reads {_clip(rows[bad])}, but the file's vertices are numbered {first} to "
-        f"{first + count - 1}",
-        kind="face",
-        elements=[bad],
-    )
+def _corners(rows: list[bytes]) -> tuple[Longs, Longs]:
+    """Return the numbers of rows, one after the other, and how many each has."""
+    words = [row.split() for row in rows]
+    flat = [word for row in words for word in row]
+    return np.array(flat, dtype=np.int64), np.array([len(row) for row in words], dtype=np.int64)
+
+
+def _notes(kind: str, ignored: Mapping[str, int]) -> tuple[str, ...]:
+    if not ignored:
+        return ()
+    what = ", ".join(f"{count} {name}" for name, count in ignored.items())
+    return (f"The {kind} file also holds {what}, which are no part of the surface: left out.",)
 
 
 # OFF ---------------------------------------------------------------------------------------------
 
-_COMMENT = re.compile(rb"#.*")
 _OFF_HEADER = re.compile(rb"\s*(?:ST)?C?N?OFF\b\s*(-?\d+)[ \t]+(-?\d+)(?:[ \t]+-?\d+)?[ \t\r]*\n")
 
 
-def _read_off(data: bytes) -> Arrays:
+def _read_off(data: bytes) -> Read:
     text = _COMMENT.sub(b"", data) if b"#" in data else data
     header = _OFF_HEADER.match(text)
     if header is None:
@@ -193,38 +203,23 @@ def _read_off(data: bytes) -> Arrays:
     if face_count == 0:
         raise InvalidMesh("the OFF file holds no faces", kind="face")
     vertex_rows = rows[:vertex_count]
-    _refuse_row(vertex_rows, _VERTEX_ROW, "vertex", "it must have three numbers")
-    polygons = _polygons(rows[vertex_count : vertex_count + face_count])
-    _refuse_out_of_range([b" ".join(polygon) for polygon in polygons], 0, vertex_count)
-    triangles = [b"3 " + triangle for triangle in _fans(polygons)]
-    counts = b"%d %d 0" % (vertex_count, len(triangles))
-    read = load_off(io.BytesIO(b"\n".join([b"OFF", counts, *vertex_rows, *triangles])))
-    return read["vertices"], read["faces"]
+    _refuse_row(vertex_rows, _VERTEX_ROW, "vertex", _VERTEX_RULE)
+    return Read(_table(vertex_rows, 3), *_corners(_polygons(rows[vertex_count:])))
 
 
-def _polygons(rows: list[bytes], skipped: int = 0) -> list[list[bytes]]:
+def _polygons(rows: list[bytes], skipped: int = 0) -> list[bytes]:
     """Return the corners of face rows: ``skipped`` words, a count, that many indices, anything."""
     polygons = []
     for face, row in enumerate(rows):
         words = row.split()[skipped:]
-        if not words or not words[0].isdigit() or not 3 <= int(words[0]) < len(words):
+        if not words or not words[0].isdigit() or not 1 <= int(words[0]) < len(words):
             raise InvalidMesh(
-                f"face {face} reads {_clip(row)}; it must have a count of three or more, then as "
-                f"many vertices",
+                f"face {face} reads {_clip(row)}; it must have a count, then as many vertices",
                 kind="face",
                 elements=[face],
             )
-        polygons.append(words[1 : int(words[0]) + 1])
+        polygons.append(b" ".join(words[1 : int(words[0]) + 1]))
     return polygons
-
-
-def _fans(polygons: list[list[bytes]]) -> list[bytes]:
-    """Return the rows of the polygons' triangles, each polygon a fan from its first corner."""
-    return [
-        b"%b %b %b" % (corners[0], corners[i], corners[i + 1])
-        for corners in polygons
-        for i in range(1, len(corners) - 1)
-    ]
 
 
 def _refuse_missing_rows(counts: dict[str, int], rows: int) -> None:
@@ -239,106 +234,210 @@ def _claim(counts: dict[str, int]) -> str:
 # PLY ---------------------------------------------------------------------------------------------
 
 _PLY_HEADER = re.compile(rb"ply[ \t]*\r?\n(.*?)^end_header[ \t]*\r?\n", re.DOTALL | re.MULTILINE)
-_PLY_FORMATS = (b"ascii", b"binary_little_endian", b"binary_big_endian")
-_PLY_NAMES = {
-    "vertex": (b"x", b"y", b"z"),
-    "face": (b"vertex_indices", b"vertex_index"),
+_PLY_ORDERS = {b"ascii": "", b"binary_little_endian": "<", b"binary_big_endian": ">"}
+_PLY_TYPES = {
+    name: code
+    for code, names in {
+        "b": b"char int8",
+        "B": b"uchar uint8",
+        "h": b"short int16",
+        "H": b"ushort uint16",
+        "i": b"int int32",
+        "I": b"uint uint32",
+        "f": b"float float32",
+        "d": b"double float64",
+    }.items()
+    for name in names.split()
 }
+"""The types by name, as `struct` and numpy both write them."""
+_CORNER_NAMES = (b"vertex_indices", b"vertex_index")
+
+
+class _Property(NamedTuple):
+    name: bytes
+    type: str
+    count_type: str
+    """Of a list; else empty."""
 
 
 class _Element(NamedTuple):
+    name: str
     size: int
-    properties: list[list[bytes]]
+    properties: list[_Property]
+
+    @property
+    def has_lists(self) -> bool:
+        return any(part.count_type for part in self.properties)
 
 
-def _read_ply(data: bytes) -> Arrays:
+def _read_ply(data: bytes) -> Read:
     header = _PLY_HEADER.match(data)
     if header is None:
         raise InvalidMesh("the PLY file has no header from 'ply' to 'end_header'")
-    form, elements = _ply_elements(header[1])
-    counts = {name: element.size for name, element in elements.items()}
-    for name in _PLY_NAMES:
+    order, elements = _ply_elements(header[1])
+    counts = {element.name: element.size for element in elements}
+    for name in ("vertex", "face"):
         if not counts.get(name):
             raise InvalidMesh(f"the PLY file holds no {name} elements", kind="face")
-    _place_of_corners(elements["face"])
+    _refuse_odd_properties(elements)
     body = data[header.end() :]
-    if form == b"ascii":
-        elements, body = _plain_triangles(elements, counts, body)
-    elif sum(counts.values()) > len(body):
-        raise InvalidMesh(f"the header declares {_claim(counts)}, but {len(body)} bytes follow")
-    read = load_ply(io.BytesIO(_ply_header(form, elements) + body))
-    faces = read["faces"].astype(np.int64)
-    if faces.ndim != 2 or faces.shape[1] < 3:
-        raise InvalidMesh("the PLY file's faces have fewer than three corners", kind="face")
-    fans = np.stack([faces[:, [0, i, i + 1]] for i in range(1, faces.shape[1] - 1)], axis=1)
-    return read["vertices"], fans.reshape(-1, 3)
+    read = _ply_binary(elements, body, order) if order else _ply_ascii(elements, body)
+    others = {name: n for name, n in counts.items() if n and name not in ("vertex", "face")}
+    return read._replace(notes=_notes("PLY", others))
 
 
-def _ply_elements(header: bytes) -> tuple[bytes, dict[str, _Element]]:
-    """Return the format and the elements; what is no geometry gets a name of no meaning.
-
-    trimesh would act on texture coordinates, colours and edges; this way it only steps over them.
-    """
-    form = b""
-    elements: dict[str, _Element] = {}
-    for number, line in enumerate(header.splitlines()):
+def _ply_elements(header: bytes) -> tuple[str, list[_Element]]:
+    """Return the byte order, empty for text, and the elements."""
+    order: str | None = None
+    elements: list[_Element] = []
+    for line in header.splitlines():
         match line.split():
-            case [b"format", form, _] if form in _PLY_FORMATS:
-                pass
+            case [b"format", form, _] if form in _PLY_ORDERS:
+                order = _PLY_ORDERS[form]
             case [b"element", word, count] if count.isdigit():
-                name = word.decode() if word in (b"vertex", b"face") else f"other{number}"
-                if name in elements:
+                name = word.decode("ascii", "replace")
+                if name in [element.name for element in elements]:
                     raise InvalidMesh(f"the PLY header says {_clip(line)} twice")
-                elements[name] = _Element(int(count), [])
-            case [b"property", *kind, word] if elements:
-                known = word in _PLY_NAMES.get(name, ())
-                elements[name].properties.append([*kind, word if known else b"other%d" % number])
+                elements.append(_Element(name, int(count), []))
+            case [b"property", b"list", count_type, item, word] if (
+                elements and item in _PLY_TYPES and _PLY_TYPES.get(count_type, "f") not in "fd"
+            ):
+                part = _Property(word, _PLY_TYPES[item], _PLY_TYPES[count_type])
+                elements[-1].properties.append(part)
+            case [b"property", item, word] if elements and item in _PLY_TYPES:
+                elements[-1].properties.append(_Property(word, _PLY_TYPES[item], ""))
             case [] | [b"comment" | b"obj_info", *_]:
                 pass
             case _:
                 raise InvalidMesh(f"the PLY header has an unknown line, {_clip(line)}")
-    if not form:
+    if order is None:
         raise InvalidMesh("the PLY header names no format")
-    return form, elements
+    return order, elements
+
+
+def _refuse_odd_properties(elements: list[_Element]) -> None:
+    for element in elements:
+        names = [part.name for part in element.properties if not part.count_type]
+        if element.name == "vertex" and (
+            element.has_lists or [names.count(axis) for axis in (b"x", b"y", b"z")] != [1, 1, 1]
+        ):
+            raise InvalidMesh("the PLY vertices must have x, y and z once each, and no lists")
+        if element.name == "face":
+            _place_of_corners(element)
 
 
 def _place_of_corners(face: _Element) -> int:
-    for place, words in enumerate(face.properties):
-        if words[0] == b"list" and len(words) == 4 and words[-1] in _PLY_NAMES["face"]:
+    for place, part in enumerate(face.properties):
+        if part.count_type and part.name in _CORNER_NAMES:
             return place
     raise InvalidMesh("the PLY faces have no property 'list … vertex_indices'", kind="face")
 
 
-def _ply_header(form: bytes, elements: dict[str, _Element]) -> bytes:
-    lines = [b"ply", b"format %b 1.0" % form]
-    for name, element in elements.items():
-        lines.append(b"element %b %d" % (name.encode(), element.size))
-        lines += [b" ".join([b"property", *words]) for words in element.properties]
-    return b"\n".join([*lines, b"end_header\n"])
-
-
-def _plain_triangles(
-    elements: dict[str, _Element], counts: dict[str, int], body: bytes
-) -> tuple[dict[str, _Element], bytes]:
-    """Return the elements and rows of an ASCII body with nothing but vertices and triangles."""
+def _ply_ascii(elements: list[_Element], body: bytes) -> Read:
     rows = [row for row in body.splitlines() if row.strip()]
-    _refuse_missing_rows(counts, len(rows))
-    blocks, start = {}, 0
-    for name, count in counts.items():
-        blocks[name] = rows[start : start + count]
-        start += count
-    _refuse_row(blocks["vertex"], _VERTEX_ROW, "vertex", "it must have three numbers")
-    at = _place_of_corners(elements["face"])
-    if any(words[0] == b"list" for words in elements["face"].properties[:at]):
-        raise InvalidMesh("the PLY faces have another list before their vertex_indices")
-    polygons = _polygons(blocks["face"], skipped=at)
-    _refuse_out_of_range([b" ".join(polygon) for polygon in polygons], 0, counts["vertex"])
-    triangles = [b"3 " + triangle for triangle in _fans(polygons)]
-    plain = {
-        "vertex": elements["vertex"],
-        "face": _Element(len(triangles), [[b"list", b"uchar", b"int", b"vertex_indices"]]),
-    }
-    return plain, b"\n".join([*blocks["vertex"], *triangles])
+    _refuse_missing_rows({element.name: element.size for element in elements}, len(rows))
+    start = 0
+    for element in elements:
+        block = rows[start : start + element.size]
+        start += element.size
+        if element.name == "vertex":
+            vertices = _ply_positions(element, block)
+        elif element.name == "face":
+            at = _place_of_corners(element)
+            if any(part.count_type for part in element.properties[:at]):
+                raise InvalidMesh("the PLY faces have another list before their vertex_indices")
+            corners, sizes = _corners(_polygons(block, skipped=at))
+    return Read(vertices, corners, sizes)
+
+
+def _ply_positions(element: _Element, rows: list[bytes]) -> Floats:
+    columns = len(element.properties)
+    _refuse_row(rows, _VERTEX_ROW, "vertex", f"it must have {columns} numbers")
+    short = next((i for i, row in enumerate(rows) if len(row.split()) < columns), None)
+    if short is not None:
+        raise InvalidMesh(
+            f"vertex {short} reads {_clip(rows[short])}; it must have {columns} numbers",
+            kind="vertex",
+            elements=[short],
+        )
+    table = dict(
+        zip((part.name for part in element.properties), _table(rows, columns).T, strict=True)
+    )
+    types = {part.name: part.type for part in element.properties}
+    with np.errstate(over="ignore"):  # the mesh refuses what is not finite
+        axes = [table[axis].astype(types[axis]) for axis in (b"x", b"y", b"z")]
+    return np.stack(axes, axis=1).astype(np.float64)
+
+
+def _ply_binary(elements: list[_Element], body: bytes, order: str) -> Read:
+    counts = {element.name: element.size for element in elements}
+    short = InvalidMesh(f"the header declares {_claim(counts)}, but {len(body)} bytes follow")
+    if sum(counts.values()) > len(body):
+        raise short
+    at = 0
+    for element in elements:
+        table = _even_records(element, body, at, order)
+        if table is None:
+            if not element.has_lists:
+                raise short
+            walked = _walked(element, body, at, order)
+            at = walked[2]
+            if element.name == "face":
+                corners, sizes = walked[:2]
+            continue
+        at += table.nbytes
+        if element.name == "vertex":
+            names = [part.name for part in element.properties]
+            axes = [table[str(names.index(axis))] for axis in (b"x", b"y", b"z")]
+            vertices = np.stack(axes, axis=1).astype(np.float64)
+        elif element.name == "face":
+            rows = table[str(_place_of_corners(element))]
+            corners, sizes = rows.astype(np.int64).reshape(-1), np.full(len(rows), rows.shape[1])
+    if at != len(body):
+        raise short
+    return Read(vertices, corners, sizes)
+
+
+def _even_records(element: _Element, body: bytes, start: int, order: str) -> NDArray[Any] | None:
+    """Return an element's records, where all lists are as long as the first; else None."""
+    fields: list[Any] = []
+    for i, part in enumerate(element.properties):
+        if part.count_type:
+            at = start + np.dtype(fields).itemsize
+            count = int(np.frombuffer(body, order + part.count_type, 1, at)[0])
+            fields += [(f"count{i}", order + part.count_type)]
+            fields += [(str(i), order + part.type, (count,))]
+        else:
+            fields.append((str(i), order + part.type))
+    dtype = np.dtype(fields)
+    if start + element.size * dtype.itemsize > len(body):
+        return None
+    table = np.frombuffer(body, dtype, element.size, start)
+    counts = [table[f"count{i}"] for i, part in enumerate(element.properties) if part.count_type]
+    return table if all((count == count[:1]).all() for count in counts) else None
+
+
+def _walked(element: _Element, body: bytes, at: int, order: str) -> tuple[Longs, Longs, int]:
+    """Return the corners of faces with any number of them, how many each has, and the end."""
+    place = _place_of_corners(element) if element.name == "face" else -1
+    counters = [struct.Struct(order + part.count_type) for part in element.properties]
+    widths = [np.dtype(part.type).itemsize for part in element.properties]
+    found, sizes = [], []
+    for _ in range(element.size):
+        for i, (counter, width) in enumerate(zip(counters, widths, strict=True)):
+            count = counter.unpack_from(body, at)[0] if counter.size else 1
+            if count < 0:
+                raise InvalidMesh(
+                    f"a list of the PLY file's {element.name} elements has {count} items"
+                )
+            at += counter.size
+            if i == place:
+                found.append(body[at : at + count * width])
+                sizes.append(count)
+            at += count * width
+    item = order + element.properties[place].type
+    corners = np.frombuffer(b"".join(found), item).astype(np.int64)
+    return corners, np.array(sizes, dtype=np.int64), at
 
 
 # STL ---------------------------------------------------------------------------------------------
@@ -348,7 +447,7 @@ _STL_FACET = re.compile(rb"^\s*facet\b", re.MULTILINE | re.IGNORECASE)
 _STL_VERTEX = re.compile(rb"^[ \t]*vertex\b[ \t]*([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
 
 
-def _read_stl(data: bytes) -> Arrays:
+def _read_stl(data: bytes) -> Read:
     triangles = int.from_bytes(data[_STL_HEADER - 4 : _STL_HEADER], "little")
     expected = _STL_HEADER + triangles * _STL_TRIANGLE
     if len(data) != expected:
@@ -359,7 +458,7 @@ def _read_stl(data: bytes) -> Arrays:
                 f"triangles, which take {expected} bytes, but it has {len(data)}"
             )
         corners = _STL_VERTEX.findall(data)
-        _refuse_row(corners, _VERTEX_ROW, "vertex", "it must have three numbers")
+        _refuse_row(corners, _VERTEX_ROW, "vertex", _VERTEX_RULE)
         if len(corners) != 3 * facets:
             raise InvalidMesh(f"the STL file has {facets} facets, but {len(corners)} corners")
         triangles = facets
@@ -371,7 +470,7 @@ def _read_stl(data: bytes) -> Arrays:
             f"the STL file is cut short or damaged: it begins {triangles} triangles, but "
             f"{len(vertices)} corners are complete"
         )
-    return vertices, np.arange(len(vertices)).reshape(-1, 3)
+    return Read(vertices, np.arange(len(vertices)), np.full(triangles, 3))
 
 
 # GLB ---------------------------------------------------------------------------------------------
@@ -380,7 +479,7 @@ _GLB_HEADER, _CHUNK_HEADER = 12, 8
 _FLOAT, _TRIANGLE_FAN = 5126, 6
 
 
-def _read_glb(data: bytes) -> Arrays:
+def _read_glb(data: bytes) -> Read:
     _refuse_bad_glb(data)
     scene = trimesh.load_scene(
         io.BytesIO(data), file_type="glb", process=False, skip_materials=True
@@ -390,11 +489,12 @@ def _read_glb(data: bytes) -> Arrays:
     nodes = reversed(scene.graph.nodes_geometry)
     placed = [(transform, name) for transform, name in map(scene.graph.get, nodes)]
     placed.sort(key=lambda place: order[place[1]])
-    vertices, faces, count = [], [], 0
+    vertices, faces, count, left_out = [], [], 0, 0
     for transform, name in placed:
         part = scene.geometry[name]
         if not isinstance(part, trimesh.Trimesh):
-            continue  # points and lines are no surface
+            left_out += 1
+            continue
         with np.errstate(invalid="ignore", over="ignore"):  # the mesh refuses what is not finite
             vertices.append(part.vertices @ transform[:3, :3].T + transform[:3, 3])
         mirrored = np.linalg.det(transform[:3, :3]) < 0.0
@@ -402,7 +502,10 @@ def _read_glb(data: bytes) -> Arrays:
         count += len(part.vertices)
     if not faces:
         raise InvalidMesh("the GLB file's scene shows no triangles", kind="face")
-    return np.concatenate(vertices), np.concatenate(faces)
+    corners = np.concatenate(faces).reshape(-1).astype(np.int64)
+    ignored = {"parts of points or lines": left_out} if left_out else {}
+    sizes = np.full(len(corners) // 3, 3)
+    return Read(np.concatenate(vertices), corners, sizes, _notes("GLB", ignored))
 
 
 def _refuse_bad_glb(data: bytes) -> None:
@@ -464,7 +567,7 @@ def _refuse_bad_accessors(tree: dict[str, Any], file_bytes: int) -> None:
                     )
 
 
-_Reader = Callable[[bytes], Arrays]
+_Reader = Callable[[bytes], Read]
 _READERS: dict[str, _Reader] = {
     "obj": _read_obj,
     "off": _read_off,

@@ -5,18 +5,22 @@ from typing import Any
 import igl
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints
+from geodesic_core.arrays import Floats, Ints, Longs
 
 
 class NearestFace:
-    """A search tree over the faces of a mesh; O(F log F) to build, O(log F) to ask in practice."""
+    """A search tree over the ``surface``, which is some of the faces of a mesh.
 
-    def __init__(self, vertices: Floats, faces: Ints) -> None:
-        self._arrays = vertices, faces.astype(np.int64)
+    O(F log F) to build, O(log F) to ask in practice.
+    """
+
+    def __init__(self, vertices: Floats, faces: Ints, surface: Longs) -> None:
+        self._surface = surface
+        self._arrays = vertices, faces[surface].astype(np.int64)
         self._tree: Any = igl.AABB()
         self._tree.init(*self._arrays)
 
     def __call__(self, position: Floats) -> tuple[int, Floats, float]:
         """Return the nearest face, the point of it, and how far that is, mesh units."""
         squared, faces, points = self._tree.squared_distance(*self._arrays, position[None])
-        return int(faces[0]), points[0], float(np.sqrt(squared[0]))
+        return int(self._surface[faces[0]]), points[0], float(np.sqrt(squared[0]))

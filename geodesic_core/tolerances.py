@@ -135,8 +135,11 @@ SAME_PLACE = 1e-9
 Asked only where several faces may be behind an edge, of which the others lead elsewhere.
 """
 
-WEIGHT = 1e-12
-"""Barycentric weight up to which a point counts as lying on the opposite edge: rounding."""
+WEIGHT = 2.0**-41
+"""Barycentric weight up to which a point counts as lying on the opposite edge: rounding.
+
+Half a step of `EDGE_STEPS`, so that a point near a vertex has one spelling there, too.
+"""
 
 WEIGHT_ERROR = 1e-9
 """How far barycentric weights may be below zero, or their sum from one: written with ten digits."""
@@ -150,3 +153,10 @@ One spelling of a point differs from another by rounding: by 1e-16 of the edge a
 
 SNAP = 1e-12
 """Share of the bounding box's diagonal within which a position counts as on a vertex or an edge."""
+
+FAN = 1e-9
+"""Share of a polygon's area that each triangle of a fan must have for the fan to be taken.
+
+Less is a sliver or rounding, where three corners lie on one line: another way to cut the polygon is
+looked for. The surface of a flat polygon is the same either way.
+"""

@@ -105,6 +105,17 @@ def test_info_names_elements_and_warns(run: Run) -> None:
     assert "unreachable" in ran.figure("warning:")
 
 
+def test_info_tells_of_polygons_and_of_what_is_left_out(run: Run) -> None:
+    rows = ["v 0 0 0", "v 1 0 0", "v 1 1 0", "v 0 1 0", "f 1 2 3 4", "f 1 2", "l 3 4"]
+    Path("quad.obj").write_text("\n".join(rows))
+    ran = run("info", "quad.obj")
+    assert ran.figure("faces") == "3"
+    assert ran.figure("triangulated polygons") == "1"
+    assert ran.figure("repeated vertex faces") == "1 (2)"
+    assert "left out" in ran.figure("warning:")
+    assert "no part of the surface" in ran.out
+
+
 def test_distance_writes_npy_csv_and_json(run: Run, plane: Path) -> None:
     expected = gc.exact_distance(gc.load_mesh(plane), [0, 120])
     for name in ("d.npy", "d.csv", "d.json"):

@@ -106,7 +106,8 @@ async def create_mesh(
     """Read, check and store a mesh; the id is a hash of its content.
 
     The body is the file itself (with its format in `Content-Type` or `?format=`), a form with one
-    file, or JSON. Vertices keep the numbers they have in the file.
+    file, or JSON. Vertices and triangles keep the order they have in the file; polygons become
+    triangles in their place, and `face_map` leads back to them.
     """
     if parameters.sample is None:
         stored, seconds = await _add_upload(service, parameters, request, deadline)
@@ -177,7 +178,7 @@ async def delete_mesh(mesh_id: str, service: ServiceDep) -> None:
 async def get_mesh_array(
     mesh_id: str, name: str, request: Request, service: ServiceDep
 ) -> Response:
-    """Send `vertices`, `faces`, `vertex_map` or `components`; ranges are served."""
+    """Send `vertices`, `faces`, `vertex_map`, `face_map` or `components`; ranges are served."""
     path = service.meshes.array_file(mesh_id, name)
     etag = etag_of(f"{mesh_id}-{name}")
     return not_modified(request, etag, IMMUTABLE) or StoredFileResponse(

@@ -91,6 +91,39 @@ def test_merging_gives_a_vertex_map(client: TestClient) -> None:
     check_problem(missing, 404, "not_found")
 
 
+QUADS = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 1 9 0\nf 1 2 3 4\nf 1 1 2\nf 4 3 5\nl 1 2"
+
+
+def test_polygons_get_a_map_back(client: TestClient) -> None:
+    report = client.post("/v1/meshes", content=QUADS, headers=TYPE_OBJ).json()
+
+    assert (report["faces"], report["triangulated_polygons"]) == (4, 1)
+    assert report["repeated_vertex_faces"] == {"count": 1, "ids": [2]}
+    assert "1 lines" in report["warnings"][0]
+    face_map = np.load(BytesIO(client.get(report["arrays"]["face_map"]).content))
+    np.testing.assert_array_equal(face_map, [0, 0, 1, 2])
+    faces = client.get(f"/v1/meshes/{report['id']}/arrays/faces").content
+    np.testing.assert_array_equal(np.load(BytesIO(faces))[2], [0, 0, 1])
+    plain = client.post("/v1/meshes", json=TETRAHEDRON).json()
+    missing = client.get(f"/v1/meshes/{plain['id']}/arrays/face_map")
+    check_problem(missing, 404, "not_found")
+
+
+def test_the_report_names_what_a_mesh_is_made_of(client: TestClient) -> None:
+    soup = {
+        "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [5, 5, 5]],
+        "faces": [[0, 1, 2], [3, 4, 5], [2, 1, 0], [6, 6, 0]],
+    }
+    report = client.post("/v1/meshes", json=soup).json()
+
+    assert report["component_vertices"] == {"count": 2, "ids": [0, 3]}
+    assert report["duplicate_vertices"] == {"count": 2, "ids": [3, 5]}
+    assert report["duplicate_faces"] == {"count": 1, "ids": [2]}
+    assert report["isolated_vertices"] == {"count": 1, "ids": [6]}
+    assert report["repeated_vertex_faces"] == {"count": 1, "ids": [3]}
+    assert len(report["warnings"]) == 5
+
+
 # Refusals
 
 

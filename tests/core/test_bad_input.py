@@ -49,17 +49,9 @@ def test_unsigned_indices_must_be_in_range():
         gc.TriangleMesh(POINTS, with_value(FACES.astype(np.uint64), (0, 0), 2**64 - 1))
 
 
-@pytest.mark.parametrize("face", [(1, 1, 2), (1, 2, 1), (2, 1, 1), (3, 3, 3)])
-def test_a_face_must_not_repeat_a_vertex(face):
-    with pytest.raises(gc.errors.InvalidMesh, match=r"face 1\b.*repeats") as caught:
-        gc.TriangleMesh(POINTS, with_value(FACES, 1, face))
-    assert caught.value.kind == "face"
-    assert caught.value.elements == (1,)
-
-
 def test_the_first_ten_faults_are_named():
     faces = np.tile(np.array([(0, 0, 1)]), (25, 1))
-    with pytest.raises(gc.errors.InvalidMesh) as caught:
+    with pytest.raises(gc.errors.InvalidMesh, match="each face repeats a vertex") as caught:
         gc.TriangleMesh(POINTS, faces)
     assert caught.value.elements == tuple(range(10))
 
@@ -120,6 +112,39 @@ def test_faces_are_rows_of_three_integers(faces):
 def test_an_edge_of_no_length_is_refused():
     with pytest.raises(gc.errors.InvalidMesh, match=r"face 0\b"):
         gc.TriangleMesh(with_value(POINTS, 1, POINTS[0]), FACES)
+
+
+@pytest.mark.parametrize(
+    ("corners", "sizes", "what"),
+    [
+        ([0, 1, 2], [], "no faces"),
+        ([0, 1, 2, 3], [3], "sum to 3"),
+        ([0, 1, 2], [3, 0], r"face 1 has no corners"),
+        ([0, 1, 2], [4, -1], r"face 1 has no corners"),
+        ([0, 1, 2, 1, 2, 3, 4], [3, 4], r"face 1 is \[1, 2, 3, 4\].* 0 to 3"),
+        ([0, 1, 2, -1], [4], r"face 0\b"),
+        ([0.0, 1.0, 2.0], [3], "integers"),
+        ([[0, 1, 2]], [3], "integers"),
+        (["0", "1", "2"], [3], "integers"),
+        ([0, 1, 2], [3.0], "integers"),
+        ([[0, 1, 2], [0, 1]], [3, 2], "rows of corners"),
+        ([0, 0, 1, 1, 1], [4, 1], "repeats a vertex"),
+    ],
+)
+def test_polygons_are_rows_of_vertices(corners, sizes, what):
+    with pytest.raises(gc.errors.InvalidMesh, match=what) as caught:
+        gc.TriangleMesh.from_polygons(POINTS, corners, sizes)
+    assert caught.value.kind == "face"
+
+
+def test_vertices_of_polygons_must_be_finite():
+    with pytest.raises(gc.errors.InvalidMesh, match=r"vertex 2\b"):
+        gc.TriangleMesh.from_polygons(with_value(POINTS, (2, 0), np.nan), [0, 1, 2, 3], [4])
+
+
+def test_a_face_out_of_range_is_named_past_one_that_repeats_a_vertex():
+    with pytest.raises(gc.errors.InvalidMesh, match=r"face 1 is \[0, 1, 9\]"):
+        gc.TriangleMesh(POINTS, [(0, 0, 1), (0, 1, 9)])
 
 
 def test_merge_is_one_of_two():

@@ -41,6 +41,7 @@ from geodesic_core.kernels.wavefront import (
 )
 from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.landmarks import Landmarks
+from geodesic_core.polygons import triangulated
 from geodesic_core.run import Control, run_sweep
 from geodesic_core.tolerances import (
     BEND,
@@ -82,6 +83,21 @@ def test_each_tolerance_is_tested():
     tested = [name.removeprefix("test_") for name in globals() if name.startswith("test_")]
     for name in names:
         assert any(test.startswith(name.lower()) for test in tested), name
+
+
+# Polygons ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("bulge", "is_kept"), [(0.1, False), (10.0, True)])
+@SCALES
+def test_fan_has_no_sliver_below_its_share(bulge, is_kept, scale):
+    """A square whose bottom bends at its middle corner, by a triangle of so much of the share."""
+    height = bulge * tolerances.FAN * 4
+    square = [(0, 0), (1, -height), (2, 0), (2, 2), (0, 2)]
+    points = np.insert(np.array(square, float) * scale, 2, 0.0, axis=1)
+    faces, face_map = triangulated(points, np.arange(5), np.array([5]))
+    assert ([0, 1, 2] in faces.tolist()) == is_kept
+    assert face_map.tolist() == [0, 0, 0]
 
 
 # Saddles ----------------------------------------------------------------------------------------

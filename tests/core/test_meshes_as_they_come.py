@@ -1,0 +1,221 @@
+"""Bad input, case by case as other libraries were tried on it: the right answer or the right error.
+
+The table is that of ``docs/accuracy.md``.
+"""
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from tests import zoo
+from tests.core.certificates import check_path
+from tests.oracles import unfolding
+
+SEAMLESS = zoo.SMALL["crumpled_sphere"]
+
+
+def distances(vertices, faces, source=0, **options):
+    return gc.exact_distance(gc.TriangleMesh(vertices, faces, **options), source).distances
+
+
+def agrees_with_the_oracle(vertices, faces):
+    matrix = unfolding.distance_matrix(vertices, faces)
+    for source in range(len(vertices)):
+        np.testing.assert_allclose(distances(vertices, faces, source), matrix[source], rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["three_faces_at_an_edge", "cubes_at_an_edge", "face_twice"])
+@pytest.mark.xfail(strict=True, raises=gc.errors.InvalidMesh, reason="refused, edges named")
+def test_non_manifold_edges(name):
+    case = zoo.REFUSED[name]
+    agrees_with_the_oracle(case.vertices, case.faces)
+
+
+@pytest.mark.parametrize("name", ["misoriented", "flipped_face", "moebius"])
+@pytest.mark.xfail(strict=True, raises=gc.errors.InvalidMesh, reason="refused, edges named")
+def test_mixed_winding(name):
+    case = zoo.REFUSED[name]
+    agrees_with_the_oracle(case.vertices, case.faces)
+
+
+@pytest.mark.parametrize("repeats", [(1, 1, 2), (1, 2, 1), (2, 1, 1), (3, 3, 3)])
+@pytest.mark.parametrize("at", [0, 40, -1])
+def test_a_face_that_repeats_a_vertex(repeats, at):
+    at = len(SEAMLESS.faces) if at < 0 else at
+    faces = np.insert(SEAMLESS.faces, at, repeats, axis=0)
+    mesh = gc.TriangleMesh(SEAMLESS.vertices, faces)
+    field = gc.exact_distance(mesh, 5)
+    clean = distances(SEAMLESS.vertices, SEAMLESS.faces, 5)
+    assert field.distances.tobytes() == clean.tobytes()
+    assert mesh.faces.tolist() == faces.tolist()
+    assert mesh.report.repeated_vertex_faces == gc.Sample(1, (at,))
+    assert f"face {at}" in mesh.warnings[-1]
+    path = field.path_to(20)
+    check_path(mesh, path, 5, 20, clean[20])
+    assert at not in path.faces
+    assert at not in [place.face_index for place in path.locations]
+    found = gc.Solver(mesh).shortest_path(5, 20, explain=True)
+    check_path(mesh, found, 5, 20, clean[20])
+    assert all(at not in step.faces for step in found.steps)
+
+
+def test_a_face_that_repeats_a_vertex_holds_no_points():
+    faces = np.insert(SEAMLESS.faces, 3, (1, 1, 2), axis=0)
+    mesh = gc.TriangleMesh(SEAMLESS.vertices, faces)
+    for point in (gc.SurfacePoint.face(3, (0.2, 0.3, 0.5)), gc.SurfacePoint.edge(3, 0, 0.5)):
+        with pytest.raises(gc.errors.InvalidPoint, match=r"face 3, which repeats a vertex"):
+            gc.exact_distance(mesh, point)
+    clean = gc.TriangleMesh(SEAMLESS.vertices, SEAMLESS.faces)
+    shift = np.arange(len(clean.faces)) + (np.arange(len(clean.faces)) >= 3)
+    for face in range(len(clean.faces)):
+        middle = clean.vertices[clean.faces[face]].mean(axis=0)
+        assert mesh.locate(middle).face_index == shift[clean.locate(middle).face_index]
+    inside = [gc.SurfacePoint.face(face, (0.2, 0.3, 0.5)) for face in (2, 60)]
+    moved = [gc.SurfacePoint.face(int(shift[face]), (0.2, 0.3, 0.5)) for face in (2, 60)]
+    expected = gc.shortest_path(clean, *inside)
+    found = gc.shortest_path(mesh, *moved)
+    assert found.points.tobytes() == expected.points.tobytes()
+    assert found.faces.tolist() == shift[expected.faces].tolist()
+
+
+@pytest.mark.parametrize("index", [-1, 10**9, len(SEAMLESS.vertices)])
+def test_a_source_out_of_range(index):
+    with pytest.raises(gc.errors.InvalidPoint, match=str(index)):
+        distances(SEAMLESS.vertices, SEAMLESS.faces, index)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_vertex_that_is_not_finite(value):
+    vertices = SEAMLESS.vertices.copy()
+    vertices[7, 1] = value
+    with pytest.raises(gc.errors.InvalidMesh, match=r"vertex 7\b") as caught:
+        gc.TriangleMesh(vertices, SEAMLESS.faces)
+    assert caught.value.elements == (7,)
+
+
+def test_a_face_of_no_area():
+    """A square whose diagonal has a vertex on it, which one side's face does not know of."""
+    vertices = [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (1, 1, 0)]
+    faces = [(0, 1, 2), (0, 2, 4), (0, 4, 3), (4, 2, 3)]
+    mesh = gc.TriangleMesh(vertices, faces)
+    assert mesh.report.degenerate_faces == gc.Sample(1, (1,))
+    for source, start in enumerate(vertices):
+        straight = np.linalg.norm(np.subtract(vertices, start), axis=1)
+        found = gc.exact_distance(mesh, source).distances
+        np.testing.assert_allclose(found, straight, rtol=1e-12)
+
+
+@pytest.mark.xfail(strict=True, reason="light from the middle of a face of no area is lost")
+def test_a_path_that_bends_where_a_face_of_no_area_begins():
+    """Around (0, 1), which is the middle vertex of a face of no area, and on over two faces."""
+    vertices = [(-1, 1, 0), (-1, 0, 0), (0, 0, 0), (0, 1, 0), (0, 2, 0), (1, 3, 0), (1, 2, 0)]
+    faces = [(3, 0, 1), (3, 1, 2), (4, 3, 2), (4, 2, 5), (2, 6, 5)]
+    found = distances(vertices, faces, 0)
+    assert found[6] == pytest.approx(1 + np.sqrt(2), rel=1e-12)
+
+
+@pytest.mark.xfail(strict=True, raises=gc.errors.InvalidMesh, reason="refused, the face named")
+def test_an_edge_of_no_length():
+    """A square cut along a diagonal, with a sliver between two vertices at one corner."""
+    vertices = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)]
+    found = distances(vertices, [(0, 1, 2), (0, 2, 4), (4, 2, 3)])
+    np.testing.assert_allclose(found, [0, 1, np.sqrt(2), 1, 0], atol=1e-12)
+
+
+def test_two_components():
+    vertices = np.vstack([SEAMLESS.vertices, SEAMLESS.vertices + 9])
+    count = len(SEAMLESS.vertices)
+    mesh = gc.TriangleMesh(vertices, np.vstack([SEAMLESS.faces, SEAMLESS.faces + count]))
+    field = gc.exact_distance(mesh, 3)
+    assert np.isfinite(field.distances[:count]).all()
+    assert np.isinf(field.distances[count:]).all()
+    assert (field.nearest_source[count:] == -1).all()
+    assert mesh.report.components == 2
+    assert mesh.report.component_vertices == gc.Sample(2, (0, count))
+    assert f"0, {count}" in mesh.warnings[0]
+    with pytest.raises(gc.errors.NoPath) as caught:
+        gc.shortest_path(mesh, 3, count + 3)
+    assert caught.value.reason == "disconnected"
+
+
+def test_vertices_duplicated_along_a_seam():
+    """A square in two halves, whose diagonal is there twice."""
+    vertices = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 0, 0), (1, 1, 0), (0, 1, 0)]
+    faces = [(0, 1, 2), (3, 4, 5)]
+    apart = gc.TriangleMesh(vertices, faces)
+    assert apart.report.duplicate_vertices == gc.Sample(2, (3, 4))
+    assert np.isinf(gc.exact_distance(apart, 1).distances[5])
+    assert any("vertex 3" in text and "merge='exact'" in text for text in apart.warnings)
+    joined = gc.TriangleMesh(vertices, faces, merge="exact")
+    assert joined.vertex_map.tolist() == [0, 1, 2, 0, 2, 3]
+    assert joined.warnings == ()
+    found = gc.exact_distance(joined, 1).distances
+    assert found[joined.vertex_map[5]] == pytest.approx(np.sqrt(2), rel=1e-15)
+
+
+def test_a_seam_inside_one_component_is_told_of_as_well():
+    vertices, faces = zoo.torus(5, 4)
+    faces = faces.copy()
+    last, corner = len(vertices), faces[0, 2]
+    faces[0, 2] = last
+    mesh = gc.TriangleMesh(np.vstack([vertices, vertices[corner]]), faces)
+    assert mesh.report.components == 1
+    assert mesh.report.duplicate_vertices == gc.Sample(1, (last,))
+    assert "merge='exact'" in mesh.warnings[0]
+
+
+def test_a_triangle_soup():
+    soup = SEAMLESS.vertices[SEAMLESS.faces].reshape(-1, 3)
+    faces = np.arange(len(soup)).reshape(-1, 3)
+    apart = gc.TriangleMesh(soup, faces)
+    assert apart.report.components == len(faces)
+    assert apart.report.duplicate_vertices.count == len(soup) - len(SEAMLESS.vertices)
+    assert np.isfinite(gc.exact_distance(apart, 0).distances).sum() == 3
+    assert any("merge='exact'" in text for text in apart.warnings)
+    joined = gc.TriangleMesh(soup, faces, merge="exact")
+    clean = gc.TriangleMesh(SEAMLESS.vertices, SEAMLESS.faces)
+    np.testing.assert_array_equal(joined.vertices[joined.vertex_map], soup)
+    number = {tuple(at): i for i, at in enumerate(joined.vertices.tolist())}
+    order = [number[tuple(at)] for at in SEAMLESS.vertices.tolist()]
+    np.testing.assert_allclose(
+        gc.exact_distance(joined, order[0]).distances[order],
+        gc.exact_distance(clean, 0).distances,
+        rtol=1e-12,
+    )
+
+
+def test_faces_that_merging_makes_repeat_a_vertex():
+    vertices = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 0)]
+    mesh = gc.TriangleMesh(vertices, [(0, 1, 2), (3, 1, 0)], merge="exact")
+    assert mesh.faces.tolist() == [[0, 1, 2], [0, 1, 0]]
+    assert mesh.report.repeated_vertex_faces == gc.Sample(1, (1,))
+    np.testing.assert_allclose(gc.exact_distance(mesh, 0).distances, [0, 1, 1])
+
+
+def test_a_pillow_of_one_triangle_and_its_back():
+    mesh = gc.TriangleMesh([(0, 0, 0), (3, 0, 0), (0, 4, 0)], [(0, 1, 2), (2, 1, 0)])
+    assert mesh.report.duplicate_faces == gc.Sample(1, (1,))
+    assert "face 1" in mesh.warnings[0]
+    np.testing.assert_allclose(gc.exact_distance(mesh, 1).distances, [3, 0, 5], rtol=1e-15)
+
+
+def test_an_unreferenced_last_vertex():
+    vertices = np.vstack([SEAMLESS.vertices, (9, 9, 9), (9, 9, 9)])
+    mesh = gc.TriangleMesh(vertices, SEAMLESS.faces)
+    field = gc.exact_distance(mesh, 0)
+    assert len(field.distances) == len(vertices)
+    assert np.isfinite(field.distances[:-2]).all()
+    assert np.isinf(field.distances[-2:]).all()
+    last = len(vertices) - 1
+    assert mesh.report.isolated_vertices == gc.Sample(2, (last - 1, last))
+    assert mesh.report.duplicate_vertices.count == 0
+    assert gc.exact_distance(mesh, last).distances[last] == 0
+
+
+def test_vertices_of_faces_that_repeat_one_alone_are_isolated():
+    vertices = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (5, 5, 5)]
+    mesh = gc.TriangleMesh(vertices, [(0, 1, 2), (0, 3, 3)])
+    assert mesh.report.isolated_vertices == gc.Sample(1, (3,))
+    assert mesh.report.components == 1
+    assert (mesh.report.faces, mesh.report.edges, mesh.report.euler_characteristic) == (2, 3, 1)
+    assert np.isinf(gc.exact_distance(mesh, 0).distances[3])
