@@ -56,11 +56,11 @@ def in_face(
 def on_edge(topology: Topology, faces: Ints, start: int, end: int, t: float) -> SurfacePoint | None:
     """Return the point at share ``t`` of the edge between two vertices; None if there is none."""
     v, u = topology.inner_vertex[start], topology.inner_vertex[end]
-    share = {v: 1.0 - t, u: t}
+    share = {int(v): 1.0 - t, int(u): t}
     for corner in topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]]:
         for h in (int(corner), int(previous(corner))):
-            ends = topology.links[h, [TAIL, HEAD]]
-            if u in ends:
+            ends = topology.links[h, [TAIL, HEAD]].tolist()
+            if v != u and u in ends:
                 return _on_edge(topology, faces, h, share[ends[0]], share[ends[1]])
     return None
 

@@ -18,6 +18,12 @@ Closes the gap that rounding may leave between its windows and those that pass b
 3.4). A wider sector is never wrong: every window stands for real paths.
 """
 
+FLAT = 1e-14
+"""Share of an edge's length that a pseudosource is kept off the edge, at least.
+
+On the line itself it would send no rays into the face beyond. Directions are off by this much.
+"""
+
 OVERLAP = 1e-6
 """Share of an edge's length up to which two windows may overlap untrimmed.
 

@@ -156,14 +156,6 @@ def unmerge(
 
 
 @kernel
-def is_inside(geometry: Floats, h: int, x: float, y: float) -> bool:
-    """Whether a point ahead of h, in its frame, lies before the other edges of the face."""
-    left = x * geometry[h, SIN_LEFT] - y * geometry[h, COS_LEFT]
-    right = (geometry[h, LENGTH] - x) * geometry[h, SIN_RIGHT] - y * geometry[h, COS_RIGHT]
-    return left > 0.0 and right > 0.0
-
-
-@kernel
 def next_face(links: Ints, m: int, after: int) -> tuple[int, bool]:
     """Half-edge across that of m, and whether it runs the same way; -1 if there is none.
 
@@ -279,37 +271,40 @@ def trace_line(
             faces[count] = face
             count += 1
             # At (x, 0) on h, its face and the pseudosource ahead
+            # The root may be in this face, but elsewhere, where the path did not come from it.
+            rest = math.sqrt((sx - x) * (sx - x) + sy * sy)
+            most = rest if fork_count > 0 else math.inf
             if row_in_face(winners, root, face) >= 0:
-                return TRACED, count, root
+                px, py = target_in_frame(topology, winners, root, h)
+                if math.hypot(px - x, py) <= most * (1.0 + SAME_PLACE):
+                    return TRACED, count, root
             apex = links[h, APEX]
             ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
             ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
             reach = math.sqrt((ax - x) * (ax - x) + ay * ay)
-            rest = math.sqrt((sx - x) * (sx - x) + sy * sy)
-            # The apex may be the root, but elsewhere, where the path did not come from this face.
-            is_root = apex == root and (fork_count == 0 or reach <= rest * (1.0 + SAME_PLACE))
+            is_root = apex == root and reach <= most * (1.0 + SAME_PLACE)
             if is_root or is_on_path(winners, apex, reach, sigma + rest, v):
                 return TRACED, count, apex
-            is_lost = fork_count > 0 and is_inside(geometry, h, sx, sy)
-            if not is_lost:
-                after = -1
-                if (ax - x) * sy - ay * (sx - x) >= 0.0:  # s is left of the apex
-                    side = geometry[h, LENGTH_LEFT]
-                    x, sx, sy = cross_edge(
-                        x, sx, sy, side, geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
-                    )
-                    m, x, sx, sy = previous(h), side - x, side - sx, -sy
-                else:  # the same, in the mirror
-                    side = geometry[h, LENGTH_RIGHT]
-                    x, sx, sy = cross_edge(
-                        length - x,
-                        length - sx,
-                        sy,
-                        side,
-                        geometry[h, COS_RIGHT],
-                        geometry[h, SIN_RIGHT],
-                    )
-                    m, sy = following(h), -sy
+            if (ax - x) * sy - ay * (sx - x) >= 0.0:  # s is left of the apex
+                side = geometry[h, LENGTH_LEFT]
+                x, sx, sy = cross_edge(
+                    x, sx, sy, side, geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
+                )
+                m, x, sx = previous(h), side - x, side - sx
+            else:  # the same, in the mirror
+                side = geometry[h, LENGTH_RIGHT]
+                x, sx, sy = cross_edge(
+                    length - x,
+                    length - sx,
+                    sy,
+                    side,
+                    geometry[h, COS_RIGHT],
+                    geometry[h, SIN_RIGHT],
+                )
+                m = following(h)
+            # In a face that the path did not come from, the line ends where there is no root.
+            is_lost = fork_count > 0 and reference < 0 and sy <= SAME_PLACE * side
+            sy, after = -sy, -1
         if is_lost:
             if fork_count == 0:
                 return LOST, count, -1

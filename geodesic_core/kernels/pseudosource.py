@@ -42,7 +42,7 @@ from geodesic_core.kernels.wavefront import (
     WINNER,
     merging,
 )
-from geodesic_core.tolerances import SECTOR_MARGIN
+from geodesic_core.tolerances import FLAT, SECTOR_MARGIN
 
 
 @kernel
@@ -187,7 +187,8 @@ def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) 
     if b1 <= b0:
         return
     sx = length - wave.geometry[row + COS_RIGHT] * wave.geometry[row + LENGTH]
-    sy = -wave.geometry[row + SIN_RIGHT] * wave.geometry[row + LENGTH]
+    # In a face of no area the apex lies on the edge across, from where no ray would leave.
+    sy = min(-wave.geometry[row + SIN_RIGHT] * wave.geometry[row + LENGTH], -FLAT * length)
     sigma, xi = wave.distance[v], 0.0
     if merging(wave):
         xi = wave.upper[v] - sigma

@@ -47,6 +47,7 @@ from geodesic_core.tolerances import (
     BEND,
     DOUBLE_ROOT,
     EDGE_STEPS,
+    FLAT,
     GAP,
     GRAZING,
     LANDMARK_ERROR,
@@ -70,6 +71,7 @@ from geodesic_core.tolerances import (
 )
 from tests import zoo
 from tests.core.approximation import MERGING
+from tests.core.certificates import check_path
 from tests.core.kernels.invariants import windows_of
 from tests.core.kernels.stepping import started, steps, topology_of, view_of_arrays
 from tests.core.searches import goal_at_vertex, spread
@@ -497,6 +499,27 @@ def test_search_slack_keeps_the_path_itself(case):
 
 
 # Points -----------------------------------------------------------------------------------------
+
+
+@SCALES
+def test_flat_faces_send_light_from_their_middle(scale):
+    """Round the middle vertex of a face of no area, and on over its longest edge."""
+    vertices = [(-1, 1, 0), (-1, 0, 0), (0, 0, 0), (0, 1, 0), (0, 2, 0), (1, 3, 0), (1, 2, 0)]
+    faces = [(3, 0, 1), (3, 1, 2), (4, 3, 2), (4, 2, 5), (2, 6, 5)]
+    field = gc.exact_distance(gc.TriangleMesh(scale * np.array(vertices, float), faces), 0)
+    assert field.distances[6] == pytest.approx(scale * (1 + math.sqrt(2)), rel=10 * FLAT)
+
+
+@SCALES
+@pytest.mark.parametrize("name", ["book_of_5", "complex_1", "complex_4", "moebius"])
+def test_same_place_tells_the_face_that_a_path_came_from(name, scale):
+    """Rounding stays below it, and what lies elsewhere above: every path has its distance."""
+    case = zoo.IRREGULAR[name].moved(scale * zoo.rotation(5), scale * np.array((1.0, -2.0, 3.0)))
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    for source in spread(case, 7):
+        field = gc.exact_distance(mesh, source)
+        for target in np.flatnonzero(np.isfinite(field.distances)).tolist():
+            check_path(mesh, field.path_to(target), source, target, field.distances[target])
 
 
 @pytest.fixture
