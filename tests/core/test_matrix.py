@@ -58,9 +58,7 @@ def test_distances_are_those_of_the_oracle(case):
     check_layouts(mesh, points, points, expected, EXACT)
 
 
-@zoo.each(
-    {name: zoo.SMALL[name] for name in ("saddle", "two_components", "isolated_vertices", "bow_tie")}
-)
+@zoo.each({name: zoo.SMALL[name] for name in ("saddle", "bow_tie", "bow_tie_of_fans", "crags")})
 def test_distances_are_those_of_fields(case):
     mesh = mesh_of(case)
     points = [*random_points(mesh, 5, seed=22), 0, len(mesh.vertices) - 1]
@@ -78,6 +76,25 @@ def test_distances_are_those_of_closed_forms(case):
     sources, targets = chosen[:4], chosen[4:]
     expected = np.array([case.distances(source)[targets] for source in sources])
     check_layouts(mesh, sources, targets, expected, 1e-8)
+
+
+@pytest.mark.parametrize("name", ["two_components", "isolated_vertices"])
+def test_what_is_not_connected_is_infinite_or_left_out(name):
+    mesh = mesh_of(zoo.SMALL[name])
+    points = [0, len(mesh.vertices) - 1, *random_points(mesh, 3, seed=22)]
+    apart = [0 if name == "two_components" else 3] * 2, [len(mesh.vertices) - 1, points[2]]
+    fields = [gc.exact_distance(mesh, point, targets=points) for point in points]
+    expected = np.array([[field.distance_at(point) for point in points] for field in fields])
+    assert np.isinf(expected).any()
+    dense = gc.distance_matrix(mesh, points, points)
+    np.testing.assert_allclose(dense, expected, SAME)
+    sparse = gc.distance_matrix(mesh, points, points, layout="sparse")
+    np.testing.assert_array_equal(as_dense(sparse), dense)
+    pairs = gc.distance_matrix(mesh, *apart, layout="pairs")
+    assert math.isinf(pairs[0])
+    none = gc.distance_matrix(mesh, [0], [len(mesh.vertices) - 1], layout="sparse")
+    assert none.shape == (1, 1)
+    assert none.nnz == 0
 
 
 @pytest.mark.jit
@@ -134,7 +151,7 @@ def test_transposing_permuting_and_leaving_out_commute_with_the_matrix():
 
 def test_what_is_beyond_max_distance_is_infinite_or_left_out():
     mesh = mesh_of(zoo.SMALL["hills"])
-    points = random_points(mesh, 7 if WITHOUT_JIT else 12, seed=27)
+    points = random_points(mesh, 8 if WITHOUT_JIT else 12, seed=27)
     sources, targets = points[:4], points[3:]  # one is both
     full = gc.distance_matrix(mesh, sources, targets)
     known = np.sort(full.reshape(-1))
