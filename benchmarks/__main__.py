@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from benchmarks import approximate, exact, path, service, topology
+from benchmarks import approximate, exact, matrix, path, service, topology
 from benchmarks.inputs import Inputs
 from benchmarks.tables import keep
 
@@ -16,6 +16,7 @@ BENCHMARKS = {
     "path": path.run,
     "path-peers": path.run_peers,
     "landmarks": path.run_landmarks,
+    "matrix": matrix.run,
     "service": service.run,
 }
 ROOT = Path(__file__).parents[1]

@@ -7,8 +7,10 @@ Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then
 
 from geodesic_core import errors, samples
 from geodesic_core.errors import GeodesicError
+from geodesic_core.matrix import distance_matrix
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.mesh_io import load_mesh
+from geodesic_core.nearest import Nearest, nearest
 from geodesic_core.path import ErrorBound, GeodesicPath, SearchStep
 from geodesic_core.report import MeshReport, Sample
 from geodesic_core.result import DistanceField, Source, SweepStats
@@ -27,6 +29,7 @@ __all__ = [
     "GeodesicError",
     "GeodesicPath",
     "MeshReport",
+    "Nearest",
     "Sample",
     "SearchStep",
     "Solver",
@@ -35,9 +38,11 @@ __all__ = [
     "SweepStats",
     "TriangleMesh",
     "approximate_distance",
+    "distance_matrix",
     "errors",
     "exact_distance",
     "load_mesh",
+    "nearest",
     "samples",
     "shortest_path",
     "warm_up",

@@ -42,13 +42,13 @@ class Landmarks:
             landmarks=self.distances, landmark_count=self.count, least=least, most=most
         )
 
-    def add(self, beside: int, bytes_beside: int, control: Control) -> None:
+    def add(self, beside: int, control: Control) -> None:
         """Add the vertex farthest from all others, in the component of inner vertex ``beside``.
 
         Raises
         ------
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As the control says, with ``bytes_beside`` held by others; nothing is added then.
+            As the control says; nothing is added then.
         """
         mesh = self.mesh
         topology = mesh.topology
@@ -61,10 +61,10 @@ class Landmarks:
             chosen = candidates[np.argmax(self._nearest[candidates])]
         bounds = wavefront.merging_bounds(math.inf, LANDMARK_ERROR, math.inf)
         wave = wavefront.new_wavefront(topology, merges=True)
-        control.grant_memory(wavefront.bytes_of(wave) + bytes_beside)
+        control.grant_memory(wavefront.bytes_of(wave))
         start = np.array([chosen], np.int32)
         sweep.start_sweep(topology, wave, start, np.zeros(1), bounds)
-        wave = run_sweep(mesh, wave, bounds, control, lambda _: 1.0, bytes_beside)
+        wave = run_sweep(mesh, wave, bounds, control, lambda _: 1.0)
         if self.count == 0:
             self.distances = aligned_rows(len(mesh.vertices), LANDMARKS, np.float32)
         self.distances[:, self.count] = wave.distance

@@ -1,14 +1,15 @@
 """From points to the nodes of a sweep: its vertices, and sites for what is no vertex."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.canonical import half_edges_around
+from geodesic_core.errors import InvalidArgument
 from geodesic_core.kernels.topology import APEX, TAIL
-from geodesic_core.kernels.wavefront import SITE, Sites
+from geodesic_core.kernels.wavefront import NODE, SITE, Sites
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.surface_point import SurfacePoint
 
@@ -30,6 +31,67 @@ class Nodes:
     """(sites, 3), mesh units"""
     components: tuple[int, ...]
     """Those of the mesh with a source in them"""
+
+
+@dataclass(frozen=True)
+class Ends:
+    """The ends of several sweeps, each from one source to some of the targets."""
+
+    sources: tuple[SurfacePoint, ...]
+    targets: tuple[SurfacePoint, ...]
+    source_components: Ints
+    """(N,): the connected component of each source"""
+    target_components: Ints
+    corners: Ints
+    """(M, 3): the inner vertices around each target, or itself"""
+    reaches: Floats
+    """(M, 3): how far each is, mesh units"""
+    nodes: Nodes
+    """Of all sources and all targets"""
+
+    def targets_connected_to(self, source: int) -> Ints:
+        """Return the targets in the component of a source."""
+        connected = self.target_components == self.source_components[source]
+        return np.flatnonzero(connected).astype(np.int32)
+
+    def between(self, source: int, targets: Ints) -> Nodes:
+        """Return the nodes of a sweep from one source to some targets."""
+        nodes = self.nodes
+        ints = nodes.sites.ints
+        start, ends = nodes.sources[[source]], nodes.targets[targets]
+        first = np.flatnonzero(ints[: nodes.first_target, NODE] == start)
+        second = nodes.first_target + np.flatnonzero(
+            np.isin(ints[nodes.first_target :, NODE], ends)
+        )
+        rows = np.concatenate([first, second])
+        return replace(
+            nodes,
+            sources=start,
+            targets=ends,
+            sites=Sites(
+                nodes.sites.nodes, ints[rows], nodes.sites.weights[rows], nodes.sites.windows
+            ),
+            first_target=len(first),
+            components=(int(self.source_components[source]),),
+        )
+
+
+def ends_of(
+    mesh: TriangleMesh, sources: Sequence[SurfacePoint], targets: Sequence[SurfacePoint]
+) -> Ends:
+    """Return the ends of sweeps from canonical points to canonical points."""
+    corners, reaches = np.empty((len(targets), 3), np.int32), np.empty((len(targets), 3))
+    for i, target in enumerate(targets):
+        corners[i], reaches[i] = corners_of(mesh, target)
+    return Ends(
+        sources=tuple(sources),
+        targets=tuple(targets),
+        source_components=np.array([component_of(mesh, point) for point in sources], np.int32),
+        target_components=np.array([component_of(mesh, point) for point in targets], np.int32),
+        corners=corners,
+        reaches=reaches,
+        nodes=nodes_of(mesh, sources, targets),
+    )
 
 
 def nodes_of(
@@ -77,6 +139,26 @@ def _edge_faces(mesh: TriangleMesh, face: int) -> int:
     """Return how many faces the three edges of an inner face have, each edge's counted."""
     links = mesh.topology.links
     return sum(len(list(half_edges_around(links, h))) for h in range(3 * face, 3 * face + 3))
+
+
+def as_points(
+    mesh: TriangleMesh, points: Iterable[int | SurfacePoint], name: str
+) -> list[SurfacePoint]:
+    """Return canonical points; ``name`` is how messages call one of them.
+
+    Raises
+    ------
+    InvalidArgument
+        There are none.
+    InvalidPoint
+        One is not a point of the mesh.
+    """
+    if isinstance(points, str | bytes) or not isinstance(points, Iterable):
+        raise InvalidArgument(f"{name}s is {points!r}; it must be a sequence of points")
+    places = [mesh.point(point, f"{name} {i}") for i, point in enumerate(points)]
+    if not places:
+        raise InvalidArgument(f"there are no {name}s: give at least one")
+    return places
 
 
 def component_of(mesh: TriangleMesh, point: SurfacePoint) -> int:

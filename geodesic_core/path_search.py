@@ -119,7 +119,7 @@ class PathSearch:
         if due and count < wavefront.LANDMARKS:
             with suppress(Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged):
                 corners, _ = corners_of(self.mesh, beside)
-                self._landmarks.add(int(corners[0]), self.nbytes, control)
+                self._landmarks.add(int(corners[0]), control.holding(self.nbytes))
 
     def _search_edges(self, leg: "_Leg") -> float:
         """Return the length of a path along edges, shortened across faces (step 1).
@@ -187,10 +187,8 @@ class PathSearch:
     def _run(
         self, wave: Wavefront, nodes: Nodes, bounds: Bounds, control: Control, share: float
     ) -> Wavefront:
-        beside = self.nbytes - wavefront.bytes_of(wave)
-        return sweep_nodes(
-            self.mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: share, beside
-        )
+        control = control.holding(self.nbytes - wavefront.bytes_of(wave))
+        return sweep_nodes(self.mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: share)
 
     def _goal(self, start: "_End", limit: float) -> Goal:
         return self._landmarks.goal(start.position, start.corners, start.reaches, limit)

@@ -30,6 +30,11 @@ SLICE_SECONDS = 0.05
 
 _FIRST_BUDGET = 1_000_000
 
+_FIRST_LIMITED_BUDGET = 10_000
+_LIMITED_GROWTH = 1.25
+"""Of the slices of a sweep whose limit shrinks: each is a quarter of all before it, so that a sweep
+does not go on for longer than that once it has found enough."""
+
 
 @dataclass(frozen=True)
 class Control:
@@ -43,6 +48,8 @@ class Control:
     """Seconds granted, from the call."""
     memory_limit: int | None = None
     """Bytes granted for the state of the call, the mesh itself not counted."""
+    bytes_beside: int = 0
+    """Bytes that the call holds besides the state of its present sweep."""
     began: float = field(default_factory=time.perf_counter)
     """When the call began."""
 
@@ -61,18 +68,23 @@ class Control:
         if self.deadline_s is not None and time.perf_counter() - self.began > self.deadline_s:
             raise DeadlineExceeded(f"not finished within {self.deadline_s:g} s: {share:.0%} done")
 
-    def for_part(self, part: int, parts: int) -> "Control":
-        """Return the control of one of several equal parts of the call."""
+    def for_part(self, part: int, parts: int, count: int = 1) -> "Control":
+        """Return the control of one of several equal parts of the call, or of some in a row."""
         progress = self.progress
         if progress is None:
             return self
-        return replace(self, progress=lambda share: progress((part + share) / parts))
+        return replace(self, progress=lambda share: progress((part + count * share) / parts))
+
+    def holding(self, bytes_beside: int) -> "Control":
+        """Return the control of a sweep beside which the call holds so many more bytes."""
+        return replace(self, bytes_beside=self.bytes_beside + bytes_beside)
 
     def grant_memory(self, needed: int) -> None:
         """Raise if the call needs more memory than it may take."""
+        needed += self.bytes_beside
         if self.memory_limit is not None and needed > self.memory_limit:
             raise MemoryLimitExceeded(
-                f"the sweep needs {needed} bytes or more; memory_limit is {self.memory_limit}"
+                f"the call needs {needed} bytes or more; memory_limit is {self.memory_limit}"
             )
 
 
@@ -84,7 +96,7 @@ def sweep_nodes(
     bounds: Bounds,
     control: Control,
     share_done: Callable[[Wavefront], float],
-    bytes_beside: int = 0,
+    limit_of: Callable[[Wavefront], float] | None = None,
 ) -> Wavefront:
     """Start a sweep at the sources of ``nodes``, run it to its end, and reach its targets.
 
@@ -96,7 +108,7 @@ def sweep_nodes(
     topology = mesh.topology
     sweep.start_sweep(topology, wave, nodes.sources, start_distances, bounds)
     sites.watch_sites(topology, wave, bounds, nodes.first_target)
-    wave = run_sweep(mesh, wave, bounds, control, share_done, bytes_beside)
+    wave = run_sweep(mesh, wave, bounds, control, share_done, limit_of)
     sites.reach_sites_inside(topology, wave, bounds, nodes.first_target)
     return wave
 
@@ -107,11 +119,13 @@ def run_sweep(
     bounds: Bounds,
     control: Control,
     share_done: Callable[[Wavefront], float],
-    bytes_beside: int = 0,
+    limit_of: Callable[[Wavefront], float] | None = None,
 ) -> Wavefront:
     """Run a sweep that has started to its end; return its state, which may have grown.
 
-    ``share_done`` tells how much of the call is done, and ``bytes_beside`` what it holds besides.
+    ``share_done`` tells how much of the call is done. ``limit_of`` tells, from what is known so
+    far, how far the sweep still has to look: never farther than ``bounds``. It is asked after fixed
+    amounts of work, so that the sweep stays the same to the bit.
 
     Raises
     ------
@@ -120,12 +134,13 @@ def run_sweep(
     NotConverged
         The windows of an edge came up too often.
     """
-    budget, shown, outcome = _FIRST_BUDGET, 0.0, sweep.RUNNING
+    budget = _FIRST_BUDGET if limit_of is None else _FIRST_LIMITED_BUDGET
+    left, shown, outcome = budget, 0.0, sweep.RUNNING
     while outcome != sweep.FINISHED:
         shown = max(shown, share_done(wave))
         control.look_up(shown)
         began = time.perf_counter()
-        outcome = sweep.advance(mesh.topology, wave, bounds, budget)
+        outcome = sweep.advance(mesh.topology, wave, bounds, left)
         took = time.perf_counter() - began
         if outcome == POOL_FULL:
             grown = wavefront.with_larger_pool
@@ -136,11 +151,17 @@ def run_sweep(
         elif outcome == RUNAWAY:
             raise _not_converged(mesh, wave)
         else:
-            if outcome == sweep.RUNNING:
+            if outcome == sweep.RUNNING and limit_of is not None:
+                limit = min(bounds.max_distance, limit_of(wave))
+                bounds = bounds._replace(max_distance=limit)
+                budget = min(int(_LIMITED_GROWTH * budget), _FIRST_BUDGET)
+            elif outcome == sweep.RUNNING:
                 budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
+            left = budget
             continue
+        left -= int(wave.counters[wavefront.WORK])  # slices do not depend on the room there was
         wave = grown(wave)
-        control.grant_memory(wavefront.bytes_of(wave) + bytes_beside)
+        control.grant_memory(wavefront.bytes_of(wave))
     return wave
 
 

@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from geodesic_core.arguments import as_limit, is_number
 from geodesic_core.arrays import Floats
@@ -16,13 +17,16 @@ from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.kernels import sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.wavefront import Bounds, Wavefront
+from geodesic_core.matrix import Layout, find_matrix
 from geodesic_core.mesh import TriangleMesh
+from geodesic_core.nearest import Nearest, find_nearest
 from geodesic_core.nodes import Nodes, component_of, nodes_of
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, joined
 from geodesic_core.path_search import PathSearch
 from geodesic_core.result import DistanceField, Source, Sources, SweepStats
 from geodesic_core.run import Control, share_of_vertices, sweep_nodes, winners_of
 from geodesic_core.surface_point import Point, SurfacePoint
+from geodesic_core.sweeper import Sweeper
 from geodesic_core.tolerances import WIDEST_ERROR
 
 
@@ -173,18 +177,19 @@ class Solver:
     """Solvers of one mesh that keep between calls what they can share.
 
     Paths need scratch memory, about two thirds of the mesh's own arrays, and get faster with
-    landmarks, which are added while paths are asked for (64 bytes a vertex). Not for use by several
-    threads at once.
+    landmarks, which are added while paths are asked for (64 bytes a vertex); matrices and nearest
+    candidates need a third. Not for use by several threads at once.
     """
 
     def __init__(self, mesh: TriangleMesh) -> None:
         self.mesh = mesh
         self._search: PathSearch | None = None
+        self._sweeper: Sweeper | None = None
 
     @property
     def nbytes(self) -> int:
         """Memory kept, bytes, the mesh not counted."""
-        return 0 if self._search is None else self._search.nbytes
+        return sum(kept.nbytes for kept in (self._search, self._sweeper) if kept is not None)
 
     def exact_distance(self, *arguments: Any, **options: Any) -> DistanceField:
         """Do as `exact_distance` does, on this mesh."""
@@ -209,11 +214,58 @@ class Solver:
         """Do as `shortest_path` does, on this mesh; in time that does not depend on its size."""
         control = Control(progress, cancel, deadline_s, memory_limit)
         stops = _as_stops(self.mesh, source, target, waypoints)
+        search = self._kept_search()
+        path = _shortest_through(search, stops, control, explain=explain)
+        search.add_landmark_if_due(stops[0], replace(control, progress=None))
+        return path
+
+    def distance_matrix(
+        self,
+        sources: Sequence[Point],
+        targets: Sequence[Point],
+        max_distance: float | None = None,
+        layout: Layout = "dense",
+        *,
+        threads: int | None = None,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> Floats | csr_array:
+        """Do as `distance_matrix` does, on this mesh; keeps the memory of one of the threads."""
+        control = Control(progress, cancel, deadline_s, memory_limit)
+        keep = self._kept_sweeper, self._kept_search
+        return find_matrix(
+            self.mesh, *keep, sources, targets, max_distance, layout, threads, control
+        )
+
+    def nearest(
+        self,
+        source: Point,
+        candidates: Sequence[Point],
+        k: int = 1,
+        max_distance: float | None = None,
+        *,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> Nearest:
+        """Do as `nearest` does, on this mesh; in time that does not depend on its size."""
+        control = Control(progress, cancel, deadline_s, memory_limit)
+        return find_nearest(
+            self.mesh, self._kept_sweeper, source, candidates, k, max_distance, control
+        )
+
+    def _kept_search(self) -> PathSearch:
         if self._search is None:
             self._search = PathSearch(self.mesh)
-        path = _shortest_through(self._search, stops, control, explain=explain)
-        self._search.add_landmark_if_due(stops[0], replace(control, progress=None))
-        return path
+        return self._search
+
+    def _kept_sweeper(self) -> Sweeper:
+        if self._sweeper is None:
+            self._sweeper = Sweeper(self.mesh)
+        return self._sweeper
 
 
 def _shortest_through(

@@ -30,7 +30,7 @@ def landmarks_of(case, count, beside=0) -> tuple[gc.TriangleMesh, Landmarks]:
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     landmarks = Landmarks(mesh)
     for _ in range(count):
-        landmarks.add(int(mesh.topology.inner_vertex[beside]), 0, Control())
+        landmarks.add(int(mesh.topology.inner_vertex[beside]), Control())
     return mesh, landmarks
 
 

@@ -443,7 +443,7 @@ def test_landmark_error_is_all_that_landmarks_fall_short(case):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     topology = mesh.topology
     landmarks = Landmarks(mesh)
-    landmarks.add(0, 0, Control())
+    landmarks.add(0, Control())
     stored = landmarks.distances[:, 0].astype(float)
     place = int(topology.outer_vertex[stored.argmin()])
     exact = gc.exact_distance(mesh, place).distances[topology.outer_vertex]

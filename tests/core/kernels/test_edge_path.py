@@ -65,7 +65,7 @@ def test_landmarks_do_not_lengthen_it_beyond_the_haste(name):
     topology = mesh.topology
     landmarks = Landmarks(mesh)
     for _ in range(3):
-        landmarks.add(0, 0, Control())
+        landmarks.add(0, Control())
     for begin, end in random_pairs(mesh, 5 if WITHOUT_JIT else 40):
         first, last = int(topology.inner_vertex[begin]), int(topology.inner_vertex[end])
         wave = wavefront.new_wavefront(topology, pruned=True)

@@ -49,7 +49,7 @@ def with_landmarks(case, count):
     landmarks = Landmarks(mesh)
     for k in range(count):
         place = np.flatnonzero(mesh.components == k % (mesh.components.max() + 1))[0]
-        landmarks.add(int(mesh.topology.inner_vertex[place]), 0, Control())
+        landmarks.add(int(mesh.topology.inner_vertex[place]), Control())
     return mesh, landmarks
 
 
