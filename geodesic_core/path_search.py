@@ -87,17 +87,21 @@ class PathSearch:
 
         Raises
         ------
-        Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As in `run_sweep`.
         """
         control.grant_memory(self.nbytes)
         control.look_up(0.0)
         start, end = _End(self.mesh, source), _End(self.mesh, target)
+        ends = start, end
         try:
-            return self._search(_Leg(start, end, SEARCH_SLACK, control, _Log(self, explain)))
-        except _LostError:
+            log = _Log(self, explain)
+            return self._search(_Leg(*ends, SEARCH_SLACK, GUIDE_ERROR, control, log))
+        except (_LostError, NotConverged):
             # Rounding on slivers can exceed any slack; without bounds there is nothing to lose.
-            return self._search(_Leg(start, end, math.inf, control, _Log(self, explain)))
+            # Where many faces lie near each other, merging may go in circles.
+            log = _Log(self, explain)
+            return self._search(_Leg(*ends, math.inf, SEARCH_SLACK, control, log))
 
     def _search(self, leg: "_Leg") -> GeodesicPath:
         try:
@@ -150,7 +154,7 @@ class PathSearch:
         """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
         limit = upper * (1.0 + leg.slack) + self._margin
         goal = self._goal(leg.start, limit)
-        bounds = wavefront.merging_bounds(math.inf, GUIDE_ERROR, math.inf, goal)
+        bounds = wavefront.merging_bounds(math.inf, leg.guide_error, math.inf, goal)
         nodes = nodes_of(self.mesh, [leg.end.point], [leg.start.point])
         self._toward = with_sites(self._toward, nodes.sites)
         wave = self._toward = self._run(self._toward, nodes, bounds, leg.control, _AFTER_EDGES)
@@ -221,6 +225,8 @@ class _Leg(NamedTuple):
     end: _End
     slack: float
     """Relative amount by which it looks beyond its bounds"""
+    guide_error: float
+    """Relative error of step 2"""
     control: Control
     log: "_Log"
 
