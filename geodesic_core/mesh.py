@@ -286,7 +286,9 @@ class TriangleMesh:
         if place.vertex_index is not None:
             position = self.vertices[place.vertex_index]
         else:
-            position = np.array(place.barycentric) @ self.vertices[self.faces[place.face_index]]
+            # Not a matrix product, whose last bit depends on where its arrays lie in memory.
+            weights = np.array(place.barycentric)[:, None]
+            position = (weights * self.vertices[self.faces[place.face_index]]).sum(axis=0)
         return position
 
     @cached_property

@@ -1,17 +1,17 @@
 """Polygons become triangles, in place, with a map back to the polygon that each came from.
 
 A polygon is a fan from its first or its second corner where all triangles of the fan point the same
-way; else mapbox_earcut cuts it, as seen along its normal. So a flat polygon, convex or not, becomes
+way; else manifold3d cuts it, as seen along its normal. So a flat polygon, convex or not, becomes
 the very surface that it encloses. Every polygon gives at least one triangle: one with fewer than
 three different corners gives one that repeats a vertex.
 """
 
-import mapbox_earcut
+import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.tolerances import FAN
+from geodesic_core.tolerances import CLIP, FAN
 
 Flags = NDArray[np.bool_]
 
@@ -31,8 +31,8 @@ def triangulated(vertices: Floats, corners: Longs, sizes: Longs) -> tuple[Longs,
     Returns
     -------
     faces, face_map
-        (F, 3), and (F,) or None where each polygon became one triangle. O(C), where earcut is not
-        needed; it takes O(n log n) in practice.
+        (F, 3), and (F,) or None where each polygon became one triangle. O(C), where fans
+        do; manifold3d takes O(n log n) in practice.
     """
     if (sizes == 3).all():
         return corners.reshape(-1, 3), None
@@ -75,7 +75,7 @@ def _cut(vertices: Floats, rows: Longs) -> Longs:
     second = others[is_second]
     faces[second] = _fan(rows[second], 1)
     for polygon in others[~is_second]:
-        triangles = _earcut(flat[polygon])
+        triangles = _clipped(flat[polygon])
         if len(triangles) == rows.shape[1] - 2:  # else it crosses itself: any fan is as good
             faces[polygon] = rows[polygon][triangles]
     return faces
@@ -113,22 +113,16 @@ def _is_fan(flat: Floats, start: int) -> Flags:
     return is_fan
 
 
-def _earcut(flat: Floats) -> list[tuple[int, int, int]]:
+def _clipped(flat: Floats) -> list[tuple[int, int, int]]:
     """Return triangles of a polygon, counter-clockwise.
 
-    earcut leaves out some corners in line with their neighbours, and makes slivers of others. The
-    former are put back as slivers; slivers then take in the triangle beyond their longest edge.
+    Where corners are in line, manifold3d makes slivers. They take in the triangle beyond their
+    longest edge.
     """
-    count = len(flat)
-    cut = mapbox_earcut.triangulate_float64(flat, np.array([count], np.uint32)).reshape(-1, 3)
+    cut = manifold3d.triangulate([flat], CLIP)
     apex: dict[tuple[int, int], int] = {}  # of the triangle on the left of each directed edge
-    for a, b, c in cut.tolist():
-        apex[a, b], apex[b, c], apex[c, a] = c, a, b
-    for a, b in [edge for edge in apex if edge[::-1] not in apex]:
-        corner = a
-        while (following := (corner + 1) % count) != b and len(apex) < 3 * count:
-            _put(apex, (b, corner, following))
-            corner = following
+    for triangle in cut.tolist():
+        _put(apex, tuple(triangle))
     _without_slivers(apex, flat)
     return [(a, b, c) for (a, b), c in apex.items() if a < min(b, c)]
 

@@ -183,6 +183,7 @@ def test_distances_in_a_polygon_are_those_of_its_visibility_graph(seed):
     expected = visibility.distance_matrix(grid, faces)
 
     points = np.insert(np.array(loop, float), 2, 0.0, axis=1) @ zoo.rotation(seed % 1000).T
+    points += rng.normal(size=points.shape) * rng.choice([0.0, 1e-16, 1e-15, 1e-14])
     mesh = gc.TriangleMesh.from_polygons(points, np.arange(len(loop)), [len(loop)])
     rows = [number[point] for point in loop]
     for source in range(0, len(loop), 3):
