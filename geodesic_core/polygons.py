@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.tolerances import CLIP, FAN
+from geodesic_core.tolerances import FAN
 
 Flags = NDArray[np.bool_]
 
@@ -119,7 +119,7 @@ def _clipped(flat: Floats) -> list[tuple[int, int, int]]:
     Where corners are in line, manifold3d makes slivers. They take in the triangle beyond their
     longest edge.
     """
-    cut = manifold3d.triangulate([flat], CLIP)
+    cut = manifold3d.triangulate([flat])
     apex: dict[tuple[int, int], int] = {}  # of the triangle on the left of each directed edge
     for triangle in cut.tolist():
         _put(apex, tuple(triangle))

@@ -167,6 +167,3 @@ FAN = 1e-9
 Less is a sliver or rounding, where three corners lie on one line: another way to cut the polygon is
 looked for. The surface of a flat polygon is the same either way.
 """
-
-CLIP = 1e-12
-"""Share of a polygon's size within which its corners count as on a line when it is cut."""
