@@ -179,7 +179,8 @@ class TriangleMesh:
         Parameters
         ----------
         barriers
-            Face ids, in any order; those that are blocked already stay so.
+            Ids of triangles, in any order (those of polygons are found in `face_map`). What is
+            blocked already stays so.
 
         Raises
         ------
@@ -292,7 +293,8 @@ class TriangleMesh:
         if isinstance(point, SurfacePoint):
             if point.vertex_index is None:
                 canonical.check_index(point.face_index, len(self.faces), "face", name)
-                if repeat_a_vertex(self.faces[[point.face_index]]):
+                outside = self.inner_face[point.face_index] < 0
+                if outside and repeat_a_vertex(self.faces[[point.face_index]]):
                     raise InvalidPoint(
                         f"the {name} is in face {point.face_index}, which repeats a vertex and is "
                         f"no part of the surface"
