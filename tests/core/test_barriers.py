@@ -421,3 +421,12 @@ def test_memory_for_the_mesh_with_barriers_counts():
     with pytest.raises(gc.errors.MemoryLimitExceeded):
         gc.exact_distance(mesh, 0, barriers=[5], memory_limit=peak)
     gc.exact_distance(mesh, 0, barriers=[5], memory_limit=2 * peak + mesh.nbytes)
+
+
+def test_what_may_not_take_the_memory_does_not(monkeypatch):
+    mesh = gc.TriangleMesh(*zoo.icosphere(2))
+    monkeypatch.setattr(
+        gc.TriangleMesh, "with_barriers", lambda *_: pytest.fail("made all the same")
+    )
+    with pytest.raises(gc.errors.MemoryLimitExceeded):
+        gc.exact_distance(mesh, 0, barriers=[5], memory_limit=1000)
