@@ -12,7 +12,7 @@ from app.queries.query import Query
 
 @dataclass(frozen=True)
 class Estimate:
-    """What an answer is likely to take."""
+    """What an answer is likely to take, in no more digits than there is sense in."""
 
     seconds: float
     memory_bytes: int
@@ -27,4 +27,9 @@ def estimate(
     likely = query.likely(opened, places)
     parts = encode(likely.answer, media_type).parts
     size = likely.times * sum(memoryview(part).nbytes for part in parts)
-    return Estimate(likely.cost.seconds, likely.cost.memory_bytes, round(size))
+    cost = likely.cost
+    return Estimate(_rounded(cost.seconds), round(_rounded(cost.memory_bytes)), round(size))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.2g}")

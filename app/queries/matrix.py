@@ -167,7 +167,8 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
             },
             "warnings": opened.warnings,
         }
-        return Answer(members, arrays, sum(members[name].size for name in arrays))
+        values = VALUES_OF_POINT * len(places) + sum(members[name].size for name in arrays)
+        return Answer(members, arrays, values)
 
 
 def _told(

@@ -378,14 +378,21 @@ def test_points_that_are_refused(
         ("path", {"source": point, "target": good}, "/source"),
         ("path", {"source": good, "target": point}, "/target"),
         ("path", {"source": good, "target": good, "waypoints": [good, point]}, "/waypoints/1"),
+        ("paths", {"source": point, "targets": [good]}, "/source"),
+        ("paths", {"source": good, "targets": [good, point]}, "/targets/1"),
+        ("matrix", {"sources": [point], "targets": [good]}, "/sources/0"),
+        ("matrix", {"sources": [good], "targets": [good, point]}, "/targets/1"),
+        ("nearest", {"source": point, "candidates": [good]}, "/source"),
+        ("nearest", {"source": good, "candidates": [good, point]}, "/candidates/1"),
     ]
     for operation, body, place in asked:
-        response = client.post(f"/v1/meshes/{apart}/{operation}", json=body)
-        problem = check_problem(response, 422, code)
-        (fault,) = problem["errors"]
-        assert fault["pointer"] == place + member
-        assert message in fault["message"]
-        assert problem["detail"] == f"{fault['pointer']}: {fault['message']}"
+        for estimate in ("", "?estimate=true"):
+            response = client.post(f"/v1/meshes/{apart}/{operation}{estimate}", json=body)
+            problem = check_problem(response, 422, code)
+            (fault,) = problem["errors"]
+            assert fault["pointer"] == place + member
+            assert message in fault["message"]
+            assert problem["detail"] == f"{fault['pointer']}: {fault['message']}"
 
 
 TEXTS = [text_of(point) for point, code, _, _ in BAD_POINTS if code == "invalid_point"][:-2]
