@@ -99,10 +99,12 @@ POINT_TAGS = {name: f"by {name}" for name in ("vertex", "edge", "face", "positio
 
 
 def _tag(written: Any) -> str | None:
-    if isinstance(written, Wire):
-        written = written.model_fields_set
-    fields = written if isinstance(written, dict | set) else ()
-    return next((tag for name, tag in POINT_TAGS.items() if name in fields), None)
+    # Called for every point that is read or written down; a query may have 100 000.
+    fields = written if isinstance(written, dict) else getattr(written, "__dict__", ())
+    for name, tag in POINT_TAGS.items():
+        if name in fields:
+            return tag
+    return None
 
 
 _BY_FIELD = Discriminator(

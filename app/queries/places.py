@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 import geodesic_core as gc
 from app import schemas
 from app.errors import Fault
-from app.points import resolve
+from app.points import described, resolve
 from app.queries.refusals import FAULTS_SHOWN, Named, refuse_points
 from geodesic_core.nodes import component_of
 
@@ -47,7 +47,7 @@ def components_of(mesh: gc.TriangleMesh, places: Places) -> NDArray[np.int64]:
 
 def positions_of(mesh: gc.TriangleMesh, places: Places) -> NDArray[np.float64]:
     """Return where points are, mesh units."""
-    return np.array([mesh.position(place) for place in places]).reshape(-1, 3)
+    return np.array([described(mesh, place)["position"] for place in places]).reshape(-1, 3)
 
 
 def _at_fault(point: schemas.Point | schemas.Source) -> str:

@@ -75,8 +75,12 @@ class Query(ABC, Generic[R]):
         return query
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Go to a worker as JSON: the models of 40 000 points would take a tenth of a second."""
-        return _revived, (type(self), self.mesh_id, self.request.model_dump_json())
+        """Go to a worker as JSON.
+
+        For 40 000 points that takes 5 ms here and 0.1 s there, where models, pickled one by one,
+        took 0.2 and 0.5 s.
+        """
+        return _revived, (type(self), self.mesh_id, _written(self.request))
 
     # What a kind says of itself
 
@@ -136,7 +140,12 @@ class Query(ABC, Generic[R]):
         return self.solve(opened, resolved(self.points(), opened.mesh, grant.cancel), grant)
 
 
-def _revived(kind: type[Query[Any]], mesh_id: str, request: str) -> Query[Any]:
+def _written(request: schemas.Wire) -> bytes:
+    """Return a request as JSON; pydantic's own way takes ten times as long."""
+    return orjson.dumps(request, default=vars)
+
+
+def _revived(kind: type[Query[Any]], mesh_id: str, request: bytes) -> Query[Any]:
     return kind(mesh_id, kind.model.model_validate_json(request))
 
 
@@ -155,7 +164,7 @@ def result_key(query: Query[Any], media_type: str) -> str:
         return uuid4().hex
     names = [type(query).__name__, query.mesh_id, media_type, code_version()]
     digest = hashlib.blake2b(orjson.dumps(names), digest_size=16)
-    digest.update(query.request.model_dump_json().encode())
+    digest.update(_written(query.request))
     return digest.hexdigest()
 
 
