@@ -579,7 +579,8 @@ class Estimate(BaseModel):
         "of 3"
     )
     response_bytes: int = Field(
-        description="Of the body, without compression; within 5 %, for paths within a factor of 3"
+        description="Of the body, within 5 %; with `max_distance`, and for paths, as if geodesics "
+        "were straight, so that paths where the surface winds take some times as much"
     )
     media_type: str = Field(description="Of the response that is estimated")
 

@@ -37,7 +37,10 @@ def likely_outline(
     end: NDArray[np.float64],
     length: float,
 ) -> dict[str, Any]:
-    """Return what might be said of a path of this length: it crosses as many edges as others do."""
+    """Return what might be said of a path of this length: it crosses as many edges as others do.
+
+    There is none where the length is infinite.
+    """
     if math.isinf(length):
         return no_outline("disconnected")
     count = 2 + round(CROSSINGS * length / typical_edge(mesh))

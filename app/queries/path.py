@@ -1,5 +1,6 @@
 """The shortest path between two points."""
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,7 +18,7 @@ from app.points import described
 from app.queries.accuracy import method_of, solve_field, with_its_error
 from app.queries.costs import PER_PATH, PER_POINT, Cost, search_cost, sweep_cost
 from app.queries.outline import likely_outline, no_outline, outline_of
-from app.queries.places import Places, positions_of
+from app.queries.places import Places, components_of, positions_of
 from app.queries.query import Grant, Likely, Query, numbered
 from app.queries.refusals import Named, detail_of, refuse_more, refuse_places, refuse_points
 from app.settings import Settings
@@ -97,6 +98,8 @@ class PathQuery(Query[schemas.PathRequest]):
             cost = sweep_cost(mesh, self.request, keeps=True)
         stops = positions_of(mesh, [source, *waypoints, target])
         length = sum(float(np.linalg.norm(there - here)) for here, there in pairwise(stops))
+        if len(set(components_of(mesh, places).tolist())) > 1:
+            length = math.inf
         found = likely_outline(mesh, stops[0], stops[-1], length)
         seconds = cost.seconds + PER_PATH + PER_POINT * len(places)
         return Likely(Cost(seconds, cost.memory_bytes), self._answer(opened, places, found))
