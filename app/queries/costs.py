@@ -28,6 +28,8 @@ PER_FACE, PER_WINDOWS = 0.4e-6, 2.5e-9
 """Of an exact sweep: for each of its n faces, and for the windows on it, which are about √n."""
 PER_FACE_MERGED = 0.5e-6
 """Of an approximate sweep."""
+PER_SWEEP = 0.3e-3
+"""To start one and to end it, however short it is."""
 PER_FACE_UNSWEPT = 0.03e-6
 """To allocate the state of a face."""
 PER_SEARCH, PER_FACE_SEARCHED = 0.5e-3, 0.08e-6
@@ -66,7 +68,7 @@ def sweep_cost(
     if request.method == "exact":
         seconds, per_face = _sweep_seconds(share * faces), SWEEP_BYTES_PER_FACE
     else:
-        seconds = PER_FACE_MERGED * share * faces
+        seconds = PER_SWEEP + PER_FACE_MERGED * share * faces
         per_face = KEEPING_BYTES_PER_FACE if keeps else MERGING_BYTES_PER_FACE
     return Cost(seconds + PER_FACE_UNSWEPT * faces, SWEEP_BYTES + per_face * faces)
 
@@ -87,7 +89,7 @@ def search_cost(mesh: gc.TriangleMesh, count: int) -> Cost:
 
 
 def _sweep_seconds(faces: float) -> float:
-    return faces * (PER_FACE + PER_WINDOWS * math.sqrt(faces))
+    return PER_SWEEP + faces * (PER_FACE + PER_WINDOWS * math.sqrt(faces))
 
 
 # Lengths, which geodesics are at least and seldom by much

@@ -21,7 +21,7 @@ from app.queries.costs import (
     straight_to_nearest,
     sweep_cost,
 )
-from app.queries.places import Places, components_of
+from app.queries.places import Places, components_of, unreachable
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_more
 from app.queries.stats import likely_stats, stats_of
@@ -166,11 +166,3 @@ def _unreachable(
     ends = mesh.components if targets is None else components_of(mesh, targets)
     with_a_source = np.isin(ends, components_of(mesh, sources))
     return unreachable(np.isinf(distances), with_a_source)
-
-
-def unreachable(missed: NDArray[np.bool_], connected: NDArray[np.bool_]) -> dict[str, int]:
-    """Return how many are missed by reason: not connected at all, or too far away."""
-    return {
-        "disconnected": int(np.count_nonzero(missed & ~connected)),
-        "beyond_max_distance": int(np.count_nonzero(missed & connected)),
-    }

@@ -13,8 +13,7 @@ from app.mesh_store import OpenMesh
 from app.points import described
 from app.queries.accuracy import CERTAIN
 from app.queries.costs import PER_POINT, Cost, share_within, straight_between, sweeps_cost
-from app.queries.distances import unreachable
-from app.queries.places import Places, components_of
+from app.queries.places import Places, components_of, unreachable
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_places
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app.queries.accuracy import CERTAIN, bound_of
-from app.queries.costs import CROSSINGS, typical_edge
+from app.queries.costs import CROSSINGS
 
 
 def outline_of(path: gc.GeodesicPath) -> dict[str, Any]:
@@ -36,14 +36,15 @@ def likely_outline(
     start: NDArray[np.float64],
     end: NDArray[np.float64],
     length: float,
+    edge: float,
 ) -> dict[str, Any]:
     """Return what might be said of a path of this length: it crosses as many edges as others do.
 
-    There is none where the length is infinite.
+    There is none where the length is infinite; ``edge`` is the typical length of an edge.
     """
     if math.isinf(length):
         return no_outline("disconnected")
-    count = 2 + round(CROSSINGS * length / typical_edge(mesh))
+    count = 2 + round(CROSSINGS * length / edge)
     shares = np.linspace(0.0, 1.0, count)[:, None]
     weights = np.concatenate([shares, 1.0 - shares, np.zeros_like(shares)], axis=1).tolist()
     face = len(mesh.faces) // 2

@@ -16,7 +16,7 @@ from app.errors import Fault, ProblemError, pointer
 from app.mesh_store import OpenMesh
 from app.points import described
 from app.queries.accuracy import method_of, solve_field, with_its_error
-from app.queries.costs import PER_PATH, PER_POINT, Cost, search_cost, sweep_cost
+from app.queries.costs import PER_PATH, PER_POINT, Cost, search_cost, sweep_cost, typical_edge
 from app.queries.outline import likely_outline, no_outline, outline_of
 from app.queries.places import Places, components_of, positions_of
 from app.queries.query import Grant, Likely, Query, numbered
@@ -100,7 +100,7 @@ class PathQuery(Query[schemas.PathRequest]):
         length = sum(float(np.linalg.norm(there - here)) for here, there in pairwise(stops))
         if len(set(components_of(mesh, places).tolist())) > 1:
             length = math.inf
-        found = likely_outline(mesh, stops[0], stops[-1], length)
+        found = likely_outline(mesh, stops[0], stops[-1], length, typical_edge(mesh))
         seconds = cost.seconds + PER_PATH + PER_POINT * len(places)
         return Likely(Cost(seconds, cost.memory_bytes), self._answer(opened, places, found))
 

@@ -17,6 +17,7 @@ from app.queries.costs import (
     share_within,
     straight_between,
     sweep_cost,
+    typical_edge,
 )
 from app.queries.outline import likely_outline, no_outline, outline_of
 from app.queries.places import Places, look_up
@@ -82,10 +83,10 @@ class PathsQuery(Query[schemas.PathsRequest]):
         sweep = sweep_cost(mesh, self.request, share, keeps=True)
         seconds = sweep.seconds + (PER_PATH + PER_POINT) * len(targets)
         some = targets[:: 1 + len(targets) // _TRIED]
-        start = mesh.position(source)
+        start, edge = mesh.position(source), typical_edge(mesh)
         lengths = straight_between(mesh, [source], some, limit)[0].tolist()
         found = [
-            likely_outline(mesh, start, mesh.position(target), length)
+            likely_outline(mesh, start, mesh.position(target), length, edge)
             for target, length in zip(some, lengths, strict=True)
         ]
         answer = self._answer(opened, [source, *some], found, likely_stats(mesh, share))

@@ -50,6 +50,14 @@ def positions_of(mesh: gc.TriangleMesh, places: Places) -> NDArray[np.float64]:
     return np.array([described(mesh, place)["position"] for place in places]).reshape(-1, 3)
 
 
+def unreachable(missed: NDArray[np.bool_], connected: NDArray[np.bool_]) -> dict[str, int]:
+    """Return how many are missed by reason: not connected at all, or too far away."""
+    return {
+        "disconnected": int(np.count_nonzero(missed & ~connected)),
+        "beyond_max_distance": int(np.count_nonzero(missed & connected)),
+    }
+
+
 def _at_fault(point: schemas.Point | schemas.Source) -> str:
     """Return the member that is wrong with a point whose indices are sound."""
     match point:
