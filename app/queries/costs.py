@@ -104,6 +104,15 @@ def straight_between(
     return _limited(table, max_distance)
 
 
+def straight_along(
+    mesh: gc.TriangleMesh, sources: Places, targets: Places, max_distance: float | None
+) -> NDArray[np.float64]:
+    """Return the same (N,) for pairs."""
+    away = np.linalg.norm(positions_of(mesh, sources) - positions_of(mesh, targets), axis=1)
+    away[components_of(mesh, sources) != components_of(mesh, targets)] = np.inf
+    return _limited(away, max_distance)
+
+
 def straight_to_nearest(
     mesh: gc.TriangleMesh, sources: Places, targets: Places | None, max_distance: float | None
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -1,5 +1,6 @@
 """Distances from many points to many others."""
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import chain
@@ -20,10 +21,11 @@ from app.queries.costs import (
     Cost,
     search_cost,
     share_within,
+    straight_along,
     straight_between,
     sweeps_cost,
 )
-from app.queries.places import Places, components_of, positions_of
+from app.queries.places import Places, components_of
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_more, refuse_places
 from app.settings import Settings
@@ -87,12 +89,8 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
         sources, targets = self._parted(places)
         found: Any
         if self.request.layout == "pairs":
-            found = np.linalg.norm(
-                positions_of(mesh, sources) - positions_of(mesh, targets), axis=1
-            )
-            apart = components_of(mesh, sources) != components_of(mesh, targets)
-            found[apart | (found > (np.inf if limit is None else limit))] = np.inf
-            cost = self._cost_of_pairs(mesh, sources, targets, found)
+            found = straight_along(mesh, sources, targets, limit)
+            cost = _cost_of_pairs(mesh, sources, targets, found)
         else:
             found = straight_between(mesh, sources, targets, limit)
             from_sources = len(sources) <= len(targets)
@@ -112,29 +110,6 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
     def _parted(self, places: Places) -> tuple[Places, Places]:
         count = len(self.request.sources)
         return places[:count], places[count:]
-
-    def _cost_of_pairs(
-        self,
-        mesh: gc.TriangleMesh,
-        sources: Places,
-        targets: Places,
-        distances: NDArray[np.float64],
-    ) -> Cost:
-        """Return the cost of the searches or of the sweeps, from the side that has fewer points."""
-        by_source, by_target = Counter(sources), Counter(targets)
-        hubs, ends = (
-            (by_source, sources) if len(by_source) <= len(by_target) else (by_target, targets)
-        )
-        few = [count for count in hubs.values() if count < SWEEP_FROM]
-        radius = dict.fromkeys(hubs, 0.0)
-        for end, away in zip(ends, distances.tolist(), strict=True):
-            if hubs[end] >= SWEEP_FROM and np.isfinite(away):
-                radius[end] = max(radius[end], away)
-        sweeps = [radius[hub] for hub, count in hubs.items() if count >= SWEEP_FROM]
-        costs = [search_cost(mesh, sum(few))] if few else []
-        if sweeps:
-            costs.append(_cost_of_sweeps(mesh, np.array(sweeps)))
-        return Cost(sum(cost.seconds for cost in costs), sum(cost.memory_bytes for cost in costs))
 
     def _answer(self, opened: OpenMesh, places: Places, found: Any) -> Answer:
         mesh, layout = opened.mesh, self.request.layout
@@ -189,3 +164,20 @@ def _farthest(distances: NDArray[np.float64]) -> NDArray[np.float64]:
 def _cost_of_sweeps(mesh: gc.TriangleMesh, radii: NDArray[np.float64]) -> Cost:
     threads = min(available_cores(), len(radii))
     return sweeps_cost(mesh, share_within(mesh, radii).tolist(), threads)
+
+
+def _cost_of_pairs(
+    mesh: gc.TriangleMesh, sources: Places, targets: Places, distances: NDArray[np.float64]
+) -> Cost:
+    """Return the cost of searches and of sweeps, these from the side that has fewer points."""
+    ends = min(sources, targets, key=lambda side: len(set(side)))
+    pairs = Counter(ends)
+    searches = sum(count for count in pairs.values() if count < SWEEP_FROM)
+    radii = {end: 0.0 for end, count in pairs.items() if count >= SWEEP_FROM}
+    for end, away in zip(ends, distances.tolist(), strict=True):
+        if end in radii and away < math.inf:
+            radii[end] = max(radii[end], away)
+    costs = [search_cost(mesh, searches)] if searches else []
+    if radii:
+        costs.append(_cost_of_sweeps(mesh, np.array(list(radii.values()))))
+    return Cost(sum(cost.seconds for cost in costs), sum(cost.memory_bytes for cost in costs))

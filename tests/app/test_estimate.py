@@ -94,6 +94,39 @@ def test_bytes_of_the_response(
         assert 1 / factor <= told["response_bytes"] / len(real.content) <= factor
 
 
+_ENDS = [{"vertex": i} for i in range(6)]
+
+
+@pytest.mark.parametrize(
+    ("operation", "body"),
+    [
+        ("distances", {"sources": _ENDS[:1], "max_distance": 0.5}),
+        ("distances", {"sources": _ENDS[:1], "targets": _ENDS}),
+        ("path", {"source": {"vertex": 0}, "target": {"vertex": 4}}),
+        ("path", {"source": {"vertex": 0}, "target": {"vertex": 4}, "method": "approximate"}),
+        ("paths", {"source": {"vertex": 0}, "targets": _ENDS, "max_distance": 0.5}),
+        *(
+            ("matrix", {"sources": _ENDS, "targets": _ENDS[::-1], **limit, "layout": layout})
+            for layout in ("dense", "sparse", "pairs")
+            for limit in ({}, {"max_distance": 0.5})
+        ),
+        ("matrix", {"sources": _ENDS[:1] * 12, "targets": _ENDS * 2, **PAIRS}),
+        ("nearest", {"source": {"vertex": 0}, "candidates": _ENDS[3:]}),
+        ("nearest", {"source": {"vertex": 0}, "candidates": _ENDS, "k": 5, "max_distance": 0.5}),
+        ("locate", {"points": [[0, 0, 9]] * 9, "max_distance": 1}),
+    ],
+)
+def test_what_is_out_of_reach_is_not_counted(
+    client: TestClient, apart: str, operation: str, body: dict[str, Any]
+) -> None:
+    link = f"/v1/meshes/{apart}/{operation}"
+
+    told = client.post(f"{link}?estimate=true", json=body).json()
+
+    size = len(client.post(link, json=body).content)
+    assert 1 / 1.1 <= told["response_bytes"] / size <= 1.1
+
+
 # Positions are looked for without any state; what is said of paths comes on top of it.
 STATEFUL = [name for name, (operation, *_) in QUERIES.items() if operation != "locate"]
 ALLOCATED = [name for name in STATEFUL if QUERIES[name][0] != "paths"]
