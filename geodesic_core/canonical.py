@@ -23,13 +23,17 @@ ROUNDING = 4.0 * np.finfo(np.float64).eps
 
 
 def at_vertex(topology: Topology, faces: Ints, vertex: int) -> SurfacePoint:
-    """Return the point at a vertex, in the lowest of its faces."""
-    v = topology.inner_vertex[vertex]
-    corners = topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]]
+    """Return the point at a vertex, in the lowest of its faces.
+
+    Of several vertices that edges of no length join, it is the lowest.
+    """
+    node = int(topology.inner_vertex[vertex])
+    vertex = int(topology.outer_vertex[node])
+    corners = topology.corners[topology.first_corner[node] : topology.first_corner[node + 1]]
     if len(corners) == 0:
         return SurfacePoint.vertex(vertex)
     face = int(topology.outer_face[corners // 3].min())
-    u, v, w = (float(corner == vertex) for corner in faces[face])
+    u, v, w = (float(v == node) for v in topology.inner_vertex[faces[face]])
     return SurfacePoint(face, (u, v, w), vertex)
 
 
@@ -44,18 +48,37 @@ def in_face(
     u, v, w = (weight / total for weight in kept)
     if u > 0.0 and v > 0.0 and w > 0.0:
         return SurfacePoint(face, (u, v, w))
-    share = dict(zip(faces[face].tolist(), (u, v, w), strict=True))
+    share = dict(zip(topology.inner_vertex[faces[face]].tolist(), (u, v, w), strict=True))
     for h in range(3 * int(inner_face[face]), 3 * int(inner_face[face]) + 3):
-        ends = (int(topology.outer_vertex[end]) for end in topology.links[h, [TAIL, HEAD]])
-        at_tail, at_head = (share[end] for end in ends)
+        at_tail, at_head = (share[end] for end in topology.links[h, [TAIL, HEAD]].tolist())
         if at_tail + at_head > 1.0 - ROUNDING:
             break
     return _on_edge(topology, faces, h, at_tail, at_head)
 
 
+def in_collapsed_face(
+    topology: Topology, faces: Ints, face: int, weights: Sequence[float]
+) -> SurfacePoint | None:
+    """Return the point of a face with an edge of no length, as one of the edge that is left of it.
+
+    None where that belongs to no other face, and the point is none of its ends.
+    """
+    corners = faces[face].tolist()
+    nodes = topology.inner_vertex[corners].tolist()
+    others = [i for i in range(3) if nodes[i] != nodes[0]]
+    t = sum(float(weights[i]) for i in others)
+    if t <= WEIGHT:
+        return at_vertex(topology, faces, corners[0])
+    if t >= 1.0 - WEIGHT:
+        return at_vertex(topology, faces, corners[others[0]])
+    return on_edge(topology, faces, corners[0], corners[others[0]], t)
+
+
 def on_edge(topology: Topology, faces: Ints, start: int, end: int, t: float) -> SurfacePoint | None:
     """Return the point at share ``t`` of the edge between two vertices; None if there is none."""
     v, u = topology.inner_vertex[start], topology.inner_vertex[end]
+    if v == u and start != end:  # an edge of no length
+        return at_vertex(topology, faces, start)
     share = {int(v): 1.0 - t, int(u): t}
     for corner in topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]]:
         for h in (int(corner), int(previous(corner))):
@@ -132,8 +155,8 @@ def _on_edge(
     topology: Topology, faces: Ints, h: int, at_tail: float, at_head: float
 ) -> SurfacePoint:
     """Return the point of half-edge h with these weights of its ends, one of them above zero."""
-    links, outer_vertex = topology.links, topology.outer_vertex
-    tail, head = (int(outer_vertex[v]) for v in links[h, [TAIL, HEAD]])
+    links = topology.links
+    tail, head = topology.outer_vertex[links[h, [TAIL, HEAD]]].tolist()
     low, high = min(tail, head), max(tail, head)
     upper = at_head if head == high else at_tail
     upper = round(upper / (at_tail + at_head) * EDGE_STEPS) / EDGE_STEPS
@@ -141,7 +164,8 @@ def _on_edge(
         return at_vertex(topology, faces, low if upper == 0.0 else high)
     face = min(int(topology.outer_face[g // 3]) for g in half_edges_around(links, h))
     share = {low: 1.0 - upper, high: upper}
-    u, v, w = (share.get(int(corner), 0.0) for corner in faces[face])
+    corners = topology.outer_vertex[topology.inner_vertex[faces[face]]]
+    u, v, w = (share.get(corner, 0.0) for corner in corners.tolist())
     return SurfacePoint(face, (u, v, w))
 
 

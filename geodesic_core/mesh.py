@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from geodesic_core import canonical
 from geodesic_core.arguments import as_limit, is_number
 from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.contraction import edges_of_no_length, lowest_joined, of_three_vertices
 from geodesic_core.equal_rows import merged
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 from geodesic_core.kernels import topology as kernels
@@ -41,14 +42,16 @@ class TriangleMesh:
     ------
     InvalidMesh
         Naming the elements at fault: wrong shape or type, NaN or infinity, an index out of range,
-        no face of three different vertices, a face with an edge of no length.
+        no face with three vertices at different positions, an edge shorter than 1e-50.
 
     Notes
     -----
     The arrays are copied once, and read-only. Vertices and faces keep the caller's order: the
     topology's own, nearer in memory, shows nowhere. A face that repeats a vertex keeps its number,
-    but is no part of the surface: it joins nothing, and no point lies in it. Preparing costs
-    O(V + F) time, and memory of about 365 bytes a face.
+    but is no part of the surface: it joins nothing, and no point lies in it. An edge of no length,
+    of a face of three different vertices, makes its ends one place: their distance is 0. What is
+    left of the face is an edge, whose points are those of its other faces, or a point. Preparing
+    costs O(V + F) time, and memory of about 365 bytes a face.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, merge: Merge = "none") -> None:
@@ -171,7 +174,10 @@ class TriangleMesh:
 
     @cached_property
     def inner_face(self) -> Ints:
-        """(F,) int32: the topology's number of each face; -1 of one that repeats a vertex."""
+        """(F,) int32: the topology's number of each face; -1 of one without extent.
+
+        Such a face repeats a vertex, or has an edge of no length.
+        """
         inner = np.full(len(self.faces), -1, np.int32)
         outer = self.topology.outer_face
         inner[outer] = np.arange(len(outer), dtype=np.int32)
@@ -241,12 +247,9 @@ class TriangleMesh:
         if isinstance(point, SurfacePoint):
             if point.vertex_index is None:
                 canonical.check_index(point.face_index, len(self.faces), "face", name)
-                if self.inner_face[point.face_index] < 0:
-                    raise InvalidPoint(
-                        f"the {name} is in face {point.face_index}, which repeats a vertex and is "
-                        f"no part of the surface"
-                    )
                 canonical.check_weights(point.barycentric, point.face_index, name)
+                if self.inner_face[point.face_index] < 0:
+                    return self._point_without_extent(point.face_index, point.barycentric, name)
                 return self._point_in_face(point.face_index, point.barycentric)
             index = point.vertex_index
         canonical.check_index(index, len(self.vertices), "vertex", name)
@@ -254,6 +257,20 @@ class TriangleMesh:
 
     def _point_in_face(self, face: int, weights: Sequence[float]) -> SurfacePoint:
         return canonical.in_face(self.topology, self.faces, self.inner_face, face, weights)
+
+    def _point_without_extent(self, face: int, weights: Sequence[float], name: str) -> SurfacePoint:
+        if not of_three_vertices(self.faces[[face]])[0]:
+            raise InvalidPoint(
+                f"the {name} is in face {face}, which repeats a vertex and is no part of the "
+                f"surface"
+            )
+        point = canonical.in_collapsed_face(self.topology, self.faces, face, weights)
+        if point is None:
+            raise InvalidPoint(
+                f"the {name} is in face {face}, which has an edge of no length and is no part of "
+                f"the surface: the edge that is left of it belongs to no other face"
+            )
+        return point
 
     def point_on_edge(self, start: int, end: int, t: float) -> SurfacePoint:
         """Return the canonical point at share ``t`` of the way between the ends of an edge.
@@ -403,27 +420,37 @@ def _refuse_out_of_range(corners: Longs, sizes: Longs, vertex_count: int) -> Non
 
 
 def _prepare(vertices: Floats, faces: Longs) -> Topology:
-    a, b, c = faces.T
-    surface = np.flatnonzero((a != b) & (b != c) & (c != a))
-    if len(surface) == 0:
-        raise InvalidMesh(
-            "each face repeats a vertex: there is no surface",
-            kind="face",
-            elements=list(range(min(len(faces), NAMED))),
-        )
-    topology = kernels.empty_topology(len(vertices), len(surface))
-    triangles = faces.astype(np.int32)
-    outcome, bad = kernels.build_topology(vertices, triangles[surface], topology)
-    topology.outer_face[:] = surface[topology.outer_face]
+    topology, outcome, bad = _built(vertices, faces)
+    if outcome == kernels.TOO_SHORT:
+        joined = lowest_joined(len(vertices), edges_of_no_length(vertices, faces))
+        topology, outcome, bad = _built(vertices, joined[faces])
+        topology.inner_vertex[:] = topology.inner_vertex[joined]
+        # The numbers of those that joined others are left out.
+        topology.component[:] = np.unique(topology.component[joined], return_inverse=True)[1]
     if outcome == kernels.TOO_SHORT:
         face = int(topology.outer_face[bad])
         raise InvalidMesh(
-            f"face {face} is {faces[face].tolist()} and has an edge of length zero (or below "
-            f"{kernels.SHORTEST_EDGE:g}): two of its vertices lie at one position; remove the face",
+            f"face {face} is {faces[face].tolist()} and has an edge shorter than "
+            f"{kernels.SHORTEST_EDGE:g}: scale the mesh, or merge the edge's vertices",
             kind="face",
             elements=[face],
         )
     return topology
+
+
+def _built(vertices: Floats, faces: Longs) -> tuple[Topology, int, int]:
+    """Return the topology of the faces of three different vertices, and how building it went."""
+    surface = np.flatnonzero(of_three_vertices(faces))
+    if len(surface) == 0:
+        raise InvalidMesh(
+            "each face repeats a vertex or has an edge of no length: there is no surface",
+            kind="face",
+            elements=list(range(min(len(faces), NAMED))),
+        )
+    topology = kernels.empty_topology(len(vertices), len(surface))
+    outcome, bad = kernels.build_topology(vertices, faces.astype(np.int32)[surface], topology)
+    topology.outer_face[:] = surface[topology.outer_face]
+    return topology, outcome, bad
 
 
 def _and_more(bad: Sequence[Any] | NDArray[Any]) -> str:

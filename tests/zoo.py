@@ -280,6 +280,30 @@ def welded(vertices, faces, keep, drop):
     return drop_unused(vertices, faces)
 
 
+def needled(vertices, faces, seed):
+    """The same surface with edges of no length: vertices get copies, which needles join to them.
+
+    Also which vertex each one is a copy of, and the place of each face among the needles.
+    """
+    rng = np.random.default_rng(seed)
+    vertices, flat = np.asarray(vertices), np.array(faces).reshape(-1)
+    groups, copy_of = {v: [v] for v in np.unique(flat).tolist()}, list(range(len(vertices)))
+    for v in rng.permutation(list(groups))[: max(2, len(groups) // 3)].tolist():
+        for _ in range(rng.integers(1, 4)):
+            groups[v].append(len(copy_of))
+            copy_of.append(v)
+    needles = []
+    for v, group in groups.items():
+        beside = np.setdiff1d(faces[(faces == v).any(axis=1)], v)
+        for i, copy in enumerate(group[1:], 1):
+            third = groups[rng.choice(beside)] if i == 1 or rng.random() < 0.7 else group[: i - 1]
+            needles.append(rng.permutation([copy, group[i - 1], rng.choice(third)]))
+    mixed = np.array([rng.choice(groups[v]) for v in flat.tolist()]).reshape(-1, 3)
+    at = np.sort(rng.integers(0, len(mixed) + 1, len(needles)))
+    place = np.arange(len(mixed)) + np.searchsorted(at, np.arange(len(mixed)), side="right")
+    return vertices[copy_of], np.insert(mixed, at, needles, axis=0), np.array(copy_of), place
+
+
 # The small zoo ----------------------------------------------------------------------------------
 
 

@@ -71,7 +71,10 @@ TOO_LARGE = 5
 
 LARGEST_COORDINATE = 1e50
 SHORTEST_EDGE = 1e-50
-"""Mesh units; between the two, sixth powers of lengths neither overflow nor vanish."""
+"""Mesh units; between the two, sixth powers of lengths neither overflow nor vanish.
+
+Edges of no length at all are contracted before; see `contraction`.
+"""
 
 
 class Topology(NamedTuple):
@@ -96,9 +99,10 @@ class Topology(NamedTuple):
     component: Ints
     """(V,): connected component, by the *caller's* vertex; isolated vertices have one each"""
     inner_vertex: Ints
-    """(V,): the caller's vertex → inner vertex"""
+    """(V,): the caller's vertex → inner vertex; one for all that edges of no length join"""
     outer_vertex: Ints
-    """(V,): inner vertex → the caller's"""
+    """(V,): inner vertex → the caller's; of several the lowest, while the others' inner vertices
+    are in no face"""
     outer_face: Ints
     """(F,): inner face → the caller's"""
 

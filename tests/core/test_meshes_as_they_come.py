@@ -111,12 +111,20 @@ def test_a_path_that_bends_where_a_face_of_no_area_begins():
     assert found[6] == pytest.approx(1 + np.sqrt(2), rel=1e-12)
 
 
-@pytest.mark.xfail(strict=True, raises=gc.errors.InvalidMesh, reason="refused, the face named")
 def test_an_edge_of_no_length():
-    """A square cut along a diagonal, with a sliver between two vertices at one corner."""
+    """A square cut along a diagonal, with a sliver between two vertices at one corner.
+
+    More in `test_zero_length_edges`.
+    """
     vertices = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)]
-    found = distances(vertices, [(0, 1, 2), (0, 2, 4), (4, 2, 3)])
-    np.testing.assert_allclose(found, [0, 1, np.sqrt(2), 1, 0], atol=1e-12)
+    mesh = gc.TriangleMesh(vertices, [(0, 1, 2), (0, 2, 4), (4, 2, 3)])
+    found = gc.exact_distance(mesh, 4).distances
+    np.testing.assert_allclose(found, [0, 1, np.sqrt(2), 1, 0], rtol=1e-15)
+    assert gc.exact_distance(mesh, 1).distances[3] == pytest.approx(np.sqrt(2), rel=1e-15)
+    assert mesh.report.zero_length_edges == gc.Sample(1, ((0, 4),))
+    assert mesh.report.collapsed_faces == gc.Sample(1, (1,))
+    assert "(0, 4)" in mesh.warnings[0]
+    assert "face 1" in mesh.warnings[0]
 
 
 def test_two_components():
