@@ -75,9 +75,17 @@ def book(rng):
     return vertices, zoo.wound_at_random(faces, seed)[0]
 
 
+def pages(rng):
+    """A few triangles on one edge, and some more beside them."""
+    count = int(rng.integers(3, 6))
+    points = np.vstack([[(0, 0, 0), (0, 0, 1)], rng.normal(size=(count, 3))])
+    faces = [(0, 1, 2 + k) for k in range(count)] + [(1, 2, 3)] * int(rng.integers(2))
+    return points, zoo.wound_at_random(np.array(faces), int(rng.integers(2**31)))[0]
+
+
 def blocks(rng):
     """Cubes that meet at faces, at edges, which have four faces then, and at corners."""
-    cells = rng.integers(0, 3, (int(rng.integers(2, 7)), 3))
+    cells = rng.integers(0, 3, (int(rng.integers(2, 6)), 3))
     return zoo.voxels(map(tuple, cells.tolist()))
 
 
@@ -94,7 +102,7 @@ def _is_manifold(vertices, faces) -> bool:
 
 
 KINDS = (terrain, holed_terrain, thin_terrain, ball, ring, cubes, cone)
-IRREGULAR_KINDS = (wound, moebius, book, blocks, tangle)
+IRREGULAR_KINDS = (wound, moebius, book, pages, blocks, tangle)
 
 
 @st.composite
