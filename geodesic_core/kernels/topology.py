@@ -333,6 +333,8 @@ def fill_geometry(vertices: Floats, faces: Ints, geometry: Floats, angles: Float
             dot = ux * wx + uy * wy + uz * wz
             cross = math.sqrt(cx * cx + cy * cy + cz * cz)
             norm = math.sqrt(dot * dot + cross * cross)
+            if norm == 0.0:  # the side toward the apex has no length
+                return f
             geometry[h, LENGTH] = length
             geometry[h, COS_LEFT] = dot / norm
             geometry[h, SIN_LEFT] = cross / norm
