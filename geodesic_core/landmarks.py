@@ -28,8 +28,7 @@ class Landmarks:
         self.mesh = mesh
         self.count = 0
         self.distances: Singles = np.empty((0, LANDMARKS), np.float32)
-        """(V, LANDMARKS) by inner vertex, mesh units, 0 where unreachable, which bounds nothing;
-        the first ``count`` columns are set"""
+        """(V, LANDMARKS) by inner vertex, mesh units; the first ``count`` columns are set"""
         self._nearest = np.full(len(mesh.vertices), math.inf)
 
     def goal(self, position: Floats, corners: Ints, reaches: Floats, limit: float) -> Goal:
@@ -68,6 +67,6 @@ class Landmarks:
         wave = run_sweep(mesh, wave, bounds, control, lambda _: 1.0)
         if self.count == 0:
             self.distances = aligned_rows(len(mesh.vertices), LANDMARKS, np.float32)
-        self.distances[:, self.count] = np.where(wave.distance < math.inf, wave.distance, 0.0)
+        self.distances[:, self.count] = wave.distance
         self.count += 1
         self._nearest = np.minimum(self._nearest, wave.distance)

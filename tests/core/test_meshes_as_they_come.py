@@ -204,6 +204,21 @@ def test_a_pillow_of_one_triangle_and_its_back():
     np.testing.assert_allclose(gc.exact_distance(mesh, 1).distances, [3, 0, 5], rtol=1e-15)
 
 
+@pytest.mark.jit
+@pytest.mark.xfail(strict=True, raises=gc.errors.DeadlineExceeded, reason="windows without end")
+def test_three_needles_upon_each_other():
+    """Windows wind about the tip from sheet to sheet, each time in two more ways."""
+    vertices = [
+        (-0.15211269660704663, 1.0566645623318836, 0.9966675671761641),
+        (-0.15162187405516467, -0.04385665101193417, 0.038200165017030135),
+        (-0.1487304589151138, -0.032884343650413754, 0.07894510119180953),
+    ]
+    mesh = gc.TriangleMesh(vertices, [(0, 2, 1), (1, 2, 0), (2, 0, 1)])
+    found = gc.exact_distance(mesh, 2, deadline_s=2).distances
+    expected = np.linalg.norm(mesh.vertices - mesh.vertices[2], axis=1)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
 def test_an_unreferenced_last_vertex():
     vertices = np.vstack([SEAMLESS.vertices, (9, 9, 9), (9, 9, 9)])
     mesh = gc.TriangleMesh(vertices, SEAMLESS.faces)

@@ -54,19 +54,18 @@ def test_distances_are_those_without_them_to_the_bit(case):
 @zoo.each(ALL)
 def test_paths_are_those_without_them(case):
     both = Needled(case, seed=2)
-    solvers = gc.Solver(both.mesh), gc.Solver(both.clean)
     points = places(both.clean, 6)
     for start, end in itertools.product(points, repeat=2):
         source, target = both.point(start), both.point(end)
         distance = gc.exact_distance(both.clean, start).distance_at(end)
         if np.isinf(distance):
             with pytest.raises(gc.errors.NoPath):
-                solvers[0].shortest_path(source, target)
+                gc.shortest_path(both.mesh, source, target)
             continue
         field = gc.exact_distance(both.mesh, source)
         assert field.distance_at(target) == distance
-        expected = solvers[1].shortest_path(start, end)
-        found = solvers[0].shortest_path(source, target, explain=True)
+        expected = gc.shortest_path(both.clean, start, end)
+        found = gc.shortest_path(both.mesh, source, target, explain=True)
         assert found.points.tobytes() == expected.points.tobytes()
         assert found.faces.tolist() == both.place[expected.faces].tolist()
         assert set(found.faces.tolist()) <= set(found.steps[4].faces.tolist())
