@@ -302,8 +302,10 @@ def trace_line(
                     geometry[h, SIN_RIGHT],
                 )
                 m = following(h)
-            # In a face that the path did not come from, the line ends where there is no root.
-            is_lost = fork_count > 0 and reference < 0 and sy <= SAME_PLACE * side
+            # In a face that the path did not come from, the line ends where there is no root; or
+            # before it meets the edge on which windows were merged.
+            is_due = reference >= 0 and winners.merge_ints[reference, MERGED_ON] == m
+            is_lost = fork_count > 0 and not is_due and sy <= SAME_PLACE * side
             sy, after = -sy, -1
         if is_lost:
             if fork_count == 0:
