@@ -12,6 +12,7 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.arrival import Arrival, arrival_at, with_target
 from geodesic_core.errors import InternalError, NoPath
 from geodesic_core.gradient import gradient_at_vertices
+from geodesic_core.isolines import Isoline, as_chord_error, as_levels, find_isolines, spaced_levels
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept
 from geodesic_core.kernels.wavefront import Bounds
@@ -169,6 +170,56 @@ class DistanceField:
         sweep.
         """
         return gradient_at_vertices(self.mesh, self._known_winners, self._nodes)
+
+    def levels(self, count: int) -> Floats:
+        """Return levels for `isolines`: evenly spaced between 0 and the largest finite distance.
+
+        The two themselves are left out.
+
+        Raises
+        ------
+        InvalidArgument
+            The count is not an integer, 1 or more.
+        """
+        return spaced_levels(self.distances, count)
+
+    def isolines(
+        self, levels: Sequence[float], chord_error: float | None = None
+    ) -> list[list[Isoline]]:
+        """Return for each level, in their order, the lines of points at that distance.
+
+        They are where the surface within that distance ends: closed, or open where they end at the
+        boundary or at an edge of more than two faces. In each face they consist of circular arcs,
+        whose ends, and what crosses edges, are exact; between them arcs become chords. A vertex at
+        the level itself counts as within. Levels beyond all distances, or beyond ``max_distance``,
+        have no lines. Of an approximate field they are those of its own distances, which the same
+        error bounds.
+
+        Parameters
+        ----------
+        levels
+            Distances above 0, mesh units; `levels` spaces some evenly.
+        chord_error
+            How far chords may stray from their arcs, mesh units; by default a thousandth of the
+            mean edge length, at least a billionth of the bounding box's diagonal.
+
+        Raises
+        ------
+        InvalidArgument
+            A level or the chord error is out of its domain.
+
+        Notes
+        -----
+        Where the sweep did not keep its windows, the first call runs it again. O(windows), and for
+        each level O(n² log n) for n windows in each face that it passes.
+        """
+        heights, error = as_levels(levels), as_chord_error(self.mesh, chord_error)
+        windows = self._swept_again[1] if self._windows is None else self._windows
+        within = [level for level in heights if level <= self.max_distance]
+        lines = iter(
+            find_isolines(self.mesh, windows, self._node_distances, self._nodes, within, error)
+        )
+        return [next(lines) if level <= self.max_distance else [] for level in heights]
 
     def _traced(
         self, place: SurfacePoint, winners: Winners, nodes: Nodes, node: int

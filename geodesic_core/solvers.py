@@ -303,6 +303,7 @@ def warm_up() -> None:
     mesh = TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     field = exact_distance(mesh, 0, keep_windows=True)
     field.path_to(3)
+    field.isolines([0.5])
     field.distance_at(SurfacePoint.face(1, (0.5, 0.25, 0.25)))
     approximate_distance(mesh, 0, keep_windows=True).path_to(3)
     shortest_path(mesh, 0, 3, explain=True)

@@ -170,3 +170,15 @@ looked for. The surface of a flat polygon is the same either way.
 
 CLIP = 1e-12
 """Share of a polygon's size within which its corners count as on a line when it is cut."""
+
+LEVEL = 1e-12
+"""Relative difference within which two ways to a point of an isoline count as equally long.
+
+Circles that should be one, or touch, differ by rounding; the first of them is taken.
+"""
+
+CROSSING = 1e-11
+"""Share of an edge's length within which two places where an isoline crosses it count as one."""
+
+PIECE = 1e-9
+"""Share of a level below which a piece of its isoline is left out: rounding, at ends of arcs."""
