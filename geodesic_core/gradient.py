@@ -9,6 +9,7 @@ from geodesic_core.kernels.wavefront import VIA
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nodes import Nodes
 from geodesic_core.path import EXACT, traced_path
+from geodesic_core.tolerances import SAME_PLACE
 
 
 def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> Floats:
@@ -32,9 +33,10 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
     across = _unit(across - np.einsum("ij,ij->i", across, along)[:, None] * along)
     gradient[reached] = _unit(away[:, :1] * along + away[:, 1:] * across)
     for v in reached[np.isnan(gradient[reached, 0])]:
-        gradient[v] = _unit(
-            np.diff(traced_path(mesh, winners, nodes, v, EXACT).points[-2:], axis=0)
-        )
+        points = traced_path(mesh, winners, nodes, v, EXACT).points
+        away = points[-1] - points
+        elsewhere = np.linalg.norm(away, axis=1) > SAME_PLACE * winners.distance[v]
+        gradient[v] = _unit(away[elsewhere][-1:])
     return gradient[topology.inner_vertex]
 
 

@@ -78,6 +78,14 @@ def test_it_is_nan_at_sources_and_where_nothing_is_reached():
     np.testing.assert_allclose(field.gradient[4], [1, 0, 0], atol=1e-12)
 
 
+def test_it_is_that_of_the_path_where_the_face_has_no_area():
+    """The middle of an edge is the third corner of such a face, through which it is reached."""
+    points = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0], [1, -1, 0]]
+    mesh = gc.TriangleMesh(points, [[0, 2, 3], [0, 1, 2], [0, 4, 1], [4, 2, 1]])
+    gradient = gc.exact_distance(mesh, 3).gradient
+    np.testing.assert_allclose(gradient[1], [0, -1, 0], atol=1e-12)
+
+
 def test_it_does_not_change():
     mesh = mesh_of(zoo.SMALL["octahedron"])
     field = gc.exact_distance(mesh, 0)
