@@ -111,7 +111,7 @@ def nodes_of(
                 continue
             found[i] = vertices + len(sited)
             sited.append(point)
-            for face, at_corners in _faces_of(mesh, point):
+            for face, at_corners in faces_of(mesh, point):
                 rows.append((int(found[i]), face, -1))
                 weights.append(at_corners)
         return found
@@ -190,7 +190,7 @@ def corners_of(mesh: TriangleMesh, point: SurfacePoint) -> tuple[Ints, Floats]:
     return inner[corners], np.linalg.norm(away, axis=1)
 
 
-def _faces_of(mesh: TriangleMesh, point: SurfacePoint) -> list[tuple[int, tuple[float, ...]]]:
+def faces_of(mesh: TriangleMesh, point: SurfacePoint) -> list[tuple[int, tuple[float, ...]]]:
     """Return each inner face that a point belongs to, with its weights there."""
     topology = mesh.topology
     corners = topology.inner_vertex[mesh.faces[point.face_index]].tolist()

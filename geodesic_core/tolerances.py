@@ -167,3 +167,15 @@ FAN = 1e-9
 Less is a sliver or rounding, where three corners lie on one line: another way to cut the polygon is
 looked for. The surface of a flat polygon is the same either way.
 """
+
+LEVEL = 1e-12
+"""Relative difference within which two ways to a point of an isoline count as equally long.
+
+Circles that should be one, or touch, differ by rounding; the first of them is taken.
+"""
+
+CROSSING = 1e-11
+"""Share of an edge's length within which two places where an isoline crosses it count as one."""
+
+PIECE = 1e-9
+"""Share of a level below which a piece of its isoline is left out: rounding, at ends of arcs."""

@@ -34,6 +34,7 @@ from geodesic_core.kernels.topology import (
     SIN_RIGHT,
     TAIL,
     following,
+    point_in_frame,
     previous,
 )
 from geodesic_core.kernels.wavefront import (
@@ -108,13 +109,10 @@ def row_in_face(winners: Any, node: int, face: int) -> int:
 def target_in_frame(topology: Any, winners: Any, node: int, h: int) -> tuple[float, float]:
     """Where the target lies in the frame of its VIA h: at the apex, or a site in the face."""
     geometry = topology.geometry
-    ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
-    ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
     if node < len(topology.total_angle):
-        return ax, ay
-    k = row_in_face(winners, node, h // 3)
-    along, up = winners.site_weights[k, (h + 1) % 3], winners.site_weights[k, (h + 2) % 3]
-    return along * geometry[h, LENGTH] + up * ax, up * ay
+        reach = geometry[h, LENGTH_LEFT]
+        return geometry[h, COS_LEFT] * reach, geometry[h, SIN_LEFT] * reach
+    return point_in_frame(geometry, h, winners.site_weights[row_in_face(winners, node, h // 3)])
 
 
 @kernel

@@ -116,24 +116,29 @@ def reach_site(wave: Any, h: int, count: int, k: int) -> None:
         w = WIDTH * i
         sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
         b0, b1 = wave.scratch[w + B0], wave.scratch[w + B1]
-        rise = y - sy
-        crossing = (sx * y - x * sy) / rise if rise > 0.0 else x
-        if b0 - gap <= crossing <= b1 + gap:
-            distance = math.hypot(x - sx, rise)
-        else:
-            crossing = min(max(crossing, b0), b1)
-            distance = math.hypot(crossing - sx, sy) + math.hypot(x - crossing, y)
-            distance *= 1.0 + BEND
         improve_site(
             wave,
             node,
-            distance + wave.scratch[w + SIGMA],
+            way_through(x, y, b0, b1, sx, sy, gap) + wave.scratch[w + SIGMA],
             h,
             sx,
             sy,
             wave.scratch_ints[INTS * i + ROOT],
             wave.scratch_ints[INTS * i + REFERENCE] if merging(wave) else -1,
         )
+
+
+@kernel
+def way_through(
+    x: float, y: float, b0: float, b1: float, sx: float, sy: float, gap: float
+) -> float:
+    """Distance from s through a window to a point of the face; bent at its end where it must."""
+    rise = y - sy
+    crossing = (sx * y - x * sy) / rise if rise > 0.0 else x
+    if b0 - gap <= crossing <= b1 + gap:
+        return math.hypot(x - sx, rise)
+    crossing = min(max(crossing, b0), b1)
+    return (math.hypot(crossing - sx, sy) + math.hypot(x - crossing, y)) * (1.0 + BEND)
 
 
 @kernel

@@ -120,6 +120,15 @@ def following(h: int) -> int:
 
 
 @kernel
+def point_in_frame(geometry: Floats, h: int, weights: Floats) -> tuple[float, float]:
+    """Where the point of a face with these barycentric weights lies in the frame of h."""
+    along, up = weights[(h + 1) % 3], weights[(h + 2) % 3]
+    reach = up * geometry[h, LENGTH_LEFT]
+    x = along * geometry[h, LENGTH] + reach * geometry[h, COS_LEFT]
+    return x, reach * geometry[h, SIN_LEFT]
+
+
+@kernel
 def next_around(links: Ints, h: int) -> int:
     """Half-edge of the same edge in the next of its faces; negative if there is none."""
     if links[h, OPPOSITE] == IRREGULAR:

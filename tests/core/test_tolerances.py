@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 import geodesic_core as gc
 from geodesic_core import tolerances
 from geodesic_core.kernels import sweep, wavefront
+from geodesic_core.kernels.arcs import CX, CY, DISC, RADIUS, outer_arcs
 from geodesic_core.kernels.arrival import precedence
 from geodesic_core.kernels.backtrace import Winners, is_on_path
+from geodesic_core.kernels.isolines import united
 from geodesic_core.kernels.lists import put_window
 from geodesic_core.kernels.merge import accuracy, directionality, merged
 from geodesic_core.kernels.planar import bisector
@@ -572,3 +574,29 @@ def test_snap_is_how_near_a_position_must_be(scale, share, snaps):
     assert carrier(mesh, mesh.locate(0.6 * a + 0.4 * b + inward)) == (2 if snaps else 3)
     along = away * (b - a) / np.linalg.norm(b - a)
     assert carrier(mesh, mesh.locate(a + along)) == (1 if snaps else 2)
+
+
+@SCALES
+@pytest.mark.parametrize("share", [-3.0, -0.5, 0.5, 3.0])
+def test_level_is_how_near_two_circles_count_as_one(scale, share):
+    """Of circles that are one the first counts; of others, around one point, the larger."""
+    mesh = gc.TriangleMesh(scale * zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
+    discs, level = np.zeros((2, DISC)), 0.1 * scale
+    discs[:, [CX, CY]] = 0.3 * scale, 0.01 * scale
+    discs[:, RADIUS] = level, level * (1.0 + share * tolerances.LEVEL)
+    arcs = outer_arcs(mesh.topology, 0, discs, level, 0.0)
+    assert set(arcs[:, RADIUS]) == {discs[1 if share > 1.0 else 0, RADIUS]}
+
+
+@pytest.mark.parametrize(("share", "left"), [(0.9, 1), (1.1, 2)])
+def test_crossing_is_the_gap_between_stretches_that_are_one(share, left):
+    gap = share * tolerances.CROSSING
+    assert united(np.array([[0.5 + gap, 0.75], [0.25, 0.5]]), tolerances.CROSSING) == left
+
+
+@pytest.mark.parametrize(("radius", "lines"), [(0.1, 0), (3.0, 1)])
+def test_piece_is_the_length_of_what_is_left_out(radius, lines):
+    mesh = gc.TriangleMesh(zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
+    source = gc.Source(gc.SurfacePoint.face(0, (0.3, 0.3, 0.4)), 1.0)
+    field = gc.exact_distance(mesh, source)
+    assert len(field.isolines([1.0 + radius * tolerances.PIECE])[0]) == lines
