@@ -59,6 +59,10 @@ class OpenMesh:
         """The mesh itself."""
         return self.solver.mesh
 
+    def with_barriers(self, faces: NDArray[np.int64]) -> "OpenMesh":
+        """Return the same with some faces blocked; see `TriangleMesh.with_barriers`."""
+        return OpenMesh(Solver(self.mesh.with_barriers(faces)), self.warnings)
+
     @property
     def nbytes(self) -> int:
         """Size of the mesh, and of what its solver keeps; that grows while paths are asked for."""

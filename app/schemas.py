@@ -148,7 +148,17 @@ class Accuracy(Wire):
     )
 
 
-class DistancesRequest(Accuracy):
+class AmongBarriers(Wire):
+    """A question that is asked of a mesh without some of its faces."""
+
+    barriers: list[StrictInt] = Field(
+        default=[],
+        description="Indices of faces that are blocked: holes, at whose corners paths may bend",
+        examples=[[7, 8]],
+    )
+
+
+class DistancesRequest(Accuracy, AmongBarriers):
     """Distances from the nearest of ``sources`` to all vertices, or to ``targets`` only."""
 
     model_config = ConfigDict(
@@ -168,10 +178,14 @@ class DistancesRequest(Accuracy):
     max_distance: NonNegative | None = Field(
         default=None, description="What is farther than this is left unreached"
     )
-    include: list[Literal["nearest_source"]] = []
+    include: list[Literal["nearest_source", "gradient"]] = Field(
+        default=[],
+        description="What else to tell of each, in JSON: `nearest_source`, its index in `sources`; "
+        "`gradient`, the direction in which distance grows fastest, of all vertices only",
+    )
 
 
-class PathRequest(Accuracy):
+class PathRequest(Accuracy, AmongBarriers):
     """The shortest path from ``source`` to ``target``, past ``waypoints`` in their order."""
 
     model_config = ConfigDict(
@@ -196,7 +210,7 @@ class PathRequest(Accuracy):
     )
 
 
-class PathsRequest(Accuracy):
+class PathsRequest(Accuracy, AmongBarriers):
     """The shortest paths from ``source`` to each of ``targets``."""
 
     model_config = ConfigDict(
@@ -212,7 +226,7 @@ class PathsRequest(Accuracy):
     )
 
 
-class MatrixRequest(Wire):
+class MatrixRequest(AmongBarriers):
     """Exact distances from each of ``sources`` to each of ``targets``."""
 
     model_config = ConfigDict(
@@ -238,7 +252,7 @@ class MatrixRequest(Wire):
     )
 
 
-class NearestRequest(Wire):
+class NearestRequest(AmongBarriers):
     """The ``k`` of some ``candidates`` that are geodesically nearest to ``source``."""
 
     model_config = ConfigDict(
@@ -440,6 +454,11 @@ class DistancesAnswer(BaseModel):
     distances: list[float | None]
     nearest_source: list[int | None] | None = Field(
         default=None, description="Index into `sources` for each distance, where asked for"
+    )
+    gradient: list[tuple[float | None, float | None, float | None]] | None = Field(
+        default=None,
+        description="A unit vector at each vertex, against the direction in which its shortest "
+        "path sets out, where asked for; `null` three times at sources and where unreachable",
     )
     unreachable: Unreachable
     stats: dict[str, Any]

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from multiprocessing import connection, parent_process
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 from setproctitle import setproctitle
 
@@ -28,7 +29,7 @@ from app.engine.work import (
 from app.errors import Problem, over_limit, problem_of
 from app.json_mesh import read_json_mesh
 from app.mesh_store import MeshStore, OpenMesh
-from app.queries import Grant, estimate
+from app.queries import Grant, Query, estimate
 from app.queries.refusals import refuse_large_json
 from app.result_store import write_result
 from app.settings import Settings
@@ -52,7 +53,8 @@ class Worker:
 
     config: WorkerConfig
     stop_number: c_longlong
-    meshes: OrderedDict[str, OpenMesh] = field(default_factory=OrderedDict)
+    meshes: OrderedDict[tuple[str, bytes], OpenMesh] = field(default_factory=OrderedDict)
+    """By id and barriers, the one that was used last at the end"""
 
     def __post_init__(self) -> None:
         self.settings = self.config.settings
@@ -87,7 +89,7 @@ class Worker:
         settings = self.settings
         grant = Grant(cancel, settings.query_memory_bytes, settings.max_json_values)
         with clock.phase("load"):
-            opened = self._open(work.query.mesh_id)
+            opened = self._open(work.query)
         with clock.phase("compute"):
             found = work.query.answer(opened, grant)
         if work.media_type == JSON:
@@ -99,18 +101,27 @@ class Worker:
 
     def _estimate(self, work: Estimating, clock: "Clock", cancel: Callable[[], bool]) -> Done:
         with clock.phase("load"):
-            opened = self._open(work.query.mesh_id)
+            opened = self._open(work.query)
         with clock.phase("compute"):
             found = estimate(work.query, work.media_type, opened, cancel)
         return Done(clock.seconds, estimate=found)
 
-    def _open(self, mesh_id: str) -> OpenMesh:
-        if mesh_id not in self.meshes:
-            self.meshes[mesh_id] = self.store.open(mesh_id)
-        self.meshes.move_to_end(mesh_id)
+    def _open(self, query: Query[Any]) -> OpenMesh:
+        """Return the mesh of a query, with its barriers."""
+        barriers, mesh_id = query.barriers, query.mesh_id
+        opened = self._keep((mesh_id, b""), lambda: self.store.open(mesh_id))
+        if len(barriers):
+            free = opened
+            opened = self._keep((mesh_id, barriers.tobytes()), lambda: query.among(free))
+        return opened
+
+    def _keep(self, name: tuple[str, bytes], open_mesh: Callable[[], OpenMesh]) -> OpenMesh:
+        if name not in self.meshes:
+            self.meshes[name] = open_mesh()
+        self.meshes.move_to_end(name)
         while len(self.meshes) > 1 and self._open_bytes() > self.settings.worker_mesh_bytes:
             self.meshes.popitem(last=False)
-        return self.meshes[mesh_id]
+        return self.meshes[name]
 
     def _open_bytes(self) -> int:
         return sum(opened.nbytes for opened in self.meshes.values())

@@ -38,14 +38,18 @@ def solve_field(
     request: schemas.Accuracy,
     sources: Any,
     *,
-    keep_windows: bool = False,
+    paths: bool = False,
+    isolines: bool = False,
     **options: Any,
 ) -> gc.DistanceField:
-    """Return the field of distances from some sources, as exact as it has to be."""
+    """Return the field of distances from some sources, as exact as it has to be.
+
+    It keeps what ``paths`` or ``isolines`` need; exact fields keep what paths need anyway.
+    """
     if request.method == "exact":
-        return solver.exact_distance(sources, **options)
+        return solver.exact_distance(sources, keep_windows=isolines, **options)
     return solver.approximate_distance(
-        sources, **errors_of(request), keep_windows=keep_windows, **options
+        sources, **errors_of(request), keep_windows=paths or isolines, **options
     )
 
 

@@ -34,6 +34,8 @@ PER_FACE_UNSWEPT = 0.03e-6
 """To allocate the state of a face."""
 PER_SEARCH, PER_FACE_SEARCHED = 0.5e-3, 0.08e-6
 """For a path between two points: each, and for each face of the mesh."""
+PER_FACE_BLOCKED = 0.4e-6
+"""To make a mesh with barriers: for each of its faces."""
 PER_PATH = 0.3e-3
 """To trace a path and to write it down."""
 

@@ -1,6 +1,6 @@
 """Distances from the nearest of some sources, to all vertices or to some targets."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from typing import Any
 
@@ -23,9 +23,13 @@ from app.queries.costs import (
 )
 from app.queries.places import Places, components_of, unreachable
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
-from app.queries.refusals import MeshSize, Named, refuse_more
+from app.queries.refusals import MeshSize, Named, refuse_more, refuse_places
+from app.queries.sources import described_sources, starts_of
 from app.queries.stats import likely_stats, stats_of
 from app.settings import Settings
+
+_VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3}
+"""Values of JSON for each distance"""
 
 
 class DistancesQuery(Query[schemas.DistancesRequest]):
@@ -35,7 +39,13 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
 
     @classmethod
     def normal(cls, request: schemas.DistancesRequest) -> schemas.DistancesRequest:
-        """Name the error that is granted, and what is included once."""
+        """Name the error that is granted, and what is included once.
+
+        The gradient is known at vertices only.
+        """
+        if "gradient" in request.include and request.targets is not None:
+            message = "gradient is that of all vertices; ask for it without targets"
+            raise refuse_places(["/include"], message)
         once = request.model_copy(update={"include": list(dict.fromkeys(request.include))})
         return with_its_error(once)
 
@@ -45,13 +55,13 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
 
     def refuse_format(self, media_type: str) -> None:
         """Refuse a second array in binary."""
-        if self._names_sources:
-            fault = Fault("/include", "nearest_source comes with JSON only")
-            raise refuse("invalid_request", f"{media_type} holds one array", errors=(fault,))
+        faults = [Fault("/include", f"{name} comes with JSON only") for name in self._included]
+        if faults:
+            raise refuse("invalid_request", f"{media_type} holds one array", errors=tuple(faults))
 
     def value_count(self, size: MeshSize) -> int:
         """Return the number of distances and of what is told of each."""
-        columns = 2 if self._names_sources else 1
+        columns = 1 + sum(_VALUES_INCLUDED[name] for name in self._included)
         if self.request.targets is None:
             return columns * size.vertices
         return (columns + VALUES_OF_POINT) * len(self.request.targets)
@@ -67,24 +77,24 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         """Sweep once."""
         request = self.request
         sources, targets = self._parted(places)
-        starts = [
-            gc.Source(place, source.start_distance)
-            for place, source in zip(sources, request.sources, strict=True)
-        ]
         field = solve_field(
             opened.solver,
             request,
-            starts,
+            starts_of(request.sources, sources),
+            paths="gradient" in self._included,
             max_distance=request.max_distance,
             targets=[place for place in targets or () if place.vertex_index is None],
             **grant.options,
         )
         distances = _at(targets, field.distances, field.distance_at)
-        nearest = None
-        if self._names_sources:
+        included: dict[str, NDArray[Any]] = {}
+        if "nearest_source" in self._included:
             nearest = _at(targets, field.nearest_source, field.nearest_source_at)
+            included["nearest_source"] = nearest
+        if "gradient" in self._included:
+            included["gradient"] = field.gradient
         bound, stats = bound_of(field.error_bound), stats_of(field.stats)
-        return self._answer(opened, places, distances, nearest, bound, stats)
+        return self._answer(opened, places, distances, included, bound, stats)
 
     def likely(self, opened: OpenMesh, places: Places) -> Likely:
         """Return what one sweep costs; the numbers of the answer are straight distances."""
@@ -93,17 +103,21 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(sources) * float(share_within(mesh, request.max_distance)))
-        sweep = sweep_cost(mesh, request, share)
+        sweep = sweep_cost(mesh, request, share, keeps="gradient" in self._included)
         away, nearest = straight_to_nearest(mesh, sources, targets, request.max_distance)
         cost = Cost(sweep.seconds + PER_POINT * len(places), sweep.memory_bytes)
         bound = {"type": "relative", "value": request.relative_error or 0.0, "kind": "guaranteed"}
-        found = nearest if self._names_sources else None
+        included: dict[str, NDArray[Any]] = {}
+        if "nearest_source" in self._included:
+            included["nearest_source"] = nearest
+        if "gradient" in self._included:
+            included["gradient"] = _likely_gradient(mesh, away)
         stats = likely_stats(mesh, share)
-        return Likely(cost, self._answer(opened, places, away, found, bound, stats))
+        return Likely(cost, self._answer(opened, places, away, included, bound, stats))
 
     @property
-    def _names_sources(self) -> bool:
-        return "nearest_source" in self.request.include
+    def _included(self) -> Sequence[str]:
+        return self.request.include
 
     def _parted(self, places: Places) -> tuple[Places, Places | None]:
         """Return sources and targets, None where those are all vertices."""
@@ -115,7 +129,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         opened: OpenMesh,
         places: Places,
         distances: NDArray[np.float64],
-        nearest_source: NDArray[Any] | None,
+        included: Mapping[str, NDArray[Any]],
         error_bound: Mapping[str, Any],
         stats: Mapping[str, Any],
     ) -> Answer:
@@ -125,10 +139,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
             "mesh_id": self.mesh_id,
             **method_of(self.request),
             "error_bound": error_bound,
-            "sources": [
-                {**described(mesh, place), "start_distance": source.start_distance}
-                for place, source in zip(sources, self.request.sources, strict=True)
-            ],
+            "sources": described_sources(mesh, self.request.sources, sources),
         }
         if targets is not None:
             members["targets"] = [described(mesh, place) for place in targets]
@@ -138,9 +149,17 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
             "stats": stats,
             "warnings": opened.warnings,
         }
-        if nearest_source is not None:
-            members["nearest_source"] = [None if i < 0 else i for i in nearest_source.tolist()]
+        for name, array in included.items():
+            is_index = name == "nearest_source"  # -1 for none
+            members[name] = [None if i < 0 else i for i in array.tolist()] if is_index else array
         return Answer(members, ("distances",))
+
+
+def _likely_gradient(mesh: gc.TriangleMesh, away: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return unit vectors of as many digits; none where distances are infinite."""
+    likely = np.full(mesh.vertices.shape, np.nan)
+    likely[np.isfinite(away)] = -1.0 / np.sqrt(3.0)
+    return likely
 
 
 def _at(

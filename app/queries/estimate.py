@@ -6,6 +6,7 @@ from typing import Any
 
 from app.encoding import encode
 from app.mesh_store import OpenMesh
+from app.queries.costs import PER_FACE_BLOCKED
 from app.queries.places import resolved
 from app.queries.query import Query
 
@@ -28,7 +29,10 @@ def estimate(
     parts = encode(likely.answer, media_type).parts
     size = likely.times * sum(memoryview(part).nbytes for part in parts)
     cost = likely.cost
-    return Estimate(_rounded(cost.seconds), round(_rounded(cost.memory_bytes)), round(size))
+    seconds = cost.seconds
+    if len(query.barriers):
+        seconds += PER_FACE_BLOCKED * len(opened.mesh.faces)
+    return Estimate(_rounded(seconds), round(_rounded(cost.memory_bytes)), round(size))
 
 
 def _rounded(value: float) -> float:

@@ -76,7 +76,7 @@ class PathQuery(Query[schemas.PathRequest]):
                     request,
                     source,
                     targets=[target],
-                    keep_windows=True,
+                    paths=True,
                     **grant.options,
                 ).path_to(target)
         except gc.errors.NoPath as error:

@@ -58,7 +58,7 @@ class PathsQuery(Query[schemas.PathsRequest]):
             source,
             max_distance=self.request.max_distance,
             targets=targets,
-            keep_windows=True,
+            paths=True,
             **grant.options,
         )
         found: list[dict[str, Any]] = []

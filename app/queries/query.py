@@ -8,14 +8,24 @@ from functools import cache
 from typing import Any, ClassVar, Generic, Self, TypeVar
 from uuid import uuid4
 
+import numpy as np
 import orjson
+from numpy.typing import NDArray
 
+import geodesic_core as gc
 from app import __version__, schemas
 from app.encoding import JSON, NPY, OCTETS, Answer
 from app.mesh_store import OpenMesh
 from app.queries.costs import Cost
 from app.queries.places import Places, resolved
-from app.queries.refusals import MeshSize, Named, refuse_large_json, refuse_outside
+from app.queries.refusals import (
+    MeshSize,
+    Named,
+    refuse_barriers_outside,
+    refuse_large_json,
+    refuse_outside,
+    refuse_places,
+)
 from app.settings import Settings
 from geodesic_core.kernels.jit import sources_digest
 
@@ -69,6 +79,9 @@ class Query(ABC, Generic[R]):
     @classmethod
     def ask(cls, mesh_id: str, size: MeshSize, request: R, settings: Settings) -> Self:
         """Return the query that ``request`` asks of a mesh of this ``size``, or refuse it."""
+        if isinstance(request, schemas.AmongBarriers):
+            refuse_barriers_outside(request.barriers, size)
+            request = request.model_copy(update={"barriers": sorted(set(request.barriers))})
         query = cls(mesh_id, cls.normal(request))
         query.refuse(settings)
         refuse_outside(query.points(), size)
@@ -81,6 +94,13 @@ class Query(ABC, Generic[R]):
         took 0.2 and 0.5 s.
         """
         return _revived, (type(self), self.mesh_id, _written(self.request))
+
+    @property
+    def barriers(self) -> NDArray[np.int64]:
+        """The faces that are blocked, ascending."""
+        request = self.request
+        blocked = request.barriers if isinstance(request, schemas.AmongBarriers) else ()
+        return np.array(blocked, np.int64)
 
     # What a kind says of itself
 
@@ -135,8 +155,18 @@ class Query(ABC, Generic[R]):
         else:
             self.refuse_format(media_type)
 
+    def among(self, opened: OpenMesh) -> OpenMesh:
+        """Return a mesh with the ``barriers``, or refuse those that leave nothing of it."""
+        try:
+            return opened.with_barriers(self.barriers)
+        except gc.errors.InvalidArgument as error:
+            raise refuse_places(["/barriers"], str(error)) from None
+
     def answer(self, opened: OpenMesh, grant: Grant) -> Answer:
-        """Answer on an open mesh; stops with ``Cancelled`` once the grant says so."""
+        """Answer on a mesh that is open `among` the barriers.
+
+        Stops with ``Cancelled`` once the grant says so.
+        """
         return self.solve(opened, resolved(self.points(), opened.mesh, grant.cancel), grant)
 
 

@@ -55,6 +55,18 @@ def refuse_outside(named: Named, size: MeshSize) -> None:
         raise refuse_points(faults)
 
 
+def refuse_barriers_outside(barriers: Sequence[int], size: MeshSize) -> None:
+    """Refuse barriers that are no faces of a mesh of this size."""
+    found = (
+        fault
+        for i, face in enumerate(barriers)
+        for fault in _outside(f"/barriers/{i}", "face", face, size.faces)
+    )
+    faults = tuple(islice(found, FAULTS_SHOWN))
+    if faults:
+        raise refuse("invalid_request", detail_of(faults), errors=faults)
+
+
 def detail_of(faults: Sequence[Fault]) -> str:
     """Return the message for some faults: the first."""
     return f"{faults[0].pointer}: {faults[0].message}"

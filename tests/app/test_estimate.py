@@ -40,6 +40,7 @@ QUERIES: dict[str, tuple[str, dict[str, Any], tuple[str, ...], float]] = {
     "near": ("distances", {"sources": SOME[:3], "max_distance": 0.3}, ("json", "npy"), 1.15),
     "rough": ("distances", {"sources": SOME[:2], **ROUGH}, JSON_ONLY, 1.05),
     "named": ("distances", {"sources": SOME[:9], "include": ["nearest_source"]}, JSON_ONLY, 1.05),
+    "slopes": ("distances", {"sources": SOME[:2], "include": ["gradient"]}, JSON_ONLY, 1.1),
     "some": ("distances", {"sources": SOME[:1], "targets": MANY}, ("json", "npy"), 1.05),
     "dense": ("matrix", {"sources": SOME, "targets": MANY}, ("json", "npy", "octets"), 1.05),
     "sparse": ("matrix", {"sources": SOME, "targets": MANY, "layout": "sparse"}, ("json",), 1.05),

@@ -51,6 +51,7 @@ def test_both_codes_of_a_status_are_named(client) -> None:
 ENDS = [{"vertex": 0}, {"vertex": 4}]
 ASKED = [
     ("distances", {"sources": ENDS, "targets": ENDS, "include": ["nearest_source"]}),
+    ("distances", {"sources": ENDS, "include": ["gradient"], "barriers": [1]}),
     ("path", {"source": ENDS[0], "target": ENDS[1]}),
     ("path", {"source": ENDS[0], "target": {"vertex": 1}, "explain": True}),
     ("paths", {"source": ENDS[0], "targets": [*ENDS, {"vertex": 1}]}),
