@@ -22,6 +22,7 @@ Layout = Literal["dense", "sparse", "pairs"]
 StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
 NonNegative = Annotated[FiniteFloat, Field(ge=0)]
 Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[Coordinate, Field(gt=0)]
 Triple = tuple[Coordinate, Coordinate, Coordinate]
 
 
@@ -182,6 +183,38 @@ class DistancesRequest(Accuracy, AmongBarriers):
         default=[],
         description="What else to tell of each, in JSON: `nearest_source`, its index in `sources`; "
         "`gradient`, the direction in which distance grows fastest, of all vertices only",
+    )
+
+
+class IsolinesRequest(Accuracy, AmongBarriers):
+    """Lines of equal distance from the nearest of ``sources``: at ``levels``, or at ``count``."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"sources": [{"vertex": 0}], "count": 10},
+                {"sources": [{"vertex": 0}, {"vertex": 7}], "levels": [0.5, 1.0]},
+            ]
+        }
+    )
+
+    sources: list[Source] = Field(min_length=1)
+    levels: list[Positive] | None = Field(
+        default=None, min_length=1, description="Distances in mesh units; these or `count`"
+    )
+    count: Annotated[StrictInt, Field(ge=1)] | None = Field(
+        default=None,
+        description="How many levels to space evenly between 0 and the largest distance of a "
+        "vertex that is reached, both left out",
+    )
+    max_distance: NonNegative | None = Field(
+        default=None, description="There are no lines at levels above this"
+    )
+    chord_error: Positive | None = Field(
+        default=None,
+        description="How far lines may stray inside of faces, in mesh units: there they are arcs, "
+        "of which the answer has chords. A thousandth of the mean edge length if not given, a "
+        "billionth of the bounding box's diagonal at least",
     )
 
 
@@ -461,6 +494,41 @@ class DistancesAnswer(BaseModel):
         "path sets out, where asked for; `null` three times at sources and where unreachable",
     )
     unreachable: Unreachable
+    stats: dict[str, Any]
+    warnings: list[str]
+
+
+class IsolineDocument(BaseModel):
+    """A polyline of points at one distance."""
+
+    closed: bool = Field(
+        description="Whether it leads from its last point back to the first, which is not repeated"
+    )
+    length: float
+    points: list[tuple[float, float, float]]
+    faces: list[int] = Field(description="The face that each piece lies in")
+
+
+class IsolineLevel(BaseModel):
+    """The lines at one distance."""
+
+    level: float = Field(description="The distance, mesh units")
+    lines: list[IsolineDocument] = Field(
+        description="Closed, or open where they end at the boundary, or at an edge of three faces "
+        "or more; none where nothing is at that distance"
+    )
+
+
+class IsolinesAnswer(BaseModel):
+    """The lines of each level, in the order of the levels."""
+
+    mesh_id: str
+    method: Method
+    exact: bool
+    error_bound: ErrorBound = Field(description="Of the distance that each line is at")
+    chord_error: float = Field(description="How far chords stray from lines at most, mesh units")
+    sources: list[ResolvedSource]
+    isolines: list[IsolineLevel]
     stats: dict[str, Any]
     warnings: list[str]
 

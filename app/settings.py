@@ -46,6 +46,8 @@ class Settings(BaseSettings):
     """Most cells of a matrix, sources by targets, or pairs."""
     max_waypoints: PositiveInt = 100
     """Most waypoints of a path."""
+    max_levels: PositiveInt = 1000
+    """Most levels of isolines."""
     max_json_values: PositiveInt = 2_000_000
     """Most values of an answer in JSON; binary ones have no such limit."""
     query_memory_bytes: PositiveInt = 8 * GIB

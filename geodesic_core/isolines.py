@@ -49,11 +49,13 @@ def spaced_levels(distances: Floats, count: int) -> Floats:
     Raises
     ------
     InvalidArgument
-        The count is not an integer, 1 or more.
+        The count is not an integer, 1 or more; or no finite distance is above 0.
     """
     if not is_index(count) or count < 1:
         raise InvalidArgument(f"the count of levels is {count!r}; it must be an integer, 1 or more")
-    largest = distances[np.isfinite(distances)].max()
+    largest = distances.max(where=np.isfinite(distances), initial=0.0)
+    if largest == 0.0:
+        raise InvalidArgument("only sources are reached: there is nothing to space levels in")
     spaced: Floats = np.arange(1, count + 1) * (largest / (count + 1))
     return spaced
 

@@ -180,7 +180,7 @@ class DistanceField:
         Raises
         ------
         InvalidArgument
-            The count is not an integer, 1 or more.
+            The count is not an integer, 1 or more; or no vertex is reached but sources.
         """
         return spaced_levels(self.distances, count)
 

@@ -7,6 +7,7 @@ is likely to cost.
 
 from app.queries.distances import DistancesQuery
 from app.queries.estimate import Estimate, estimate
+from app.queries.isolines import IsolinesQuery
 from app.queries.locate import LocateQuery
 from app.queries.matrix import MatrixQuery
 from app.queries.nearest import NearestQuery
@@ -19,6 +20,7 @@ __all__ = [
     "DistancesQuery",
     "Estimate",
     "Grant",
+    "IsolinesQuery",
     "LocateQuery",
     "MatrixQuery",
     "MeshSize",

@@ -58,6 +58,11 @@ def method_of(request: schemas.Accuracy) -> dict[str, Any]:
     return {"method": request.method, "exact": request.method == "exact"}
 
 
+def likely_bound(request: schemas.Accuracy) -> Mapping[str, Any]:
+    """Return about the same as `bound_of` for a field that is not there yet."""
+    return {"type": "relative", "value": request.relative_error or 0.0, "kind": "guaranteed"}
+
+
 def bound_of(bound: gc.ErrorBound) -> Mapping[str, Any]:
     """Return what answers say of their error."""
     return {"type": bound.type, "value": bound.value, "kind": bound.kind}

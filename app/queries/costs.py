@@ -34,6 +34,10 @@ PER_FACE_UNSWEPT = 0.03e-6
 """To allocate the state of a face."""
 PER_SEARCH, PER_FACE_SEARCHED = 0.5e-3, 0.08e-6
 """For a path between two points: each, and for each face of the mesh."""
+PER_WINDOW_KEPT = 50e-9
+"""To keep the windows of an exact sweep, for the n√n of n faces."""
+PER_FACE_AND_LEVEL = 1e-6
+"""For the isolines of a level, for each face of the mesh."""
 PER_FACE_BLOCKED = 0.4e-6
 """To make a mesh with barriers: for each of its faces."""
 PER_PATH = 0.3e-3
@@ -42,12 +46,18 @@ PER_PATH = 0.3e-3
 # Bytes of state, beside the mesh
 SWEEP_BYTES, SWEEP_BYTES_PER_FACE = 82_000, 100
 MERGING_BYTES_PER_FACE = 120
-KEEPING_BYTES_PER_FACE = 170
-"""Of an approximate sweep, and where it keeps its windows for paths."""
+KEEPING_BYTES_PER_FACE = 600
+"""Of an approximate sweep, and where it keeps its windows."""
+BYTES_OF_WINDOWS_KEPT = 30
+"""Of an exact sweep that keeps its windows, for the n√n of n faces."""
 SEARCH_BYTES, SEARCH_BYTES_PER_FACE = 230_000, 275
 
 CROSSINGS = 2.3
 """Edges that a path crosses over the length of one."""
+ARC_IN_FACE = 0.45
+"""How long a line is in a face that it crosses, in edges."""
+PIECES_IN_FACE, PIECES_BY_WINDOWS = 2.0, 0.05
+"""Of an isoline, in a face: at least, and for √n more, by the windows of an exact sweep."""
 
 
 @dataclass(frozen=True)
@@ -63,16 +73,23 @@ def sweep_cost(
     request: Accuracy,
     share: float = 1.0,
     *,
-    keeps: bool = False,
+    paths: bool = False,
+    isolines: bool = False,
 ) -> Cost:
-    """Return the cost of one sweep over a share of the mesh."""
+    """Return the cost of one sweep over a share of the mesh, and of what it keeps."""
     faces = len(mesh.faces)
+    memory = SWEEP_BYTES
     if request.method == "exact":
-        seconds, per_face = _sweep_seconds(share * faces), SWEEP_BYTES_PER_FACE
+        seconds = _sweep_seconds(share * faces)
+        memory += SWEEP_BYTES_PER_FACE * faces
+        if isolines:
+            seconds += PER_WINDOW_KEPT * (share * faces) ** 1.5
+            memory += round(BYTES_OF_WINDOWS_KEPT * (share * faces) ** 1.5)
     else:
         seconds = PER_SWEEP + PER_FACE_MERGED * share * faces
-        per_face = KEEPING_BYTES_PER_FACE if keeps else MERGING_BYTES_PER_FACE
-    return Cost(seconds + PER_FACE_UNSWEPT * faces, SWEEP_BYTES + per_face * faces)
+        per_face = KEEPING_BYTES_PER_FACE if paths or isolines else MERGING_BYTES_PER_FACE
+        memory += per_face * faces
+    return Cost(seconds + PER_FACE_UNSWEPT * faces, memory)
 
 
 def sweeps_cost(mesh: gc.TriangleMesh, shares: Sequence[float], threads: int) -> Cost:

@@ -13,7 +13,7 @@ from app.encoding import Answer
 from app.errors import Fault, refuse
 from app.mesh_store import OpenMesh
 from app.points import described
-from app.queries.accuracy import bound_of, method_of, solve_field, with_its_error
+from app.queries.accuracy import bound_of, likely_bound, method_of, solve_field, with_its_error
 from app.queries.costs import (
     PER_POINT,
     Cost,
@@ -21,7 +21,7 @@ from app.queries.costs import (
     straight_to_nearest,
     sweep_cost,
 )
-from app.queries.places import Places, components_of, unreachable
+from app.queries.places import Places, components_of, positions_of, unreachable
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_more, refuse_places
 from app.queries.sources import described_sources, starts_of
@@ -103,15 +103,16 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(sources) * float(share_within(mesh, request.max_distance)))
-        sweep = sweep_cost(mesh, request, share, keeps="gradient" in self._included)
+        sweep = sweep_cost(mesh, request, share, paths="gradient" in self._included)
         away, nearest = straight_to_nearest(mesh, sources, targets, request.max_distance)
         cost = Cost(sweep.seconds + PER_POINT * len(places), sweep.memory_bytes)
-        bound = {"type": "relative", "value": request.relative_error or 0.0, "kind": "guaranteed"}
+        bound = likely_bound(request)
         included: dict[str, NDArray[Any]] = {}
         if "nearest_source" in self._included:
             included["nearest_source"] = nearest
         if "gradient" in self._included:
-            included["gradient"] = _likely_gradient(mesh, away)
+            starts = positions_of(mesh, sources)
+            included["gradient"] = _straight_gradient(mesh, starts[nearest], away)
         stats = likely_stats(mesh, share)
         return Likely(cost, self._answer(opened, places, away, included, bound, stats))
 
@@ -155,11 +156,15 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         return Answer(members, ("distances",))
 
 
-def _likely_gradient(mesh: gc.TriangleMesh, away: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return unit vectors of as many digits; none where distances are infinite."""
-    likely = np.full(mesh.vertices.shape, np.nan)
-    likely[np.isfinite(away)] = -1.0 / np.sqrt(3.0)
-    return likely
+def _straight_gradient(
+    mesh: gc.TriangleMesh, starts: NDArray[np.float64], away: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the directions (V, 3) from straight ahead; NaN as in the real one."""
+    ahead: NDArray[np.float64] = mesh.vertices - starts
+    length = np.linalg.norm(ahead, axis=1)
+    length[~np.isfinite(away) | (length == 0.0)] = np.nan
+    ahead /= length[:, None]
+    return ahead
 
 
 def _at(

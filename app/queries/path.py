@@ -95,7 +95,7 @@ class PathQuery(Query[schemas.PathRequest]):
         if self.request.method == "exact":
             cost = search_cost(mesh, len(places) - 1)
         else:
-            cost = sweep_cost(mesh, self.request, keeps=True)
+            cost = sweep_cost(mesh, self.request, paths=True)
         stops = positions_of(mesh, [source, *waypoints, target])
         length = sum(float(np.linalg.norm(there - here)) for here, there in pairwise(stops))
         if len(set(components_of(mesh, places).tolist())) > 1:

@@ -80,7 +80,7 @@ class PathsQuery(Query[schemas.PathsRequest]):
         mesh, limit = opened.mesh, self.request.max_distance
         source, *targets = places
         share = 1.0 if limit is None else float(share_within(mesh, limit))
-        sweep = sweep_cost(mesh, self.request, share, keeps=True)
+        sweep = sweep_cost(mesh, self.request, share, paths=True)
         seconds = sweep.seconds + (PER_PATH + PER_POINT) * len(targets)
         some = targets[:: 1 + len(targets) // _TRIED]
         start, edge = mesh.position(source), typical_edge(mesh)

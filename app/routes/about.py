@@ -22,6 +22,7 @@ _LIMITS = (
     "max_sources",
     "max_matrix_cells",
     "max_waypoints",
+    "max_levels",
     "max_json_values",
     "query_memory_bytes",
     "queue_size",

@@ -9,6 +9,7 @@ from app.dependencies import Deadline, ServiceDep, media_type_of, require_json, 
 from app.encoding import NPY, NPZ, OCTETS
 from app.queries import (
     DistancesQuery,
+    IsolinesQuery,
     LocateQuery,
     MatrixQuery,
     NearestQuery,
@@ -33,6 +34,8 @@ from app.schemas import (
     DistancesAnswer,
     DistancesRequest,
     Estimate,
+    IsolinesAnswer,
+    IsolinesRequest,
     LocateAnswer,
     LocateRequest,
     MatrixAnswer,
@@ -181,6 +184,21 @@ async def get_path(parameters: Annotated[PathParameters, Query()], asked: AskedD
 async def compute_paths(body: PathsRequest, parameters: Parameters, asked: AskedDep) -> Response:
     """Return a path to each target, or the reason why there is none."""
     return await asked.answer(PathsQuery, body, parameters)
+
+
+@router.post(
+    "/isolines",
+    **_posted(
+        "computeIsolines",
+        "Lines of equal distance from sources",
+        _answers(IsolinesAnswer, "The lines of each level, closed and open"),
+    ),
+)
+async def compute_isolines(
+    body: IsolinesRequest, parameters: Parameters, asked: AskedDep
+) -> Response:
+    """Return the polylines of points at each level, exact where they cross edges."""
+    return await asked.answer(IsolinesQuery, body, parameters)
 
 
 @router.post(

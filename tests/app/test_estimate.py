@@ -14,6 +14,7 @@ from app.mesh_store import OpenMesh
 from app.queries import (
     DistancesQuery,
     Grant,
+    IsolinesQuery,
     LocateQuery,
     MatrixQuery,
     NearestQuery,
@@ -51,12 +52,17 @@ QUERIES: dict[str, tuple[str, dict[str, Any], tuple[str, ...], float]] = {
     "path": ("path", {"source": INSIDE, "target": {"vertex": 1900}}, ("json", "npy"), 3),
     "legs": ("path", {"source": INSIDE, "target": SOME[0], "waypoints": SOME[1:4]}, JSON_ONLY, 3),
     "rough path": ("path", {"source": INSIDE, "target": {"vertex": 1900}, **ROUGH}, JSON_ONLY, 3),
+    "lines": ("isolines", {"sources": [INSIDE], "count": 10}, JSON_ONLY, 3),
+    "some lines": ("isolines", {"sources": SOME[:2], "levels": [0.2, 0.3]}, JSON_ONLY, 3),
+    "rough lines": ("isolines", {"sources": SOME[:2], "count": 5, **ROUGH}, JSON_ONLY, 3),
+    "fine": ("isolines", {"sources": [INSIDE], "count": 3, "chord_error": 1e-6}, JSON_ONLY, 3),
     "paths": ("paths", {"source": INSIDE, "targets": MANY}, JSON_ONLY, 3),
     "rough paths": ("paths", {"source": INSIDE, "targets": SOME, **ROUGH}, JSON_ONLY, 3),
     "locate": ("locate", {"points": [[0.1 * i, 0.3, 0.2] for i in range(30)]}, JSON_ONLY, 1.15),
 }  # fmt: skip
 KINDS: dict[str, type[Query[Any]]] = {
     "distances": DistancesQuery,
+    "isolines": IsolinesQuery,
     "locate": LocateQuery,
     "matrix": MatrixQuery,
     "nearest": NearestQuery,
