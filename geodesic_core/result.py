@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.curve import Curve, Polyline
 from geodesic_core.errors import InternalError, NoPath
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.wavefront import Bounds
@@ -24,7 +25,7 @@ from geodesic_core.tolerances import PATH_LENGTH
 class Source:
     """A source, and the distance at which it starts (mesh units, 0 or more)."""
 
-    point: Point
+    point: Point | Curve
     start_distance: float = 0.0
 
 
@@ -63,7 +64,7 @@ class DistanceField:
     """(V,) int32 index into ``sources``; -1 where unreachable; ties to the lowest."""
     error_bound: ErrorBound
     stats: SweepStats
-    _places: tuple[SurfacePoint, ...]
+    _places: tuple[Polyline, ...]
     """The sources' points, canonical"""
     _bounds: Bounds
     _nodes: Nodes
@@ -163,11 +164,16 @@ class DistanceField:
     def _nearest_to(self, place: SurfacePoint) -> NearestSource:
         starts = np.array([source.start_distance for source in self.sources])
         return find_nearest_source(
-            self.mesh, self._places, starts, self._node_distances, self._bounds, place
+            self.mesh,
+            [line[0] for line in self._places],
+            starts,
+            self._node_distances,
+            self._bounds,
+            place,
         )
 
     def _no_path(self, place: SurfacePoint) -> NoPath:
-        if component_of(self.mesh, place) in {component_of(self.mesh, p) for p in self._places}:
+        if component_of(self.mesh, place) in {component_of(self.mesh, p) for p, *_ in self._places}:
             return NoPath(
                 f"{place} is farther than max_distance = {self.max_distance:g} from every source",
                 "beyond_max_distance",
@@ -177,4 +183,4 @@ class DistanceField:
         )
 
 
-Sources = Point | Source | Sequence[Point | Source]
+Sources = Point | Curve | Source | Sequence[Point | Curve | Source]

@@ -13,6 +13,7 @@ from scipy.sparse import csr_array
 
 from geodesic_core.arguments import as_limit, is_number
 from geodesic_core.arrays import Floats
+from geodesic_core.curve import Curve, Polyline, polyline_of
 from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.kernels import sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
@@ -48,7 +49,8 @@ def exact_distance(
     mesh
         The surface.
     sources
-        A vertex index, a `SurfacePoint`, a `Source` with a start distance, or several of these.
+        A vertex index, a `SurfacePoint`, a `Curve`, a `Source` with a start distance, or several
+        of these.
     max_distance
         Vertices farther than this (mesh units) are not looked for; they count as unreachable.
     targets
@@ -307,6 +309,7 @@ def _solve(
     ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
     nodes = nodes_of(mesh, places, ends)
     distances = np.array([start.start_distance for start in starts])
+    bounds = bounds._replace(strips=(1,) if nodes.pieces else ())
     wave = _sweep(mesh, nodes, distances, bounds, control, keeps=keeps)
     wave.distance[wave.distance > bounds.max_distance] = math.inf
     winners = _winners_of(wave)
@@ -415,16 +418,19 @@ def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, f
 
 def _as_sources(
     mesh: TriangleMesh, sources: Any
-) -> tuple[tuple[Source, ...], tuple[SurfacePoint, ...]]:
+) -> tuple[tuple[Source, ...], tuple[Polyline, ...]]:
     """Return the sources, and their canonical points."""
     if isinstance(sources, str | bytes):
         raise InvalidPoint(f"the source is {sources!r}; it must be a vertex index or a Source")
-    if isinstance(sources, Source | SurfacePoint) or not isinstance(sources, Iterable):
+    if isinstance(sources, Source | SurfacePoint | Curve) or not isinstance(sources, Iterable):
         sources = [sources]
     found, places = [], []
     for i, item in enumerate(sources):
         source = item if isinstance(item, Source) else Source(item)
-        places.append(mesh.point(source.point, f"source {i}"))
+        if isinstance(source.point, Curve):
+            places.append(polyline_of(mesh, source.point, f"source {i}"))
+        else:
+            places.append((mesh.point(source.point, f"source {i}"),))
         start = source.start_distance
         if not is_number(start) or not (math.isfinite(start) and start >= 0.0):
             raise InvalidArgument(

@@ -471,7 +471,9 @@ def sought(mesh, source, target, exact, limit) -> float:
     goal = goal_at_vertex(mesh, start, limit, known=exact[topology.outer_vertex])
     bounds = exact_bounds(math.inf, goal)
     wave = new_wavefront(topology, pruned=True)
-    sweep.start_sweep(topology, wave, np.array([start], np.int32), np.zeros(1), bounds)
+    sweep.start_sweep(
+        topology, wave, np.array([start], np.int32), np.zeros(1, np.int32), np.zeros(1), bounds
+    )
     return float(run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0).distance[end])
 
 
