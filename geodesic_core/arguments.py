@@ -1,10 +1,12 @@
 """What arguments must be."""
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 
+from geodesic_core.arrays import Longs
 from geodesic_core.errors import InvalidArgument
 
 
@@ -31,3 +33,33 @@ def as_limit(max_distance: float | None) -> float:
     if not is_number(max_distance) or not max_distance >= 0.0:
         raise InvalidArgument(f"max_distance is {max_distance!r}; it must be a number, 0 or more")
     return float(max_distance)
+
+
+def as_barriers(barriers: Any, face_count: int) -> Longs:
+    """Return face ids, ascending and each once.
+
+    Raises
+    ------
+    InvalidArgument
+        They are not integers from 0 to ``face_count`` - 1. A mask is refused: as a list it could
+        not be told from ids.
+    """
+    if isinstance(barriers, str | bytes) or not isinstance(barriers, Iterable):
+        raise InvalidArgument(f"barriers is {barriers!r}; it must be a sequence of face ids")
+    if isinstance(barriers, np.ndarray) and barriers.dtype.kind in "iu" and barriers.ndim == 1:
+        faces = barriers
+    else:
+        faces = np.array([None, *barriers], dtype=object)[1:]  # so that rows stay what they are
+        for i, face in enumerate(faces):
+            if not is_index(face):
+                raise InvalidArgument(
+                    f"barrier {i} is {face!r}; it must be a face id, an integer (of a mask, "
+                    f"numpy.flatnonzero makes these)"
+                )
+    bad = np.flatnonzero((faces < 0) | (faces >= face_count))
+    if len(bad):
+        raise InvalidArgument(
+            f"barrier {bad[0]} is face {faces[bad[0]]}, but faces are numbered 0 to "
+            f"{face_count - 1}"
+        )
+    return np.unique(faces.astype(np.int64))

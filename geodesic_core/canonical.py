@@ -14,7 +14,7 @@ import numpy as np
 from geodesic_core.arguments import is_index, is_number
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import InvalidPoint
-from geodesic_core.kernels.topology import HEAD, TAIL, Topology, next_around, previous
+from geodesic_core.kernels.topology import APEX, HEAD, Topology, next_around, previous
 from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import EDGE_STEPS, WEIGHT, WEIGHT_ERROR
 
@@ -34,35 +34,46 @@ def at_vertex(topology: Topology, faces: Ints, vertex: int) -> SurfacePoint:
 
 
 def in_face(
-    topology: Topology, faces: Ints, inner_face: Ints, face: int, weights: Sequence[float]
+    topology: Topology,
+    faces: Ints,
+    inner_face: Ints,
+    face: int,
+    weights: Sequence[float],
+    name: str,
 ) -> SurfacePoint:
-    """Return the point of a face that has these weights, which may be rounded."""
+    """Return the point of a face that has these weights, which may be rounded.
+
+    Raises
+    ------
+    InvalidPoint
+        The face is blocked, and the point in no other; ``name`` is how the message calls it.
+    """
     kept = [float(weight) if weight > WEIGHT else 0.0 for weight in weights]
     total = math.fsum(kept)
     if abs(total - 1.0) <= ROUNDING:
         total = 1.0  # else a canonical point would change each time it is asked for
     u, v, w = (weight / total for weight in kept)
-    if u > 0.0 and v > 0.0 and w > 0.0:
-        return SurfacePoint(face, (u, v, w))
-    share = dict(zip(faces[face].tolist(), (u, v, w), strict=True))
-    for h in range(3 * int(inner_face[face]), 3 * int(inner_face[face]) + 3):
-        ends = (int(topology.outer_vertex[end]) for end in topology.links[h, [TAIL, HEAD]])
-        at_tail, at_head = (share[end] for end in ends)
-        if at_tail + at_head > 1.0 - ROUNDING:
-            break
-    return _on_edge(topology, faces, h, at_tail, at_head)
+    corners = faces[face].tolist()
+    share = {corner: part for corner, part in zip(corners, (u, v, w), strict=True) if part > 0.0}
+    if len(share) == 1:
+        return at_vertex(topology, faces, *share)
+    place = None
+    if len(share) == 2:
+        place = _on_edge(topology, faces, share)
+    elif inner_face[face] >= 0:
+        place = SurfacePoint(face, (u, v, w))
+    if place is None:
+        raise InvalidPoint(
+            f"the {name} lies in face {face}, which is blocked, and in no face that is free"
+        )
+    return place
 
 
 def on_edge(topology: Topology, faces: Ints, start: int, end: int, t: float) -> SurfacePoint | None:
     """Return the point at share ``t`` of the edge between two vertices; None if there is none."""
-    v, u = topology.inner_vertex[start], topology.inner_vertex[end]
-    share = {int(v): 1.0 - t, int(u): t}
-    for corner in topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]]:
-        for h in (int(corner), int(previous(corner))):
-            ends = topology.links[h, [TAIL, HEAD]].tolist()
-            if v != u and u in ends:
-                return _on_edge(topology, faces, h, share[ends[0]], share[ends[1]])
-    return None
+    if start == end:
+        return None
+    return _on_edge(topology, faces, {int(start): 1.0 - t, int(end): t})
 
 
 def weights_of(point: Floats, corners: Floats, snap: float) -> list[float]:
@@ -128,21 +139,30 @@ def check_weights(weights: Any, face: int, name: str) -> None:
         )
 
 
-def _on_edge(
-    topology: Topology, faces: Ints, h: int, at_tail: float, at_head: float
-) -> SurfacePoint:
-    """Return the point of half-edge h with these weights of its ends, one of them above zero."""
-    links, outer_vertex = topology.links, topology.outer_vertex
-    tail, head = (int(outer_vertex[v]) for v in links[h, [TAIL, HEAD]])
-    low, high = min(tail, head), max(tail, head)
-    upper = at_head if head == high else at_tail
-    upper = round(upper / (at_tail + at_head) * EDGE_STEPS) / EDGE_STEPS
+def _on_edge(topology: Topology, faces: Ints, share: dict[int, float]) -> SurfacePoint | None:
+    """Return the point with these weights of two vertices; None if no edge joins them."""
+    h = _half_edge_between(topology, *share)
+    if h is None:
+        return None
+    low, high = sorted(share)
+    upper = round(share[high] / (share[low] + share[high]) * EDGE_STEPS) / EDGE_STEPS
     if upper in (0.0, 1.0):
         return at_vertex(topology, faces, low if upper == 0.0 else high)
-    face = min(int(topology.outer_face[g // 3]) for g in half_edges_around(links, h))
+    face = min(int(topology.outer_face[g // 3]) for g in half_edges_around(topology.links, h))
     share = {low: 1.0 - upper, high: upper}
     u, v, w = (share.get(int(corner), 0.0) for corner in faces[face])
     return SurfacePoint(face, (u, v, w))
+
+
+def _half_edge_between(topology: Topology, start: int, end: int) -> int | None:
+    """Return a half-edge of the edge that joins two vertices, in either direction."""
+    u, v = topology.inner_vertex[start], topology.inner_vertex[end]
+    corners = topology.corners[topology.first_corner[u] : topology.first_corner[u + 1]]
+    leaving = corners[topology.links[corners, HEAD] == v]
+    if len(leaving):
+        return int(leaving[0])
+    beside = corners[topology.links[corners, APEX] == v]
+    return int(previous(beside[0])) if len(beside) else None
 
 
 def half_edges_around(links: Ints, h: int) -> Iterator[int]:

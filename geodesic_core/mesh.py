@@ -1,6 +1,6 @@
 """The triangle mesh: validated, frozen, with its topology."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Literal
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core import canonical
-from geodesic_core.arguments import as_limit, is_number
+from geodesic_core.arguments import as_barriers, as_limit, is_number
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.equal_rows import merged
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
@@ -16,7 +16,7 @@ from geodesic_core.kernels import topology as kernels
 from geodesic_core.kernels.topology import Topology
 from geodesic_core.nearest_face import NearestFace
 from geodesic_core.polygons import triangulated
-from geodesic_core.report import NAMED, MeshReport, report_of, warnings_of
+from geodesic_core.report import NAMED, MeshReport, repeat_a_vertex, report_of, warnings_of
 from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import SNAP, WEIGHT_ERROR
 
@@ -47,7 +47,8 @@ class TriangleMesh:
     -----
     The arrays are copied once, and read-only. Vertices and faces keep the caller's order: the
     topology's own, nearer in memory, shows nowhere. A face that repeats a vertex keeps its number,
-    but is no part of the surface: it joins nothing, and no point lies in it. Preparing costs
+    but is no part of the surface: it joins nothing, and no point lies in it. To block other faces
+    as well, see `with_barriers`. Preparing costs
     O(V + F) time, and memory of about 365 bytes a face.
     """
 
@@ -113,8 +114,16 @@ class TriangleMesh:
             triangles = vertex_map[triangles]
         elif merge != "none":
             raise InvalidArgument(f"merge is {merge!r}; it must be 'none' or 'exact'")
-        topology = _prepare(points, triangles)
-        self._hold(points, triangles.astype(np.int32), vertex_map, face_map, topology, notes)
+        surface = np.flatnonzero(~repeat_a_vertex(triangles))
+        if len(surface) == 0:
+            raise InvalidMesh(
+                "each face repeats a vertex: there is no surface",
+                kind="face",
+                elements=list(range(min(len(triangles), NAMED))),
+            )
+        faces = triangles.astype(np.int32)
+        topology = _prepare(points, faces, surface)
+        self._hold(points, faces, vertex_map, face_map, topology, notes)
 
     def _hold(
         self,
@@ -159,6 +168,49 @@ class TriangleMesh:
             arrays["face_map"] = self.face_map
         return arrays | self.topology._asdict()
 
+    def with_barriers(self, barriers: Iterable[int]) -> "TriangleMesh":
+        """Return this mesh with some faces blocked: holes, at whose corners paths may bend.
+
+        Every question can be asked of it, and all vertices and faces keep their numbers. Paths run
+        along a blocked face where a free one is beside, and past it through a corner that free
+        faces share. No point lies in blocked faces alone; a vertex of these alone is as isolated
+        as one of no face: it reaches itself, and nothing else.
+
+        Parameters
+        ----------
+        barriers
+            Ids of triangles, in any order (those of polygons are found in `face_map`). What is
+            blocked already stays so.
+
+        Raises
+        ------
+        InvalidArgument
+            They are not ids of faces, or leave no face free.
+
+        Notes
+        -----
+        O(V + F): what `TriangleMesh` takes, but for checking. The two share vertices and faces.
+        Nothing is kept of it here: who asks again among the same barriers keeps the mesh.
+        """
+        blocked = as_barriers(barriers, len(self.faces))
+        if (self.inner_face[blocked] < 0).all():
+            return self
+        is_free = self.inner_face >= 0
+        is_free[blocked] = False
+        surface = np.flatnonzero(is_free)
+        if len(surface) == 0:
+            raise InvalidArgument("the barriers block every face: there is no surface left")
+        mesh = TriangleMesh.__new__(TriangleMesh)
+        # A copy of the vertices: kernels that prepare are compiled for arrays that can be written.
+        topology = _prepare(np.array(self.vertices), self.faces, surface)
+        mesh._hold(self.vertices, self.faces, self.vertex_map, self.face_map, topology, self._notes)
+        return mesh
+
+    @cached_property
+    def barriers(self) -> Longs:
+        """(B,) int64: the faces that are blocked, ascending; see `with_barriers`."""
+        return np.flatnonzero((self.inner_face < 0) & ~repeat_a_vertex(self.faces))
+
     @property
     def nbytes(self) -> int:
         """Memory of all arrays, bytes."""
@@ -171,7 +223,7 @@ class TriangleMesh:
 
     @cached_property
     def inner_face(self) -> Ints:
-        """(F,) int32: the topology's number of each face; -1 of one that repeats a vertex."""
+        """(F,) int32: the topology's number of each face; -1 of one that is not in the surface."""
         inner = np.full(len(self.faces), -1, np.int32)
         outer = self.topology.outer_face
         inner[outer] = np.arange(len(outer), dtype=np.int32)
@@ -227,7 +279,7 @@ class TriangleMesh:
                 f"which is more than max_distance = {limit:g}"
             )
         weights = canonical.weights_of(point, self.vertices[self.faces[face]], SNAP * self.diagonal)
-        return self._point_in_face(face, weights)
+        return self._point_in_face(face, weights, "position")
 
     def point(self, point: int | SurfacePoint, name: str = "point") -> SurfacePoint:
         """Return a point in its one spelling: all that name the same come out equal, to the bit.
@@ -241,19 +293,20 @@ class TriangleMesh:
         if isinstance(point, SurfacePoint):
             if point.vertex_index is None:
                 canonical.check_index(point.face_index, len(self.faces), "face", name)
-                if self.inner_face[point.face_index] < 0:
+                outside = self.inner_face[point.face_index] < 0
+                if outside and repeat_a_vertex(self.faces[[point.face_index]]):
                     raise InvalidPoint(
                         f"the {name} is in face {point.face_index}, which repeats a vertex and is "
                         f"no part of the surface"
                     )
                 canonical.check_weights(point.barycentric, point.face_index, name)
-                return self._point_in_face(point.face_index, point.barycentric)
+                return self._point_in_face(point.face_index, point.barycentric, name)
             index = point.vertex_index
         canonical.check_index(index, len(self.vertices), "vertex", name)
         return canonical.at_vertex(self.topology, self.faces, int(index))
 
-    def _point_in_face(self, face: int, weights: Sequence[float]) -> SurfacePoint:
-        return canonical.in_face(self.topology, self.faces, self.inner_face, face, weights)
+    def _point_in_face(self, face: int, weights: Sequence[float], name: str) -> SurfacePoint:
+        return canonical.in_face(self.topology, self.faces, self.inner_face, face, weights, name)
 
     def point_on_edge(self, start: int, end: int, t: float) -> SurfacePoint:
         """Return the canonical point at share ``t`` of the way between the ends of an edge.
@@ -261,7 +314,7 @@ class TriangleMesh:
         Raises
         ------
         InvalidPoint
-            The two are no vertices, no edge joins them, or ``t`` is not from 0 to 1.
+            The two are no vertices, no edge of the surface joins them, or ``t`` is not from 0 to 1.
         """
         for vertex in (start, end):
             canonical.check_index(vertex, len(self.vertices), "vertex", "end of the edge")
@@ -270,7 +323,8 @@ class TriangleMesh:
         share = min(max(float(t), 0.0), 1.0)
         point = canonical.on_edge(self.topology, self.faces, start, end, share)
         if point is None:
-            raise InvalidPoint(f"no edge joins the vertices {start} and {end}")
+            kind = "edge of a free face" if len(self.barriers) else "edge"
+            raise InvalidPoint(f"no {kind} joins the vertices {start} and {end}")
         return point
 
     def position(self, point: int | SurfacePoint) -> Floats:
@@ -307,7 +361,8 @@ class TriangleMesh:
         return (*self._notes, *warnings_of(self.report))
 
     def __repr__(self) -> str:
-        return f"TriangleMesh({len(self.vertices)} vertices, {len(self.faces)} faces)"
+        blocked = f", {len(self.barriers)} of them blocked" if len(self.barriers) else ""
+        return f"TriangleMesh({len(self.vertices)} vertices, {len(self.faces)} faces{blocked})"
 
 
 def _frozen(array: NDArray[Any]) -> NDArray[Any]:
@@ -402,18 +457,10 @@ def _refuse_out_of_range(corners: Longs, sizes: Longs, vertex_count: int) -> Non
     )
 
 
-def _prepare(vertices: Floats, faces: Longs) -> Topology:
-    a, b, c = faces.T
-    surface = np.flatnonzero((a != b) & (b != c) & (c != a))
-    if len(surface) == 0:
-        raise InvalidMesh(
-            "each face repeats a vertex: there is no surface",
-            kind="face",
-            elements=list(range(min(len(faces), NAMED))),
-        )
+def _prepare(vertices: Floats, faces: Ints, surface: Longs) -> Topology:
+    """Return the topology of some of the faces."""
     topology = kernels.empty_topology(len(vertices), len(surface))
-    triangles = faces.astype(np.int32)
-    outcome, bad = kernels.build_topology(vertices, triangles[surface], topology)
+    outcome, bad = kernels.build_topology(vertices, faces[surface], topology)
     topology.outer_face[:] = surface[topology.outer_face]
     if outcome == kernels.TOO_SHORT:
         face = int(topology.outer_face[bad])

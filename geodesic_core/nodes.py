@@ -8,10 +8,10 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.canonical import half_edges_around
 from geodesic_core.curve import PieceInFace, Polyline, pieces_of, weights_by_face
-from geodesic_core.errors import InvalidArgument
+from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.kernels.wavefront import NODE, PIECE, PIECE_ENDS, SITE, Sites
 from geodesic_core.mesh import TriangleMesh
-from geodesic_core.surface_point import SurfacePoint
+from geodesic_core.surface_point import UNPLACED, SurfacePoint
 
 
 @dataclass(frozen=True)
@@ -183,6 +183,17 @@ def component_of(mesh: TriangleMesh, point: SurfacePoint) -> int:
     if vertex is None:
         vertex = int(mesh.faces[point.face_index, 0])
     return int(mesh.components[vertex])
+
+
+def disconnected(mesh: TriangleMesh, message: str, *points: SurfacePoint) -> NoPath:
+    """Return the error of canonical points that are not connected, and why they may not be."""
+    lonely = [point for point in points if point.face_index == UNPLACED]
+    blocked = len(mesh.barriers)
+    if lonely:
+        message += f": {lonely[0]} belongs to no {'free face' if blocked else 'face'}"
+    elif blocked:
+        message += f", among {blocked} blocked {'face' if blocked == 1 else 'faces'}"
+    return NoPath(message, "disconnected")
 
 
 def corners_of(mesh: TriangleMesh, point: SurfacePoint) -> tuple[Ints, Floats]:

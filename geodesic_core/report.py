@@ -36,9 +36,9 @@ class MeshReport:
 
     vertices: int
     faces: int
-    """All of them, those that repeat a vertex as well."""
+    """All of them, those that are no part of the surface as well."""
     edges: int
-    """Of the surface, to which faces that repeat a vertex do not belong."""
+    """Of the surface, to which faces that repeat a vertex or are blocked do not belong."""
     triangulated_polygons: int
     """Polygons that became several faces."""
     components: int
@@ -47,7 +47,7 @@ class MeshReport:
     """The lowest vertex of each component."""
     boundary_loops: int
     euler_characteristic: int
-    """V - E + F of the surface: isolated vertices and faces that repeat a vertex do not count."""
+    """V - E + F of the surface: isolated vertices and faces beside it do not count."""
     saddle_vertices: int
     boundary_vertices: int
     bow_tie_vertices: Sample
@@ -75,6 +75,13 @@ class MeshReport:
     def as_dict(self) -> dict[str, Any]:
         """Return the report as what JSON can hold."""
         return asdict(self)
+
+
+def repeat_a_vertex(faces: Ints | Longs) -> NDArray[np.bool_]:
+    """Tell which faces repeat a vertex."""
+    a, b, c = faces.T
+    repeats: NDArray[np.bool_] = (a == b) | (b == c) | (c == a)
+    return repeats
 
 
 def edges_of(faces: Ints) -> tuple[Ints, Ints, NDArray[np.bool_]]:
@@ -123,7 +130,7 @@ def report_of(
         ),
         isolated_vertices=Sample.of(np.flatnonzero(~is_used)),
         duplicate_vertices=Sample.of(used[repeated(vertices[used])]),
-        repeated_vertex_faces=Sample.of(np.setdiff1d(np.arange(len(faces)), surface)),
+        repeated_vertex_faces=Sample.of(np.flatnonzero(repeat_a_vertex(faces))),
         duplicate_faces=Sample.of(surface[repeated(np.sort(faces[surface], axis=1))]),
         degenerate_faces=Sample.of(np.sort(topology.outer_face[flat])),
         non_manifold_edges=Sample.of(edges[edge_faces > 2]),

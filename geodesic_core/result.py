@@ -15,7 +15,7 @@ from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.wavefront import Bounds
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest_source import NearestSource, find_nearest_source
-from geodesic_core.nodes import Nodes, component_of
+from geodesic_core.nodes import Nodes, component_of, disconnected
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, traced_path
 from geodesic_core.surface_point import Point, SurfacePoint
 from geodesic_core.tolerances import PATH_LENGTH
@@ -55,6 +55,7 @@ class DistanceField:
     """Geodesic distances from the sources to all vertices."""
 
     mesh: TriangleMesh
+    """With its barriers, if there are any"""
     sources: tuple[Source, ...]
     max_distance: float
     """Mesh units; infinite where no limit was given."""
@@ -178,9 +179,8 @@ class DistanceField:
                 f"{place} is farther than max_distance = {self.max_distance:g} from every source",
                 "beyond_max_distance",
             )
-        return NoPath(
-            f"{place} is in another connected component than every source", "disconnected"
-        )
+        message = f"{place} is in another connected component than every source"
+        return disconnected(self.mesh, message, place, *(line[0] for line in self._places))
 
 
 Sources = Point | Curve | Source | Sequence[Point | Curve | Source]

@@ -11,17 +11,17 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from geodesic_core.arguments import as_limit, is_number
+from geodesic_core.arguments import as_barriers, as_limit, is_number
 from geodesic_core.arrays import Floats
 from geodesic_core.curve import Curve, Polyline, polyline_of
-from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
+from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.kernels import sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.wavefront import Bounds, Wavefront
 from geodesic_core.matrix import Layout, find_matrix
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest import Nearest, find_nearest
-from geodesic_core.nodes import Nodes, component_of, nodes_of
+from geodesic_core.nodes import Nodes, component_of, disconnected, nodes_of
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, joined
 from geodesic_core.path_search import PathSearch
 from geodesic_core.result import DistanceField, Source, Sources, SweepStats
@@ -36,6 +36,7 @@ def exact_distance(
     sources: Sources,
     max_distance: float | None = None,
     targets: Sequence[Point] = (),
+    barriers: Iterable[int] = (),
     *,
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
@@ -56,13 +57,16 @@ def exact_distance(
     targets
         Points whose distances are found on the way, so that `DistanceField.distance_at` and
         `DistanceField.path_to` know them without a search of their own.
+    barriers
+        Ids of faces that act as holes, for this call: the field is that of
+        `TriangleMesh.with_barriers`, which makes the same mesh once for many calls.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
     Raises
     ------
     InvalidPoint, InvalidArgument
-        A source that is not on the mesh; a limit out of its domain.
+        A source that is not on the mesh, or inside a barrier; a limit out of its domain.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         The sweep was stopped; the mesh is as good as before.
 
@@ -73,6 +77,7 @@ def exact_distance(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     bounds = wavefront.exact_bounds(as_limit(max_distance))
+    mesh, control = _among(mesh, barriers, control)
     return _solve(mesh, sources, targets, bounds, EXACT, control, keeps=True)
 
 
@@ -83,6 +88,7 @@ def approximate_distance(
     absolute_error: float | None = None,
     max_distance: float | None = None,
     targets: Sequence[Point] = (),
+    barriers: Iterable[int] = (),
     *,
     keep_windows: bool = False,
     progress: Callable[[float], None] | None = None,
@@ -94,7 +100,7 @@ def approximate_distance(
 
     Parameters
     ----------
-    mesh, sources, max_distance, targets
+    mesh, sources, max_distance, targets, barriers
         As in `exact_distance`.
     relative_error
         Share of the exact distance by which a distance may fall short: above 0 and below 1. None
@@ -122,6 +128,7 @@ def approximate_distance(
     relative, absolute = _as_errors(relative_error, absolute_error)
     limit = as_limit(max_distance)
     bounds = wavefront.merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
+    mesh, control = _among(mesh, barriers, control)
     if math.isfinite(relative):
         promise = ErrorBound("relative", relative, "guaranteed")
     else:
@@ -294,6 +301,18 @@ def warm_up() -> None:
     mesh.report  # noqa: B018 - computed on access
 
 
+def _among(
+    mesh: TriangleMesh, barriers: Iterable[int], control: Control
+) -> tuple[TriangleMesh, Control]:
+    """Return the mesh with its barriers, and the control of a call that holds what that takes."""
+    faces = as_barriers(barriers, len(mesh.faces))
+    if len(faces) == 0:
+        return mesh, control
+    control = control.holding(sum(array.nbytes for array in mesh.topology))
+    control.grant_memory(0)
+    return mesh.with_barriers(faces), control
+
+
 def _solve(
     mesh: TriangleMesh,
     sources: Sources,
@@ -393,9 +412,8 @@ def _as_stops(
     stops.append(mesh.point(target, "target"))
     for here, there in pairwise(stops):
         if component_of(mesh, here) != component_of(mesh, there):
-            raise NoPath(
-                f"{here} and {there} are in different connected components", "disconnected"
-            )
+            message = f"{here} and {there} are in different connected components"
+            raise disconnected(mesh, message, here, there)
     return stops
 
 

@@ -330,7 +330,7 @@ def trace_line(
             if m == previous(h):
                 x, sx = side - u, sw * side - sx
             # In a face that the path did not come from, the line ends where there is no root.
-            is_lost = fork_count > 0 and reference < 0 and left <= 0.0
+            is_lost = fork_count > 0 and left <= 0.0
             sy, after = -sy, -1
         if is_lost:
             if fork_count == 0:

@@ -23,6 +23,7 @@ def check_path(mesh: gc.TriangleMesh, path: gc.GeodesicPath, source, target, dis
     pieces = np.linalg.norm(np.diff(points, axis=0), axis=1)
     assert pieces.sum() == pytest.approx(path.length, rel=LENGTH, abs=0)
     carriers = [_check_location(mesh, *pair) for pair in zip(points, locations, strict=True)]
+    assert not set(faces.tolist()) & set(mesh.barriers.tolist()), "no piece crosses a blocked face"
     for face, start, end in zip(faces, carriers, carriers[1:], strict=False):
         # Both ends lie on the closed face: the piece between them does, a face is convex.
         assert start | end <= set(mesh.faces[face].tolist())
@@ -46,9 +47,10 @@ def _check_location(mesh, point, location) -> set[int]:
 
 @lru_cache(maxsize=1)
 def _faces_at(mesh) -> list[set[int]]:
-    """The faces of each vertex."""
+    """The faces of each vertex, those that are free."""
     faces_at: list[set[int]] = [set() for _ in mesh.vertices]
+    blocked = set(mesh.barriers.tolist())
     for number, face in enumerate(mesh.faces.tolist()):
-        for vertex in face:
+        for vertex in face if number not in blocked else ():
             faces_at[vertex].add(number)
     return faces_at
