@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import orjson
 from numpy.typing import NDArray
+from scipy.sparse import coo_array, save_npz
 
 JSON = "application/json"
 NPY = "application/x-npy"
+NPZ = "application/x-npz"
 OCTETS = "application/octet-stream"
-FORMATS: Mapping[str, str] = {"json": JSON, "npy": NPY, "octets": OCTETS}
+FORMATS: Mapping[str, str] = {"json": JSON, "npy": NPY, "npz": NPZ, "octets": OCTETS}
 
 # Servers and proxies refuse longer header lines; what does not fit is in the JSON answer.
 _LONGEST_HEADER = 4096
@@ -21,21 +23,22 @@ _LONGEST_HEADER = 4096
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer on its way out: members of all sizes, one of which is the array asked for.
+    """An answer on its way out: members of all sizes, among them the arrays asked for.
 
     Attributes
     ----------
     members
         In the order of the JSON object; arrays where they are large.
-    array
-        Name of the member that is the body in binary formats (empty where that is ``None``); the
-        small ones become headers. No name for an answer that comes as JSON only.
+    arrays
+        Names of the members that are the body in binary formats (empty where that is ``None``); the
+        small ones become headers. The distances of a sparse matrix come with their rows and
+        columns. No names for an answer that comes as JSON only.
     values
         How many values its JSON has, where the query did not tell before it was answered.
     """
 
     members: Mapping[str, Any]
-    array: str = ""
+    arrays: tuple[str, ...] = ()
     values: int = 0
 
 
@@ -57,18 +60,29 @@ def to_npy(answer: Answer) -> Encoded:
     array = _little_endian(answer)
     header = BytesIO()
     np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(array))
-    return Encoded([header.getvalue(), _raw(array)], _headers(answer, array))
+    return Encoded([header.getvalue(), _raw(array)], _array_headers(array) | _headers(answer))
+
+
+def to_npz(answer: Answer) -> Encoded:
+    """Encode a sparse matrix as `scipy.sparse.load_npz` reads it, the rest as headers."""
+    distances, rows, columns = (answer.members[name] for name in answer.arrays)
+    table = coo_array((distances, (rows, columns)), shape=answer.members["shape"]).tocsr()
+    file = BytesIO()
+    save_npz(file, table, compressed=False)
+    headers = {"Geodesic-Dtype": "<f8", "Geodesic-Shape": ",".join(map(str, table.shape))}
+    return Encoded([file.getbuffer()], headers | _headers(answer))
 
 
 def to_octets(answer: Answer) -> Encoded:
     """Encode the bare array, little-endian and in C order, the rest as headers."""
     array = _little_endian(answer)
-    return Encoded([_raw(array)], _headers(answer, array))
+    return Encoded([_raw(array)], _array_headers(array) | _headers(answer))
 
 
 ENCODERS: Mapping[str, Callable[[Answer], Encoded]] = {
     JSON: to_json,
     NPY: to_npy,
+    NPZ: to_npz,
     OCTETS: to_octets,
 }
 
@@ -115,7 +129,7 @@ def _matches(media: str, offered: str) -> bool:
 
 
 def _little_endian(answer: Answer) -> NDArray[Any]:
-    array: NDArray[Any] | None = answer.members[answer.array]
+    array: NDArray[Any] | None = answer.members[answer.arrays[0]]
     if array is None:  # no path: the headers say why
         return np.empty(0)
     return np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
@@ -130,13 +144,14 @@ def _dump(value: Any) -> bytes:
     return orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY, default=np.ndarray.tolist)
 
 
-def _headers(answer: Answer, array: NDArray[Any]) -> dict[str, str]:
-    headers = {
-        "Geodesic-Dtype": array.dtype.str,
-        "Geodesic-Shape": ",".join(map(str, array.shape)),
-    }
+def _array_headers(array: NDArray[Any]) -> dict[str, str]:
+    return {"Geodesic-Dtype": array.dtype.str, "Geodesic-Shape": ",".join(map(str, array.shape))}
+
+
+def _headers(answer: Answer) -> dict[str, str]:
+    headers = {}
     for name, value in answer.members.items():
-        if name == answer.array:
+        if name in (*answer.arrays, "shape"):
             continue
         text = value if isinstance(value, str) else _ascii(value)
         if text is not None and len(text) <= _LONGEST_HEADER:

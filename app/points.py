@@ -28,7 +28,8 @@ def resolve(mesh: gc.TriangleMesh, point: Point) -> gc.SurfacePoint:
 
 def described(mesh: gc.TriangleMesh, place: gc.SurfacePoint) -> Mapping[str, Any]:
     """Return what answers say of a resolved point: vertex, or face and weights, and position."""
+    vertex = place.vertex_index
+    if vertex is not None:  # many a query has thousands, and the mesh would check each again
+        return {"vertex": vertex, "position": mesh.vertices[vertex].tolist()}
     position = mesh.position(place).tolist()
-    if place.vertex_index is not None:
-        return {"vertex": place.vertex_index, "position": position}
     return {"face": place.face_index, "barycentric": place.barycentric, "position": position}

@@ -11,13 +11,16 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.types import Receive, Scope, Send
 
+from app.encoding import JSON
 from app.errors import CODES, PROBLEM_JSON, Problem
+from app.queries import Estimate
 from app.result_store import ResultStore
 from app.schemas import ProblemDocument
 from app.service import Answered
 
 CACHED = {"Cache-Control": "private, max-age=3600", "Vary": "Accept, Accept-Encoding, Prefer"}
 IMMUTABLE = {"Cache-Control": "private, max-age=31536000, immutable"}
+UNSTORED = {"Cache-Control": "no-store"}
 REVALIDATED = {"Cache-Control": "private, no-cache"}
 
 
@@ -58,6 +61,14 @@ def not_modified(request: Request, etag: str, headers: Mapping[str, str]) -> Res
     if request.method == "GET" and (etag in tags or known.strip() == "*"):
         return Response(status_code=304, headers={"ETag": etag, **headers})
     return None
+
+
+def estimate_response(
+    mesh_id: str, estimate: Estimate, media_type: str, seconds: Mapping[str, float]
+) -> Response:
+    """Return an estimate: what it is of may cost another time tomorrow."""
+    members = {"mesh_id": mesh_id, "is_estimate": True, **vars(estimate), "media_type": media_type}
+    return Response(orjson.dumps(members), 200, {**UNSTORED, **server_timing(seconds)}, JSON)
 
 
 class StoredFileResponse(FileResponse):

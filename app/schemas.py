@@ -18,6 +18,7 @@ Merge = Literal["none", "exact"]
 MeshFormat = Literal["obj", "off", "ply", "stl", "glb"]
 SampleName = Literal["knot", "sphere", "plane"]
 Method = Literal["exact", "approximate"]
+Layout = Literal["dense", "sparse", "pairs"]
 StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
 NonNegative = Annotated[FiniteFloat, Field(ge=0)]
 Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -98,10 +99,12 @@ POINT_TAGS = {name: f"by {name}" for name in ("vertex", "edge", "face", "positio
 
 
 def _tag(written: Any) -> str | None:
-    if isinstance(written, Wire):
-        written = written.model_fields_set
-    fields = written if isinstance(written, dict | set) else ()
-    return next((tag for name, tag in POINT_TAGS.items() if name in fields), None)
+    # Called for every point that is read or written down; a query may have 100 000.
+    fields = written if isinstance(written, dict) else getattr(written, "__dict__", ())
+    for name, tag in POINT_TAGS.items():
+        if name in fields:
+            return tag
+    return None
 
 
 _BY_FIELD = Discriminator(
@@ -193,6 +196,69 @@ class PathRequest(Accuracy):
     )
 
 
+class PathsRequest(Accuracy):
+    """The shortest paths from ``source`` to each of ``targets``."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [{"source": {"vertex": 0}, "targets": [{"vertex": 7}, {"vertex": 9}]}]
+        }
+    )
+
+    source: Point
+    targets: list[Point] = Field(min_length=1)
+    max_distance: NonNegative | None = Field(
+        default=None, description="There is no path to what is farther than this"
+    )
+
+
+class MatrixRequest(Wire):
+    """Exact distances from each of ``sources`` to each of ``targets``."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {
+                    "sources": [{"vertex": 0}, {"vertex": 1}],
+                    "targets": [{"vertex": 7}, {"face": 7, "barycentric": [0.2, 0.3, 0.5]}],
+                }
+            ]
+        }
+    )
+
+    sources: list[Point] = Field(min_length=1)
+    targets: list[Point] = Field(min_length=1)
+    max_distance: NonNegative | None = Field(
+        default=None, description="What is farther than this is left unreached"
+    )
+    layout: Layout = Field(
+        default="dense",
+        description="`dense`: a row for each source; `sparse`: what can be reached, with its row "
+        "and column; `pairs`: from each source to the target of the same index",
+    )
+
+
+class NearestRequest(Wire):
+    """The ``k`` of some ``candidates`` that are geodesically nearest to ``source``."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "examples": [
+                {"source": {"vertex": 0}, "candidates": [{"vertex": 7}, {"vertex": 9}], "k": 1}
+            ]
+        }
+    )
+
+    source: Point
+    candidates: list[Point] = Field(min_length=1)
+    k: Annotated[StrictInt, Field(ge=1)] = Field(
+        default=1, description="How many to find, at most the number of candidates"
+    )
+    max_distance: NonNegative | None = Field(
+        default=None, description="Candidates farther than this are left out"
+    )
+
+
 class LocateRequest(Wire):
     """The points of the surface that are nearest to some positions."""
 
@@ -206,13 +272,17 @@ class LocateRequest(Wire):
     )
 
 
-AnswerFormat = Literal["json", "npy", "octets"]
+AnswerFormat = Literal["json", "npy", "npz", "octets"]
 
 
 class AnswerParameters(Wire):
-    """How the answer is to be written."""
+    """How the answer is to be written, or whether only to tell what it would take."""
 
     format: AnswerFormat | None = Field(default=None, description="Overrides `Accept`")
+    estimate: bool = Field(
+        default=False,
+        description="Do not compute: answer with an `Estimate` of what it would take, in JSON",
+    )
 
 
 class PathAnswerParameters(AnswerParameters):
@@ -346,7 +416,7 @@ class ResolvedSource(ResolvedPoint):
 
 
 class Unreachable(BaseModel):
-    """How many of the distances are ``null``, by reason."""
+    """How many distances there are not, by reason."""
 
     disconnected: int
     beyond_max_distance: int
@@ -391,28 +461,128 @@ class SearchStep(BaseModel):
     faces: list[int] = Field(description="The region that was visited")
 
 
-class PathAnswer(BaseModel):
-    """A path from source to target, or the reason why there is none."""
+class Outline(BaseModel):
+    """A path, or the reason why there is none."""
 
-    mesh_id: str
-    method: Method
-    exact: bool
     status: Literal["ok", "no_path"]
-    reason: str | None = None
-    source: ResolvedPoint
-    target: ResolvedPoint
-    waypoints: list[ResolvedPoint]
+    reason: Literal["disconnected", "beyond_max_distance"] | None = None
     length: float | None = None
     points: list[tuple[float, float, float]] | None
     locations: list[Location] | None = None
     faces: list[int] | None = Field(
         default=None, description="The face that each piece of the path crosses"
     )
+    error_bound: ErrorBound
+
+
+class PathAnswer(Outline):
+    """A path from source to target, or the reason why there is none."""
+
+    mesh_id: str
+    method: Method
+    exact: bool
+    source: ResolvedPoint
+    target: ResolvedPoint
+    waypoints: list[ResolvedPoint]
     steps: list[SearchStep] | None = Field(
         default=None, description="Of the search, leg by leg, where asked for by `explain`"
     )
-    error_bound: ErrorBound
     warnings: list[str]
+
+
+class PathTo(Outline):
+    """The path to one of several targets."""
+
+    target: ResolvedPoint
+
+
+class PathsAnswer(BaseModel):
+    """The paths from a point, in the order of their targets."""
+
+    mesh_id: str
+    method: Method
+    exact: bool
+    source: ResolvedPoint
+    paths: list[PathTo]
+    stats: dict[str, Any]
+    warnings: list[str]
+
+
+class MatrixEnd(ResolvedPoint):
+    """A source or target of a matrix."""
+
+    component: int = Field(
+        description="The connected component of the mesh that it is in: where source and target "
+        "differ in it, there is no path; else what is missing is beyond `max_distance`"
+    )
+
+
+class MatrixAnswer(BaseModel):
+    """Distances in mesh units between many points."""
+
+    mesh_id: str
+    method: Method
+    exact: bool
+    error_bound: ErrorBound
+    layout: Layout
+    sources: list[MatrixEnd]
+    targets: list[MatrixEnd]
+    shape: tuple[int, int] | None = Field(default=None, description="Of a sparse matrix")
+    rows: list[int] | None = Field(
+        default=None, description="Of a sparse matrix: the source of each distance"
+    )
+    columns: list[int] | None = Field(
+        default=None, description="Of a sparse matrix: the target of each distance"
+    )
+    distances: list[list[float | None]] | list[float | None] = Field(
+        description="Dense: a row for each source. Pairs: one for each. Both `null` where "
+        "unreachable. Sparse: those that can be reached, zeros too"
+    )
+    unreachable: Unreachable
+    warnings: list[str]
+
+
+class NearestPoint(ResolvedPoint):
+    """A candidate that is among the nearest."""
+
+    candidate: int = Field(description="Index into `candidates`")
+    distance: float
+
+
+class NearestAnswer(BaseModel):
+    """The nearest candidates, nearest first; of equal distances the lower index goes first."""
+
+    mesh_id: str
+    method: Method
+    exact: bool
+    error_bound: ErrorBound
+    source: ResolvedPoint
+    nearest: list[NearestPoint] = Field(
+        description="There are fewer than `k` where fewer can be reached"
+    )
+    unreachable: Unreachable | None = Field(
+        default=None, description="Why the other candidates are none, where there are fewer"
+    )
+    warnings: list[str]
+
+
+class Estimate(BaseModel):
+    """What an answer is likely to take, told without computing it."""
+
+    mesh_id: str
+    is_estimate: Literal[True]
+    seconds: float = Field(
+        description="On a free worker; meshes and machines differ from it by a factor of 3 and more"
+    )
+    memory_bytes: int = Field(
+        description="Beside the mesh, as `GEODESIC_QUERY_MEMORY_BYTES` limits it; within a factor "
+        "of 3"
+    )
+    response_bytes: int = Field(
+        description="Of the body, within 5 %; with `max_distance`, and for paths, as if geodesics "
+        "were straight, so that paths where the surface winds take some times as much"
+    )
+    media_type: str = Field(description="Of the response that is estimated")
 
 
 class LocatedPoint(ResolvedPoint):

@@ -8,26 +8,20 @@ from typing import Any
 
 from anyio import to_thread
 
-from app.encoding import JSON
 from app.engine import (
     Answering,
     Done,
     Engine,
+    Estimating,
     LocalEngine,
     MeshFromFile,
     MeshFromSample,
     StoredMesh,
+    Work,
 )
-from app.errors import Fault, ProblemError, refuse
+from app.errors import ProblemError, refuse
 from app.mesh_store import PUBLIC_ARRAYS, MeshStore
-from app.queries import (
-    DistancesQuery,
-    MeshSize,
-    Query,
-    refuse_large_json,
-    result_key,
-    value_count,
-)
+from app.queries import Estimate, MeshSize, Query, result_key
 from app.result_store import Result, ResultStore, result_name
 from app.settings import Settings, variable_of
 
@@ -106,9 +100,9 @@ class Service:
         await to_thread.run_sync(self.meshes.delete, mesh_id)
         self.results.forget_mesh(mesh_id)
 
-    async def answer(self, query: Query, media_type: str, deadline_s: float) -> Answered:
+    async def answer(self, query: Query[Any], media_type: str, deadline_s: float) -> Answered:
         """Answer ``query``: from a kept result, or by a worker."""
-        self._refuse_format(query, media_type)
+        query.refuse_answer(media_type, self.size(query.mesh_id), self.settings)
         name = result_name(query.mesh_id, result_key(query, media_type))
         kept = await self.results.find(name)
         if kept is not None:
@@ -117,17 +111,16 @@ class Service:
         result = self.results.take_new(name, is_kept=query.is_repeatable)
         return Answered(result, done.seconds)
 
-    def _refuse_format(self, query: Query, media_type: str) -> None:
-        if media_type == JSON:
-            values = value_count(query, self.size(query.mesh_id).vertices)
-            refuse_large_json(query, values, self.settings)
-        elif isinstance(query, DistancesQuery) and query.nearest_source:
-            fault = Fault("/include", "nearest_source comes with JSON only")
-            raise refuse("invalid_request", f"{media_type} holds one array", errors=(fault,))
+    async def estimate(
+        self, query: Query[Any], media_type: str, deadline_s: float
+    ) -> tuple[Estimate, Seconds]:
+        """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
+        query.refuse_answer(media_type, self.size(query.mesh_id), self.settings)
+        done = await self._run(Estimating(query, media_type), deadline_s, query.mesh_id)
+        assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
+        return done.estimate, done.seconds
 
-    async def _run(
-        self, work: MeshFromFile | MeshFromSample | Answering, deadline_s: float, mesh_id: str = ""
-    ) -> Done:
+    async def _run(self, work: Work, deadline_s: float, mesh_id: str = "") -> Done:
         try:
             async with asyncio.timeout(deadline_s):
                 return await self.engine.run(work, mesh_id or None)

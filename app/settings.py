@@ -42,6 +42,8 @@ class Settings(BaseSettings):
     """Most faces of a mesh."""
     max_sources: PositiveInt = 10_000
     """Most sources of a query."""
+    max_matrix_cells: PositiveInt = 10_000_000
+    """Most cells of a matrix, sources by targets, or pairs."""
     max_waypoints: PositiveInt = 100
     """Most waypoints of a path."""
     max_json_values: PositiveInt = 2_000_000

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import uvicorn
 from fastapi import FastAPI
+from scipy.sparse import load_npz
 
 import geodesic_core as gc
 from app import __version__
@@ -334,6 +335,116 @@ def test_locate_prints_a_point_that_others_take(run: Run, knot: Path) -> None:
     assert float(ran.figure("distance")) == 0
 
 
+def point_options(option: str, *points: object) -> list[object]:
+    return [each for point in points for each in (option, point)]
+
+
+def test_paths_are_written_with_those_that_are_not_there(run: Run, knot: Path) -> None:
+    mesh = gc.load_mesh(knot)
+    face = int(np.flatnonzero((mesh.faces == 20).any(axis=1))[0])
+    inside = gc.SurfacePoint.face(face, (0.2, 0.3, 0.5))
+    field = gc.exact_distance(mesh, 3, 4.0, [700, inside])
+    targets = point_options("--target", 700, f"f{face}:0.2,0.3,0.5", "v3", 20)
+    assert np.isinf(field.distances[700])
+    ends = ["--source", 3, *targets, "--max-distance", 4]
+
+    ran = run("paths", knot, *ends, "--out", "p.json")
+
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("no path") == "to 700: beyond_max_distance"
+    answer = json.loads(Path("p.json").read_text())["paths"]
+    assert answer[0] == {"status": "no_path", "reason": "beyond_max_distance"}
+    for found, target in zip(answer[1:], (inside, 3, 20), strict=True):
+        path = field.path_to(target)
+        assert (found["status"], found["length"]) == ("ok", path.length)
+        assert found["points"] == path.points.tolist()
+        assert repr(path.length) in ran.out
+    assert run("paths", knot, *ends, "--out", "p.obj").code == 0
+    rows = [row.split() for row in Path("p.obj").read_text().splitlines()]
+    points = [row for row in rows if row[0] == "v"]
+    elements = [row[1:] for row in rows if row[0] in "lp"]
+    assert [row[0] for row in rows if row[0] in "lp"] == ["l", "p", "l"]
+    assert [len(each) for each in elements] == [len(found["points"]) for found in answer[1:]]
+    numbers = [number for each in elements for number in each]
+    assert numbers == list(map(str, range(1, len(points) + 1)))
+
+
+def test_approximate_paths_report_their_own_bounds(run: Run, knot: Path) -> None:
+    errors = ["--method", "approximate", "--relative-error", 0.05]
+    targets = point_options("--target", 700, 20)
+    ran = run("paths", knot, "--source", 3, *targets, *errors, "--out", "p.json")
+    field = gc.approximate_distance(gc.load_mesh(knot), 3, 0.05, keep_windows=True)
+    assert ran.code == 0
+    for found, target in zip(
+        json.loads(Path("p.json").read_text())["paths"], (700, 20), strict=True
+    ):
+        assert found["error_bound"] == asdict(field.path_to(target).error_bound)
+
+
+@pytest.mark.parametrize("limit", [None, 4.0])
+def test_matrices_are_the_library_s(run: Run, knot: Path, limit: float | None) -> None:
+    mesh = gc.load_mesh(knot)
+    inside = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5))
+    expected = gc.distance_matrix(mesh, [3, inside], [700, 3, 20], limit)
+    sources = point_options("--source", 3, "f40:0.2,0.3,0.5")
+    ends = [*sources, *point_options("--target", 700, 3, 20)]
+    ends += [] if limit is None else ["--max-distance", limit]
+    rows = [(i, j, expected[i, j]) for i in range(2) for j in range(3)]
+    near = [row for row in rows if np.isfinite(row[2])]
+
+    for layout, names in (("dense", "npy csv json"), ("sparse", "npz csv json")):
+        for name in names.split():
+            ran = run("matrix", knot, *ends, "--layout", layout, "--out", f"{layout}.{name}")
+            assert (ran.code, ran.err) == (0, "")
+            assert ran.figure("reached") == f"{len(near)} of 6 distances"
+            assert ran.figure("written") == f"{layout}.{name}"
+    assert np.load("dense.npy").tolist() == expected.tolist()
+    answer = json.loads(Path("dense.json").read_text())["distances"]
+    assert answer == [[d if np.isfinite(d) else None for d in row] for row in expected.tolist()]
+    for layout, cells in (("dense", rows), ("sparse", near)):
+        table = np.loadtxt(f"{layout}.csv", delimiter=",", skiprows=1)
+        assert [tuple(row) for row in table.tolist()] == cells
+    table = load_npz("sparse.npz").tocoo()
+    assert list(zip(table.row, table.col, table.data, strict=True)) == near
+    answer = json.loads(Path("sparse.json").read_text())
+    assert answer["shape"] == [2, 3]
+    columns = answer["rows"], answer["columns"], answer["distances"]
+    assert list(zip(*columns, strict=True)) == near
+
+
+def test_pairs(run: Run, knot: Path) -> None:
+    expected = gc.distance_matrix(gc.load_mesh(knot), [3, 9], [700, 20], layout="pairs")
+    ends = [*point_options("--source", 3, 9), *point_options("--target", 700, 20)]
+    for name in ("d.npy", "d.csv", "d.json"):
+        ran = run("matrix", knot, *ends, "--layout", "pairs", "--out", name)
+        assert ran.figure("reached") == "2 of 2 distances"
+    assert np.load("d.npy").tolist() == expected.tolist()
+    assert json.loads(Path("d.json").read_text())["distances"] == expected.tolist()
+    rows = [f"{i},{i},{d!r}" for i, d in enumerate(expected.tolist())]
+    assert Path("d.csv").read_text().splitlines() == ["source,target,distance", *rows]
+
+
+def test_nearest_prints_candidates_as_they_were_written(run: Run, knot: Path) -> None:
+    texts = ["700", "f40:0.2,0.3,0.5", "v20", "9"]
+    places = [700, gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), 20, 9]
+    mesh = gc.load_mesh(knot)
+    expected = gc.nearest(mesh, 3, places, 3)
+    candidates = point_options("--candidate", *texts)
+
+    ran = run("nearest", knot, "--source", 3, *candidates, "-k", 3)
+
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("found") == "3 of 3"
+    told = [row.split() for row in ran.out.splitlines() if row.startswith("nearest")]
+    assert [(row[1], float(row[3])) for row in told] == [
+        (texts[i], away)
+        for i, away in zip(expected.indices, expected.distances.tolist(), strict=True)
+    ]
+    limit = ["--max-distance", expected.distances[0]]
+    ran = run("nearest", knot, "--source", 3, *candidates, "-k", 3, *limit)
+    assert ran.figure("found") == "1 of 3"
+
+
 def test_a_path_to_its_own_source_is_a_point(run: Run, plane: Path) -> None:
     assert run("path", plane, "--source", 7, "--target", 7, "--out", "p.obj").code == 0
     assert Path("p.obj").read_text().splitlines()[-1] == "p 1"
@@ -384,6 +495,28 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
                 ("p0,0,1e99", "the position is"),
             )
         ),
+        (
+            "paths plane.ply --source 0 --target 1 --target 121 --out p.obj",
+            "--target 121: the point is vertex 121",
+        ),
+        (
+            "paths plane.ply --source 0 --target 1 --max-distance -1 --out p.json",
+            "max_distance",
+        ),
+        (
+            "matrix plane.ply --source 0 --target v-1 --out m.npy",
+            "--target v-1: the point is vertex -1",
+        ),
+        (
+            "matrix plane.ply --source e0-120:0.5 --target 1 --out m.npy",
+            "--source e0-120:0.5: no edge joins",
+        ),
+        ("matrix plane.ply --source 0 --target 1 --max-distance nan --out m.npy", "max_distance"),
+        (
+            "nearest plane.ply --source 0 --candidate f200:1,0,0",
+            "--candidate f200:1,0,0: the point is face 200",
+        ),
+        ("nearest plane.ply --source 0 --candidate 1 --max-distance -1", "max_distance"),
         ("locate plane.ply --at 0,0,-1e99", "--at 0,0,-1e99: the position is"),
         ("locate nowhere.ply --at 0,0,0", "cannot read nowhere.ply"),
         *(
@@ -455,6 +588,28 @@ def test_what_fails_says_why_in_one_line(
             "path plane.ply --source 0 --target 1 --out p.obj --method approximate --explain",
             "--explain goes with --method exact only",
         ),
+        ("paths plane.ply --source 0 --out p.obj", "--target"),
+        ("paths plane.ply --source 0 --target 1 --out p.npy", ".obj or .json"),
+        (
+            "paths plane.ply --source 0 --target 1 --out p.obj --relative-error 0.1",
+            "--relative-error goes with --method approximate only",
+        ),
+        ("matrix plane.ply --source 0 --target 1 --out m.txt", "m.txt must end in .npy or .npz"),
+        ("matrix plane.ply --source 0 --target 1 --out m.npz", ".npz does not go with --layout d"),
+        (
+            "matrix plane.ply --source 0 --target 1 --out m.npy --layout sparse",
+            ".npy does not go with --layout sparse",
+        ),
+        ("matrix plane.ply --source 0 --target 1 --out m.npy --layout rows", "rows"),
+        (
+            "matrix plane.ply --source 0 --target 1 --target 2 --out m.npy --layout pairs",
+            "there are 1 sources and 2 targets; pairs need as many",
+        ),
+        ("matrix plane.ply --source 0 --target 1", "--out"),
+        ("nearest plane.ply --source 0", "--candidate"),
+        ("nearest plane.ply --source 0 --candidate 1 -k 2", "-k is 2, but there are only 1"),
+        ("nearest plane.ply --source 0 --candidate 1 -k 0", "-k"),
+        ("nearest plane.ply --source 0 --candidate x", "'x' is not a point"),
         ("sample cube c.ply", "cube"),
         ("sample knot c.obj", ".ply"),
         ("serve --port 70000", "--port"),
@@ -552,7 +707,17 @@ def test_version_and_help(run: Run) -> None:
     assert run("--version").out == f"geodesic {__version__}\n"
     usage = run("--help")
     assert usage.code == 0
-    for command in ("serve", "info", "distance", "path", "locate", "sample"):
+    for command in (
+        "serve",
+        "info",
+        "distance",
+        "path",
+        "paths",
+        "matrix",
+        "nearest",
+        "locate",
+        "sample",
+    ):
         assert command in usage.out
         assert "--help" in run(command, "--help").out
 

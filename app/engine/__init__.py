@@ -5,12 +5,21 @@
 
 from app.engine.interface import Engine
 from app.engine.local import LocalEngine
-from app.engine.work import Answering, Done, MeshFromFile, MeshFromSample, StoredMesh, Work
+from app.engine.work import (
+    Answering,
+    Done,
+    Estimating,
+    MeshFromFile,
+    MeshFromSample,
+    StoredMesh,
+    Work,
+)
 
 __all__ = [
     "Answering",
     "Done",
     "Engine",
+    "Estimating",
     "LocalEngine",
     "MeshFromFile",
     "MeshFromSample",

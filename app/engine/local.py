@@ -4,6 +4,7 @@ import asyncio
 import logging
 from collections import deque
 from collections.abc import Coroutine
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -64,7 +65,7 @@ class LocalEngine:
                 continue  # it had died idle, unnoticed: nothing was tried yet
             if isinstance(outcome, Problem):
                 raise ProblemError(outcome)
-            return Done({"queue": queued, **outcome.seconds}, outcome.mesh)
+            return replace(outcome, seconds={"queue": queued, **outcome.seconds})
         raise AssertionError("the last try returns or raises")
 
     async def _run_in(self, slot: Slot, work: Work) -> Done | Problem:

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
-from app.queries import Query
+from app.queries import Estimate, Query
 from app.schemas import Merge
 
 
@@ -35,14 +35,24 @@ class MeshFromSample:
 class Answering:
     """Answer ``query`` into the result ``result_name``."""
 
-    query: Query
+    query: Query[Any]
     media_type: str
     result_name: str
 
     stops_when_asked: ClassVar[bool] = True
 
 
-Work = MeshFromFile | MeshFromSample | Answering
+@dataclass(frozen=True)
+class Estimating:
+    """Tell what the answer to ``query`` would take."""
+
+    query: Query[Any]
+    media_type: str
+
+    stops_when_asked: ClassVar[bool] = True
+
+
+Work = MeshFromFile | MeshFromSample | Answering | Estimating
 
 
 @dataclass(frozen=True)
@@ -55,7 +65,11 @@ class StoredMesh:
 
 @dataclass(frozen=True)
 class Done:
-    """What a worker reports: the seconds of each phase, and the mesh where one was stored."""
+    """What a worker reports: the seconds of each phase, and what the work was for, if it is small.
+
+    Answers are files.
+    """
 
     seconds: Mapping[str, float]
     mesh: StoredMesh | None = None
+    estimate: Estimate | None = None

@@ -15,13 +15,21 @@ from time import perf_counter
 from setproctitle import setproctitle
 
 import geodesic_core as gc
-from app.answers import answer
 from app.encoding import JSON, encode
-from app.engine.work import Answering, Done, MeshFromFile, MeshFromSample, StoredMesh, Work
+from app.engine.work import (
+    Answering,
+    Done,
+    Estimating,
+    MeshFromFile,
+    MeshFromSample,
+    StoredMesh,
+    Work,
+)
 from app.errors import Problem, over_limit, problem_of
 from app.json_mesh import read_json_mesh
 from app.mesh_store import MeshStore, OpenMesh
-from app.queries import refuse_large_json
+from app.queries import Grant, estimate
+from app.queries.refusals import refuse_large_json
 from app.result_store import write_result
 from app.settings import Settings
 
@@ -53,11 +61,17 @@ class Worker:
     def do(self, number: int, work: Work) -> Done:
         """Do ``work``, unless the number of the work to stop reaches ``number``."""
         clock = Clock()
+
+        def is_to_stop() -> bool:
+            return self.stop_number.value >= number
+
         match work:
             case MeshFromFile() | MeshFromSample():
                 return self._add_mesh(work, clock)
             case Answering():
-                return self._answer(work, clock, lambda: self.stop_number.value >= number)
+                return self._answer(work, clock, is_to_stop)
+            case Estimating():
+                return self._estimate(work, clock, is_to_stop)
 
     def _add_mesh(self, work: MeshFromFile | MeshFromSample, clock: "Clock") -> Done:
         with clock.phase("load"):
@@ -70,18 +84,25 @@ class Worker:
         return Done(clock.seconds, StoredMesh(mesh_id, is_new))
 
     def _answer(self, work: Answering, clock: "Clock", cancel: Callable[[], bool]) -> Done:
+        settings = self.settings
+        grant = Grant(cancel, settings.query_memory_bytes, settings.max_json_values)
         with clock.phase("load"):
             opened = self._open(work.query.mesh_id)
         with clock.phase("compute"):
-            found = answer(
-                work.query, opened, cancel=cancel, memory_limit=self.settings.query_memory_bytes
-            )
+            found = work.query.answer(opened, grant)
         if work.media_type == JSON:
-            refuse_large_json(work.query, found.values, self.settings)
+            refuse_large_json(found.values, settings.max_json_values, work.query.hint)
         with clock.phase("encode"):
             encoded = encode(found, work.media_type)
             write_result(self.config.results, work.result_name, encoded.parts, encoded.headers)
         return Done(clock.seconds)
+
+    def _estimate(self, work: Estimating, clock: "Clock", cancel: Callable[[], bool]) -> Done:
+        with clock.phase("load"):
+            opened = self._open(work.query.mesh_id)
+        with clock.phase("compute"):
+            found = estimate(work.query, work.media_type, opened, cancel)
+        return Done(clock.seconds, estimate=found)
 
     def _open(self, mesh_id: str) -> OpenMesh:
         if mesh_id not in self.meshes:

@@ -20,6 +20,7 @@ _LIMITS = (
     "max_query_bytes",
     "max_faces",
     "max_sources",
+    "max_matrix_cells",
     "max_waypoints",
     "max_json_values",
     "query_memory_bytes",

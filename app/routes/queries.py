@@ -1,43 +1,54 @@
-"""Queries on a mesh: distances, paths, and where positions are on it."""
+"""Queries on a mesh: one handler for each kind."""
 
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 
-from app.dependencies import (
-    Deadline,
-    ServiceDep,
-    media_type_of,
-    require_json,
-    while_connected,
-)
-from app.encoding import JSON, NPY, OCTETS
-from app.queries import Query as ValidQuery
+from app.dependencies import Deadline, ServiceDep, media_type_of, require_json, while_connected
+from app.encoding import NPY, NPZ, OCTETS
 from app.queries import (
-    distances_query,
-    locate_query,
+    DistancesQuery,
+    LocateQuery,
+    MatrixQuery,
+    NearestQuery,
+    PathQuery,
+    PathsQuery,
     naming_parameters,
-    path_query,
     result_key,
     written_request,
 )
-from app.responses import CACHED, ResultResponse, etag_of, not_modified, problems
+from app.queries import Query as ValidQuery
+from app.responses import (
+    CACHED,
+    UNSTORED,
+    ResultResponse,
+    estimate_response,
+    etag_of,
+    not_modified,
+    problems,
+)
 from app.schemas import (
     AnswerParameters,
     DistancesAnswer,
     DistancesRequest,
+    Estimate,
     LocateAnswer,
     LocateRequest,
+    MatrixAnswer,
+    MatrixRequest,
+    NearestAnswer,
+    NearestRequest,
     PathAnswer,
     PathAnswerParameters,
     PathParameters,
     PathRequest,
+    PathsAnswer,
+    PathsRequest,
 )
-from app.service import Service
 
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"])
 
-_BINARY = {"schema": {"type": "string", "format": "binary"}}
 _CODES = (
     "mesh_not_found",
     "not_acceptable",
@@ -53,59 +64,97 @@ _CODES = (
     "deadline_exceeded",
     "storage_full",
 )
-_PROBLEMS = problems(*_CODES)
-_BODY_PROBLEMS = problems("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
-_UNSTORED = {"Cache-Control": "no-store"}
+_BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
 
 
-def _answers(model: type, array: str) -> dict[int | str, dict[str, Any]]:
-    binary = {NPY: _BINARY, OCTETS: _BINARY}
+def _answers(model: type, description: str, *binary: str) -> dict[int | str, dict[str, Any]]:
+    content = {name: {"schema": {"type": "string", "format": "binary"}} for name in binary}
+    return {200: {"model": model | Estimate, "content": content, "description": description}}
+
+
+def _in_binary(model: type, array: str) -> dict[int | str, dict[str, Any]]:
     description = f"The answer; in binary the {array}, the rest as `Geodesic-…` headers"
-    return {200: {"model": model, "content": binary, "description": description}}
+    return _answers(model, description, NPY, OCTETS)
+
+
+def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[str, Any]:
+    """Return what is said of a query whose points come as JSON."""
+    return {
+        "operation_id": name,
+        "summary": summary,
+        "response_class": Response,
+        "responses": {**answers, **problems(*_BODY_CODES)},
+        "dependencies": [Depends(require_json)],
+    }
+
+
+class Asked:
+    """Of what a query is asked, and by whom."""
+
+    def __init__(
+        self, mesh_id: str, request: Request, service: ServiceDep, deadline: Deadline
+    ) -> None:
+        self.mesh_id = mesh_id
+        self._request = request
+        self._service = service
+        self._deadline = deadline
+
+    async def answer(
+        self, kind: type[ValidQuery[Any]], body: Any, parameters: AnswerParameters
+    ) -> Response:
+        """Answer the query of a kind that a body asks, or tell what that would take."""
+        service, request = self._service, self._request
+        query = kind.ask(self.mesh_id, service.size(self.mesh_id), body, service.settings)
+        media_type = media_type_of(request, parameters.format, query.offers)
+        if parameters.estimate:
+            estimating = service.estimate(query, media_type, self._deadline)
+            estimate, seconds = await while_connected(request, estimating)
+            return estimate_response(self.mesh_id, estimate, media_type, seconds)
+        unchanged = not_modified(request, etag_of(result_key(query, media_type)), CACHED)
+        if unchanged is not None:
+            return unchanged
+        answering = service.answer(query, media_type, self._deadline)
+        answered = await while_connected(request, answering)
+        is_cacheable = request.method == "GET" and query.is_repeatable
+        headers = CACHED if is_cacheable else UNSTORED
+        return ResultResponse(answered, media_type, service.results, headers)
+
+
+AskedDep = Annotated[Asked, Depends()]
+Parameters = Annotated[AnswerParameters, Query()]
 
 
 @router.post(
     "/distances",
-    operation_id="computeDistances",
-    summary="Distances from sources to all vertices, exact or within a chosen error",
-    response_class=Response,
-    responses={**_answers(DistancesAnswer, "distances"), **_BODY_PROBLEMS},
-    dependencies=[Depends(require_json)],
+    **_posted(
+        "computeDistances",
+        "Distances from sources to all vertices, exact or within a chosen error",
+        _in_binary(DistancesAnswer, "distances"),
+    ),
 )
 async def compute_distances(
-    mesh_id: str,
-    body: DistancesRequest,
-    parameters: Annotated[AnswerParameters, Query()],
-    request: Request,
-    service: ServiceDep,
-    deadline: Deadline,
+    body: DistancesRequest, parameters: Parameters, asked: AskedDep
 ) -> Response:
     """Return the distance along the surface from the nearest source to each vertex."""
-    query = distances_query(mesh_id, service.size(mesh_id), body, service.settings)
-    media_type = media_type_of(request, parameters.format)
-    return await _respond(service, request, query, media_type, deadline)
+    return await asked.answer(DistancesQuery, body, parameters)
 
 
 @router.post(
     "/path",
-    operation_id="computePath",
-    summary="The shortest path between two points, exact or within a chosen error",
-    response_class=Response,
-    responses={**_answers(PathAnswer, "points"), **_BODY_PROBLEMS},
-    dependencies=[Depends(require_json)],
+    **_posted(
+        "computePath",
+        "The shortest path between two points, exact or within a chosen error",
+        _in_binary(PathAnswer, "points"),
+    ),
 )
 async def compute_path(
-    mesh_id: str,
     body: PathRequest,
     parameters: Annotated[PathAnswerParameters, Query()],
-    request: Request,
-    service: ServiceDep,
-    deadline: Deadline,
+    asked: AskedDep,
 ) -> Response:
     """Return the points of the path, from source to target, and the faces it crosses."""
-    query = path_query(mesh_id, service.size(mesh_id), body, parameters, service.settings)
-    media_type = media_type_of(request, parameters.format)
-    return await _respond(service, request, query, media_type, deadline)
+    explain = body.explain or parameters.explain
+    return await asked.answer(PathQuery, body.model_copy(update={"explain": explain}), parameters)
 
 
 @router.get(
@@ -113,57 +162,74 @@ async def compute_path(
     operation_id="getPath",
     summary="The shortest path between two points, cacheable",
     response_class=Response,
-    responses={**_answers(PathAnswer, "points"), **_PROBLEMS},
+    responses={**_in_binary(PathAnswer, "points"), **problems(*_CODES)},
 )
-async def get_path(
-    mesh_id: str,
-    parameters: Annotated[PathParameters, Query()],
-    request: Request,
-    service: ServiceDep,
-    deadline: Deadline,
-) -> Response:
+async def get_path(parameters: Annotated[PathParameters, Query()], asked: AskedDep) -> Response:
     """Return the same as `POST`, for points written as `v12` or `f7:0.2,0.3,0.5`."""
     with naming_parameters():
-        body = written_request(parameters)
-        query = path_query(mesh_id, service.size(mesh_id), body, parameters, service.settings)
-        media_type = media_type_of(request, parameters.format)
-        unchanged = not_modified(request, etag_of(result_key(query, media_type)), CACHED)
-        return unchanged or await _respond(service, request, query, media_type, deadline)
+        return await asked.answer(PathQuery, written_request(parameters), parameters)
+
+
+@router.post(
+    "/paths",
+    **_posted(
+        "computePaths",
+        "Shortest paths from one point to many, from one solve",
+        _answers(PathsAnswer, "The paths, in the order of the targets"),
+    ),
+)
+async def compute_paths(body: PathsRequest, parameters: Parameters, asked: AskedDep) -> Response:
+    """Return a path to each target, or the reason why there is none."""
+    return await asked.answer(PathsQuery, body, parameters)
+
+
+@router.post(
+    "/matrix",
+    **_posted(
+        "computeMatrix",
+        "Exact distances from many points to many others",
+        _answers(
+            MatrixAnswer,
+            "The answer; in binary the distances (a sparse matrix as `scipy.sparse.load_npz` reads "
+            "it), the rest as `Geodesic-…` headers",
+            NPY,
+            NPZ,
+            OCTETS,
+        ),
+    ),
+)
+async def compute_matrix(body: MatrixRequest, parameters: Parameters, asked: AskedDep) -> Response:
+    """Return a distance for each source and target, or for each pair.
+
+    A dense matrix and pairs come as JSON, npy and octets, a sparse matrix as JSON and npz.
+    """
+    return await asked.answer(MatrixQuery, body, parameters)
+
+
+@router.post(
+    "/nearest",
+    **_posted(
+        "findNearest",
+        "The candidates that are nearest to a point along the surface",
+        _answers(NearestAnswer, "The candidates, nearest first"),
+    ),
+)
+async def find_nearest(body: NearestRequest, parameters: Parameters, asked: AskedDep) -> Response:
+    """Return the `k` nearest candidates, or as many as can be reached."""
+    return await asked.answer(NearestQuery, body, parameters)
 
 
 @router.post(
     "/locate",
-    operation_id="locatePoints",
-    summary="The points of the surface that are nearest to positions",
-    response_class=Response,
-    responses={
-        200: {"model": LocateAnswer, "description": "The points, in the order of the positions"},
-        **_BODY_PROBLEMS,
-    },
-    dependencies=[Depends(require_json)],
+    **_posted(
+        "locatePoints",
+        "The points of the surface that are nearest to positions",
+        _answers(LocateAnswer, "The points, in the order of the positions"),
+    ),
 )
-async def locate_points(
-    mesh_id: str,
-    body: LocateRequest,
-    parameters: Annotated[AnswerParameters, Query()],
-    request: Request,
-    service: ServiceDep,
-    deadline: Deadline,
-) -> Response:
+async def locate_points(body: LocateRequest, parameters: Parameters, asked: AskedDep) -> Response:
     """Return the nearest point for each position, `null` where it is farther than `max_distance`.
 
     A point that is nearer to a vertex or an edge than 1e-12 of the bounding box is on it.
     """
-    media_type = media_type_of(request, parameters.format, [JSON])
-    query = locate_query(mesh_id, body)
-    return await _respond(service, request, query, media_type, deadline)
-
-
-async def _respond(
-    service: Service, request: Request, query: ValidQuery, media_type: str, deadline: float
-) -> Response:
-    answering = service.answer(query, media_type, deadline)
-    answered = await while_connected(request, answering)
-    is_cacheable = request.method == "GET" and query.is_repeatable
-    headers = CACHED if is_cacheable else _UNSTORED
-    return ResultResponse(answered, media_type, service.results, headers)
+    return await asked.answer(LocateQuery, body, parameters)

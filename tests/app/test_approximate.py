@@ -9,8 +9,8 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.queries import Approximation, PathQuery, result_key
-from app.schemas import VertexPoint
+from app.queries import PathQuery, result_key
+from app.schemas import PathRequest, VertexPoint
 
 from .conftest import NPY, check_problem, distances, mesh_of, upload_sample
 
@@ -154,10 +154,15 @@ def test_the_usual_error_is_one_result_with_its_spelling(client: TestClient, kno
 
 
 def test_keys_tell_methods_and_errors_apart() -> None:
-    granted = [None, Approximation(1e-3, None), Approximation(None, 1e-3), Approximation(0.1, 1e-3)]
+    granted: list[dict[str, Any]] = [
+        {},
+        {"method": "approximate", "relative_error": 1e-3},
+        {"method": "approximate", "absolute_error": 1e-3},
+        {"method": "approximate", "relative_error": 0.1, "absolute_error": 1e-3},
+    ]
 
-    ends = VertexPoint(vertex=0), VertexPoint(vertex=1)
-    keys = {result_key(PathQuery("m", *ends, errors), "a/b") for errors in granted}
+    ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
+    keys = {result_key(PathQuery("m", PathRequest(**ends, **errors)), "a/b") for errors in granted}
 
     assert len(keys) == len(granted)
 

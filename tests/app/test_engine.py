@@ -18,8 +18,8 @@ from app.engine.worker import Clock, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
 from app.mesh_store import MeshStore
-from app.queries import Approximation, PathQuery
-from app.schemas import VertexPoint
+from app.queries import PathQuery
+from app.schemas import PathRequest, VertexPoint
 from app.settings import Settings
 from geodesic_core import TriangleMesh, samples
 
@@ -339,16 +339,17 @@ def test_a_defect_in_a_worker_is_logged_there_and_told(
     assert "ZeroDivisionError" in caplog.text
 
 
-@pytest.mark.parametrize("approximation", [None, Approximation(0.01, None)])
+@pytest.mark.parametrize("accuracy", [{}, {"method": "approximate", "relative_error": 0.01}])
 def test_work_that_was_asked_to_stop_stops(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, approximation: Approximation | None
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accuracy: dict[str, Any]
 ) -> None:
     asked = c_longlong(0)
     state = Worker(config(tmp_path), asked)
     state.store.prepare()
     mesh_id, _ = state.store.add(TriangleMesh(*samples.sphere(100_000)))
     monkeypatch.setattr(worker, "_worker", state)
-    query = PathQuery(mesh_id, VertexPoint(vertex=0), VertexPoint(vertex=1), approximation)
+    ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
+    query = PathQuery(mesh_id, PathRequest(**ends, **accuracy))
     work = Answering(query, "application/json", f"{mesh_id}/key")
     (tmp_path / "results").mkdir()
 

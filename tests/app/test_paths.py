@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.queries import PathQuery, result_key
-from app.schemas import StepName, VertexPoint
+from app.schemas import PathRequest, StepName, VertexPoint
 
 from .conftest import NPY, check_problem, mesh_of, serving, upload_sample
 
@@ -154,7 +154,14 @@ def test_each_route_has_a_result_of_its_own() -> None:
     routes = [(), (3,), (4,), (3, 4), (4, 3)]
     first, last = VertexPoint(vertex=0), VertexPoint(vertex=9)
     queries = [
-        PathQuery("m", first, last, waypoints=tuple(VertexPoint(vertex=i) for i in route))
+        PathQuery(
+            "m",
+            PathRequest(
+                source=first,
+                target=last,
+                waypoints=[VertexPoint(vertex=i) for i in route],
+            ),
+        )
         for route in routes
     ]
 

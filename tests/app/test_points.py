@@ -8,10 +8,29 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.answers import answer
 from app.mesh_store import OpenMesh
-from app.queries import DistancesQuery, LocateQuery, PathQuery, Query, result_key
-from app.schemas import FacePoint, VertexPoint, VertexSource
+from app.queries import (
+    DistancesQuery,
+    Grant,
+    LocateQuery,
+    MatrixQuery,
+    NearestQuery,
+    PathQuery,
+    PathsQuery,
+    Query,
+    result_key,
+)
+from app.schemas import (
+    DistancesRequest,
+    FacePoint,
+    LocateRequest,
+    MatrixRequest,
+    NearestRequest,
+    PathRequest,
+    PathsRequest,
+    VertexPoint,
+    VertexSource,
+)
 
 from .conftest import check_problem, distances, mesh_of, upload_sample
 
@@ -273,25 +292,30 @@ def test_keys_tell_points_apart() -> None:
         FacePoint(face=1, barycentric=(1, 0, 0)),
         FacePoint(face=1, barycentric=(0, 1, 0)),
     ]
-    keys = [result_key(PathQuery("m", points[0], target), "a/b") for target in points]
-    keys += [result_key(PathQuery("m", target, points[0]), "a/b") for target in points[1:]]
-    for positions, limit in ((((0, 0, 0),), None), (((0, 0, 0),), 1.0), (((0, 0, 1),), None)):
-        keys.append(result_key(LocateQuery("m", positions, limit), "a/b"))
+    paths = [PathRequest(source=points[0], target=target) for target in points]
+    paths += [PathRequest(source=target, target=points[0]) for target in points[1:]]
+    queries: list[Query[Any]] = [PathQuery("m", path) for path in paths]
+    for position, limit in (((0, 0, 0), None), ((0, 0, 0), 1.0), ((0, 0, 1), None)):
+        queries.append(LocateQuery("m", LocateRequest(points=[position], max_distance=limit)))
+    queries.append(PathQuery("n", paths[0]))
 
-    assert len(set(keys)) == len(keys)
+    assert len({result_key(query, "a/b") for query in queries}) == len(queries)
 
 
 def test_looking_for_points_can_be_stopped() -> None:
     mesh = gc.TriangleMesh(*gc.samples.plane(200))
     point = VertexPoint(vertex=1)
-    queries: list[Query] = [
-        DistancesQuery("m", (VertexSource(vertex=1),), (point,), None, nearest_source=False),
-        PathQuery("m", point, point),
-        LocateQuery("m", ((0.0, 0.0, 0.0),), None),
+    queries: list[Query[Any]] = [
+        DistancesQuery("m", DistancesRequest(sources=[VertexSource(vertex=1)])),
+        PathQuery("m", PathRequest(source=point, target=point)),
+        PathsQuery("m", PathsRequest(source=point, targets=[point])),
+        MatrixQuery("m", MatrixRequest(sources=[point], targets=[point])),
+        NearestQuery("m", NearestRequest(source=point, candidates=[point])),
+        LocateQuery("m", LocateRequest(points=[(0.0, 0.0, 0.0)])),
     ]
     for query in queries:
         with pytest.raises(gc.errors.Cancelled, match="looked for"):
-            answer(query, OpenMesh(gc.Solver(mesh), []), cancel=lambda: True, memory_limit=2**30)
+            query.answer(OpenMesh(gc.Solver(mesh), []), Grant(lambda: True, 2**30, 100))
 
 
 # Refusals
@@ -354,14 +378,21 @@ def test_points_that_are_refused(
         ("path", {"source": point, "target": good}, "/source"),
         ("path", {"source": good, "target": point}, "/target"),
         ("path", {"source": good, "target": good, "waypoints": [good, point]}, "/waypoints/1"),
+        ("paths", {"source": point, "targets": [good]}, "/source"),
+        ("paths", {"source": good, "targets": [good, point]}, "/targets/1"),
+        ("matrix", {"sources": [point], "targets": [good]}, "/sources/0"),
+        ("matrix", {"sources": [good], "targets": [good, point]}, "/targets/1"),
+        ("nearest", {"source": point, "candidates": [good]}, "/source"),
+        ("nearest", {"source": good, "candidates": [good, point]}, "/candidates/1"),
     ]
     for operation, body, place in asked:
-        response = client.post(f"/v1/meshes/{apart}/{operation}", json=body)
-        problem = check_problem(response, 422, code)
-        (fault,) = problem["errors"]
-        assert fault["pointer"] == place + member
-        assert message in fault["message"]
-        assert problem["detail"] == f"{fault['pointer']}: {fault['message']}"
+        for estimate in ("", "?estimate=true"):
+            response = client.post(f"/v1/meshes/{apart}/{operation}{estimate}", json=body)
+            problem = check_problem(response, 422, code)
+            (fault,) = problem["errors"]
+            assert fault["pointer"] == place + member
+            assert message in fault["message"]
+            assert problem["detail"] == f"{fault['pointer']}: {fault['message']}"
 
 
 TEXTS = [text_of(point) for point, code, _, _ in BAD_POINTS if code == "invalid_point"][:-2]

@@ -1,5 +1,6 @@
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -7,7 +8,7 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.queries import DistancesQuery, result_key
-from app.schemas import VertexPoint, VertexSource
+from app.schemas import DistancesRequest
 
 from .conftest import NPY, check_problem, distances, mesh_of, serving, upload_sample
 
@@ -91,21 +92,19 @@ def test_the_same_query_is_not_solved_again(client: TestClient, plane: str) -> N
 
 
 def test_the_hash_of_a_query_is_stable(monkeypatch: pytest.MonkeyPatch) -> None:
-    source, target = VertexSource(vertex=1), VertexPoint(vertex=2)
-    query = DistancesQuery("m", (source,), (target,), None, nearest_source=False)
-    twin = DistancesQuery(
-        "m",
-        (VertexSource(vertex=1, start_distance=0.0),),
-        (VertexPoint(vertex=2),),
-        None,
-        nearest_source=False,
+    def asked(**body: Any) -> DistancesQuery:
+        return DistancesQuery("m", DistancesRequest.model_validate(body))
+
+    query = asked(sources=[{"vertex": 1}], targets=[{"vertex": 2}])
+    twin = asked(
+        sources=[{"vertex": 1, "start_distance": 0}], targets=[{"vertex": 2}], max_distance=None
     )
-    other = DistancesQuery("m", (source,), None, None, nearest_source=False)
+    other = asked(sources=[{"vertex": 1}])
     key = result_key(query, "a/b")
 
     assert key == result_key(twin, "a/b")
     assert len({key, result_key(other, "a/b"), result_key(query, "a/c")}) == 3
-    monkeypatch.setattr("app.queries.code_version", lambda: "another")
+    monkeypatch.setattr("app.queries.query.code_version", lambda: "another")
     assert result_key(query, "a/b") != key
 
 

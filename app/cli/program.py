@@ -1,0 +1,75 @@
+"""The ``geodesic`` command as a whole: its options, and how it ends."""
+
+import sys
+from typing import Annotated
+
+import typer
+from typer.exceptions import TyperException
+
+from app import __version__
+from app.cli import meshes, queries, serve
+from app.cli.steps import Failure
+
+FAILED, INTERRUPTED = 1, 130
+"""Exit codes: the work failed, Ctrl-C; typer's own for a wrong command line is 2."""
+
+cli = typer.Typer(
+    help="Geodesic distances and shortest paths on triangle meshes, exact or within an error.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+def main() -> None:
+    """Run the command line: every foreseeable failure is one line on standard error."""
+    try:
+        code = cli(standalone_mode=False)
+    except TyperException as error:
+        code = _say_error(f"{error.format_message()} (geodesic --help tells more)", error.exit_code)
+    except Exception as error:
+        from geodesic_core.errors import GeodesicError, InternalError
+
+        if not isinstance(error, GeodesicError | Failure) or isinstance(error, InternalError):
+            raise
+        code = _say_error(str(error), FAILED)
+    if code == INTERRUPTED:
+        _say_error("interrupted", code)
+    sys.exit(code)
+
+
+def _say_error(message: str, code: int) -> int:
+    typer.echo("error: " + " ".join(message.split()), err=True)
+    return code
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"geodesic {__version__}")
+        raise typer.Exit
+
+
+@cli.callback()
+def _options(
+    _version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+        ),
+    ] = False,
+) -> None:
+    pass
+
+
+for command in (
+    serve.serve,
+    meshes.info,
+    queries.distance,
+    queries.path,
+    queries.paths,
+    queries.matrix,
+    queries.nearest,
+    meshes.locate,
+    meshes.sample,
+):
+    cli.command()(command)

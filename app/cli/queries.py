@@ -1,0 +1,276 @@
+"""Commands that answer questions on a mesh."""
+
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli import files
+from app.cli.arguments import (
+    AbsoluteError,
+    Layout,
+    MaxDistance,
+    Merge,
+    MergeOption,
+    MeshFile,
+    Method,
+    MethodOption,
+    Point,
+    RelativeError,
+    Source,
+    Sources,
+    Targets,
+    granted_errors,
+    writable,
+)
+from app.cli.steps import point_of, read, showing
+
+if TYPE_CHECKING:
+    from geodesic_core import ErrorBound, GeodesicPath, TriangleMesh
+
+
+def distance(
+    mesh_file: MeshFile,
+    source: Sources,
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Where the distances go: .npy, .csv or .json.",
+            callback=writable(".npy", ".csv", ".json"),
+        ),
+    ],
+    max_distance: MaxDistance = None,
+    method: MethodOption = Method.EXACT,
+    relative_error: RelativeError = None,
+    absolute_error: AbsoluteError = None,
+    merge: MergeOption = Merge.NONE,
+) -> None:
+    """Compute the distance of every vertex from the nearest source."""
+    granted = granted_errors(method, relative_error, absolute_error)
+    mesh, seconds = read(mesh_file, merge)
+    import numpy as np
+
+    from geodesic_core import approximate_distance, exact_distance
+
+    sources = [point_of(mesh, "--source", written) for written in source]
+    with showing("Computing distances") as step:
+        if granted is None:
+            field = exact_distance(mesh, sources, max_distance, **step._asdict())
+        else:
+            field = approximate_distance(mesh, sources, *granted, max_distance, **step._asdict())
+    files.write_file(out, files.DISTANCES[out.suffix.lower()], field)
+    reached = np.isfinite(field.distances)
+    farthest = int(np.argmax(np.where(reached, field.distances, -1.0)))
+    _tell_size(mesh)
+    typer.echo(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
+    typer.echo(f"farthest    vertex {farthest} at {float(field.distances[farthest])!r}")
+    typer.echo(f"error bound {_bound_in_words(field.error_bound)}")
+    typer.echo(f"took        {seconds:.3f} s to read, {field.stats.seconds:.3f} s to solve")
+    typer.echo(f"written     {out}")
+
+
+def path(
+    mesh_file: MeshFile,
+    source: Source,
+    target: Annotated[
+        Point,
+        typer.Option(parser=Point.parse, metavar="POINT", help="The point to go to."),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Where the path goes: .obj (a polyline) or .json.",
+            callback=writable(".obj", ".json"),
+        ),
+    ],
+    via: Annotated[
+        list[Point] | None,
+        typer.Option(
+            parser=Point.parse,
+            metavar="POINT",
+            help="A point to pass on the way; may be given again, in order.",
+        ),
+    ] = None,
+    explain: Annotated[
+        bool,
+        typer.Option("--explain", help="Tell what each step of the search did; exact paths only."),
+    ] = False,
+    method: MethodOption = Method.EXACT,
+    relative_error: RelativeError = None,
+    absolute_error: AbsoluteError = None,
+    merge: MergeOption = Merge.NONE,
+) -> None:
+    """Compute a shortest path over the surface between two points."""
+    granted = granted_errors(method, relative_error, absolute_error)
+    if granted is not None and (via or explain):
+        name = "--via" if via else "--explain"
+        raise typer.BadParameter(f"{name} goes with --method exact only")
+    mesh, seconds = read(mesh_file, merge)
+    from geodesic_core import approximate_distance, shortest_path
+
+    first, last = point_of(mesh, "--source", source), point_of(mesh, "--target", target)
+    between = [point_of(mesh, "--via", written) for written in via or ()]
+    with showing("Computing the path") as step:
+        start = perf_counter()
+        if granted is None:
+            found = shortest_path(mesh, first, last, between, explain=explain, **step._asdict())
+        else:
+            field = approximate_distance(
+                mesh, first, *granted, targets=[last], keep_windows=True, **step._asdict()
+            )
+            found = field.path_to(last)
+        solved = perf_counter() - start
+    files.write_file(out, files.PATH[out.suffix.lower()], found)
+    _tell_size(mesh)
+    typer.echo(f"length      {found.length!r}")
+    typer.echo(f"points      {len(found.points)}")
+    typer.echo(f"error bound {_bound_in_words(found.error_bound)}")
+    typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
+    for part in found.steps or ():
+        typer.echo(
+            f"leg {part.leg}, {part.name:12} {1e3 * part.seconds:8.2f} ms, bound {part.bound!r}, "
+            f"{part.windows} windows, {len(part.faces)} faces"
+        )
+    typer.echo(f"written     {out}")
+
+
+def paths(
+    mesh_file: MeshFile,
+    source: Source,
+    target: Targets,
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Where the paths go: .obj (a polyline each) or .json.",
+            callback=writable(".obj", ".json"),
+        ),
+    ],
+    max_distance: MaxDistance = None,
+    method: MethodOption = Method.EXACT,
+    relative_error: RelativeError = None,
+    absolute_error: AbsoluteError = None,
+    merge: MergeOption = Merge.NONE,
+) -> None:
+    """Compute shortest paths from one point to several others, in one sweep."""
+    granted = granted_errors(method, relative_error, absolute_error)
+    mesh, seconds = read(mesh_file, merge)
+    from geodesic_core import approximate_distance, exact_distance
+    from geodesic_core.errors import NoPath
+
+    start = point_of(mesh, "--source", source)
+    ends = [point_of(mesh, "--target", written) for written in target]
+    found: list[GeodesicPath | NoPath] = []
+    with showing("Computing the paths") as step:
+        began = perf_counter()
+        if granted is None:
+            field = exact_distance(mesh, start, max_distance, ends, **step._asdict())
+        else:
+            field = approximate_distance(
+                mesh, start, *granted, max_distance, ends, keep_windows=True, **step._asdict()
+            )
+        for end in ends:
+            try:
+                found.append(field.path_to(end))
+            except NoPath as error:
+                found.append(error)
+        solved = perf_counter() - began
+    files.write_file(out, files.PATHS[out.suffix.lower()], found)
+    _tell_size(mesh)
+    for written, path in zip(target, found, strict=True):
+        if isinstance(path, NoPath):
+            typer.echo(f"no path     to {written.text}: {path.reason}")
+        else:
+            bound = _bound_in_words(path.error_bound)
+            typer.echo(f"path        to {written.text}: {path.length!r}, error bound {bound}")
+    typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
+    typer.echo(f"written     {out}")
+
+
+def matrix(
+    mesh_file: MeshFile,
+    source: Sources,
+    target: Targets,
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Where the distances go: .npy, .csv or .json; of a sparse matrix .npz, .csv or "
+            ".json.",
+            callback=writable(".npy", ".npz", ".csv", ".json"),
+        ),
+    ],
+    layout: Annotated[
+        Layout,
+        typer.Option(
+            help="'dense': from each source to each target; 'sparse': what can be reached; "
+            "'pairs': from each source to the target of the same number."
+        ),
+    ] = Layout.DENSE,
+    max_distance: MaxDistance = None,
+    merge: MergeOption = Merge.NONE,
+) -> None:
+    """Compute the distances from several points to several others."""
+    is_sparse = layout is Layout.SPARSE
+    other = ".npy" if is_sparse else ".npz"
+    if out.suffix.lower() == other:
+        raise typer.BadParameter(f"{other} does not go with --layout {layout.value}")
+    if layout is Layout.PAIRS and len(source) != len(target):
+        raise typer.BadParameter(
+            f"there are {len(source)} sources and {len(target)} targets; pairs need as many"
+        )
+    mesh, seconds = read(mesh_file, merge)
+    import numpy as np
+
+    from geodesic_core import distance_matrix
+
+    starts = [point_of(mesh, "--source", written) for written in source]
+    ends = [point_of(mesh, "--target", written) for written in target]
+    with showing("Computing the matrix") as step:
+        began = perf_counter()
+        found = distance_matrix(mesh, starts, ends, max_distance, layout.value, **step._asdict())
+        solved = perf_counter() - began
+    files.write_file(out, files.MATRIX[out.suffix.lower()], found)
+    values = found.data if is_sparse else found
+    cells = len(source) if layout is Layout.PAIRS else len(source) * len(target)
+    _tell_size(mesh)
+    typer.echo(f"reached     {np.count_nonzero(np.isfinite(values))} of {cells} distances")
+    typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
+    typer.echo(f"written     {out}")
+
+
+def nearest(
+    mesh_file: MeshFile,
+    source: Source,
+    candidate: Annotated[
+        list[Point],
+        typer.Option(parser=Point.parse, metavar="POINT", help="A candidate; may be given again."),
+    ],
+    k: Annotated[int, typer.Option("-k", min=1, help="How many to find.")] = 1,
+    max_distance: MaxDistance = None,
+    merge: MergeOption = Merge.NONE,
+) -> None:
+    """Find the candidates that are nearest to a point along the surface."""
+    if k > len(candidate):
+        raise typer.BadParameter(f"-k is {k}, but there are only {len(candidate)} candidates")
+    mesh, seconds = read(mesh_file, merge)
+    from geodesic_core import nearest
+
+    start = point_of(mesh, "--source", source)
+    places = [point_of(mesh, "--candidate", written) for written in candidate]
+    with showing("Looking for the nearest") as step:
+        began = perf_counter()
+        found = nearest(mesh, start, places, k, max_distance, **step._asdict())
+        solved = perf_counter() - began
+    _tell_size(mesh)
+    typer.echo(f"found       {len(found.indices)} of {k}")
+    for i, away in zip(found.indices.tolist(), found.distances.tolist(), strict=True):
+        typer.echo(f"nearest     {candidate[i].text} at {away!r}")
+    typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
+
+
+def _tell_size(mesh: "TriangleMesh") -> None:
+    typer.echo(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
+
+
+def _bound_in_words(bound: "ErrorBound") -> str:
+    return f"{bound.value!r} ({bound.type}, {bound.kind})"

@@ -1,0 +1,30 @@
+"""``geodesic serve``."""
+
+from typing import Annotated
+
+import typer
+
+_DRAIN_S = 20
+"""Granted to requests that run when the server is told to stop."""
+
+
+def serve(
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.")] = 8000,
+) -> None:
+    """Serve geodesics over HTTP until interrupted; settings are GEODESIC_… variables."""
+    import uvicorn
+    from pydantic import ValidationError
+
+    from app.main import create_app
+    from app.settings import Settings, variable_of
+
+    try:
+        settings = Settings()
+    except ValidationError as error:
+        faults = [
+            f"{variable_of(str(fault['loc'][0]))}: {fault['msg']}" if fault["loc"] else fault["msg"]
+            for fault in error.errors()
+        ]
+        raise typer.BadParameter("; ".join(faults)) from error
+    uvicorn.run(create_app(settings), host=host, port=port, timeout_graceful_shutdown=_DRAIN_S)

@@ -1,0 +1,85 @@
+"""What commands do before they answer: read a mesh, find points, and show that they are at it."""
+
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from time import perf_counter
+from types import FrameType
+from typing import TYPE_CHECKING, NamedTuple
+
+from app.cli.arguments import Merge, Point
+
+if TYPE_CHECKING:
+    from geodesic_core import SurfacePoint, TriangleMesh
+
+
+class Failure(Exception):  # noqa: N818 - not an error of this program
+    """A one-line message for the user, who can do something about it."""
+
+
+def read(mesh_file: Path, merge: Merge) -> "tuple[TriangleMesh, float]":
+    """Return the mesh of a file, and the seconds that took once the kernels were there."""
+    with showing("Loading kernels (compiled on the first run)"):
+        from geodesic_core import load_mesh, warm_up
+
+        warm_up()
+    with showing(f"Reading {mesh_file.name}"):
+        start = perf_counter()
+        mesh = load_mesh(mesh_file, merge=merge.value)
+        seconds = perf_counter() - start
+    return mesh, seconds
+
+
+def point_of(mesh: "TriangleMesh", option: str, written: Point) -> "SurfacePoint":
+    """Return the point of the mesh that an option names."""
+    from app.points import resolve
+    from geodesic_core.errors import InvalidPoint
+
+    try:
+        return resolve(mesh, written.point)
+    except InvalidPoint as error:
+        raise Failure(f"{option} {written.text}: {error}") from None
+
+
+class Step(NamedTuple):
+    """How a step reports its progress, and learns that Ctrl-C was pressed."""
+
+    progress: Callable[[float], None]
+    cancel: Callable[[], bool]
+
+
+@contextmanager
+def showing(label: str) -> Iterator[Step]:
+    """Show a bar on standard error, where that is a terminal, until the step is over.
+
+    Ctrl-C ends the step at its next look-up: a KeyboardInterrupt that is raised in the midst of
+    importing or of calling compiled code gets lost there, or becomes a SystemError. Pressed again,
+    it works as usual.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    pressed = False
+
+    def note(_number: int, _frame: FrameType | None) -> None:
+        nonlocal pressed
+        pressed = True
+        signal.signal(signal.SIGINT, usual)
+
+    usual = signal.signal(signal.SIGINT, note)
+    console = Console(stderr=True)
+    try:
+        with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+            task = progress.add_task(label, total=None)
+            yield Step(
+                progress=lambda share: progress.update(task, total=1.0, completed=share),
+                cancel=lambda: pressed,
+            )
+    except Exception:
+        if not pressed:
+            raise  # else it is what the step made of being cancelled
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    if pressed:
+        raise KeyboardInterrupt

@@ -1,0 +1,33 @@
+"""What can be asked of a mesh: one module per kind of question, and what all of them share.
+
+A `Query` is a request that has been validated. Its kind says all that is known of it: what is
+checked before a worker is asked, the formats it is answered in, how it is answered, and what that
+is likely to cost.
+"""
+
+from app.queries.distances import DistancesQuery
+from app.queries.estimate import Estimate, estimate
+from app.queries.locate import LocateQuery
+from app.queries.matrix import MatrixQuery
+from app.queries.nearest import NearestQuery
+from app.queries.path import PathQuery, naming_parameters, written_request
+from app.queries.paths import PathsQuery
+from app.queries.query import Grant, Query, result_key
+from app.queries.refusals import MeshSize
+
+__all__ = [
+    "DistancesQuery",
+    "Estimate",
+    "Grant",
+    "LocateQuery",
+    "MatrixQuery",
+    "MeshSize",
+    "NearestQuery",
+    "PathQuery",
+    "PathsQuery",
+    "Query",
+    "estimate",
+    "naming_parameters",
+    "result_key",
+    "written_request",
+]

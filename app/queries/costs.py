@@ -1,0 +1,147 @@
+"""What a query is likely to cost: a small model, told by the size of the mesh and the query.
+
+The constants were measured on one core of an AMD EPYC, kernels compiled, on meshes of 10³ to 10⁵
+faces: the samples, and scans such as the horse and the dragon of `benchmarks`. Seconds depend on
+the machine, and on the shape of a mesh by a factor of 3; bytes depend on neither by more than half.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+from scipy.spatial.distance import cdist
+
+import geodesic_core as gc
+from app.queries.places import Places, components_of, positions_of
+from app.schemas import Accuracy
+
+# Seconds
+PER_POINT = 12e-6
+"""To find a point of the mesh, and to tell of it."""
+PER_POSITION = 60e-6
+"""To find the point nearest to a position."""
+PER_FACE, PER_WINDOWS = 0.4e-6, 2.5e-9
+"""Of an exact sweep: for each of its n faces, and for the windows on it, which are about √n."""
+PER_FACE_MERGED = 0.5e-6
+"""Of an approximate sweep."""
+PER_SWEEP = 0.3e-3
+"""To start one and to end it, however short it is."""
+PER_FACE_UNSWEPT = 0.03e-6
+"""To allocate the state of a face."""
+PER_SEARCH, PER_FACE_SEARCHED = 0.5e-3, 0.08e-6
+"""For a path between two points: each, and for each face of the mesh."""
+PER_PATH = 0.3e-3
+"""To trace a path and to write it down."""
+
+# Bytes of state, beside the mesh
+SWEEP_BYTES, SWEEP_BYTES_PER_FACE = 82_000, 100
+MERGING_BYTES_PER_FACE = 120
+KEEPING_BYTES_PER_FACE = 170
+"""Of an approximate sweep, and where it keeps its windows for paths."""
+SEARCH_BYTES, SEARCH_BYTES_PER_FACE = 230_000, 275
+
+CROSSINGS = 2.3
+"""Edges that a path crosses over the length of one."""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Seconds, and bytes of the state that ``GEODESIC_QUERY_MEMORY_BYTES`` limits."""
+
+    seconds: float
+    memory_bytes: int
+
+
+def sweep_cost(
+    mesh: gc.TriangleMesh,
+    request: Accuracy,
+    share: float = 1.0,
+    *,
+    keeps: bool = False,
+) -> Cost:
+    """Return the cost of one sweep over a share of the mesh."""
+    faces = len(mesh.faces)
+    if request.method == "exact":
+        seconds, per_face = _sweep_seconds(share * faces), SWEEP_BYTES_PER_FACE
+    else:
+        seconds = PER_SWEEP + PER_FACE_MERGED * share * faces
+        per_face = KEEPING_BYTES_PER_FACE if keeps else MERGING_BYTES_PER_FACE
+    return Cost(seconds + PER_FACE_UNSWEPT * faces, SWEEP_BYTES + per_face * faces)
+
+
+def sweeps_cost(mesh: gc.TriangleMesh, shares: Sequence[float], threads: int) -> Cost:
+    """Return the cost of exact sweeps over shares of the mesh, in some threads."""
+    faces = len(mesh.faces)
+    seconds = sum(_sweep_seconds(share * faces) for share in shares)
+    memory = SWEEP_BYTES + SWEEP_BYTES_PER_FACE * faces
+    return Cost(PER_FACE_UNSWEPT * faces * threads + seconds / threads, memory * threads)
+
+
+def search_cost(mesh: gc.TriangleMesh, count: int) -> Cost:
+    """Return the cost of searches between two points each."""
+    faces = len(mesh.faces)
+    seconds = count * (PER_SEARCH + PER_FACE_SEARCHED * faces)
+    return Cost(seconds, SEARCH_BYTES + SEARCH_BYTES_PER_FACE * faces)
+
+
+def _sweep_seconds(faces: float) -> float:
+    return PER_SWEEP + faces * (PER_FACE + PER_WINDOWS * math.sqrt(faces))
+
+
+# Lengths, which geodesics are at least and seldom by much
+
+
+def straight_between(
+    mesh: gc.TriangleMesh, sources: Places, targets: Places, max_distance: float | None
+) -> NDArray[np.float64]:
+    """Return the straight distances (N, M); infinite where there is no path, or none so short."""
+    table: NDArray[np.float64] = cdist(positions_of(mesh, sources), positions_of(mesh, targets))
+    table[components_of(mesh, sources)[:, None] != components_of(mesh, targets)] = np.inf
+    return _limited(table, max_distance)
+
+
+def straight_along(
+    mesh: gc.TriangleMesh, sources: Places, targets: Places, max_distance: float | None
+) -> NDArray[np.float64]:
+    """Return the same (N,) for pairs."""
+    away = np.linalg.norm(positions_of(mesh, sources) - positions_of(mesh, targets), axis=1)
+    away[components_of(mesh, sources) != components_of(mesh, targets)] = np.inf
+    return _limited(away, max_distance)
+
+
+def straight_to_nearest(
+    mesh: gc.TriangleMesh, sources: Places, targets: Places | None, max_distance: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the straight distances of targets, or of all vertices, and the nearest sources."""
+    ends = mesh.vertices if targets is None else positions_of(mesh, targets)
+    components = mesh.components if targets is None else components_of(mesh, targets)
+    away, nearest = KDTree(positions_of(mesh, sources)).query(ends)
+    away[~np.isin(components, components_of(mesh, sources))] = np.inf
+    return _limited(away, max_distance), nearest
+
+
+def share_within(mesh: gc.TriangleMesh, radius: Any) -> Any:
+    """Return the share of the surface within a radius of a point, were it flat; of an array too."""
+    with np.errstate(over="ignore"):
+        return np.minimum(1.0, math.pi * np.square(radius) / _area(mesh))
+
+
+def typical_edge(mesh: gc.TriangleMesh) -> float:
+    """Return the length of the edges, were all faces equal and equilateral; mesh units."""
+    return math.sqrt(4.0 / math.sqrt(3.0) * _area(mesh) / len(mesh.faces))
+
+
+def _area(mesh: gc.TriangleMesh) -> float:
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    return area or math.inf
+
+
+def _limited(away: NDArray[np.float64], max_distance: float | None) -> NDArray[np.float64]:
+    if max_distance is not None:
+        away[away > max_distance] = np.inf
+    return away

@@ -1,0 +1,35 @@
+"""What a query is likely to take, told without running it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from app.encoding import encode
+from app.mesh_store import OpenMesh
+from app.queries.places import resolved
+from app.queries.query import Query
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What an answer is likely to take, in no more digits than there is sense in."""
+
+    seconds: float
+    memory_bytes: int
+    response_bytes: int
+
+
+def estimate(
+    query: Query[Any], media_type: str, opened: OpenMesh, cancel: Callable[[], bool]
+) -> Estimate:
+    """Return what the answer to ``query`` would take, or refuse its points as the answer would."""
+    places = resolved(query.points(), opened.mesh, cancel)
+    likely = query.likely(opened, places)
+    parts = encode(likely.answer, media_type).parts
+    size = likely.times * sum(memoryview(part).nbytes for part in parts)
+    cost = likely.cost
+    return Estimate(_rounded(cost.seconds), round(_rounded(cost.memory_bytes)), round(size))
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.2g}")

@@ -1,0 +1,98 @@
+"""The geodesically nearest of some candidates."""
+
+from collections.abc import Sequence
+from itertools import chain
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app import schemas
+from app.encoding import JSON, Answer
+from app.mesh_store import OpenMesh
+from app.points import described
+from app.queries.accuracy import CERTAIN
+from app.queries.costs import PER_POINT, Cost, share_within, straight_between, sweeps_cost
+from app.queries.places import Places, components_of, unreachable
+from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
+from app.queries.refusals import MeshSize, Named, refuse_places
+
+
+class NearestQuery(Query[schemas.NearestRequest]):
+    """The ``k`` candidates that are geodesically nearest to a point."""
+
+    model = schemas.NearestRequest
+    offers: Sequence[str] = (JSON,)
+    hint = "ask for a smaller k"
+
+    @classmethod
+    def normal(cls, request: schemas.NearestRequest) -> schemas.NearestRequest:
+        """Refuse to find more candidates than there are."""
+        k, count = request.k, len(request.candidates)
+        if k > count:
+            message = f"k is {k}; it must be an integer from 1 to the number of candidates, {count}"
+            raise refuse_places(["/k"], message)
+        return request
+
+    def value_count(self, size: MeshSize) -> int:
+        """Return the number of values of those found."""
+        return (VALUES_OF_POINT + 1) * self.request.k
+
+    def points(self) -> Named:
+        """Yield the source, then the candidates."""
+        request = self.request
+        return chain([("/source", request.source)], numbered("candidates", request.candidates))
+
+    def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
+        """Sweep to the k-th nearest."""
+        source, *candidates = places
+        request = self.request
+        found = opened.solver.nearest(
+            source, candidates, request.k, request.max_distance, **grant.options
+        )
+        return self._answer(opened, places, found.indices, found.distances)
+
+    def likely(self, opened: OpenMesh, places: Places) -> Likely:
+        """Return what a sweep costs to the candidate that is k-th nearest along a straight line."""
+        mesh, k = opened.mesh, self.request.k
+        source, *candidates = places
+        away = straight_between(mesh, [source], candidates, self.request.max_distance)[0]
+        order = np.argsort(away, kind="stable")[:k]
+        order = order[np.isfinite(away[order])]
+        if len(order) == k:
+            share = float(share_within(mesh, away[order[-1]]))
+        elif self.request.max_distance is not None:
+            share = float(share_within(mesh, self.request.max_distance))
+        else:
+            share = 1.0
+        sweep = sweeps_cost(mesh, [share], 1)
+        cost = Cost(sweep.seconds + PER_POINT * len(places), sweep.memory_bytes)
+        return Likely(cost, self._answer(opened, places, order, away[order]))
+
+    def _answer(
+        self,
+        opened: OpenMesh,
+        places: Places,
+        indices: NDArray[Any],
+        distances: NDArray[np.float64],
+    ) -> Answer:
+        mesh = opened.mesh
+        source, *candidates = places
+        members = {
+            "mesh_id": self.mesh_id,
+            "method": "exact",
+            "exact": True,
+            "error_bound": CERTAIN,
+            "source": described(mesh, source),
+            "nearest": [
+                {"candidate": i, "distance": away, **described(mesh, candidates[i])}
+                for i, away in zip(indices.tolist(), distances.tolist(), strict=True)
+            ],
+            "warnings": opened.warnings,
+        }
+        if len(indices) < self.request.k:
+            missed = np.ones(len(candidates), bool)
+            missed[indices] = False
+            connected = components_of(mesh, candidates) == components_of(mesh, [source])[0]
+            members["unreachable"] = unreachable(missed, connected)
+        return Answer(members)

@@ -1,0 +1,58 @@
+"""What answers say of a path, or of there being none."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import geodesic_core as gc
+from app.queries.accuracy import CERTAIN, bound_of
+from app.queries.costs import CROSSINGS
+
+
+def outline_of(path: gc.GeodesicPath) -> dict[str, Any]:
+    """Return what is said of a path."""
+    return {
+        "status": "ok",
+        "length": path.length,
+        "points": path.points,
+        "locations": [
+            {"face": location.face_index, "barycentric": location.barycentric}
+            for location in path.locations
+        ],
+        "faces": path.faces,
+        "error_bound": bound_of(path.error_bound),
+    }
+
+
+def no_outline(reason: str) -> dict[str, Any]:
+    """Return what is said where there is no path."""
+    return {"status": "no_path", "reason": reason, "points": None, "error_bound": CERTAIN}
+
+
+def likely_outline(
+    mesh: gc.TriangleMesh,
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    length: float,
+    edge: float,
+) -> dict[str, Any]:
+    """Return what might be said of a path of this length: it crosses as many edges as others do.
+
+    There is none where the length is infinite; ``edge`` is the typical length of an edge.
+    """
+    if math.isinf(length):
+        return no_outline("disconnected")
+    count = 2 + round(CROSSINGS * length / edge)
+    shares = np.linspace(0.0, 1.0, count)[:, None]
+    weights = np.concatenate([shares, 1.0 - shares, np.zeros_like(shares)], axis=1).tolist()
+    face = len(mesh.faces) // 2
+    return {
+        "status": "ok",
+        "length": length,
+        "points": (1.0 - shares) * start + shares * end,
+        "locations": [{"face": face, "barycentric": at} for at in weights],
+        "faces": np.full(count - 1, face, np.int32),
+        "error_bound": CERTAIN,
+    }

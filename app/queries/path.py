@@ -1,0 +1,164 @@
+"""The shortest path between two points."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import chain, pairwise
+from typing import Any
+
+import numpy as np
+
+import geodesic_core as gc
+from app import point_text, schemas
+from app.encoding import Answer
+from app.errors import Fault, ProblemError, pointer
+from app.mesh_store import OpenMesh
+from app.points import described
+from app.queries.accuracy import method_of, solve_field, with_its_error
+from app.queries.costs import PER_PATH, PER_POINT, Cost, search_cost, sweep_cost, typical_edge
+from app.queries.outline import likely_outline, no_outline, outline_of
+from app.queries.places import Places, components_of, positions_of
+from app.queries.query import Grant, Likely, Query, numbered
+from app.queries.refusals import Named, detail_of, refuse_more, refuse_places, refuse_points
+from app.settings import Settings
+
+
+class PathQuery(Query[schemas.PathRequest]):
+    """The shortest path between two points, past ``waypoints`` in their order."""
+
+    model = schemas.PathRequest
+
+    @classmethod
+    def normal(cls, request: schemas.PathRequest) -> schemas.PathRequest:
+        """Name the error that is granted."""
+        request = with_its_error(request)
+        if request.method == "approximate":
+            asked = {"/waypoints": request.waypoints, "/explain": request.explain}
+            given = [place for place, wanted in asked.items() if wanted]
+            if given:
+                raise refuse_places(given, "goes with method 'exact' only")
+        return request
+
+    @property
+    def is_repeatable(self) -> bool:
+        """Whether the answer is the same in every run: one that tells seconds is not."""
+        return not self.request.explain
+
+    @property
+    def hint(self) -> str:
+        """What to do where the answer is too large for JSON."""
+        if self.request.explain:
+            return "ask without explain, or past fewer waypoints at once"
+        return super().hint
+
+    def refuse(self, settings: Settings) -> None:
+        """Refuse too many waypoints."""
+        refuse_more("waypoints", len(self.request.waypoints), settings, "max_waypoints")
+
+    def points(self) -> Named:
+        """Yield the source, the target, then the waypoints."""
+        ends = ("/source", self.request.source), ("/target", self.request.target)
+        return chain(ends, numbered("waypoints", self.request.waypoints))
+
+    def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
+        """Search, or sweep where the path is to be approximate."""
+        request = self.request
+        source, target, *waypoints = places
+        try:
+            if request.method == "exact":
+                path = opened.solver.shortest_path(
+                    source, target, waypoints, explain=request.explain, **grant.options
+                )
+            else:
+                path = solve_field(
+                    opened.solver,
+                    request,
+                    source,
+                    targets=[target],
+                    keep_windows=True,
+                    **grant.options,
+                ).path_to(target)
+        except gc.errors.NoPath as error:
+            return self._answer(opened, places, no_outline(error.reason))
+        found = outline_of(path)
+        values = 8 * len(path.points)
+        if path.steps is not None:
+            found["steps"] = path.steps
+            values += sum(step.faces.size for step in path.steps)
+        return replace(self._answer(opened, places, found), values=values)
+
+    def likely(self, opened: OpenMesh, places: Places) -> Likely:
+        """Return what its searches or its sweep cost; the path leads straight to each stop."""
+        mesh = opened.mesh
+        source, target, *waypoints = places
+        if self.request.method == "exact":
+            cost = search_cost(mesh, len(places) - 1)
+        else:
+            cost = sweep_cost(mesh, self.request, keeps=True)
+        stops = positions_of(mesh, [source, *waypoints, target])
+        length = sum(float(np.linalg.norm(there - here)) for here, there in pairwise(stops))
+        if len(set(components_of(mesh, places).tolist())) > 1:
+            length = math.inf
+        found = likely_outline(mesh, stops[0], stops[-1], length, typical_edge(mesh))
+        seconds = cost.seconds + PER_PATH + PER_POINT * len(places)
+        return Likely(Cost(seconds, cost.memory_bytes), self._answer(opened, places, found))
+
+    def _answer(self, opened: OpenMesh, places: Places, found: dict[str, Any]) -> Answer:
+        source, target, *waypoints = (described(opened.mesh, place) for place in places)
+        members = {
+            "mesh_id": self.mesh_id,
+            **method_of(self.request),
+            "source": source,
+            "target": target,
+            "waypoints": waypoints,
+            "warnings": opened.warnings,
+        }
+        return Answer(members | found, ("points",))
+
+
+# As a GET
+
+
+def written_request(parameters: schemas.PathParameters) -> schemas.PathRequest:
+    """Return the body of the ``POST`` that asks the same as the parameters of a ``GET``."""
+    return schemas.PathRequest(
+        source=_parsed("/source", parameters.source),
+        target=_parsed("/target", parameters.target),
+        waypoints=[_parsed(pointer("waypoints", i), text) for i, text in enumerate(parameters.via)],
+        explain=parameters.explain,
+        **parameters.model_dump(include=set(schemas.Accuracy.model_fields)),
+    )
+
+
+@contextmanager
+def naming_parameters() -> Iterator[None]:
+    """Have refusals name the parameters of a ``GET`` where they name members of its body."""
+    try:
+        yield
+    except ProblemError as error:
+        faults = [Fault(_in_query(fault.pointer), fault.message) for fault in error.problem.errors]
+        if not faults:
+            raise
+        raise ProblemError(
+            replace(error.problem, detail=detail_of(faults), errors=tuple(faults))
+        ) from None
+
+
+def _parsed(place: str, text: str) -> schemas.Point:
+    try:
+        return point_text.parse(text)
+    except ValueError as error:
+        raise refuse_points([Fault(place, str(error))]) from None
+
+
+def _in_query(place: str) -> str:
+    """Return the parameter of a ``GET`` that stands for a place in the body of a ``POST``."""
+    _, name, *members = place.split("/")
+    if name == "query":
+        return place
+    kept = members[:1] if name == "waypoints" else []  # the number of the waypoint
+    return pointer("query", _PARAMETERS.get(name, name), *kept)
+
+
+_PARAMETERS = {"source": "from", "target": "to", "waypoints": "via"}
