@@ -32,6 +32,7 @@ from geodesic_core.kernels.topology import (
 )
 from geodesic_core.kernels.wavefront import (
     FIRST,
+    FRESH,
     LAST,
     NO_SITES,
     SIZE,
@@ -41,6 +42,7 @@ from geodesic_core.kernels.wavefront import (
 )
 from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.landmarks import Landmarks
+from geodesic_core.nodes import nodes_of
 from geodesic_core.polygons import triangulated
 from geodesic_core.run import Control, run_sweep
 from geodesic_core.tolerances import (
@@ -51,6 +53,7 @@ from geodesic_core.tolerances import (
     GAP,
     GRAZING,
     LANDMARK_ERROR,
+    LEVEL,
     LOCAL_SHARE,
     LOOSE_OVERLAP,
     LOWER_BOUND,
@@ -322,6 +325,8 @@ def winners(distance, nearest=(0, 0)) -> Winners:
         none,
         NO_SITES.ints,
         NO_SITES.weights,
+        NO_SITES.piece_ints,
+        NO_SITES.piece_ends,
     )
 
 
@@ -574,3 +579,25 @@ def test_snap_is_how_near_a_position_must_be(scale, share, snaps):
     assert carrier(mesh, mesh.locate(0.6 * a + 0.4 * b + inward)) == (2 if snaps else 3)
     along = away * (b - a) / np.linalg.norm(b - a)
     assert carrier(mesh, mesh.locate(a + along)) == (1 if snaps else 2)
+
+
+@SCALES
+@pytest.mark.parametrize(("slope", "strips"), [(0.5, 2), (2.0, 3)])
+def test_level_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope, strips):
+    """A piece that stands on the edge between two cells; those above are always lit by it."""
+    points, faces = zoo.grid(2, 2)
+    mesh = gc.TriangleMesh(points * scale, faces)
+    foot, head = (
+        scale * np.array(place) for place in ((0.5, 1, 0), (0.5 + slope * LEVEL * 0.2, 1.2, 0))
+    )
+    line = tuple(mesh.locate(place) for place in (foot, head))
+    nodes = nodes_of(mesh, [line], [])
+    wave = new_wavefront(mesh.topology, nodes.sites)
+    bounds = exact_bounds(math.inf, strips=True)
+    sweep.start_sweep(mesh.topology, wave, nodes.sources, nodes.origins, np.zeros(1), bounds)
+    roots = wave.windows[: wave.counters[FRESH]].view(np.int32)[:, ROOT]
+    assert (roots == nodes.sources[-1]).sum() == strips
+    found = gc.exact_distance(mesh, gc.Curve(line)).distances
+    share = np.clip((mesh.vertices - foot) @ (head - foot) / ((head - foot) @ (head - foot)), 0, 1)
+    expected = np.linalg.norm(foot + share[:, None] * (head - foot) - mesh.vertices, axis=1)
+    np.testing.assert_allclose(found, expected, rtol=1e-14, atol=0)
