@@ -328,7 +328,8 @@ def _solve(
     ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
     nodes = nodes_of(mesh, places, ends)
     distances = np.array([start.start_distance for start in starts])
-    bounds = bounds._replace(strips=(1,) if nodes.pieces else ())
+    if nodes.pieces:
+        bounds = bounds._replace(strips=(len(mesh.vertices) + len(nodes.points),))
     wave = _sweep(mesh, nodes, distances, bounds, control, keeps=keeps)
     wave.distance[wave.distance > bounds.max_distance] = math.inf
     winners = _winners_of(wave)

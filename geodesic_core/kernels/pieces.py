@@ -45,32 +45,32 @@ def end_in_frame(geometry: Any, ends: Any, first: int, h: int) -> tuple[float, f
 
 
 @kernel
-def emit_piece(wave: Any, k: int) -> None:
+def emit_piece(wave: Any, ints: Any, ends: Any, k: int) -> None:
     """Send the strips of the piece of row k over the edges of its face, and reach the corners."""
-    face = wave.piece_ints[PIECE * k + FACE]
+    node, face = ints[PIECE * k + NODE], ints[PIECE * k + FACE]
     for h in range(3 * face, 3 * face + 3):
-        px, py = end_in_frame(wave.geometry, wave.piece_ends, PIECE_ENDS * k, h)
-        qx, qy = end_in_frame(wave.geometry, wave.piece_ends, PIECE_ENDS * k + PIECE_END, h)
+        px, py = end_in_frame(wave.geometry, ends, PIECE_ENDS * k, h)
+        qx, qy = end_in_frame(wave.geometry, ends, PIECE_ENDS * k + PIECE_END, h)
         reach = math.hypot(qx - px, qy - py)
         dx, dy = (qx - px) / reach, (qy - py) / reach
         if dx < 0.0:
             px, py, qx, qy, dx, dy = qx, qy, px, py, -dx, -dy
-        if dx > LEVEL and is_off_edge(wave, k, h):
-            emit_strip(wave, k, h, px, py, qx, qy, dx, dy)
-        reach_corner(wave, k, h, px, py, dx, dy, reach)
+        if dx > LEVEL and is_off_edge(ends, k, h):
+            emit_strip(wave, node, h, px, py, qx, qy, dx, dy)
+        reach_corner(wave, node, h, px, py, dx, dy, reach)
 
 
 @kernel
-def is_off_edge(wave: Any, k: int, h: int) -> bool:
+def is_off_edge(ends: Any, k: int, h: int) -> bool:
     """Whether the piece does not run along the edge of h; by weights, as faces may have no area."""
     up = PIECE_ENDS * k + (h + 2) % 3
-    return max(wave.piece_ends[up], wave.piece_ends[up + PIECE_END]) > 0.0
+    return bool(max(ends[up], ends[up + PIECE_END]) > 0.0)
 
 
 @kernel
 def emit_strip(
     wave: Any,
-    k: int,
+    node: int,
     h: int,
     px: float,
     py: float,
@@ -80,7 +80,7 @@ def emit_strip(
     dy: float,
 ) -> None:
     """Send the strip that leaves pq over the edge of h; (dx, dy) is its direction, dx > 0."""
-    node, row = wave.piece_ints[PIECE * k + NODE], ROW * h
+    row = ROW * h
     length, across = wave.geometry[row + LENGTH], wave.links[row + OPPOSITE]
     b0, b1 = max(px + py * dy / dx, 0.0), min(qx + qy * dy / dx, length)
     if across == NO_FACE or b1 <= b0:
@@ -97,10 +97,10 @@ def emit_strip(
 
 @kernel
 def reach_corner(
-    wave: Any, k: int, h: int, px: float, py: float, dx: float, dy: float, reach: float
+    wave: Any, node: int, h: int, px: float, py: float, dx: float, dy: float, reach: float
 ) -> None:
     """Offer the apex of h the perpendicular to the piece from p on, if its foot is on it."""
-    node, row = wave.piece_ints[PIECE * k + NODE], ROW * h
+    row = ROW * h
     x = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT] - px
     y = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT] - py
     height = y * dx - x * dy

@@ -341,8 +341,7 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
         xi, reference = 0.0, -1
         if merging(wave):
             xi, reference = wave.scratch[w + XI], wave.scratch_ints[INTS * i + REFERENCE]
-        root = wave.scratch_ints[INTS * i + ROOT]
-        sw = source_weight(wave, root)
+        sw = source_weight(wave, wave.scratch_ints[INTS * i + ROOT])
         rise, x = ay * sw - sy, sx * ay - ax * sy
         goes_left = x > b0 * rise
         goes_right = x < b1 * rise
@@ -370,6 +369,7 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
                 u1 = hit_left(b1, sy, s_left, sin_left, length_left, sw)
             if u1 > u0:
                 along = sx * cos_left + sy * sin_left
+                root = wave.scratch_ints[INTS * i + ROOT]
                 slot = put_window(wave, u0, u1, along, s_left, sigma, root, xi, reference)
                 if left_last >= 0:
                     wave.window_ints[INTS * left_last + NEXT] = slot
@@ -385,6 +385,7 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
                 u1 = hit_left(length - b0, sy, s_right, sin_right, length_right, sw)
             if u1 > u0:
                 along = length_right * sw + (sx - length * sw) * cos_right - sy * sin_right
+                root = wave.scratch_ints[INTS * i + ROOT]
                 if sw == 0.0:  # the frame begins at the apex
                     sigma -= sx * ax + sy * ay
                 u0, u1 = length_right - u1, length_right - u0

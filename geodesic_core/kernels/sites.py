@@ -10,7 +10,7 @@ import math
 from typing import Any
 
 from geodesic_core.kernels.arrival import bound_vertex, improve_vertex, light_vertex, precedence
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import kernel, pointer
 from geodesic_core.kernels.lists import insert_sorted, put_window, send_across
 from geodesic_core.kernels.pieces import distance_to_piece
 from geodesic_core.kernels.topology import (
@@ -193,9 +193,10 @@ def reach_sites_inside(topology: Any, wavefront: Any, bounds: Any, first: int) -
                 sx, sy = site_in_frame(wave, source, h)
                 distance = wave.distance[root] + math.hypot(x - sx, y - sy)
                 improve_site(wave, node, distance, h, sx, sy, root, -1 - root)
-        for piece in range(wave.piece_count):
-            if wave.piece_ints[PIECE * piece + FACE] == face:
-                root = wave.piece_ints[PIECE * piece + NODE]
-                distance = distance_to_piece(wave.geometry, wave.piece_ends, piece, h, x, y)
+        ints, ends = pointer(wavefront.piece_ints), pointer(wavefront.piece_ends)
+        for piece in range(len(wavefront.piece_ints)):
+            if ints[PIECE * piece + FACE] == face:
+                root = ints[PIECE * piece + NODE]
+                distance = distance_to_piece(wave.geometry, ends, piece, h, x, y)
                 distance += wave.distance[root]
                 improve_site(wave, node, distance, h, 0.0, 0.0, root, -1 - root)

@@ -7,7 +7,7 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.arrival import bound_vertex, improve_vertex
-from geodesic_core.kernels.jit import inlined, kernel, prefetch
+from geodesic_core.kernels.jit import inlined, kernel, pointer, prefetch
 from geodesic_core.kernels.lists import faces_beyond, free_windows, queue_list
 from geodesic_core.kernels.pieces import emit_piece
 from geodesic_core.kernels.propagate import POOL_FULL, PROPAGATED, propagate_list
@@ -81,9 +81,10 @@ def start_sweep(
         if wave.distance[wave.site_ints[SITE * k + NODE]] < math.inf:
             emit_site(wave, k)
     if len(wave.strips) > 0:
-        for k in range(wave.piece_count):
-            if wave.distance[wave.piece_ints[PIECE * k + NODE]] < math.inf:
-                emit_piece(wave, k)
+        ints, ends = pointer(wavefront.piece_ints), pointer(wavefront.piece_ends)
+        for k in range(len(wavefront.piece_ints)):
+            if wave.distance[ints[PIECE * k + NODE]] < math.inf:
+                emit_piece(wave, ints, ends, k)
 
 
 @kernel

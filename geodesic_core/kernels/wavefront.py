@@ -166,12 +166,13 @@ class Bounds(NamedTuple):
     exact ones carry nothing of merging"""
     goal: Goal
     strips: tuple[int, ...]
-    """Empty where no source is a curve; the same for windows that are strips"""
+    """Empty where no source is a curve, else the first node that is a piece of one; the same for
+    windows that are strips"""
 
 
-def exact_bounds(max_distance: float, goal: Goal = NO_GOAL, *, strips: bool = False) -> Bounds:
+def exact_bounds(max_distance: float, goal: Goal = NO_GOAL, strips: tuple[int, ...] = ()) -> Bounds:
     """Return the bounds of a sweep that never merges."""
-    return Bounds(max_distance, 0.0, 0.0, (), goal, (1,) if strips else ())
+    return Bounds(max_distance, 0.0, 0.0, (), goal, strips)
 
 
 def merging_bounds(
@@ -179,11 +180,10 @@ def merging_bounds(
     relative_error: float,
     absolute_error: float,
     goal: Goal = NO_GOAL,
-    *,
-    strips: bool = False,
+    strips: tuple[int, ...] = (),
 ) -> Bounds:
     """Return the bounds of a sweep that merges windows within both errors."""
-    return Bounds(max_distance, relative_error, absolute_error, (1,), goal, (1,) if strips else ())
+    return Bounds(max_distance, relative_error, absolute_error, (1,), goal, strips)
 
 
 class Wavefront(NamedTuple):
@@ -265,8 +265,6 @@ class View(NamedTuple):
     counters: Any
     site_ints: Any
     site_weights: Any
-    piece_ints: Any
-    piece_ends: Any
     touched: Any
     toward: Any
     known: Any
@@ -282,8 +280,6 @@ class View(NamedTuple):
     merge_ints: Any
     vertex_count: int
     site_count: int
-    piece_count: int
-    first_piece: int
     ring_capacity: int
     pool: int
     scratch_size: int
@@ -303,9 +299,6 @@ class View(NamedTuple):
 @kernel
 def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
     """Return the View of two tuples of arrays, which the caller must hold meanwhile."""
-    first_piece = wave.distance.shape[0]
-    if wave.piece_ints.shape[0] > 0:
-        first_piece = wave.piece_ints[0, NODE]
     return View(
         pointer(topology.positions),
         pointer(topology.geometry),
@@ -332,8 +325,6 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         pointer(wave.counters),
         pointer(wave.site_ints),
         pointer(wave.site_weights),
-        pointer(wave.piece_ints),
-        pointer(wave.piece_ends),
         pointer(wave.touched),
         pointer(wave.toward),
         pointer(bounds.goal.known),
@@ -349,8 +340,6 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         pointer(wave.merge_ints),
         topology.total_angle.shape[0],
         wave.site_ints.shape[0],
-        wave.piece_ints.shape[0],
-        first_piece,
         wave.ring.shape[0],
         wave.windows.shape[0],
         wave.scratch.shape[0],
@@ -377,7 +366,7 @@ def merging(wave: Any) -> bool:
 @inlined
 def source_weight(wave: Any, root: int) -> float:
     """SW of a window with this root: 0 for a strip, which comes from a piece of a curve, else 1."""
-    if len(wave.strips) > 0 and root >= wave.first_piece:
+    if len(wave.strips) > 0 and root >= wave.strips[0]:
         return 0.0
     return 1.0
 
