@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from app.errors import ProblemError, refuse
 from geodesic_core import Solver, TriangleMesh
 
-VERSION = 3
+VERSION = 4
 PUBLIC_ARRAYS = {
     "vertices": "vertices",
     "faces": "faces",

@@ -368,6 +368,12 @@ class MeshDocument(BaseModel):
     repeated_vertex_faces: Sample = Field(
         description="Made of fewer than three different vertices: no part of the surface"
     )
+    zero_length_edges: Sample = Field(
+        description="Between different vertices at one position: their ends are one place"
+    )
+    collapsed_faces: Sample = Field(
+        description="With such an edge: what is left is an edge of other faces, or a vertex"
+    )
     duplicate_faces: Sample = Field(description="Of the same three vertices as an earlier one")
     degenerate_faces: Sample = Field(description="Of the surface, but without area")
     non_manifold_edges: Sample

@@ -8,6 +8,7 @@ Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then
 from geodesic_core import errors, samples
 from geodesic_core.curve import Curve
 from geodesic_core.errors import GeodesicError
+from geodesic_core.isolines import Isoline
 from geodesic_core.matrix import distance_matrix
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.mesh_io import load_mesh
@@ -30,6 +31,7 @@ __all__ = [
     "ErrorBound",
     "GeodesicError",
     "GeodesicPath",
+    "Isoline",
     "MeshReport",
     "Nearest",
     "Sample",

@@ -23,57 +23,50 @@ ROUNDING = 4.0 * np.finfo(np.float64).eps
 
 
 def at_vertex(topology: Topology, faces: Ints, vertex: int) -> SurfacePoint:
-    """Return the point at a vertex, in the lowest of its faces."""
-    v = topology.inner_vertex[vertex]
-    corners = topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]]
+    """Return the point at a vertex, in the lowest of its faces.
+
+    Of several vertices that edges of no length join, it is the lowest.
+    """
+    node = int(topology.inner_vertex[vertex])
+    vertex = int(topology.outer_vertex[node])
+    corners = topology.corners[topology.first_corner[node] : topology.first_corner[node + 1]]
     if len(corners) == 0:
         return SurfacePoint.vertex(vertex)
     face = int(topology.outer_face[corners // 3].min())
-    u, v, w = (float(corner == vertex) for corner in faces[face])
+    u, v, w = (float(v == node) for v in topology.inner_vertex[faces[face]])
     return SurfacePoint(face, (u, v, w), vertex)
 
 
 def in_face(
-    topology: Topology,
-    faces: Ints,
-    inner_face: Ints,
-    face: int,
-    weights: Sequence[float],
-    name: str,
-) -> SurfacePoint:
+    topology: Topology, faces: Ints, inner_face: Ints, face: int, weights: Sequence[float]
+) -> SurfacePoint | None:
     """Return the point of a face that has these weights, which may be rounded.
 
-    Raises
-    ------
-    InvalidPoint
-        The face is blocked, and the point in no other; ``name`` is how the message calls it.
+    None where it is in no face of the surface: the face is blocked, or an edge of no length has
+    left of it an edge that no other face has.
     """
     kept = [float(weight) if weight > WEIGHT else 0.0 for weight in weights]
     total = math.fsum(kept)
     if abs(total - 1.0) <= ROUNDING:
         total = 1.0  # else a canonical point would change each time it is asked for
     u, v, w = (weight / total for weight in kept)
-    corners = faces[face].tolist()
-    share = {corner: part for corner, part in zip(corners, (u, v, w), strict=True) if part > 0.0}
+    share: dict[int, float] = {}
+    for node, part in zip(topology.inner_vertex[faces[face]].tolist(), (u, v, w), strict=True):
+        if part > 0.0:
+            share[node] = share.get(node, 0.0) + part
     if len(share) == 1:
-        return at_vertex(topology, faces, *share)
-    place = None
+        return at_vertex(topology, faces, int(topology.outer_vertex[next(iter(share))]))
     if len(share) == 2:
-        place = _on_edge(topology, faces, share)
-    elif inner_face[face] >= 0:
-        place = SurfacePoint(face, (u, v, w))
-    if place is None:
-        raise InvalidPoint(
-            f"the {name} lies in face {face}, which is blocked, and in no face that is free"
-        )
-    return place
+        return _on_edge(topology, faces, share)
+    return SurfacePoint(face, (u, v, w)) if inner_face[face] >= 0 else None
 
 
 def on_edge(topology: Topology, faces: Ints, start: int, end: int, t: float) -> SurfacePoint | None:
     """Return the point at share ``t`` of the edge between two vertices; None if there is none."""
-    if start == end:
-        return None
-    return _on_edge(topology, faces, {int(start): 1.0 - t, int(end): t})
+    u, v = topology.inner_vertex[[start, end]].tolist()
+    if u == v:  # an edge of no length, or none
+        return at_vertex(topology, faces, start) if start != end else None
+    return _on_edge(topology, faces, {u: 1.0 - t, v: t})
 
 
 def weights_of(point: Floats, corners: Floats, snap: float) -> list[float]:
@@ -140,23 +133,24 @@ def check_weights(weights: Any, face: int, name: str) -> None:
 
 
 def _on_edge(topology: Topology, faces: Ints, share: dict[int, float]) -> SurfacePoint | None:
-    """Return the point with these weights of two vertices; None if no edge joins them."""
+    """Return the point with these weights of two inner vertices; None if no edge joins them."""
     h = _half_edge_between(topology, *share)
     if h is None:
         return None
-    low, high = sorted(share)
-    upper = round(share[high] / (share[low] + share[high]) * EDGE_STEPS) / EDGE_STEPS
+    outer = {int(topology.outer_vertex[node]): weight for node, weight in share.items()}
+    low, high = sorted(outer)
+    upper = round(outer[high] / (outer[low] + outer[high]) * EDGE_STEPS) / EDGE_STEPS
     if upper in (0.0, 1.0):
         return at_vertex(topology, faces, low if upper == 0.0 else high)
     face = min(int(topology.outer_face[g // 3]) for g in half_edges_around(topology.links, h))
-    share = {low: 1.0 - upper, high: upper}
-    u, v, w = (share.get(int(corner), 0.0) for corner in faces[face])
+    placed = {low: 1.0 - upper, high: upper}
+    corners = topology.outer_vertex[topology.inner_vertex[faces[face]]]
+    u, v, w = (placed.get(corner, 0.0) for corner in corners.tolist())
     return SurfacePoint(face, (u, v, w))
 
 
-def _half_edge_between(topology: Topology, start: int, end: int) -> int | None:
-    """Return a half-edge of the edge that joins two vertices, in either direction."""
-    u, v = topology.inner_vertex[start], topology.inner_vertex[end]
+def _half_edge_between(topology: Topology, u: int, v: int) -> int | None:
+    """Return a half-edge of the edge that joins two inner vertices, in either direction."""
     corners = topology.corners[topology.first_corner[u] : topology.first_corner[u + 1]]
     leaving = corners[topology.links[corners, HEAD] == v]
     if len(leaving):

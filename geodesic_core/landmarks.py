@@ -52,8 +52,8 @@ class Landmarks:
         """
         mesh = self.mesh
         topology = mesh.topology
-        component = mesh.components[topology.outer_vertex]
-        candidates = np.flatnonzero(component == component[beside])
+        component = mesh.components[topology.outer_vertex[beside]]
+        candidates = topology.inner_vertex[mesh.components == component]
         if np.isinf(self._nearest[beside]):  # the first here: far from somewhere, at least
             apart = topology.positions[candidates] - topology.positions[beside]
             chosen = candidates[np.argmax(np.einsum("vk,vk->v", apart, apart))]

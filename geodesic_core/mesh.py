@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 from geodesic_core import canonical
 from geodesic_core.arguments import as_barriers, as_limit, is_number
 from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.contraction import edges_of_no_length, lowest_joined, of_three_vertices
 from geodesic_core.equal_rows import merged
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 from geodesic_core.kernels import topology as kernels
 from geodesic_core.kernels.topology import Topology
 from geodesic_core.nearest_face import NearestFace
 from geodesic_core.polygons import triangulated
-from geodesic_core.report import NAMED, MeshReport, repeat_a_vertex, report_of, warnings_of
+from geodesic_core.report import NAMED, MeshReport, report_of, warnings_of
 from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import SNAP, WEIGHT_ERROR
 
@@ -41,15 +42,17 @@ class TriangleMesh:
     ------
     InvalidMesh
         Naming the elements at fault: wrong shape or type, NaN or infinity, an index out of range,
-        no face of three different vertices, a face with an edge of no length.
+        no face with three vertices at different positions, an edge shorter than 1e-50.
 
     Notes
     -----
     The arrays are copied once, and read-only. Vertices and faces keep the caller's order: the
     topology's own, nearer in memory, shows nowhere. A face that repeats a vertex keeps its number,
     but is no part of the surface: it joins nothing, and no point lies in it. To block other faces
-    as well, see `with_barriers`. Preparing costs
-    O(V + F) time, and memory of about 365 bytes a face.
+    as well, see `with_barriers`. An edge of no length, of a face of three different vertices, makes
+    its ends one place: their distance is 0. What is left of the face is an edge, whose points are
+    those of its other faces, or a point. Preparing costs O(V + F) time, and memory of about 365
+    bytes a face.
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, merge: Merge = "none") -> None:
@@ -114,15 +117,8 @@ class TriangleMesh:
             triangles = vertex_map[triangles]
         elif merge != "none":
             raise InvalidArgument(f"merge is {merge!r}; it must be 'none' or 'exact'")
-        surface = np.flatnonzero(~repeat_a_vertex(triangles))
-        if len(surface) == 0:
-            raise InvalidMesh(
-                "each face repeats a vertex: there is no surface",
-                kind="face",
-                elements=list(range(min(len(triangles), NAMED))),
-            )
         faces = triangles.astype(np.int32)
-        topology = _prepare(points, faces, surface)
+        topology = _prepare(points, faces, np.arange(len(faces)))
         self._hold(points, faces, vertex_map, face_map, topology, notes)
 
     def _hold(
@@ -193,23 +189,23 @@ class TriangleMesh:
         Nothing is kept of it here: who asks again among the same barriers keeps the mesh.
         """
         blocked = as_barriers(barriers, len(self.faces))
-        if (self.inner_face[blocked] < 0).all():
+        added = np.setdiff1d(blocked[of_three_vertices(self.faces[blocked])], self.barriers)
+        if len(added) == 0:
             return self
-        is_free = self.inner_face >= 0
-        is_free[blocked] = False
-        surface = np.flatnonzero(is_free)
-        if len(surface) == 0:
+        kept = np.setdiff1d(np.arange(len(self.faces)), np.union1d(self.barriers, added))
+        if (self.inner_face[kept] < 0).all():
             raise InvalidArgument("the barriers block every face: there is no surface left")
         mesh = TriangleMesh.__new__(TriangleMesh)
         # A copy of the vertices: kernels that prepare are compiled for arrays that can be written.
-        topology = _prepare(np.array(self.vertices), self.faces, surface)
+        topology = _prepare(np.array(self.vertices), self.faces, kept)
         mesh._hold(self.vertices, self.faces, self.vertex_map, self.face_map, topology, self._notes)
         return mesh
 
     @cached_property
     def barriers(self) -> Longs:
         """(B,) int64: the faces that are blocked, ascending; see `with_barriers`."""
-        return np.flatnonzero((self.inner_face < 0) & ~repeat_a_vertex(self.faces))
+        nodes = self.topology.inner_vertex[self.faces]
+        return np.flatnonzero((self.inner_face < 0) & of_three_vertices(nodes))
 
     @property
     def nbytes(self) -> int:
@@ -223,7 +219,10 @@ class TriangleMesh:
 
     @cached_property
     def inner_face(self) -> Ints:
-        """(F,) int32: the topology's number of each face; -1 of one that is not in the surface."""
+        """(F,) int32: the topology's number of each face; -1 of one that is not in the surface.
+
+        Such a face repeats a vertex, has an edge of no length, or is blocked.
+        """
         inner = np.full(len(self.faces), -1, np.int32)
         outer = self.topology.outer_face
         inner[outer] = np.arange(len(outer), dtype=np.int32)
@@ -293,12 +292,6 @@ class TriangleMesh:
         if isinstance(point, SurfacePoint):
             if point.vertex_index is None:
                 canonical.check_index(point.face_index, len(self.faces), "face", name)
-                outside = self.inner_face[point.face_index] < 0
-                if outside and repeat_a_vertex(self.faces[[point.face_index]]):
-                    raise InvalidPoint(
-                        f"the {name} is in face {point.face_index}, which repeats a vertex and is "
-                        f"no part of the surface"
-                    )
                 canonical.check_weights(point.barycentric, point.face_index, name)
                 return self._point_in_face(point.face_index, point.barycentric, name)
             index = point.vertex_index
@@ -306,7 +299,22 @@ class TriangleMesh:
         return canonical.at_vertex(self.topology, self.faces, int(index))
 
     def _point_in_face(self, face: int, weights: Sequence[float], name: str) -> SurfacePoint:
-        return canonical.in_face(self.topology, self.faces, self.inner_face, face, weights, name)
+        if not of_three_vertices(self.faces[[face]])[0]:
+            raise InvalidPoint(
+                f"the {name} is in face {face}, which repeats a vertex and is no part of the "
+                f"surface"
+            )
+        point = canonical.in_face(self.topology, self.faces, self.inner_face, face, weights)
+        if point is None and face in self.barriers:
+            raise InvalidPoint(
+                f"the {name} lies in face {face}, which is blocked, and in no face that is free"
+            )
+        if point is None:
+            raise InvalidPoint(
+                f"the {name} is in face {face}, which has an edge of no length and is no part of "
+                f"the surface: the edge that is left of it belongs to no other face"
+            )
+        return point
 
     def point_on_edge(self, start: int, end: int, t: float) -> SurfacePoint:
         """Return the canonical point at share ``t`` of the way between the ends of an edge.
@@ -457,20 +465,39 @@ def _refuse_out_of_range(corners: Longs, sizes: Longs, vertex_count: int) -> Non
     )
 
 
-def _prepare(vertices: Floats, faces: Ints, surface: Longs) -> Topology:
+def _prepare(vertices: Floats, faces: Ints, kept: Longs) -> Topology:
     """Return the topology of some of the faces."""
-    topology = kernels.empty_topology(len(vertices), len(surface))
-    outcome, bad = kernels.build_topology(vertices, faces[surface], topology)
-    topology.outer_face[:] = surface[topology.outer_face]
+    topology, outcome, bad = _built(vertices, faces, kept)
+    if outcome == kernels.TOO_SHORT:
+        joined = lowest_joined(len(vertices), edges_of_no_length(vertices, faces[kept]))
+        topology, outcome, bad = _built(vertices, joined[faces].astype(np.int32), kept)
+        topology.inner_vertex[:] = topology.inner_vertex[joined]
+        # The numbers of those that joined others are left out.
+        topology.component[:] = np.unique(topology.component[joined], return_inverse=True)[1]
     if outcome == kernels.TOO_SHORT:
         face = int(topology.outer_face[bad])
         raise InvalidMesh(
-            f"face {face} is {faces[face].tolist()} and has an edge of length zero (or below "
-            f"{kernels.SHORTEST_EDGE:g}): two of its vertices lie at one position; remove the face",
+            f"face {face} is {faces[face].tolist()} and has an edge shorter than "
+            f"{kernels.SHORTEST_EDGE:g}: scale the mesh, or merge the edge's vertices",
             kind="face",
             elements=[face],
         )
     return topology
+
+
+def _built(vertices: Floats, faces: Ints, kept: Longs) -> tuple[Topology, int, int]:
+    """Return the topology of those faces of three different vertices, and how building it went."""
+    surface = kept[of_three_vertices(faces[kept])]
+    if len(surface) == 0:
+        raise InvalidMesh(
+            "each face repeats a vertex or has an edge of no length: there is no surface",
+            kind="face",
+            elements=kept[:NAMED].tolist(),
+        )
+    topology = kernels.empty_topology(len(vertices), len(surface))
+    outcome, bad = kernels.build_topology(vertices, faces[surface], topology)
+    topology.outer_face[:] = surface[topology.outer_face]
+    return topology, outcome, bad
 
 
 def _and_more(bad: Sequence[Any] | NDArray[Any]) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.contraction import edges_of_no_length, of_three_vertices
 from geodesic_core.equal_rows import repeated
 from geodesic_core.kernels import topology as kernels
 from geodesic_core.kernels.topology import Topology
@@ -47,7 +48,10 @@ class MeshReport:
     """The lowest vertex of each component."""
     boundary_loops: int
     euler_characteristic: int
-    """V - E + F of the surface: isolated vertices and faces beside it do not count."""
+    """V - E + F of the surface: isolated vertices and faces beside it do not count.
+
+    Here and below, vertices that edges of no length join count as one, and go by the lowest.
+    """
     saddle_vertices: int
     boundary_vertices: int
     bow_tie_vertices: Sample
@@ -58,6 +62,10 @@ class MeshReport:
     """Vertices of the surface at the position of an earlier one."""
     repeated_vertex_faces: Sample
     """Faces that repeat a vertex: they have a number, but are no part of the surface."""
+    zero_length_edges: Sample
+    """Edges between different vertices at one position: their ends are one place."""
+    collapsed_faces: Sample
+    """Faces with such an edge: what is left of them is an edge of other faces, or a vertex."""
     duplicate_faces: Sample
     """Faces with the same three vertices as an earlier one."""
     degenerate_faces: Sample
@@ -75,13 +83,6 @@ class MeshReport:
     def as_dict(self) -> dict[str, Any]:
         """Return the report as what JSON can hold."""
         return asdict(self)
-
-
-def repeat_a_vertex(faces: Ints | Longs) -> NDArray[np.bool_]:
-    """Tell which faces repeat a vertex."""
-    a, b, c = faces.T
-    repeats: NDArray[np.bool_] = (a == b) | (b == c) | (c == a)
-    return repeats
 
 
 def edges_of(faces: Ints) -> tuple[Ints, Ints, NDArray[np.bool_]]:
@@ -105,12 +106,18 @@ def report_of(
 ) -> MeshReport:
     """Return the report of a mesh; O(V log V + F log F)."""
     inner = topology.inner_vertex
+    lowest_joined = topology.outer_vertex[inner]
     is_used = (np.diff(topology.first_corner) > 0)[inner]
-    used = np.flatnonzero(is_used)
-    flags = topology.flags[inner]
+    is_place = lowest_joined == np.arange(len(vertices))
+    used = np.flatnonzero(is_used & is_place)
+    flags = np.where(is_place, topology.flags[inner], 0)
     flat = topology.geometry[::3, kernels.SIN_LEFT] == 0.0
     surface = np.sort(topology.outer_face)
-    edges, edge_faces, same_way = edges_of(faces[surface])
+    corners = lowest_joined[faces[surface]]
+    outside = np.setdiff1d(np.arange(len(faces)), surface)
+    is_collapsed = of_three_vertices(faces[outside]) & ~of_three_vertices(inner[faces[outside]])
+    collapsed = outside[is_collapsed]
+    edges, edge_faces, same_way = edges_of(corners)
     lengths = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
     lowest = used[np.unique(topology.component[used], return_index=True)[1]]
     polygons = np.zeros(0) if face_map is None else np.bincount(face_map)
@@ -130,8 +137,10 @@ def report_of(
         ),
         isolated_vertices=Sample.of(np.flatnonzero(~is_used)),
         duplicate_vertices=Sample.of(used[repeated(vertices[used])]),
-        repeated_vertex_faces=Sample.of(np.flatnonzero(repeat_a_vertex(faces))),
-        duplicate_faces=Sample.of(surface[repeated(np.sort(faces[surface], axis=1))]),
+        repeated_vertex_faces=Sample.of(outside[~of_three_vertices(faces[outside])]),
+        zero_length_edges=Sample.of(edges_of_no_length(vertices, faces[collapsed])),
+        collapsed_faces=Sample.of(collapsed),
+        duplicate_faces=Sample.of(surface[repeated(np.sort(corners, axis=1))]),
         degenerate_faces=Sample.of(np.sort(topology.outer_face[flat])),
         non_manifold_edges=Sample.of(edges[edge_faces > 2]),
         inconsistent_orientation=bool(same_way.any()),
@@ -167,6 +176,13 @@ def warnings_of(report: MeshReport) -> Iterator[str]:
         yield (
             f"{_faces(found.count)} made of fewer than three different vertices and no part of "
             f"the surface; the first is face {found.ids[0]}."
+        )
+    found = report.zero_length_edges
+    if found.count:
+        yield (
+            f"{_edges(found.count)} of no length, both ends one place; the first joins the "
+            f"vertices {found.ids[0]}. {_faces(report.collapsed_faces.count)} thereby no more than "
+            f"an edge or a point; the first is face {report.collapsed_faces.ids[0]}."
         )
     found = report.duplicate_faces
     if found.count:

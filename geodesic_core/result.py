@@ -9,10 +9,14 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.arrival import Arrival, arrival_at, with_target
 from geodesic_core.curve import Curve, Polyline
-from geodesic_core.errors import InternalError, NoPath
+from geodesic_core.errors import InternalError, InvalidArgument, NoPath
+from geodesic_core.gradient import gradient_at_vertices
+from geodesic_core.isolines import Isoline, as_chord_error, as_levels, find_isolines, spaced_levels
 from geodesic_core.kernels.backtrace import Winners
-from geodesic_core.kernels.wavefront import Bounds
+from geodesic_core.kernels.kept import Kept
+from geodesic_core.kernels.wavefront import Bounds, exact_bounds
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest_source import NearestSource, find_nearest_source
 from geodesic_core.nodes import Nodes, component_of, disconnected
@@ -77,18 +81,26 @@ class DistanceField:
     """(N,) the same of `nearest_source`"""
     _winners: Winners | None
     """For backtracing; None where the sweep kept nothing for it."""
-    _find_winners: Callable[[], Winners]
+    _windows: Kept | None
+    """None where they were not kept."""
+    _sweep_again: Callable[[Bounds], tuple[Winners, Kept]]
 
     @cached_property
+    def _swept_again(self) -> tuple[Winners, Kept]:
+        return self._sweep_again(self._bounds)
+
+    @property
     def _known_winners(self) -> Winners:
-        return self._find_winners() if self._winners is None else self._winners
+        return self._swept_again[0] if self._winners is None else self._winners
 
     def distance_at(self, point: Point) -> float:
         """Return the distance of any point of the surface, mesh units; infinite as in `distances`.
 
         At a vertex or a target of the sweep it is what the sweep found, O(1). Elsewhere it is
-        exact, also where the field is approximate: by an exact sweep from the point to the nearest
-        source, in a thin strip that the field's own values leave.
+        exact, also where the field is approximate: by the windows of an exact field that kept them,
+        O(windows of the face); else by an exact sweep from the point to the nearest source, in a
+        thin strip that the field's own values leave. Where a source is a curve, the first such
+        point runs the sweep again, exactly, and keeps its windows.
 
         Raises
         ------
@@ -99,7 +111,8 @@ class DistanceField:
         node = self._node(place)
         if node is not None:
             return float(self._node_distances[node])
-        return self._nearest_to(place).distance
+        arrival = self._arrival_at(place)
+        return self._nearest_to(place).distance if arrival is None else arrival.distance
 
     def nearest_source_at(self, point: Point) -> int:
         """Return the index of the source nearest to any point of the surface; -1 for none.
@@ -115,7 +128,8 @@ class DistanceField:
         node = self._node(place)
         if node is not None:
             return int(self._node_nearest[node])
-        return self._nearest_to(place).source
+        arrival = self._arrival_at(place)
+        return self._nearest_to(place).source if arrival is None else arrival.source
 
     def path_to(self, target: Point) -> GeodesicPath:
         """Return a path from the nearest source to any point of the surface (sections 3.5 and 4.3).
@@ -123,7 +137,7 @@ class DistanceField:
         Of an exact field its length is the point's distance less the start distance of its source;
         of an approximate one at most the promised error more. O(faces crossed) to a vertex or a
         target of the sweep. Where an approximate field was not told to keep its windows, the first
-        of those runs the sweep again. To other points as in `distance_at`.
+        of those runs the sweep again. To other points as `distance_at` finds their distances.
 
         Raises
         ------
@@ -134,16 +148,93 @@ class DistanceField:
         """
         place = self.mesh.point(target, "target")
         node = self._node(place)
-        if node is None:
-            nearest = self._nearest_to(place)
-            if nearest.path is None:
+        if node is not None:
+            if math.isinf(self._node_distances[node]):
                 raise self._no_path(place)
-            return nearest.path
-        distance = float(self._node_distances[node])
-        if math.isinf(distance):
+            return self._traced(place, self._known_winners, self._nodes, node)
+        arrival = self._arrival_at(place)
+        if arrival is not None and self._exact_ways is not None:
+            if arrival.source < 0:
+                raise self._no_path(place)
+            reached = with_target(self.mesh, self._exact_ways[0], self._nodes, place, arrival)
+            return self._traced(place, *reached)
+        path = self._nearest_to(place).path
+        if path is None:
             raise self._no_path(place)
-        winners = self._known_winners
-        path = traced_path(self.mesh, winners, self._nodes, node, EXACT)
+        return path
+
+    @cached_property
+    def gradient(self) -> Floats:
+        """Unit vectors (V, 3), float64: where distance grows fastest, tangent to the surface.
+
+        At each vertex the direction against that in which the shortest path to its nearest source
+        sets out; of one of them where several are as short. NaN at sources, and where `distances`
+        is infinite. O(V); of an approximate field that did not keep its windows, after another
+        sweep.
+        """
+        return gradient_at_vertices(self.mesh, self._known_winners, self._nodes)
+
+    def levels(self, count: int) -> Floats:
+        """Return levels for `isolines`: evenly spaced between 0 and the largest finite distance.
+
+        The two themselves are left out.
+
+        Raises
+        ------
+        InvalidArgument
+            The count is not an integer, 1 or more.
+        """
+        return spaced_levels(self.distances, count)
+
+    def isolines(
+        self, levels: Sequence[float], chord_error: float | None = None
+    ) -> list[list[Isoline]]:
+        """Return for each level, in their order, the lines of points at that distance.
+
+        They are where the surface within that distance ends: closed, or open where they end at the
+        boundary or at an edge of more than two faces. In each face they consist of circular arcs,
+        whose ends, and what crosses edges, are exact; between them arcs become chords. A vertex at
+        the level itself counts as within. Levels beyond all distances, or beyond ``max_distance``,
+        have no lines. Of an approximate field they are those of its own distances, which the same
+        error bounds.
+
+        Parameters
+        ----------
+        levels
+            Distances above 0, mesh units; `levels` spaces some evenly.
+        chord_error
+            How far chords may stray from their arcs, mesh units; by default a thousandth of the
+            mean edge length, at least a billionth of the bounding box's diagonal.
+
+        Raises
+        ------
+        InvalidArgument
+            A level or the chord error is out of its domain; or a source is a curve.
+
+        Notes
+        -----
+        Where the sweep did not keep its windows, the first call runs it again. O(windows), and for
+        each level O(n² log n) for n windows in each face that it passes.
+        """
+        heights, error = as_levels(levels), as_chord_error(self.mesh, chord_error)
+        if self._bounds.strips:
+            raise InvalidArgument(
+                "a source of the field is a curve, of which no isolines are known yet: give the "
+                "curve's points as sources instead, as close as need be"
+            )
+        windows = self._swept_again[1] if self._windows is None else self._windows
+        within = [level for level in heights if level <= self.max_distance]
+        lines = iter(
+            find_isolines(self.mesh, windows, self._node_distances, self._nodes, within, error)
+        )
+        return [next(lines) if level <= self.max_distance else [] for level in heights]
+
+    def _traced(
+        self, place: SurfacePoint, winners: Winners, nodes: Nodes, node: int
+    ) -> GeodesicPath:
+        """Return the path to a node, which must have the length that the field says."""
+        distance = float(winners.distance[node])
+        path = traced_path(self.mesh, winners, nodes, node, EXACT)
         start = self.sources[winners.nearest[node]].start_distance
         excess = start + path.length - distance
         exact = self.error_bound == EXACT
@@ -161,6 +252,21 @@ class DistanceField:
         if place.vertex_index is not None:
             return int(self.mesh.topology.inner_vertex[place.vertex_index])
         return self._node_of.get(place)
+
+    @cached_property
+    def _exact_ways(self) -> tuple[Winners, Kept] | None:
+        """The windows of an exact sweep; None where they were not kept, and need not be."""
+        if self._windows is not None and not self._bounds.merging:
+            return self._known_winners, self._windows
+        if self._bounds.strips:  # a sweep back from a point ends at points, not on curves
+            return self._sweep_again(exact_bounds(self.max_distance, strips=self._bounds.strips))
+        return None
+
+    def _arrival_at(self, place: SurfacePoint) -> Arrival | None:
+        """How kept windows reach a point; None where there are none, or they are merged ones."""
+        if self._exact_ways is None:
+            return None
+        return arrival_at(self.mesh, *self._exact_ways, self._nodes, place, self.max_distance)
 
     def _nearest_to(self, place: SurfacePoint) -> NearestSource:
         starts = np.array([source.start_distance for source in self.sources])

@@ -18,7 +18,13 @@ from geodesic_core.errors import (
 )
 from geodesic_core.kernels import sites, sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
-from geodesic_core.kernels.propagate import MERGES_FULL, POOL_FULL, RUNAWAY, SCRATCH_FULL
+from geodesic_core.kernels.propagate import (
+    KEPT_FULL,
+    MERGES_FULL,
+    POOL_FULL,
+    RUNAWAY,
+    SCRATCH_FULL,
+)
 from geodesic_core.kernels.topology import HEAD, TAIL
 from geodesic_core.kernels.wavefront import Bounds, Wavefront
 from geodesic_core.mesh import TriangleMesh
@@ -146,6 +152,8 @@ def run_sweep(
             grown = wavefront.with_larger_pool
         elif outcome == SCRATCH_FULL:
             grown = wavefront.with_larger_scratch
+        elif outcome == KEPT_FULL:
+            grown = wavefront.with_more_kept
         elif outcome == MERGES_FULL:
             grown = wavefront.with_more_merges
         elif outcome == RUNAWAY:

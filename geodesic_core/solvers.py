@@ -15,8 +15,9 @@ from geodesic_core.arguments import as_barriers, as_limit, is_number
 from geodesic_core.arrays import Floats
 from geodesic_core.curve import Curve, Polyline, polyline_of
 from geodesic_core.errors import InvalidArgument, InvalidPoint
-from geodesic_core.kernels import sweep, wavefront
+from geodesic_core.kernels import kept, sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
+from geodesic_core.kernels.kept import Kept
 from geodesic_core.kernels.wavefront import Bounds, Wavefront
 from geodesic_core.matrix import Layout, find_matrix
 from geodesic_core.mesh import TriangleMesh
@@ -38,6 +39,7 @@ def exact_distance(
     targets: Sequence[Point] = (),
     barriers: Iterable[int] = (),
     *,
+    keep_windows: bool = False,
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
     deadline_s: float | None = None,
@@ -60,6 +62,10 @@ def exact_distance(
     barriers
         Ids of faces that act as holes, for this call: the field is that of
         `TriangleMesh.with_barriers`, which makes the same mesh once for many calls.
+    keep_windows
+        Keep the windows of all faces, 64 bytes each: then `DistanceField.distance_at` and
+        `DistanceField.path_to` find any point by those of its face, without a search, and
+        `DistanceField.isolines` does not run the sweep again.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
@@ -73,12 +79,12 @@ def exact_distance(
     Notes
     -----
     O(F^1.5 log F) in practice and O(F² log F) at worst. Memory: about a third of the mesh's own
-    arrays, since windows are given back as soon as they are propagated.
+    arrays, since windows are given back as soon as they are propagated, unless they are kept.
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     bounds = wavefront.exact_bounds(as_limit(max_distance))
     mesh, control = _among(mesh, barriers, control)
-    return _solve(mesh, sources, targets, bounds, EXACT, control, keeps=True)
+    return _solve(mesh, sources, targets, bounds, EXACT, control, paths=True, windows=keep_windows)
 
 
 def approximate_distance(
@@ -108,8 +114,8 @@ def approximate_distance(
     absolute_error
         The same in mesh units. Where both are given, both hold.
     keep_windows
-        Keep what `DistanceField.path_to` needs, at most about as much as the mesh's own arrays.
-        Else the first path runs the sweep again.
+        Keep what `DistanceField.path_to` and `DistanceField.isolines` need: what was merged, and
+        the windows of all faces, 64 bytes each. Else the first of them runs the sweep again.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
@@ -133,7 +139,16 @@ def approximate_distance(
         promise = ErrorBound("relative", relative, "guaranteed")
     else:
         promise = ErrorBound("absolute", absolute, "guaranteed")
-    return _solve(mesh, sources, targets, bounds, promise, control, keeps=keep_windows)
+    return _solve(
+        mesh,
+        sources,
+        targets,
+        bounds,
+        promise,
+        control,
+        paths=keep_windows,
+        windows=keep_windows,
+    )
 
 
 def shortest_path(
@@ -295,7 +310,10 @@ def warm_up() -> None:
     """Compile all kernels, or load them from the cache on disk (about 10 s, or 0.1 s)."""
     corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     mesh = TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
-    exact_distance(mesh, 0).path_to(3)
+    field = exact_distance(mesh, 0, keep_windows=True)
+    field.path_to(3)
+    field.isolines([0.5])
+    field.distance_at(SurfacePoint.face(1, (0.5, 0.25, 0.25)))
     approximate_distance(mesh, 0, keep_windows=True).path_to(3)
     shortest_path(mesh, 0, 3, explain=True)
     mesh.report  # noqa: B018 - computed on access
@@ -321,18 +339,21 @@ def _solve(
     promise: ErrorBound,
     control: Control,
     *,
-    keeps: bool,
+    paths: bool,
+    windows: bool,
 ) -> DistanceField:
-    """Check the arguments, sweep, and make the result; without ``keeps``, none for backtracing."""
+    """Check the arguments, sweep, and make the result, with what paths and windows need kept."""
     starts, places = _as_sources(mesh, sources)
     ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
     nodes = nodes_of(mesh, places, ends)
     distances = np.array([start.start_distance for start in starts])
     if nodes.pieces:
         bounds = bounds._replace(strips=(len(mesh.vertices) + len(nodes.points),))
-    wave = _sweep(mesh, nodes, distances, bounds, control, keeps=keeps)
+    wave = _sweep(mesh, nodes, distances, bounds, control, paths=paths, windows=windows)
     wave.distance[wave.distance > bounds.max_distance] = math.inf
     winners = _winners_of(wave)
+    peak = wavefront.bytes_of(wave) + (kept.bytes_of(wave) if windows else 0)
+    control.grant_memory(peak)
     inner = mesh.topology.inner_vertex
     return DistanceField(
         mesh=mesh,
@@ -341,24 +362,26 @@ def _solve(
         distances=wave.distance[inner],
         nearest_source=winners.nearest[inner],
         error_bound=promise,
-        stats=_stats(mesh, wave, time.perf_counter() - control.began),
+        stats=_stats(mesh, wave, peak, time.perf_counter() - control.began),
         _places=places,
         _bounds=bounds,
         _nodes=nodes,
         _node_of=dict(zip(ends, nodes.targets.tolist(), strict=True)),
         _node_distances=wave.distance,
         _node_nearest=winners.nearest,
-        _winners=winners if keeps else None,
-        _find_winners=partial(_find_winners, mesh, nodes, distances, bounds),
+        _winners=winners if paths else None,
+        _windows=kept.kept_of(wave) if windows else None,
+        _sweep_again=partial(_sweep_again, mesh, nodes, distances),
     )
 
 
-def _find_winners(
+def _sweep_again(
     mesh: TriangleMesh, nodes: Nodes, start_distances: Floats, bounds: Bounds
-) -> Winners:
-    """Sweep again, and keep what backtracing needs: sweeps are the same to the bit."""
-    wave = _sweep(mesh, nodes, start_distances, bounds, Control(), keeps=True)
-    return _winners_of(wave)
+) -> tuple[Winners, Kept]:
+    """Sweep again, and keep all that there is: sweeps are the same to the bit."""
+    wave = _sweep(mesh, nodes, start_distances, bounds, Control(), paths=True, windows=True)
+    wave.distance[wave.distance > bounds.max_distance] = math.inf
+    return _winners_of(wave), kept.kept_of(wave)
 
 
 def _winners_of(wave: Wavefront) -> Winners:
@@ -375,11 +398,12 @@ def _sweep(
     bounds: Bounds,
     control: Control,
     *,
-    keeps: bool,
+    paths: bool,
+    windows: bool,
 ) -> Wavefront:
     merges = bool(bounds.merging)
     wave = wavefront.new_wavefront(
-        mesh.topology, nodes.sites, merges=merges, paths=merges and keeps
+        mesh.topology, nodes.sites, merges=merges, paths=merges and paths, windows=windows
     )
     control.grant_memory(wavefront.bytes_of(wave))
     reachable = int(np.isin(mesh.components, nodes.components).sum())
@@ -390,7 +414,7 @@ def _sweep(
     return wave
 
 
-def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
+def _stats(mesh: TriangleMesh, wave: Wavefront, peak: int, seconds: float) -> SweepStats:
     created = int(wave.counters[wavefront.CREATED])
     kept = int(wave.counters[wavefront.KEPT])
     return SweepStats(
@@ -399,7 +423,7 @@ def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
         windows_peak=int(wave.counters[wavefront.PEAK]),
         windows_per_edge_created=created / mesh.edge_count,
         windows_per_edge_kept=kept / mesh.edge_count,
-        peak_bytes=wavefront.bytes_of(wave),
+        peak_bytes=peak,
         seconds=seconds,
     )
 

@@ -168,9 +168,21 @@ Less is a sliver or rounding, where three corners lie on one line: another way t
 looked for. The surface of a flat polygon is the same either way.
 """
 
-LEVEL = 1e-9
+SLANT = 1e-9
 """Sine of the angle to an edge from which on the rays of a curve's piece are sent across it.
 
 Of rays that are flatter, those that meet the edge leave the piece within so small a share of the
 edge from its end that the rays of that end are as near: the square of this share is no number.
 """
+
+LEVEL = 1e-12
+"""Relative difference within which two ways to a point of an isoline count as equally long.
+
+Circles that should be one, or touch, differ by rounding; the first of them is taken.
+"""
+
+CROSSING = 1e-11
+"""Share of an edge's length within which two places where an isoline crosses it count as one."""
+
+PIECE = 1e-9
+"""Share of a level below which a piece of its isoline is left out: rounding, at ends of arcs."""

@@ -280,6 +280,30 @@ def welded(vertices, faces, keep, drop):
     return drop_unused(vertices, faces)
 
 
+def needled(vertices, faces, seed):
+    """The same surface with edges of no length: vertices get copies, which needles join to them.
+
+    Also which vertex each one is a copy of, and the place of each face among the needles.
+    """
+    rng = np.random.default_rng(seed)
+    vertices, flat = np.asarray(vertices), np.array(faces).reshape(-1)
+    groups, copy_of = {v: [v] for v in np.unique(flat).tolist()}, list(range(len(vertices)))
+    for v in rng.permutation(list(groups))[: max(2, len(groups) // 3)].tolist():
+        for _ in range(rng.integers(1, 4)):
+            groups[v].append(len(copy_of))
+            copy_of.append(v)
+    needles = []
+    for v, group in groups.items():
+        beside = np.setdiff1d(faces[(faces == v).any(axis=1)], v)
+        for i, copy in enumerate(group[1:], 1):
+            third = groups[rng.choice(beside)] if i == 1 or rng.random() < 0.7 else group[: i - 1]
+            needles.append(rng.permutation([copy, group[i - 1], rng.choice(third)]))
+    mixed = np.array([rng.choice(groups[v]) for v in flat.tolist()]).reshape(-1, 3)
+    at = np.sort(rng.integers(0, len(mixed) + 1, len(needles)))
+    place = np.arange(len(mixed)) + np.searchsorted(at, np.arange(len(mixed)), side="right")
+    return vertices[copy_of], np.insert(mixed, at, needles, axis=0), np.array(copy_of), place
+
+
 # The small zoo ----------------------------------------------------------------------------------
 
 
@@ -519,25 +543,25 @@ def _irregular() -> Iterable[Irregular]:
     flipped = faces.copy()
     flipped[2] = flipped[2, ::-1]
     yield Irregular("flipped_face", vertices, flipped, misoriented=((0, 2), (0, 3), (2, 3)))
-    vertices, faces = _moebius(9)
+    vertices, faces = moebius(9)
     yield Irregular("moebius", vertices, faces, misoriented=((0, 9),))
-    faces, many, same = _wound_at_random(faces, 1)
+    faces, many, same = wound_at_random(faces, 1)
     yield Irregular("moebius_wound_at_random", vertices, faces, None, many, same)
     vertices, faces = voxels([(0, 0, 0), (1, 1, 0)])
     low, high = (int(np.flatnonzero((vertices == (1, 1, z)).all(axis=1))[0]) for z in (0, 1))
     edge = (min(low, high), max(low, high))
     yield Irregular("cubes_at_an_edge", vertices, faces, non_manifold=(edge,))
     for count in (3, 5):
-        vertices, faces, spine = _book(count, 3)
+        vertices, faces, spine = book(count, 3)
         yield Irregular(f"book_of_{count}", vertices, faces, non_manifold=spine)
     vertices, faces = _crumpled(torus(9, 6), 0.3, 3)
-    faces, many, same = _wound_at_random(faces, 2)
+    faces, many, same = wound_at_random(faces, 2)
     yield Irregular("torus_wound_at_random", vertices, faces, None, many, same)
     for seed in range(6):
         yield _complex(7, 14, seed)
 
 
-def _wound_at_random(faces, seed):
+def wound_at_random(faces, seed):
     """The faces, half of them turned over; no edges of three; those that run the same way twice."""
     faces = faces.copy()
     turned = np.random.default_rng(seed).random(len(faces)) < 0.5
@@ -555,9 +579,9 @@ def _irregular_edges(faces):
     return many, same
 
 
-def _book(pages, rows):
+def book(pages, rows, seed=None):
     """Uneven pages, two columns of quads each, that share a spine of several edges."""
-    rng = np.random.default_rng(pages)
+    rng = np.random.default_rng(pages if seed is None else seed)
     points = [(0.0, 0.0, float(z)) for z in range(rows + 1)]
     faces = []
     for page in range(pages):
@@ -581,11 +605,11 @@ def _complex(vertex_count, face_count, seed) -> Irregular:
     rng = np.random.default_rng(seed)
     every = list(itertools.combinations(range(vertex_count), 3))
     chosen = [every[k] for k in rng.choice(len(every), face_count, replace=False)]
-    faces, many, same = _wound_at_random(np.array(chosen), seed)
+    faces, many, same = wound_at_random(np.array(chosen), seed)
     return Irregular(f"complex_{seed}", rng.random((vertex_count, 3)), faces, None, many, same)
 
 
-def _moebius(count):
+def moebius(count):
     turn = 2 * np.pi * np.arange(count) / count
     points = []
     for side in (-0.4, 0.4):

@@ -18,7 +18,7 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.jit import kernel, pointer
-from geodesic_core.kernels.pieces import distance_to_piece
+from geodesic_core.kernels.pieces import distance_to_piece, is_piece
 from geodesic_core.kernels.topology import (
     APEX,
     AROUND,
@@ -35,6 +35,7 @@ from geodesic_core.kernels.topology import (
     SIN_RIGHT,
     TAIL,
     following,
+    point_in_frame,
     previous,
 )
 from geodesic_core.kernels.wavefront import (
@@ -108,15 +109,9 @@ def row_in_face(winners: Any, node: int, face: int) -> int:
 
 
 @kernel
-def is_piece(winners: Any, node: int) -> bool:
-    """Whether a node is a piece of a curve."""
-    return len(winners.piece_ints) > 0 and node >= winners.piece_ints[0, NODE]
-
-
-@kernel
 def piece_in_face(winners: Any, node: int, face: int) -> int:
     """Row of a piece in a face; -1 where it is not in that face, or no piece."""
-    if is_piece(winners, node):
+    if is_piece(winners.piece_ints, node):
         for k in range(len(winners.piece_ints)):
             if winners.piece_ints[k, NODE] == node and winners.piece_ints[k, FACE] == face:
                 return k
@@ -127,13 +122,10 @@ def piece_in_face(winners: Any, node: int, face: int) -> int:
 def target_in_frame(topology: Any, winners: Any, node: int, h: int) -> tuple[float, float]:
     """Where the target lies in the frame of its VIA h: at the apex, or a site in the face."""
     geometry = topology.geometry
-    ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
-    ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
     if node < len(topology.total_angle):
-        return ax, ay
-    k = row_in_face(winners, node, h // 3)
-    along, up = winners.site_weights[k, (h + 1) % 3], winners.site_weights[k, (h + 2) % 3]
-    return along * geometry[h, LENGTH] + up * ax, up * ay
+        reach = geometry[h, LENGTH_LEFT]
+        return geometry[h, COS_LEFT] * reach, geometry[h, SIN_LEFT] * reach
+    return point_in_frame(geometry, h, winners.site_weights[row_in_face(winners, node, h // 3)])
 
 
 @kernel
@@ -245,7 +237,7 @@ def trace_line(
     reference = winners.reference[v] if len(winners.reference) > 0 else -1 - root
     if reference >= 0:
         root = -1  # not known before the merges are undone
-    sw = 0.0 if is_piece(winners, root) else 1.0
+    sw = 0.0 if is_piece(winners.piece_ints, root) else 1.0
     face, length = m // 3, geometry[m, LENGTH]
     ax, ay = target_in_frame(topology, winners, v, m)
     faces[count - 1] = face

@@ -31,7 +31,13 @@ from geodesic_core.kernels.wavefront import (
     PIECE_ENDS,
     merging,
 )
-from geodesic_core.tolerances import LEVEL
+from geodesic_core.tolerances import SLANT
+
+
+@kernel
+def is_piece(ints: Any, node: int) -> bool:
+    """Whether a node is a piece; ``ints`` are rows of pieces, as `Wavefront.piece_ints`."""
+    return len(ints) > 0 and node >= ints[0, NODE]
 
 
 @kernel
@@ -55,7 +61,7 @@ def emit_piece(wave: Any, ints: Any, ends: Any, k: int) -> None:
         dx, dy = (qx - px) / reach, (qy - py) / reach
         if dx < 0.0:
             px, py, qx, qy, dx, dy = qx, qy, px, py, -dx, -dy
-        if dx > LEVEL and is_off_edge(ends, k, h):
+        if dx > SLANT and is_off_edge(ends, k, h):
             emit_strip(wave, node, h, px, py, qx, qy, dx, dy)
         reach_corner(wave, node, h, px, py, dx, dy, reach)
 

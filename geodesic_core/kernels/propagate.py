@@ -85,6 +85,7 @@ POOL_FULL = 1
 SCRATCH_FULL = 2
 MERGES_FULL = 5
 RUNAWAY = 6  # a list came up again and again
+KEPT_FULL = 7
 
 
 @inlined
@@ -217,6 +218,16 @@ def record_merge(
     wave.merge_ints[m + LEFT_REFERENCE] = wave.scratch_ints[INTS * i + REFERENCE]
     wave.merge_ints[m + RIGHT_REFERENCE] = reference
     wave.scratch_ints[INTS * i + REFERENCE] = record
+
+
+@kernel
+def keep_windows(wave: Any, h: int, count: int) -> None:
+    """Keep the windows of scratch, which are those that cross the face of h."""
+    first = wave.counters[KEPT]
+    for i in range(WIDTH * count):
+        wave.kept[WIDTH * first + i] = wave.scratch[i]
+    for i in range(first, first + count):
+        wave.kept_ints[INTS * i + NEXT] = h
 
 
 @inlined
@@ -452,6 +463,9 @@ def propagate_list(wave: Any, h: int) -> int:
         return POOL_FULL
     if size > wave.scratch_size:
         return SCRATCH_FULL
+    # Asked per list, while the sweep runs: free, where a compiled switch would double the kernels.
+    if wave.keep_capacity > 0 and wave.counters[KEPT] + size > wave.keep_capacity:
+        return KEPT_FULL
     if merging(wave):
         if wave.merge_capacity > 0 and wave.counters[MERGES] + size > wave.merge_capacity:
             return MERGES_FULL
@@ -460,6 +474,8 @@ def propagate_list(wave: Any, h: int) -> int:
         wave.runs[h] += 1
     count = collect(wave, h)
     release_list(wave, h)
+    if wave.keep_capacity > 0:
+        keep_windows(wave, h, count)
     wave.counters[KEPT] += count
     wave.counters[WORK] += 4 * size + 20
     if count > 0:

@@ -131,26 +131,40 @@ def reach_site(wave: Any, h: int, count: int, k: int) -> None:
         w = WIDTH * i
         sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
         b0, b1 = wave.scratch[w + B0], wave.scratch[w + B1]
-        root, sigma = wave.scratch_ints[INTS * i + ROOT], wave.scratch[w + SIGMA]
-        sw = source_weight(wave, root)
-        rise = y * sw - sy
-        crossing = (sx * y - x * sy) / rise if rise > 0.0 else x
-        if b0 - gap <= crossing <= b1 + gap:
-            distance = straight_distance(x, y, sx, sy, sw, sigma)
-        else:
-            crossing = min(max(crossing, b0), b1)
-            distance = distance_at(crossing, sx, sy, sigma, sw) + math.hypot(x - crossing, y)
-            distance *= 1.0 + BEND
+        root = wave.scratch_ints[INTS * i + ROOT]
+        sw, sigma = source_weight(wave, root), wave.scratch[w + SIGMA]
         improve_site(
             wave,
             node,
-            distance,
+            way_through(x, y, b0, b1, sx, sy, sw, sigma, gap),
             h,
             sx,
             sy,
             root,
             wave.scratch_ints[INTS * i + REFERENCE] if merging(wave) else -1,
         )
+
+
+@kernel
+def way_through(
+    x: float,
+    y: float,
+    b0: float,
+    b1: float,
+    sx: float,
+    sy: float,
+    sw: float,
+    sigma: float,
+    gap: float,
+) -> float:
+    """Distance through a window of a point of the face; the way is bent at its end if it must."""
+    rise = y * sw - sy
+    crossing = (sx * y - x * sy) / rise if rise > 0.0 else x
+    if b0 - gap <= crossing <= b1 + gap:
+        return straight_distance(x, y, sx, sy, sw, sigma)
+    crossing = min(max(crossing, b0), b1)
+    there = distance_at(crossing, sx, sy, sigma, sw)
+    return (there + math.hypot(x - crossing, y)) * (1.0 + BEND)
 
 
 @kernel

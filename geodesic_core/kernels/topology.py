@@ -71,7 +71,10 @@ TOO_LARGE = 5
 
 LARGEST_COORDINATE = 1e50
 SHORTEST_EDGE = 1e-50
-"""Mesh units; between the two, sixth powers of lengths neither overflow nor vanish."""
+"""Mesh units; between the two, sixth powers of lengths neither overflow nor vanish.
+
+Edges of no length at all are contracted before; see `contraction`.
+"""
 
 
 class Topology(NamedTuple):
@@ -96,9 +99,10 @@ class Topology(NamedTuple):
     component: Ints
     """(V,): connected component, by the *caller's* vertex; isolated vertices have one each"""
     inner_vertex: Ints
-    """(V,): the caller's vertex → inner vertex"""
+    """(V,): the caller's vertex → inner vertex; one for all that edges of no length join"""
     outer_vertex: Ints
-    """(V,): inner vertex → the caller's"""
+    """(V,): inner vertex → the caller's; of several the lowest, while the others' inner vertices
+    are in no face"""
     outer_face: Ints
     """(F,): inner face → the caller's"""
 
@@ -113,6 +117,15 @@ def previous(h: int) -> int:
 def following(h: int) -> int:
     """Half-edge after h in its face."""
     return h - 2 if h % 3 == 2 else h + 1
+
+
+@kernel
+def point_in_frame(geometry: Floats, h: int, weights: Floats) -> tuple[float, float]:
+    """Where the point of a face with these barycentric weights lies in the frame of h."""
+    along, up = weights[(h + 1) % 3], weights[(h + 2) % 3]
+    reach = up * geometry[h, LENGTH_LEFT]
+    x = along * geometry[h, LENGTH] + reach * geometry[h, COS_LEFT]
+    return x, reach * geometry[h, SIN_LEFT]
 
 
 @kernel
@@ -329,6 +342,8 @@ def fill_geometry(vertices: Floats, faces: Ints, geometry: Floats, angles: Float
             dot = ux * wx + uy * wy + uz * wz
             cross = math.sqrt(cx * cx + cy * cy + cz * cz)
             norm = math.sqrt(dot * dot + cross * cross)
+            if norm == 0.0:  # the side toward the apex has no length
+                return f
             geometry[h, LENGTH] = length
             geometry[h, COS_LEFT] = dot / norm
             geometry[h, SIN_LEFT] = cross / norm

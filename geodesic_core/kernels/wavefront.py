@@ -73,7 +73,7 @@ FREE_SIZE = 4
 FRESH = 5  # rows of the pool from here on were never used
 DONE_VERTICES = 6
 CREATED = 7  # windows, in all
-KEPT = 8  # windows that survived trimming and were propagated
+KEPT = 8  # windows that survived trimming and were propagated; rows of `kept`, where it is used
 PEAK = 9  # windows alive at once, at most
 WORK = 10  # done in this slice, about 10 ns each
 MERGES = 11  # recorded for backtracing
@@ -222,6 +222,8 @@ class Wavefront(NamedTuple):
     """(V,): the vertices that are not as they were at first"""
     toward: Floats
     """(V,): lower bound of the rest of a path from a touched vertex on; empty unless pruned"""
+    kept: Floats
+    """(K, 8): windows that were propagated, as in the pool, NEXT their half-edge; or empty"""
     # The following are empty unless the sweep merges.
     upper: Floats
     """(V,): upper bound of the exact distance"""
@@ -267,6 +269,8 @@ class View(NamedTuple):
     site_weights: Any
     touched: Any
     toward: Any
+    kept: Any
+    kept_ints: Any
     known: Any
     landmarks: Any
     start: Any
@@ -283,6 +287,7 @@ class View(NamedTuple):
     ring_capacity: int
     pool: int
     scratch_size: int
+    keep_capacity: int
     merge_capacity: int
     max_distance: float
     relative_error: float
@@ -327,6 +332,8 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         pointer(wave.site_weights),
         pointer(wave.touched),
         pointer(wave.toward),
+        pointer(wave.kept),
+        pointer(wave.kept.view(np.int32)),
         pointer(bounds.goal.known),
         pointer(bounds.goal.landmarks),
         pointer(bounds.goal.position),
@@ -343,6 +350,7 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         wave.ring.shape[0],
         wave.windows.shape[0],
         wave.scratch.shape[0],
+        wave.kept.shape[0],
         wave.merges.shape[0],
         bounds.max_distance,
         bounds.relative_error,
@@ -377,11 +385,13 @@ def new_wavefront(
     *,
     merges: bool = False,
     paths: bool = False,
+    windows: bool = False,
     pruned: bool = False,
 ) -> Wavefront:
     """Allocate the state of one sweep: O(V + F), nothing reached yet.
 
-    With ``paths``, a sweep that merges records what it merges, for backtracing.
+    With ``paths``, a sweep that merges records what it merges, for backtracing; with ``windows``
+    any sweep keeps those that it propagates.
     """
     vertices, half_edges = len(topology.total_angle), len(topology.links)
     nodes = vertices + sites.nodes
@@ -408,6 +418,7 @@ def new_wavefront(
         piece_ends=sites.piece_ends,
         touched=np.empty(vertices, np.int32),
         toward=np.empty(vertices if pruned else 0),
+        kept=aligned_rows(4096 if windows else 0, WIDTH, np.float64),
         upper=np.full(merged_vertices, np.inf),
         light=np.tile([1.0, -1.0, 1.0, -1.0, np.inf], (merged_vertices, 1)),
         reference=np.full(merged_nodes, -1, np.int32),
@@ -432,6 +443,13 @@ def with_larger_pool(wave: Wavefront) -> Wavefront:
 def with_larger_scratch(wave: Wavefront) -> Wavefront:
     """Return the wavefront with room for lists twice as long."""
     return wave._replace(scratch=aligned_rows(2 * len(wave.scratch), WIDTH, np.float64))
+
+
+def with_more_kept(wave: Wavefront) -> Wavefront:
+    """Return the wavefront with room to keep twice the windows."""
+    kept = aligned_rows(2 * len(wave.kept), WIDTH, np.float64)
+    kept[: len(wave.kept)] = wave.kept
+    return wave._replace(kept=kept)
 
 
 def with_more_merges(wave: Wavefront) -> Wavefront:

@@ -124,6 +124,30 @@ def test_the_report_names_what_a_mesh_is_made_of(client: TestClient) -> None:
     assert len(report["warnings"]) == 5
 
 
+def test_edges_of_no_length_are_told_of_and_their_ends_are_one_place(client: TestClient) -> None:
+    needle = {
+        "vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0]],
+        "faces": [[0, 1, 2], [0, 2, 4], [4, 2, 3]],
+    }
+    report = client.post("/v1/meshes", json=needle).json()
+
+    assert report["zero_length_edges"] == {"count": 1, "ids": [[0, 4]]}
+    assert report["collapsed_faces"] == {"count": 1, "ids": [1]}
+    assert "(0, 4)" in report["warnings"][0]
+    queries = f"/v1/meshes/{report['id']}/distances"
+    spellings: list[dict[str, object]] = [
+        {"vertex": 0},
+        {"vertex": 4},
+        {"edge": [4, 0], "t": 0.5},
+        {"face": 1, "barycentric": [0.5, 0, 0.5]},
+    ]
+    answers = [client.post(queries, json={"sources": [one]}).json() for one in spellings]
+    assert [answer["distances"][4] for answer in answers] == [0, 0, 0, 0]
+    for answer in answers:
+        assert answer["sources"] == answers[0]["sources"]
+        assert answer["distances"] == answers[0]["distances"]
+
+
 # Refusals
 
 

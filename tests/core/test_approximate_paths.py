@@ -150,3 +150,22 @@ def test_a_path_ends_at_the_named_one_of_sources_that_tie(solve, order, winding)
     np.testing.assert_array_equal(path.points[0], vertices[sources[0].point])
     assert path.length == pytest.approx(1 - sources[0].start_distance, rel=1e-12)
     assert path.error_bound.value == pytest.approx(0, abs=1e-12)
+
+
+def test_a_walk_into_another_sheet_than_the_path_came_from_is_given_up():
+    """Over edges of four faces, from points on edges, where windows were merged before.
+
+    Three cubes that meet at edges: 36 faces.
+    """
+    vertices, faces = zoo.voxels([(0, 0, 0), (0, 1, 1), (1, 0, 1)])
+    rng = np.random.default_rng(0)
+    names = rng.permutation(len(vertices))
+    mesh = gc.TriangleMesh(vertices[np.argsort(names)], rng.permutation(names[faces]))
+    for face in (5,) if WITHOUT_JIT else range(len(faces)):
+        for corner in range(3):
+            source = gc.SurfacePoint.edge(face, corner, 0.2)
+            exact = gc.exact_distance(mesh, source).distances
+            field = gc.approximate_distance(mesh, source, keep_windows=True)
+            for target in range(len(vertices)):
+                length = field.path_to(target).length
+                assert exact[target] * (1 - 1e-9) <= length <= exact[target] * (1 + 1e-3)

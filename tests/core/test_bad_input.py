@@ -109,9 +109,19 @@ def test_faces_are_rows_of_three_integers(faces):
     assert caught.value.kind == "face"
 
 
-def test_an_edge_of_no_length_is_refused():
-    with pytest.raises(gc.errors.InvalidMesh, match=r"face 0\b"):
-        gc.TriangleMesh(with_value(POINTS, 1, POINTS[0]), FACES)
+@pytest.mark.parametrize("length", [1e-51, 1e-200, 5e-324])
+def test_an_edge_that_is_too_short_is_refused(length):
+    points = [(0, 0, 0), (length, 0, 0), (0, 1, 0), (1, 1, 0)]
+    with pytest.raises(gc.errors.InvalidMesh, match=r"face 1\b.*shorter than 1e-50") as caught:
+        gc.TriangleMesh(points, [(0, 2, 3), (0, 1, 2)])
+    assert caught.value.elements == (1,)
+
+
+def test_faces_of_edges_of_no_length_alone_are_no_surface():
+    points = [(0, 0, 0), (0, 0, 0), (0, 0, -0.0), (0, 1, 0)]
+    with pytest.raises(gc.errors.InvalidMesh, match="no surface") as caught:
+        gc.TriangleMesh(points, [(0, 1, 2), (0, 1, 3), (3, 3, 1)])
+    assert caught.value.elements == (0, 1, 2)
 
 
 @pytest.mark.parametrize(

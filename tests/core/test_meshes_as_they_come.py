@@ -111,12 +111,20 @@ def test_a_path_that_bends_where_a_face_of_no_area_begins():
     assert found[6] == pytest.approx(1 + np.sqrt(2), rel=1e-12)
 
 
-@pytest.mark.xfail(strict=True, raises=gc.errors.InvalidMesh, reason="refused, the face named")
 def test_an_edge_of_no_length():
-    """A square cut along a diagonal, with a sliver between two vertices at one corner."""
+    """A square cut along a diagonal, with a sliver between two vertices at one corner.
+
+    More in `test_zero_length_edges`.
+    """
     vertices = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 0)]
-    found = distances(vertices, [(0, 1, 2), (0, 2, 4), (4, 2, 3)])
-    np.testing.assert_allclose(found, [0, 1, np.sqrt(2), 1, 0], atol=1e-12)
+    mesh = gc.TriangleMesh(vertices, [(0, 1, 2), (0, 2, 4), (4, 2, 3)])
+    found = gc.exact_distance(mesh, 4).distances
+    np.testing.assert_allclose(found, [0, 1, np.sqrt(2), 1, 0], rtol=1e-15)
+    assert gc.exact_distance(mesh, 1).distances[3] == pytest.approx(np.sqrt(2), rel=1e-15)
+    assert mesh.report.zero_length_edges == gc.Sample(1, ((0, 4),))
+    assert mesh.report.collapsed_faces == gc.Sample(1, (1,))
+    assert "(0, 4)" in mesh.warnings[0]
+    assert "face 1" in mesh.warnings[0]
 
 
 def test_two_components():
@@ -194,6 +202,21 @@ def test_a_pillow_of_one_triangle_and_its_back():
     assert mesh.report.duplicate_faces == gc.Sample(1, (1,))
     assert "face 1" in mesh.warnings[0]
     np.testing.assert_allclose(gc.exact_distance(mesh, 1).distances, [3, 0, 5], rtol=1e-15)
+
+
+@pytest.mark.jit
+@pytest.mark.xfail(strict=True, raises=gc.errors.DeadlineExceeded, reason="windows without end")
+def test_three_needles_upon_each_other():
+    """Windows wind about the tip from sheet to sheet, each time in two more ways."""
+    vertices = [
+        (-0.15211269660704663, 1.0566645623318836, 0.9966675671761641),
+        (-0.15162187405516467, -0.04385665101193417, 0.038200165017030135),
+        (-0.1487304589151138, -0.032884343650413754, 0.07894510119180953),
+    ]
+    mesh = gc.TriangleMesh(vertices, [(0, 2, 1), (1, 2, 0), (2, 0, 1)])
+    found = gc.exact_distance(mesh, 2, deadline_s=2).distances
+    expected = np.linalg.norm(mesh.vertices - mesh.vertices[2], axis=1)
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
 def test_an_unreferenced_last_vertex():

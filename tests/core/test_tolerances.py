@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 import geodesic_core as gc
 from geodesic_core import tolerances
 from geodesic_core.kernels import sweep, wavefront
+from geodesic_core.kernels.arcs import CX, CY, DISC, RADIUS, outer_arcs
 from geodesic_core.kernels.arrival import precedence
 from geodesic_core.kernels.backtrace import Winners, is_on_path
+from geodesic_core.kernels.isolines import united
 from geodesic_core.kernels.lists import put_window
 from geodesic_core.kernels.merge import accuracy, directionality, merged
 from geodesic_core.kernels.planar import bisector
@@ -53,7 +55,6 @@ from geodesic_core.tolerances import (
     GAP,
     GRAZING,
     LANDMARK_ERROR,
-    LEVEL,
     LOCAL_SHARE,
     LOOSE_OVERLAP,
     LOWER_BOUND,
@@ -65,6 +66,7 @@ from geodesic_core.tolerances import (
     SEARCH_SLACK,
     SECTOR_MARGIN,
     SLACK,
+    SLANT,
     SNAP,
     STRAIGHT,
     TIE,
@@ -583,12 +585,12 @@ def test_snap_is_how_near_a_position_must_be(scale, share, snaps):
 
 @SCALES
 @pytest.mark.parametrize(("slope", "strips"), [(0.5, 2), (2.0, 3)])
-def test_level_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope, strips):
+def test_slant_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope, strips):
     """A piece that stands on the edge between two cells; those above are always lit by it."""
     points, faces = zoo.grid(2, 2)
     mesh = gc.TriangleMesh(points * scale, faces)
     foot, head = (
-        scale * np.array(place) for place in ((0.5, 1, 0), (0.5 + slope * LEVEL * 0.2, 1.2, 0))
+        scale * np.array(place) for place in ((0.5, 1, 0), (0.5 + slope * SLANT * 0.2, 1.2, 0))
     )
     line = tuple(mesh.locate(place) for place in (foot, head))
     nodes = nodes_of(mesh, [line], [])
@@ -601,3 +603,29 @@ def test_level_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope,
     share = np.clip((mesh.vertices - foot) @ (head - foot) / ((head - foot) @ (head - foot)), 0, 1)
     expected = np.linalg.norm(foot + share[:, None] * (head - foot) - mesh.vertices, axis=1)
     np.testing.assert_allclose(found, expected, rtol=1e-14, atol=0)
+
+
+@SCALES
+@pytest.mark.parametrize("share", [-3.0, -0.5, 0.5, 3.0])
+def test_level_is_how_near_two_circles_count_as_one(scale, share):
+    """Of circles that are one the first counts; of others, around one point, the larger."""
+    mesh = gc.TriangleMesh(scale * zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
+    discs, level = np.zeros((2, DISC)), 0.1 * scale
+    discs[:, [CX, CY]] = 0.3 * scale, 0.01 * scale
+    discs[:, RADIUS] = level, level * (1.0 + share * tolerances.LEVEL)
+    arcs = outer_arcs(mesh.topology, 0, discs, level, 0.0)
+    assert set(arcs[:, RADIUS]) == {discs[1 if share > 1.0 else 0, RADIUS]}
+
+
+@pytest.mark.parametrize(("share", "left"), [(0.9, 1), (1.1, 2)])
+def test_crossing_is_the_gap_between_stretches_that_are_one(share, left):
+    gap = share * tolerances.CROSSING
+    assert united(np.array([[0.5 + gap, 0.75], [0.25, 0.5]]), tolerances.CROSSING) == left
+
+
+@pytest.mark.parametrize(("radius", "lines"), [(0.1, 0), (3.0, 1)])
+def test_piece_is_the_length_of_what_is_left_out(radius, lines):
+    mesh = gc.TriangleMesh(zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
+    source = gc.Source(gc.SurfacePoint.face(0, (0.3, 0.3, 0.4)), 1.0)
+    field = gc.exact_distance(mesh, source)
+    assert len(field.isolines([1.0 + radius * tolerances.PIECE])[0]) == lines

@@ -21,7 +21,7 @@ def distance_matrix(points, faces) -> np.ndarray:
     direct = np.full((len(points), len(points)), np.inf)
     for i, p in enumerate(points):
         for j, q in enumerate(points[:i]):
-            if _is_free(p, q, walls, triangles):
+            if p == q or _is_free(p, q, walls, triangles):
                 direct[i, j] = direct[j, i] = math.dist(p, q)
     return all_pairs(direct)
 

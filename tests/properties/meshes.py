@@ -57,16 +57,57 @@ def cone(rng):
     return zoo.crumpled(vertices, rng.choice([0, 0.2]), int(rng.integers(2**31))), faces
 
 
+def wound(rng):
+    """A mesh of another kind, half of its faces turned over."""
+    vertices, faces = KINDS[rng.integers(len(KINDS))](rng)
+    return vertices, zoo.wound_at_random(faces, int(rng.integers(2**31)))[0]
+
+
+def moebius(rng):
+    vertices, faces = zoo.moebius(int(rng.integers(5, 12)))
+    faces, _, _ = zoo.wound_at_random(faces, int(rng.integers(2**31)))
+    return zoo.crumpled(vertices, rng.choice([0, 0.1]), int(rng.integers(2**31))), faces
+
+
+def book(rng):
+    pages, rows, seed = rng.integers((3, 1, 0), (6, 4, 2**31)).tolist()
+    vertices, faces, _ = zoo.book(pages, rows, seed)
+    return vertices, zoo.wound_at_random(faces, seed)[0]
+
+
+def pages(rng):
+    """A few triangles on one edge, and some more beside them."""
+    count = int(rng.integers(3, 6))
+    points = np.vstack([[(0, 0, 0), (0, 0, 1)], rng.normal(size=(count, 3))])
+    faces = [(0, 1, 2 + k) for k in range(count)] + [(1, 2, 3)] * int(rng.integers(2))
+    return points, zoo.wound_at_random(np.array(faces), int(rng.integers(2**31)))[0]
+
+
+def blocks(rng):
+    """Cubes that meet at faces, at edges, which have four faces then, and at corners."""
+    cells = rng.integers(0, 3, (int(rng.integers(2, 6)), 3))
+    return zoo.voxels(map(tuple, cells.tolist()))
+
+
+def tangle(rng):
+    """Random triangles between a few points: edges of many faces, and sheets that cross."""
+    every = list(itertools.combinations(range(7), 3))
+    chosen = rng.choice(len(every), int(rng.integers(3, 15)), replace=False)
+    faces, _, _ = zoo.wound_at_random(np.array(every)[chosen], int(rng.integers(2**31)))
+    return zoo.drop_unused(rng.random((7, 3)), faces)
+
+
 def _is_manifold(vertices, faces) -> bool:
     return 2 * len(edge_lengths(vertices, faces)) == 3 * len(faces)
 
 
 KINDS = (terrain, holed_terrain, thin_terrain, ball, ring, cubes, cone)
+IRREGULAR_KINDS = (wound, moebius, book, pages, blocks, tangle)
 
 
 @st.composite
-def cases(draw) -> zoo.Case:
-    kind = draw(st.sampled_from(KINDS))
+def cases(draw, kinds=KINDS) -> zoo.Case:
+    kind = draw(st.sampled_from(kinds))
     seed = draw(st.integers(0, 2**31 - 1))
     vertices, faces = kind(np.random.default_rng(seed))
     return zoo.Case(f"{kind.__name__}({seed})", vertices, faces)

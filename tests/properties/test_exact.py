@@ -5,7 +5,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import geodesic_core as gc
-from tests import zoo
 from tests.core.certificates import check_path
 from tests.oracles import graph, unfolding
 from tests.properties.meshes import cases
@@ -64,52 +63,6 @@ def test_paths_certify_distances(case, seed):
     for target in np.random.default_rng(seed).integers(0, len(case.vertices), 8).tolist():
         if target != source and np.isfinite(field.distances[target]):
             check_path(mesh, field.path_to(target), source, target, field.distances[target])
-
-
-@given(cases(), seeds)
-def test_names_do_not_matter(case, seed):
-    """Other vertex numbers, face order, first corners, and the surface inside out."""
-    rng = np.random.default_rng(seed)
-    source = vertex_of(case, seed)
-    distances = solve(case.vertices, case.faces, source)
-    names = rng.permutation(len(case.vertices))
-    vertices = np.empty_like(case.vertices)
-    vertices[names] = case.vertices
-    faces = np.array([np.roll(face, rng.integers(3)) for face in names[case.faces]])
-    faces = rng.permutation(faces)
-    for winding in (faces, faces[:, ::-1]):
-        renamed = solve(vertices, winding, int(names[source]))
-        np.testing.assert_allclose(renamed[names], distances, rtol=EXACT)
-
-
-@given(cases(), seeds)
-def test_place_does_not_matter(case, seed):
-    source = vertex_of(case, seed)
-    moved = case.moved(zoo.rotation(seed), np.random.default_rng(seed).normal(size=3))
-    np.testing.assert_allclose(
-        solve(moved.vertices, moved.faces, source),
-        solve(case.vertices, case.faces, source),
-        rtol=EXACT,
-    )
-
-
-@given(cases(), seeds, st.sampled_from([1e-9, 1e-3, 7.0, 1e9]))
-def test_distances_scale_with_the_mesh(case, seed, scale):
-    source = vertex_of(case, seed)
-    np.testing.assert_allclose(
-        solve(case.vertices * scale, case.faces, source),
-        solve(case.vertices, case.faces, source) * scale,
-        rtol=EXACT,
-    )
-
-
-@given(cases(), seeds)
-def test_splitting_faces_in_their_planes_changes_nothing(case, seed):
-    source = vertex_of(case, seed)
-    distances = solve(case.vertices, case.faces, source)
-    for split in (zoo.subdivide, zoo.split_at_centroids):
-        finer = solve(*split(case.vertices, case.faces), source)
-        np.testing.assert_allclose(finer[: len(distances)], distances, rtol=EXACT)
 
 
 @given(cases(), seeds, st.floats(0, 2))

@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 from hypothesis import given
-from hypothesis import strategies as st
 
 import geodesic_core as gc
-from tests import zoo
 from tests.core.certificates import LENGTH
 from tests.core.searches import STEPS, check_search, random_pairs
 from tests.oracles import unfolding
@@ -71,31 +69,3 @@ def test_waypoints_are_passed_and_a_detour_is_no_shorter(case, seed):
     assert path.length == pytest.approx(matrix[stops[:-1], stops[1:]].sum(), rel=EXACT, abs=0)
     assert path.length >= matrix[source, target] * (1 - EXACT)
     assert set(stops) <= {place.vertex_index for place in path.locations}
-
-
-@given(split_cases(), seeds, st.sampled_from([1e-9, 1e-3, 7.0, 1e9]))
-def test_names_place_and_scale_do_not_matter(case, seed, scale):
-    rng = np.random.default_rng(seed)
-    mesh = mesh_of(case)
-    names = rng.permutation(len(case.vertices))
-    moved = case.moved(scale * zoo.rotation(seed), scale * rng.normal(size=3))
-    vertices = np.empty_like(moved.vertices)
-    vertices[names] = moved.vertices
-    faces = rng.permutation(names[case.faces])
-    for winding in (faces, faces[:, ::-1]):
-        other = gc.Solver(gc.TriangleMesh(vertices, winding))
-        for source, target in random_pairs(mesh, 3, seed):
-            length = gc.shortest_path(mesh, source, target).length
-            found = other.shortest_path(int(names[source]), int(names[target])).length
-            assert found == pytest.approx(length * scale, rel=EXACT, abs=0)
-
-
-@given(cases(), seeds)
-def test_splitting_faces_in_their_planes_changes_nothing(case, seed):
-    mesh = mesh_of(case)
-    for split in (zoo.subdivide, zoo.split_at_centroids):
-        finer = gc.Solver(gc.TriangleMesh(*split(case.vertices, case.faces)))
-        for source, target in random_pairs(mesh, 3, seed):
-            length = gc.shortest_path(mesh, source, target).length
-            found = finer.shortest_path(source, target).length
-            assert found == pytest.approx(length, rel=EXACT, abs=0)

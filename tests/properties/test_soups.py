@@ -1,5 +1,6 @@
 """Meshes as nobody means them: each gets the right answer or a typed refusal, and never NaN."""
 
+import itertools
 from contextlib import suppress
 
 import numpy as np
@@ -44,12 +45,29 @@ def torn(rng, vertices, faces):
     return np.vstack([vertices, vertices[faces.reshape(-1)[loose]]]), flat.reshape(-1, 3)
 
 
+def places_of(vertices, faces):
+    """The lowest vertex at each one's place, which edges of no length make of several."""
+    place = np.arange(len(vertices))
+    edges = [
+        [a, b]
+        for face in faces.tolist()
+        for a, b in itertools.combinations(face, 2)
+        if len(set(face)) == 3 and (vertices[a] == vertices[b]).all()
+    ]
+    for _ in edges:
+        for edge in edges:
+            place[edge] = place[edge].min()
+    return place
+
+
 def check_answers(mesh, sources):
     """Distances are the oracle's, or within their error of it; paths have their lengths."""
-    surface = mesh.faces[mesh.inner_face >= 0]
-    matrix = unfolding.distance_matrix(mesh.vertices, surface)
+    place = places_of(mesh.vertices, mesh.faces)
+    surface = [face for face in place[mesh.faces].tolist() if len(set(face)) == 3]
+    assert len(surface) == np.count_nonzero(mesh.inner_face >= 0)
+    matrix = unfolding.distance_matrix(mesh.vertices, surface)[np.ix_(place, place)]
     for source in sources:
-        field = gc.exact_distance(mesh, source)
+        field = gc.exact_distance(mesh, source, deadline_s=20)  # else a case that hangs has no name
         assert not np.isnan(field.distances).any()
         np.testing.assert_allclose(field.distances, matrix[source], rtol=EXACT, atol=0)
         with suppress(gc.errors.NotConverged):
@@ -59,7 +77,7 @@ def check_answers(mesh, sources):
             if np.isfinite(matrix[source, target]):
                 path = gc.shortest_path(mesh, source, target)
                 assert path.length == pytest.approx(matrix[source, target], rel=EXACT, abs=0)
-                assert not set(path.faces) & set(mesh.report.repeated_vertex_faces.ids)
+                assert (mesh.inner_face[path.faces] >= 0).all()
 
 
 @given(seeds, st.sampled_from(["none", "exact"]))

@@ -1,0 +1,55 @@
+"""In which direction distance grows fastest, at the vertices."""
+
+import numpy as np
+
+from geodesic_core.arrays import Flags, Floats
+from geodesic_core.kernels.backtrace import Winners
+from geodesic_core.kernels.topology import APEX, COS_LEFT, HEAD, LENGTH_LEFT, SIN_LEFT, TAIL
+from geodesic_core.kernels.wavefront import FROM, NODE, VIA
+from geodesic_core.mesh import TriangleMesh
+from geodesic_core.nodes import Nodes
+from geodesic_core.path import EXACT, traced_path
+from geodesic_core.tolerances import SAME_PLACE
+
+
+def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> Floats:
+    """Return unit vectors (V, 3) away from where the path to each vertex comes from; NaN for none.
+
+    The winning window has the pseudosource in the plane of the face that the path ends in. A face
+    of no area has no such plane: there the path is traced. O(V).
+    """
+    topology = mesh.topology
+    gradient = np.full(mesh.vertices.shape, np.nan)
+    via = winners.winner_ints[: len(gradient), VIA]
+    reached = np.flatnonzero((via >= 0) & np.isfinite(winners.distance[: len(gradient)]))
+    via = via[reached]
+    geometry, positions = topology.geometry[via], topology.positions
+    tail, head, apex = (positions[topology.links[via, k]] for k in (TAIL, HEAD, APEX))
+    reach = geometry[:, LENGTH_LEFT]
+    away = np.column_stack([geometry[:, COS_LEFT] * reach, geometry[:, SIN_LEFT] * reach])
+    away[_is_strip(winners)[reached]] = 0.0  # a direction is all that there is of a strip's
+    away -= winners.winner[reached]
+    along = _unit(head - tail)
+    across = apex - tail
+    across = _unit(across - np.einsum("ij,ij->i", across, along)[:, None] * along)
+    gradient[reached] = _unit(away[:, :1] * along + away[:, 1:] * across)
+    for v in reached[np.isnan(gradient[reached, 0])]:
+        points = traced_path(mesh, winners, nodes, v, EXACT).points
+        away = points[-1] - points
+        elsewhere = np.linalg.norm(away, axis=1) > SAME_PLACE * winners.distance[v]
+        gradient[v] = _unit(away[elsewhere][-1:])
+    return gradient[topology.inner_vertex]
+
+
+def _is_strip(winners: Winners) -> Flags:
+    """Tell which nodes are reached from a piece of a curve."""
+    if len(winners.piece_ints) == 0:
+        return np.zeros(len(winners.distance), np.bool_)
+    is_strip: Flags = winners.winner_ints[:, FROM] >= winners.piece_ints[0, NODE]
+    return is_strip
+
+
+def _unit(vectors: Floats) -> Floats:
+    with np.errstate(invalid="ignore"):  # of no length, no direction: NaN
+        unit: Floats = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return unit

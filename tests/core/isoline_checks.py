@@ -1,0 +1,100 @@
+"""What must hold of the isolines of any exact field."""
+
+import itertools
+
+import numpy as np
+
+import geodesic_core as gc
+
+LEVEL = 1e-9
+"""Relative distance of points from their level."""
+
+
+def weights_in(corners, point):
+    """Barycentric weights of a point of a triangle, by least squares."""
+    edges = (corners[1:] - corners[0]).T
+    v, w = np.linalg.lstsq(edges, point - corners[0], rcond=None)[0]
+    return np.array([1.0 - v - w, v, w])
+
+
+def line_points(mesh, line):
+    """The points of a line as points of the surface."""
+    faces = line.faces if line.closed else [*line.faces, line.faces[-1]]
+    found = []
+    for point, face in zip(line.points, faces, strict=True):
+        weights = np.clip(weights_in(mesh.vertices[mesh.faces[face]], point), 0.0, None)
+        weights[weights < 1e-13] = 0.0
+        found.append(mesh.point(gc.SurfacePoint.face(int(face), tuple(weights / weights.sum()))))
+    return found
+
+
+def check_points(mesh, sources, level, lines, most=60):
+    """Points, evenly taken, lie at the level, as a sweep to them says."""
+    points = [point for line in lines for point in line_points(mesh, line)]
+    points = points[:: max(len(points) // most, 1)]
+    field = gc.exact_distance(mesh, sources, targets=points)
+    found = [field.distance_at(point) for point in points]
+    np.testing.assert_allclose(found, level, rtol=LEVEL)
+
+
+def check_pieces(mesh, line):
+    """Each piece lies in its face, and has a length."""
+    points = np.vstack([line.points, line.points[:1]]) if line.closed else line.points
+    assert len(line.faces) == len(points) - 1
+    assert (np.linalg.norm(np.diff(points, axis=0), axis=1) > 0.0).all()
+    for face, ends in zip(line.faces, itertools.pairwise(points), strict=True):
+        corners = mesh.vertices[mesh.faces[face]]
+        size = np.abs(corners - corners[0]).max()
+        for point in ends:
+            weights = np.clip(weights_in(corners, point), 0.0, None)
+            assert np.abs(weights @ corners / weights.sum() - point).max() < 1e-9 * size
+
+
+def edge_kinds(mesh):
+    """How many faces each edge has."""
+    count = {}
+    for a, b, c in mesh.faces.tolist():
+        for edge in ((a, b), (b, c), (c, a)):
+            key = (min(edge), max(edge))
+            count[key] = count.get(key, 0) + 1
+    return count
+
+
+def check_ends(mesh, line):
+    """A line that is not closed ends at the boundary, or at an edge of several faces."""
+    if line.closed:
+        return
+    odd = [edge for edge, count in edge_kinds(mesh).items() if count != 2]
+    for point in (line.points[0], line.points[-1]):
+        assert min(from_segment(point, *mesh.vertices[list(edge)]) for edge in odd) < 1e-9
+
+
+def from_segment(point, start, end):
+    t = np.clip((point - start) @ (end - start) / ((end - start) @ (end - start)), 0.0, 1.0)
+    return np.linalg.norm(start + t * (end - start) - point)
+
+
+def check_crossings(mesh, sources, level, lines, samples=40):
+    """On each edge the lines have as many points as its distances pass the level, sampled.
+
+    A stretch between two samples may go unseen: there are lines at its two ends then.
+    """
+    edges = sorted(edge_kinds(mesh))
+    shares = (np.arange(samples) + 0.5) / samples
+    targets = [mesh.point_on_edge(u, v, float(t)) for u, v in edges for t in shares]
+    field = gc.exact_distance(mesh, sources, targets=targets)
+    found = np.array([field.distance_at(point) for point in targets]).reshape(len(edges), samples)
+    inside = np.hstack([field.distances[edges][:, :1], found, field.distances[edges][:, 1:]])
+    inside = inside <= level
+    # The point of a crossing is the same to the bit in all lines through it.
+    points = np.array(sorted({tuple(point) for line in lines for point in line.points.tolist()}))
+    for (u, v), row in zip(edges, inside, strict=True):
+        passed = set(np.flatnonzero(row[1:] != row[:-1]).tolist())
+        start, way = mesh.vertices[u], mesh.vertices[v] - mesh.vertices[u]
+        rest = (points if len(points) else np.empty((0, 3))) - start
+        places = rest @ way / (way @ way)
+        off = np.linalg.norm(rest - places[:, None] * way, axis=1)
+        on_edge = (off < 1e-10 * np.linalg.norm(way)) & (places > -1e-10) & (places < 1 + 1e-10)
+        gaps = np.clip(np.floor(places[on_edge] * samples + 0.5), 0, samples).astype(int).tolist()
+        for gap in range(samples + 1):
+            assert gaps.count(gap) % 2 == (gap in passed), (u, v, gap)
