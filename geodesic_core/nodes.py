@@ -33,9 +33,23 @@ class Nodes:
     positions: Floats
     """(sites, 3), mesh units"""
     pieces: tuple[PieceInFace, ...]
-    """Those that became pieces, in the order of their nodes, each in one of its faces."""
+    """The pieces of curves, in the order of their nodes, each in one of its faces."""
+    first_piece: int
+    """The node of the first"""
     components: tuple[int, ...]
     """Those of the mesh with a source in them"""
+
+    def piece(self, node: int) -> PieceInFace | None:
+        """Return the piece of a node; None if it is none."""
+        rank = node - self.first_piece
+        return self.pieces[rank] if 0 <= rank < len(self.pieces) else None
+
+    def site(self, node: int) -> tuple[SurfacePoint, Floats]:
+        """Return the point of a node that is neither vertex nor piece, and its position."""
+        # What is asked for after a sweep comes behind its pieces.
+        rank = node - self.first_piece
+        rank += self.sites.nodes - len(self.pieces) - (len(self.pieces) if rank >= 0 else 0)
+        return self.points[rank], self.positions[rank]
 
 
 @dataclass(frozen=True)
@@ -147,6 +161,7 @@ def nodes_of(
         points=tuple(sited),
         positions=np.array([mesh.position(point) for point in sited]).reshape(-1, 3),
         pieces=tuple(piece[0] for _, piece in pieces),
+        first_piece=first_piece,
         components=tuple({component_of(mesh, line[0]) for line in sources}),
     )
 

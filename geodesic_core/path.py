@@ -118,16 +118,15 @@ def traced_path(
         mesh.topology, mesh.faces, nodes, parameters, faces, weights, vertices, points
     )
     for i in (count - 1, 0):
-        site = -1 - int(nodes[i]) - len(mesh.vertices)
-        if site >= len(nodes_of_sweep.points):
-            piece = nodes_of_sweep.pieces[site - len(nodes_of_sweep.points)]
+        node = -1 - int(nodes[i])
+        if node < len(mesh.vertices):
+            continue
+        piece = nodes_of_sweep.piece(node)
+        if piece is None:
+            point, points[i] = nodes_of_sweep.site(node)
+        else:
             point = foot_on(mesh, piece, points[1])
             points[i] = mesh.position(point)
-        elif site >= 0:
-            point = nodes_of_sweep.points[site]
-            points[i] = nodes_of_sweep.positions[site]
-        else:
-            continue
         faces[i], weights[i] = point.face_index, point.barycentric
         vertices[i] = -1 if point.vertex_index is None else point.vertex_index
     kept = np.empty(count, np.uint8)

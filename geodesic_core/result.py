@@ -16,7 +16,7 @@ from geodesic_core.gradient import gradient_at_vertices
 from geodesic_core.isolines import Isoline, as_chord_error, as_levels, find_isolines, spaced_levels
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept
-from geodesic_core.kernels.wavefront import Bounds, exact_bounds
+from geodesic_core.kernels.wavefront import Bounds, exact_bounds, with_strips
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest_source import NearestSource, find_nearest_source
 from geodesic_core.nodes import Nodes, component_of, disconnected
@@ -259,7 +259,8 @@ class DistanceField:
         if self._windows is not None and not self._bounds.merging:
             return self._known_winners, self._windows
         if self._bounds.strips:  # a sweep back from a point ends at points, not on curves
-            return self._sweep_again(exact_bounds(self.max_distance, strips=self._bounds.strips))
+            exact = exact_bounds(self.max_distance)
+            return self._sweep_again(with_strips(exact, self._bounds.first_piece))
         return None
 
     def _arrival_at(self, place: SurfacePoint) -> Arrival | None:

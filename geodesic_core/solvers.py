@@ -18,7 +18,7 @@ from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.kernels import kept, sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept
-from geodesic_core.kernels.wavefront import Bounds, Wavefront
+from geodesic_core.kernels.wavefront import Bounds, Wavefront, with_strips
 from geodesic_core.matrix import Layout, find_matrix
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest import Nearest, find_nearest
@@ -348,7 +348,7 @@ def _solve(
     nodes = nodes_of(mesh, places, ends)
     distances = np.array([start.start_distance for start in starts])
     if nodes.pieces:
-        bounds = bounds._replace(strips=(len(mesh.vertices) + len(nodes.points),))
+        bounds = with_strips(bounds, nodes.first_piece)
     wave = _sweep(mesh, nodes, distances, bounds, control, paths=paths, windows=windows)
     wave.distance[wave.distance > bounds.max_distance] = math.inf
     winners = _winners_of(wave)

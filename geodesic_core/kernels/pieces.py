@@ -37,7 +37,7 @@ from geodesic_core.tolerances import SLANT
 @kernel
 def is_piece(ints: Any, node: int) -> bool:
     """Whether a node is a piece; ``ints`` are rows of pieces, as `Wavefront.piece_ints`."""
-    return len(ints) > 0 and node >= ints[0, NODE]
+    return len(ints) > 0 and ints[0, NODE] <= node <= ints[-1, NODE]
 
 
 @kernel

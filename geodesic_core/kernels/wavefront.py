@@ -166,13 +166,14 @@ class Bounds(NamedTuple):
     exact ones carry nothing of merging"""
     goal: Goal
     strips: tuple[int, ...]
-    """Empty where no source is a curve, else the first node that is a piece of one; the same for
-    windows that are strips"""
+    """Empty where no source is a curve; the same for windows that are strips"""
+    first_piece: int
+    """The first node that is a piece of a curve, if there are any"""
 
 
-def exact_bounds(max_distance: float, goal: Goal = NO_GOAL, strips: tuple[int, ...] = ()) -> Bounds:
+def exact_bounds(max_distance: float, goal: Goal = NO_GOAL) -> Bounds:
     """Return the bounds of a sweep that never merges."""
-    return Bounds(max_distance, 0.0, 0.0, (), goal, strips)
+    return Bounds(max_distance, 0.0, 0.0, (), goal, (), 0)
 
 
 def merging_bounds(
@@ -180,10 +181,14 @@ def merging_bounds(
     relative_error: float,
     absolute_error: float,
     goal: Goal = NO_GOAL,
-    strips: tuple[int, ...] = (),
 ) -> Bounds:
     """Return the bounds of a sweep that merges windows within both errors."""
-    return Bounds(max_distance, relative_error, absolute_error, (1,), goal, strips)
+    return Bounds(max_distance, relative_error, absolute_error, (1,), goal, (), 0)
+
+
+def with_strips(bounds: Bounds, first_piece: int) -> Bounds:
+    """Return the bounds of the same sweep from curves whose pieces are the nodes from there on."""
+    return bounds._replace(strips=(1,), first_piece=first_piece)
 
 
 class Wavefront(NamedTuple):
@@ -294,6 +299,7 @@ class View(NamedTuple):
     absolute_error: float
     merging: tuple[int, ...]
     strips: tuple[int, ...]
+    first_piece: int
     pruned: bool
     limit: float
     landmark_count: int
@@ -357,6 +363,7 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         bounds.absolute_error,
         bounds.merging,
         bounds.strips,
+        bounds.first_piece,
         wave.toward.shape[0] > 0,
         bounds.goal.limit,
         bounds.goal.landmark_count,
@@ -374,7 +381,7 @@ def merging(wave: Any) -> bool:
 @inlined
 def source_weight(wave: Any, root: int) -> float:
     """SW of a window with this root: 0 for a strip, which comes from a piece of a curve, else 1."""
-    if len(wave.strips) > 0 and root >= wave.strips[0]:
+    if len(wave.strips) > 0 and root >= wave.first_piece:
         return 0.0
     return 1.0
 

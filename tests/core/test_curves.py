@@ -148,10 +148,14 @@ def test_distances_on_a_plane_are_those_of_segments(seed):
     field = gc.exact_distance(mesh, curve, targets=targets)
     ends = np.array([mesh.position(point) for point in curve.points])
 
-    def distance(place):
+    def foot(place):
         start, step = ends[:-1], np.diff(ends, axis=0)
         share = np.clip(((place - start) * step).sum(axis=1) / (step**2).sum(axis=1), 0, 1)
-        return np.linalg.norm(start + share[:, None] * step - place, axis=1).min()
+        feet = start + share[:, None] * step
+        return feet[np.linalg.norm(feet - place, axis=1).argmin()]
+
+    def distance(place):
+        return np.linalg.norm(foot(place) - place)
 
     expected = [distance(place) for place in mesh.vertices]
     np.testing.assert_allclose(field.distances, expected, rtol=1e-12, atol=1e-13)
@@ -159,6 +163,27 @@ def test_distances_on_a_plane_are_those_of_segments(seed):
         expected = distance(mesh.position(target))
         assert field.distance_at(target) == pytest.approx(expected, rel=1e-12, abs=1e-13)
         check_path_from(mesh, field.path_to(target), curve, target, expected)
+    # Points that the sweep was not told of, and the direction at vertices
+    later = [
+        gc.exact_distance(mesh, curve),
+        gc.exact_distance(mesh, curve, keep_windows=True),
+        gc.approximate_distance(mesh, curve, 1e-2),
+    ]
+    for target, field in itertools.product(targets[:12], later):
+        expected = distance(mesh.position(target))
+        assert field.distance_at(target) == pytest.approx(expected, rel=1e-12, abs=1e-13)
+        assert field.nearest_source_at(target) == 0
+        check_path_from(mesh, field.path_to(target), curve, target, expected)
+    away = np.array([place - foot(place) for place in mesh.vertices])
+    away /= np.linalg.norm(away, axis=1, keepdims=True)
+    np.testing.assert_allclose(later[0].gradient, away, atol=1e-9)
+
+
+def test_isolines_of_curves_are_refused():
+    """Until straight ones are drawn: a wrong line would be worse."""
+    field = gc.exact_distance(mesh_of(zoo.SMALL["octahedron"]), gc.Curve([0, 2, 0]))
+    with pytest.raises(gc.errors.InvalidArgument, match="is a curve"):
+        field.isolines([0.5])
 
 
 @pytest.mark.parametrize("seed", range(2 if WITHOUT_JIT else 8))

@@ -41,6 +41,7 @@ from geodesic_core.kernels.wavefront import (
     exact_bounds,
     merging_bounds,
     new_wavefront,
+    with_strips,
 )
 from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.landmarks import Landmarks
@@ -595,7 +596,7 @@ def test_slant_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope,
     line = tuple(mesh.locate(place) for place in (foot, head))
     nodes = nodes_of(mesh, [line], [])
     wave = new_wavefront(mesh.topology, nodes.sites)
-    bounds = exact_bounds(math.inf, strips=(int(nodes.sources[-1]),))
+    bounds = with_strips(exact_bounds(math.inf), int(nodes.sources[-1]))
     sweep.start_sweep(mesh.topology, wave, nodes.sources, nodes.origins, np.zeros(1), bounds)
     roots = wave.windows[: wave.counters[FRESH]].view(np.int32)[:, ROOT]
     assert (roots == nodes.sources[-1]).sum() == strips
