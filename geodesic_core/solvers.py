@@ -163,7 +163,7 @@ def shortest_path(
     deadline_s: float | None = None,
     memory_limit: int | None = None,
 ) -> GeodesicPath:
-    """Return an exact shortest path between two vertices (section 5).
+    """Return an exact shortest path between two points of the surface (section 5).
 
     For many paths on one mesh, a `Solver` is faster.
 
