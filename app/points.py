@@ -33,3 +33,12 @@ def described(mesh: gc.TriangleMesh, place: gc.SurfacePoint) -> Mapping[str, Any
         return {"vertex": vertex, "position": mesh.vertices[vertex].tolist()}
     position = mesh.position(place).tolist()
     return {"face": place.face_index, "barycentric": place.barycentric, "position": position}
+
+
+def described_source(mesh: gc.TriangleMesh, source: gc.Source) -> Mapping[str, Any]:
+    """Return what answers say of a source: its point or its curve, and where it starts."""
+    if isinstance(source.point, gc.Curve):
+        line = [described(mesh, mesh.point(point)) for point in source.point.points]
+        return {"polyline": line, "start_distance": source.start_distance}
+    place = described(mesh, mesh.point(source.point))
+    return {**place, "start_distance": source.start_distance}

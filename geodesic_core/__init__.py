@@ -6,6 +6,7 @@ Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then
 """
 
 from geodesic_core import errors, samples
+from geodesic_core.curve import Curve
 from geodesic_core.errors import GeodesicError
 from geodesic_core.isolines import Isoline
 from geodesic_core.matrix import distance_matrix
@@ -25,6 +26,7 @@ from geodesic_core.solvers import (
 from geodesic_core.surface_point import SurfacePoint
 
 __all__ = [
+    "Curve",
     "DistanceField",
     "ErrorBound",
     "GeodesicError",

@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from geodesic_core.curve import weights_by_face
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept, Reach, reach_point
 from geodesic_core.kernels.wavefront import SITE
 from geodesic_core.mesh import TriangleMesh
-from geodesic_core.nodes import Nodes, faces_of
+from geodesic_core.nodes import Nodes
 from geodesic_core.surface_point import SurfacePoint
 
 
@@ -35,7 +36,7 @@ def arrival_at(
     """Return how a canonical point is reached; O(windows of its faces)."""
     ways = (
         reach_point(mesh.topology, winners, kept, nodes.first_target, face, np.array(weights))
-        for face, weights in faces_of(mesh, point)
+        for face, weights in weights_by_face(mesh, point).items()
     )
     best = min(ways, key=lambda way: way[0])
     reach = Reach(*best)
@@ -49,8 +50,8 @@ def with_target(
 ) -> tuple[Winners, Nodes, int]:
     """Return winners and nodes with one more node, at the point, and its number; O(V)."""
     node, reach = len(winners.distance), arrival.reach
-    faces = faces_of(mesh, point)
-    rows = np.array([(node, face, -1) for face, _ in faces], np.int32).reshape(-1, SITE)
+    faces = weights_by_face(mesh, point)
+    rows = np.array([(node, face, -1) for face in faces], np.int32).reshape(-1, SITE)
     return (
         winners._replace(
             nearest=np.append(winners.nearest, np.int32(arrival.source)),
@@ -60,7 +61,7 @@ def with_target(
                 [winners.winner_ints, np.array([reach.via, reach.root], np.int32)]
             ),
             site_ints=np.vstack([winners.site_ints, rows]),
-            site_weights=np.vstack([winners.site_weights, [weights for _, weights in faces]]),
+            site_weights=np.vstack([winners.site_weights, list(faces.values())]),
         ),
         replace(
             nodes,

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from geodesic_core.arrays import Floats
+from geodesic_core.arrays import Flags, Floats
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.topology import APEX, COS_LEFT, HEAD, LENGTH_LEFT, SIN_LEFT, TAIL
-from geodesic_core.kernels.wavefront import VIA
+from geodesic_core.kernels.wavefront import FROM, NODE, VIA
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nodes import Nodes
 from geodesic_core.path import EXACT, traced_path
@@ -27,6 +27,7 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
     tail, head, apex = (positions[topology.links[via, k]] for k in (TAIL, HEAD, APEX))
     reach = geometry[:, LENGTH_LEFT]
     away = np.column_stack([geometry[:, COS_LEFT] * reach, geometry[:, SIN_LEFT] * reach])
+    away[_is_strip(winners)[reached]] = 0.0  # a direction is all that there is of a strip's
     away -= winners.winner[reached]
     along = _unit(head - tail)
     across = apex - tail
@@ -38,6 +39,14 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
         elsewhere = np.linalg.norm(away, axis=1) > SAME_PLACE * winners.distance[v]
         gradient[v] = _unit(away[elsewhere][-1:])
     return gradient[topology.inner_vertex]
+
+
+def _is_strip(winners: Winners) -> Flags:
+    """Tell which nodes are reached from a piece of a curve."""
+    if len(winners.piece_ints) == 0:
+        return np.zeros(len(winners.distance), np.bool_)
+    is_strip: Flags = winners.winner_ints[:, FROM] >= winners.piece_ints[0, NODE]
+    return is_strip
 
 
 def _unit(vectors: Floats) -> Floats:

@@ -63,7 +63,7 @@ class Landmarks:
         wave = wavefront.new_wavefront(topology, merges=True)
         control.grant_memory(wavefront.bytes_of(wave))
         start = np.array([chosen], np.int32)
-        sweep.start_sweep(topology, wave, start, np.zeros(1), bounds)
+        sweep.start_sweep(topology, wave, start, np.zeros(1, np.int32), np.zeros(1), bounds)
         wave = run_sweep(mesh, wave, bounds, control, lambda _: 1.0)
         if self.count == 0:
             self.distances = aligned_rows(len(mesh.vertices), LANDMARKS, np.float32)

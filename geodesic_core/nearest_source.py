@@ -43,7 +43,7 @@ def find_nearest_source(
 
     ``known`` is by inner vertex, with more behind. O(faces in the strip), and O(V + F) for memory.
     """
-    nodes = nodes_of(mesh, [point], sources)
+    nodes = nodes_of(mesh, [(point,)], sources)
     corners, reaches = corners_of(mesh, point)
     least = known[: len(mesh.vertices)]
     upper = float((_most(least[corners], bounds) + reaches).min())

@@ -1,4 +1,4 @@
-"""From points to the nodes of a sweep: its vertices, and sites for what is no vertex."""
+"""From points and curves to the nodes of a sweep: vertices, sites, and the pieces of curves."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -7,9 +7,9 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.canonical import half_edges_around
+from geodesic_core.curve import PieceInFace, Polyline, pieces_of, weights_by_face
 from geodesic_core.errors import InvalidArgument, NoPath
-from geodesic_core.kernels.topology import APEX, TAIL
-from geodesic_core.kernels.wavefront import NODE, SITE, Sites
+from geodesic_core.kernels.wavefront import NODE, PIECE, PIECE_ENDS, SITE, Sites
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.surface_point import UNPLACED, SurfacePoint
 
@@ -19,7 +19,10 @@ class Nodes:
     """The nodes of the sources of a sweep, and of what it is to reach."""
 
     sources: Ints
-    """(N,): an inner vertex, or a number beyond the vertices, for each source"""
+    """(N,): an inner vertex, or a number beyond the vertices, for each point and each piece of the
+    sources"""
+    origins: Ints
+    """(N,): which of the sources each belongs to"""
     targets: Ints
     """(M,): the same for each target"""
     sites: Sites
@@ -29,8 +32,24 @@ class Nodes:
     """Those that became sites, in the order of their nodes."""
     positions: Floats
     """(sites, 3), mesh units"""
+    pieces: tuple[PieceInFace, ...]
+    """The pieces of curves, in the order of their nodes, each in one of its faces."""
+    first_piece: int
+    """The node of the first"""
     components: tuple[int, ...]
     """Those of the mesh with a source in them"""
+
+    def piece(self, node: int) -> PieceInFace | None:
+        """Return the piece of a node; None if it is none."""
+        rank = node - self.first_piece
+        return self.pieces[rank] if 0 <= rank < len(self.pieces) else None
+
+    def site(self, node: int) -> tuple[SurfacePoint, Floats]:
+        """Return the point of a node that is neither vertex nor piece, and its position."""
+        # What is asked for after a sweep comes behind its pieces.
+        rank = node - self.first_piece
+        rank += self.sites.nodes - len(self.pieces) - (len(self.pieces) if rank >= 0 else 0)
+        return self.points[rank], self.positions[rank]
 
 
 @dataclass(frozen=True)
@@ -58,7 +77,7 @@ class Ends:
         """Return the nodes of a sweep from one source to some targets."""
         nodes = self.nodes
         ints = nodes.sites.ints
-        start, ends = nodes.sources[[source]], nodes.targets[targets]
+        start, ends = nodes.sources[[source]], nodes.targets[targets]  # without curves, one each
         first = np.flatnonzero(ints[: nodes.first_target, NODE] == start)
         second = nodes.first_target + np.flatnonzero(
             np.isin(ints[nodes.first_target :, NODE], ends)
@@ -67,10 +86,9 @@ class Ends:
         return replace(
             nodes,
             sources=start,
+            origins=np.zeros(1, np.int32),
             targets=ends,
-            sites=Sites(
-                nodes.sites.nodes, ints[rows], nodes.sites.weights[rows], nodes.sites.windows
-            ),
+            sites=nodes.sites._replace(ints=ints[rows], weights=nodes.sites.weights[rows]),
             first_target=len(first),
             components=(int(self.source_components[source]),),
         )
@@ -90,48 +108,61 @@ def ends_of(
         target_components=np.array([component_of(mesh, point) for point in targets], np.int32),
         corners=corners,
         reaches=reaches,
-        nodes=nodes_of(mesh, sources, targets),
+        nodes=nodes_of(mesh, [(source,) for source in sources], targets),
     )
 
 
 def nodes_of(
-    mesh: TriangleMesh, sources: Sequence[SurfacePoint], targets: Sequence[SurfacePoint]
+    mesh: TriangleMesh, sources: Sequence[Polyline], targets: Sequence[SurfacePoint]
 ) -> Nodes:
-    """Return the nodes of canonical points."""
+    """Return the nodes of sources, which are points or curves, and of canonical points."""
     vertices = len(mesh.vertices)
     sited: list[SurfacePoint] = []
     rows: list[tuple[int, int, int]] = []
     weights: list[tuple[float, ...]] = []
 
-    def nodes(points: Sequence[SurfacePoint]) -> Ints:
-        found = np.empty(len(points), np.int32)
-        for i, point in enumerate(points):
-            if point.vertex_index is not None:
-                found[i] = mesh.topology.inner_vertex[point.vertex_index]
-                continue
-            found[i] = vertices + len(sited)
-            sited.append(point)
-            for face, at_corners in faces_of(mesh, point):
-                rows.append((int(found[i]), face, -1))
-                weights.append(at_corners)
-        return found
+    def node_of(point: SurfacePoint) -> int:
+        if point.vertex_index is not None:
+            return int(mesh.topology.inner_vertex[point.vertex_index])
+        node = vertices + len(sited)
+        sited.append(point)
+        for face, at_corners in weights_by_face(mesh, point).items():
+            rows.append((node, face, -1))
+            weights.append(at_corners)
+        return node
 
-    source_nodes = nodes(sources)
+    starts = [
+        (node_of(point), i) for i, line in enumerate(sources) for point in dict.fromkeys(line)
+    ]
     first_target = len(rows)
-    target_nodes = nodes(targets)
+    ends = [node_of(point) for point in targets]
+    pieces = [(i, piece) for i, line in enumerate(sources) for piece in pieces_of(mesh, line)]
+    first_piece = vertices + len(sited)
+    starts += [(first_piece + k, i) for k, (i, _) in enumerate(pieces)]
+    in_faces = [(first_piece + k, part) for k, (_, piece) in enumerate(pieces) for part in piece]
+    faces = [face for _, face, _ in rows] + [part.face for _, part in in_faces]
     return Nodes(
-        sources=source_nodes,
-        targets=target_nodes,
+        sources=np.array([node for node, _ in starts], np.int32),
+        origins=np.array([origin for _, origin in starts], np.int32),
+        targets=np.array(ends, np.int32),
         sites=Sites(
-            len(sited),
-            np.array(rows, np.int32).reshape(-1, SITE),
-            np.array(weights).reshape(-1, 3),
-            sum(_edge_faces(mesh, face) for _, face, _ in rows),
+            nodes=len(sited) + len(pieces),
+            ints=np.array(rows, np.int32).reshape(-1, SITE),
+            weights=np.array(weights).reshape(-1, 3),
+            windows=sum(_edge_faces(mesh, face) for face in faces),
+            piece_ints=np.array([(k, part.face) for k, part in in_faces], np.int32).reshape(
+                -1, PIECE
+            ),
+            piece_ends=np.array([part.start + part.end for _, part in in_faces]).reshape(
+                -1, PIECE_ENDS
+            ),
         ),
         first_target=first_target,
         points=tuple(sited),
         positions=np.array([mesh.position(point) for point in sited]).reshape(-1, 3),
-        components=tuple({component_of(mesh, point) for point in sources}),
+        pieces=tuple(piece[0] for _, piece in pieces),
+        first_piece=first_piece,
+        components=tuple({component_of(mesh, line[0]) for line in sources}),
     )
 
 
@@ -188,20 +219,3 @@ def corners_of(mesh: TriangleMesh, point: SurfacePoint) -> tuple[Ints, Floats]:
     corners = mesh.faces[point.face_index]
     away = mesh.vertices[corners] - mesh.position(point)
     return inner[corners], np.linalg.norm(away, axis=1)
-
-
-def faces_of(mesh: TriangleMesh, point: SurfacePoint) -> list[tuple[int, tuple[float, ...]]]:
-    """Return each inner face that a point belongs to, with its weights there."""
-    topology = mesh.topology
-    corners = topology.inner_vertex[mesh.faces[point.face_index]].tolist()
-    share = dict(zip(corners, point.barycentric, strict=True))
-
-    def weights_in(face: int) -> tuple[float, ...]:
-        inner_corners = topology.links[3 * face : 3 * face + 3, TAIL].tolist()
-        return tuple(share.get(corner, 0.0) for corner in inner_corners)
-
-    face = int(mesh.inner_face[point.face_index])
-    if 0.0 not in point.barycentric:
-        return [(face, weights_in(face))]
-    (h,) = (h for h in range(3 * face, 3 * face + 3) if share[topology.links[h, APEX]] == 0.0)
-    return [(g // 3, weights_in(g // 3)) for g in half_edges_around(topology.links, h)]

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.curve import foot_on
 from geodesic_core.errors import InternalError
 from geodesic_core.kernels import backtrace, places
 from geodesic_core.kernels.backtrace import Winners
@@ -116,12 +117,18 @@ def traced_path(
     places.place_nodes(
         mesh.topology, mesh.faces, nodes, parameters, faces, weights, vertices, points
     )
-    for i in (0, count - 1):
-        site = -1 - int(nodes[i]) - len(mesh.vertices)
-        if site >= 0:
-            point = nodes_of_sweep.points[site]
-            faces[i], vertices[i], weights[i] = point.face_index, -1, point.barycentric
-            points[i] = nodes_of_sweep.positions[site]
+    for i in (count - 1, 0):
+        node = -1 - int(nodes[i])
+        if node < len(mesh.vertices):
+            continue
+        piece = nodes_of_sweep.piece(node)
+        if piece is None:
+            point, points[i] = nodes_of_sweep.site(node)
+        else:
+            point = foot_on(mesh, piece, points[1])
+            points[i] = mesh.position(point)
+        faces[i], weights[i] = point.face_index, point.barycentric
+        vertices[i] = -1 if point.vertex_index is None else point.vertex_index
     kept = np.empty(count, np.uint8)
     places.leave_out_repeated(faces, weights, kept)
     where = np.flatnonzero(kept)

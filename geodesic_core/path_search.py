@@ -155,7 +155,7 @@ class PathSearch:
         limit = upper * (1.0 + leg.slack) + self._margin
         goal = self._goal(leg.start, limit)
         bounds = wavefront.merging_bounds(math.inf, leg.guide_error, math.inf, goal)
-        nodes = nodes_of(self.mesh, [leg.end.point], [leg.start.point])
+        nodes = nodes_of(self.mesh, [(leg.end.point,)], [leg.start.point])
         self._toward = with_sites(self._toward, nodes.sites)
         wave = self._toward = self._run(self._toward, nodes, bounds, leg.control, _AFTER_EDGES)
         node = int(nodes.targets[0])
@@ -172,7 +172,7 @@ class PathSearch:
     def _sweep_outward(self, leg: "_Leg", upper: float, goal: Goal) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
         bounds = wavefront.exact_bounds(math.inf, goal)
-        nodes = nodes_of(self.mesh, [leg.start.point], [leg.end.point])
+        nodes = nodes_of(self.mesh, [(leg.start.point,)], [leg.end.point])
         self._outward = with_sites(self._outward, nodes.sites)
         wave = self._outward = self._run(
             self._outward, nodes, bounds, leg.control, _AFTER_APPROXIMATE

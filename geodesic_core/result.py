@@ -10,12 +10,13 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.arrival import Arrival, arrival_at, with_target
-from geodesic_core.errors import InternalError, NoPath
+from geodesic_core.curve import Curve, Polyline
+from geodesic_core.errors import InternalError, InvalidArgument, NoPath
 from geodesic_core.gradient import gradient_at_vertices
 from geodesic_core.isolines import Isoline, as_chord_error, as_levels, find_isolines, spaced_levels
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept
-from geodesic_core.kernels.wavefront import Bounds
+from geodesic_core.kernels.wavefront import Bounds, exact_bounds, with_strips
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest_source import NearestSource, find_nearest_source
 from geodesic_core.nodes import Nodes, component_of, disconnected
@@ -28,7 +29,7 @@ from geodesic_core.tolerances import PATH_LENGTH
 class Source:
     """A source, and the distance at which it starts (mesh units, 0 or more)."""
 
-    point: Point
+    point: Point | Curve
     start_distance: float = 0.0
 
 
@@ -68,7 +69,7 @@ class DistanceField:
     """(V,) int32 index into ``sources``; -1 where unreachable; ties to the lowest."""
     error_bound: ErrorBound
     stats: SweepStats
-    _places: tuple[SurfacePoint, ...]
+    _places: tuple[Polyline, ...]
     """The sources' points, canonical"""
     _bounds: Bounds
     _nodes: Nodes
@@ -82,11 +83,11 @@ class DistanceField:
     """For backtracing; None where the sweep kept nothing for it."""
     _windows: Kept | None
     """None where they were not kept."""
-    _sweep_again: Callable[[], tuple[Winners, Kept]]
+    _sweep_again: Callable[[Bounds], tuple[Winners, Kept]]
 
     @cached_property
     def _swept_again(self) -> tuple[Winners, Kept]:
-        return self._sweep_again()
+        return self._sweep_again(self._bounds)
 
     @property
     def _known_winners(self) -> Winners:
@@ -98,7 +99,8 @@ class DistanceField:
         At a vertex or a target of the sweep it is what the sweep found, O(1). Elsewhere it is
         exact, also where the field is approximate: by the windows of an exact field that kept them,
         O(windows of the face); else by an exact sweep from the point to the nearest source, in a
-        thin strip that the field's own values leave.
+        thin strip that the field's own values leave. Where a source is a curve, the first such
+        point runs the sweep again, exactly, and keeps its windows.
 
         Raises
         ------
@@ -151,10 +153,10 @@ class DistanceField:
                 raise self._no_path(place)
             return self._traced(place, self._known_winners, self._nodes, node)
         arrival = self._arrival_at(place)
-        if arrival is not None:
+        if arrival is not None and self._exact_ways is not None:
             if arrival.source < 0:
                 raise self._no_path(place)
-            reached = with_target(self.mesh, self._known_winners, self._nodes, place, arrival)
+            reached = with_target(self.mesh, self._exact_ways[0], self._nodes, place, arrival)
             return self._traced(place, *reached)
         path = self._nearest_to(place).path
         if path is None:
@@ -207,7 +209,7 @@ class DistanceField:
         Raises
         ------
         InvalidArgument
-            A level or the chord error is out of its domain.
+            A level or the chord error is out of its domain; or a source is a curve.
 
         Notes
         -----
@@ -215,6 +217,11 @@ class DistanceField:
         each level O(n² log n) for n windows in each face that it passes.
         """
         heights, error = as_levels(levels), as_chord_error(self.mesh, chord_error)
+        if self._bounds.strips:
+            raise InvalidArgument(
+                "a source of the field is a curve, of which no isolines are known yet: give the "
+                "curve's points as sources instead, as close as need be"
+            )
         windows = self._swept_again[1] if self._windows is None else self._windows
         within = [level for level in heights if level <= self.max_distance]
         lines = iter(
@@ -246,28 +253,41 @@ class DistanceField:
             return int(self.mesh.topology.inner_vertex[place.vertex_index])
         return self._node_of.get(place)
 
+    @cached_property
+    def _exact_ways(self) -> tuple[Winners, Kept] | None:
+        """The windows of an exact sweep; None where they were not kept, and need not be."""
+        if self._windows is not None and not self._bounds.merging:
+            return self._known_winners, self._windows
+        if self._bounds.strips:  # a sweep back from a point ends at points, not on curves
+            exact = exact_bounds(self.max_distance)
+            return self._sweep_again(with_strips(exact, self._bounds.first_piece))
+        return None
+
     def _arrival_at(self, place: SurfacePoint) -> Arrival | None:
         """How kept windows reach a point; None where there are none, or they are merged ones."""
-        if self._windows is None or self._bounds.merging:
+        if self._exact_ways is None:
             return None
-        return arrival_at(
-            self.mesh, self._known_winners, self._windows, self._nodes, place, self.max_distance
-        )
+        return arrival_at(self.mesh, *self._exact_ways, self._nodes, place, self.max_distance)
 
     def _nearest_to(self, place: SurfacePoint) -> NearestSource:
         starts = np.array([source.start_distance for source in self.sources])
         return find_nearest_source(
-            self.mesh, self._places, starts, self._node_distances, self._bounds, place
+            self.mesh,
+            [line[0] for line in self._places],
+            starts,
+            self._node_distances,
+            self._bounds,
+            place,
         )
 
     def _no_path(self, place: SurfacePoint) -> NoPath:
-        if component_of(self.mesh, place) in {component_of(self.mesh, p) for p in self._places}:
+        if component_of(self.mesh, place) in {component_of(self.mesh, p) for p, *_ in self._places}:
             return NoPath(
                 f"{place} is farther than max_distance = {self.max_distance:g} from every source",
                 "beyond_max_distance",
             )
         message = f"{place} is in another connected component than every source"
-        return disconnected(self.mesh, message, place, *self._places)
+        return disconnected(self.mesh, message, place, *(line[0] for line in self._places))
 
 
-Sources = Point | Source | Sequence[Point | Source]
+Sources = Point | Curve | Source | Sequence[Point | Curve | Source]

@@ -112,7 +112,7 @@ def sweep_nodes(
         As in `run_sweep`.
     """
     topology = mesh.topology
-    sweep.start_sweep(topology, wave, nodes.sources, start_distances, bounds)
+    sweep.start_sweep(topology, wave, nodes.sources, nodes.origins, start_distances, bounds)
     sites.watch_sites(topology, wave, bounds, nodes.first_target)
     wave = run_sweep(mesh, wave, bounds, control, share_done, limit_of)
     sites.reach_sites_inside(topology, wave, bounds, nodes.first_target)
@@ -186,6 +186,8 @@ def winners_of(wave: Wavefront, nearest: Ints) -> Winners:
         merge_ints=wave.merge_ints[:count],
         site_ints=wave.site_ints,
         site_weights=wave.site_weights,
+        piece_ints=wave.piece_ints,
+        piece_ends=wave.piece_ends,
     )
 
 

@@ -13,11 +13,12 @@ from scipy.sparse import csr_array
 
 from geodesic_core.arguments import as_barriers, as_limit, is_number
 from geodesic_core.arrays import Floats
+from geodesic_core.curve import Curve, Polyline, polyline_of
 from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.kernels import kept, sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept
-from geodesic_core.kernels.wavefront import Bounds, Wavefront
+from geodesic_core.kernels.wavefront import Bounds, Wavefront, with_strips
 from geodesic_core.matrix import Layout, find_matrix
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest import Nearest, find_nearest
@@ -51,7 +52,8 @@ def exact_distance(
     mesh
         The surface.
     sources
-        A vertex index, a `SurfacePoint`, a `Source` with a start distance, or several of these.
+        A vertex index, a `SurfacePoint`, a `Curve`, a `Source` with a start distance, or several
+        of these.
     max_distance
         Vertices farther than this (mesh units) are not looked for; they count as unreachable.
     targets
@@ -161,7 +163,7 @@ def shortest_path(
     deadline_s: float | None = None,
     memory_limit: int | None = None,
 ) -> GeodesicPath:
-    """Return an exact shortest path between two vertices (section 5).
+    """Return an exact shortest path between two points of the surface (section 5).
 
     For many paths on one mesh, a `Solver` is faster.
 
@@ -345,6 +347,8 @@ def _solve(
     ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
     nodes = nodes_of(mesh, places, ends)
     distances = np.array([start.start_distance for start in starts])
+    if nodes.pieces:
+        bounds = with_strips(bounds, nodes.first_piece)
     wave = _sweep(mesh, nodes, distances, bounds, control, paths=paths, windows=windows)
     wave.distance[wave.distance > bounds.max_distance] = math.inf
     winners = _winners_of(wave)
@@ -367,7 +371,7 @@ def _solve(
         _node_nearest=winners.nearest,
         _winners=winners if paths else None,
         _windows=kept.kept_of(wave) if windows else None,
-        _sweep_again=partial(_sweep_again, mesh, nodes, distances, bounds),
+        _sweep_again=partial(_sweep_again, mesh, nodes, distances),
     )
 
 
@@ -457,16 +461,19 @@ def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, f
 
 def _as_sources(
     mesh: TriangleMesh, sources: Any
-) -> tuple[tuple[Source, ...], tuple[SurfacePoint, ...]]:
+) -> tuple[tuple[Source, ...], tuple[Polyline, ...]]:
     """Return the sources, and their canonical points."""
     if isinstance(sources, str | bytes):
         raise InvalidPoint(f"the source is {sources!r}; it must be a vertex index or a Source")
-    if isinstance(sources, Source | SurfacePoint) or not isinstance(sources, Iterable):
+    if isinstance(sources, Source | SurfacePoint | Curve) or not isinstance(sources, Iterable):
         sources = [sources]
     found, places = [], []
     for i, item in enumerate(sources):
         source = item if isinstance(item, Source) else Source(item)
-        places.append(mesh.point(source.point, f"source {i}"))
+        if isinstance(source.point, Curve):
+            places.append(polyline_of(mesh, source.point, f"source {i}"))
+        else:
+            places.append((mesh.point(source.point, f"source {i}"),))
         start = source.start_distance
         if not is_number(start) or not (math.isfinite(start) and start >= 0.0):
             raise InvalidArgument(

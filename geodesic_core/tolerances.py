@@ -168,6 +168,13 @@ Less is a sliver or rounding, where three corners lie on one line: another way t
 looked for. The surface of a flat polygon is the same either way.
 """
 
+SLANT = 1e-9
+"""Sine of the angle to an edge from which on the rays of a curve's piece are sent across it.
+
+Of rays that are flatter, those that meet the edge leave the piece within so small a share of the
+edge from its end that the rays of that end are as near: the square of this share is no number.
+"""
+
 LEVEL = 1e-12
 """Relative difference within which two ways to a point of an isoline count as equally long.
 

@@ -43,14 +43,12 @@ def _distances_to_csv(file: IO[bytes], field: "DistanceField") -> None:
 
 
 def _distances_to_json(file: IO[bytes], field: "DistanceField") -> None:
-    from app.points import described
+    from app.points import described_source
 
     _dump_json(
         file,
         {
-            "sources": [
-                described(field.mesh, field.mesh.point(source.point)) for source in field.sources
-            ],
+            "sources": [described_source(field.mesh, source) for source in field.sources],
             "distances": field.distances,  # infinity becomes null
             "nearest_source": field.nearest_source,
             "error_bound": field.error_bound,

@@ -72,7 +72,9 @@ def bound_vertex(wave: Any, v: int, upper: float) -> None:
 
 
 @kernel
-def light_vertex(wave: Any, v: int, distance: float, via: int, sx: float, sy: float) -> None:
+def light_vertex(
+    wave: Any, v: int, distance: float, via: int, sx: float, sy: float, sw: float
+) -> None:
     """Note the direction in which v sees a pseudosource that reaches it at ``distance``.
 
     Where windows are merged, the winner's direction need not be that of the exact path: all that
@@ -81,7 +83,7 @@ def light_vertex(wave: Any, v: int, distance: float, via: int, sx: float, sy: fl
     """
     if distance > wave.upper[v] * (1.0 + SLACK):
         return
-    angle = incoming_angle(wave, via, sx, sy)
+    angle = incoming_angle(wave, via, sx, sy, sw)
     row = LIGHT * v
     lo, hi = wave.light[row + LIT_FROM], wave.light[row + LIT_TO]
     if lo > hi:
@@ -99,17 +101,17 @@ def light_vertex(wave: Any, v: int, distance: float, via: int, sx: float, sy: fl
 
 
 @kernel
-def incoming_angle(wave: Any, via: int, sx: float, sy: float) -> float:
+def incoming_angle(wave: Any, via: int, sx: float, sy: float, sw: float) -> float:
     """Angle, in its unfolded fan, at which the apex of a half-edge sees a pseudosource.
 
-    The pseudosource is at (sx, sy) in the frame of the half-edge ``via``.
+    The pseudosource is at (sx, sy, sw) in the frame of the half-edge ``via``.
     """
     row = ROW * via
     # From the apex: toward the tail, and toward the pseudosource
     ex = -wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
     ey = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
     hx = ex + wave.geometry[row + LENGTH]
-    dx, dy = sx + ex, sy + ey
+    dx, dy = sx + sw * ex, sy + sw * ey
     if hx * dy - ey * dx > 0.0:  # beyond the head
         dx, dy = hx, ey
     turn = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)

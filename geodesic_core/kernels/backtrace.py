@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import kernel, pointer
+from geodesic_core.kernels.pieces import distance_to_piece, is_piece
 from geodesic_core.kernels.topology import (
     APEX,
     AROUND,
@@ -49,7 +50,7 @@ from geodesic_core.kernels.wavefront import (
     SPLIT,
     VIA,
 )
-from geodesic_core.tolerances import ON_PATH, SAME_PLACE
+from geodesic_core.tolerances import GAP, ON_PATH, SAME_PLACE
 
 
 class Winners(NamedTuple):
@@ -65,6 +66,8 @@ class Winners(NamedTuple):
     merge_ints: Ints
     site_ints: Ints
     site_weights: Floats
+    piece_ints: Ints
+    piece_ends: Floats
 
 
 # Outcomes
@@ -78,30 +81,40 @@ FORKS = 64
 
 @kernel
 def cross_edge(
-    x: float, sx: float, sy: float, length: float, cosine: float, sine: float
+    x: float, sx: float, sy: float, sw: float, length: float, cosine: float, sine: float
 ) -> tuple[float, float, float]:
-    """Walk from (x, 0) toward s and out over the left edge of a face.
+    """Walk from (x, 0) toward s, of weight sw, and out over the left edge of a face.
 
     Returns the exit's distance from the tail and s in the frame of that edge, whose own face is
     ahead again (y > 0).
     """
     along, ahead = sx * cosine + sy * sine, sy * cosine - sx * sine
     ex, ey = x * cosine, -x * sine
-    if ahead <= ey:  # parallel within rounding: s lies on the edge's line
+    if ahead <= sw * ey:  # parallel within rounding: s lies on the edge's line
         return min(max(along, 0.0), length), along, ahead
-    u = ex - (along - ex) * ey / (ahead - ey)
+    u = ex - (along - sw * ex) * ey / (ahead - sw * ey)
     return min(max(u, 0.0), length), along, ahead
 
 
 @kernel
 def row_in_face(winners: Any, node: int, face: int) -> int:
-    """Row of a site in a face; -1 where it is not in that face, or is a vertex."""
+    """Row of a site in a face; -1 where it is not in that face, or no site."""
     rows = len(winners.site_ints)
     if rows == 0 or node < winners.site_ints[0, NODE]:
         return -1
     for k in range(rows):
         if winners.site_ints[k, NODE] == node and winners.site_ints[k, FACE] == face:
             return k
+    return -1
+
+
+@kernel
+def piece_in_face(winners: Any, node: int, face: int) -> int:
+    """Row of a piece in a face; -1 where it is not in that face, or no piece."""
+    if is_piece(winners.piece_ints, node):
+        for k in range(len(winners.piece_ints)):
+            if winners.piece_ints[k, NODE] == node and winners.piece_ints[k, FACE] == face:
+                return k
     return -1
 
 
@@ -224,10 +237,11 @@ def trace_line(
     reference = winners.reference[v] if len(winners.reference) > 0 else -1 - root
     if reference >= 0:
         root = -1  # not known before the merges are undone
+    sw = 0.0 if is_piece(winners.piece_ints, root) else 1.0
     face, length = m // 3, geometry[m, LENGTH]
     ax, ay = target_in_frame(topology, winners, v, m)
     faces[count - 1] = face
-    if row_in_face(winners, root, face) >= 0:
+    if row_in_face(winners, root, face) >= 0 or piece_in_face(winners, root, face) >= 0:
         return TRACED, count, root
     tail, head = links[m, TAIL], links[m, HEAD]
     if tail == root or is_on_path(winners, tail, math.hypot(ax, ay), distance[v], v):
@@ -235,9 +249,12 @@ def trace_line(
     if head == root or is_on_path(winners, head, math.hypot(ax - length, ay), distance[v], v):
         return TRACED, count, head
     # From there back over m itself
-    x = sx if ay <= sy else (sx * ay - ax * sy) / (ay - sy)
+    rise = sw * ay - sy
+    x = (sx * ay - ax * sy) / rise if rise > 0.0 else sx
     x = min(max(x, 0.0), length)
-    sigma = distance[v] - math.hypot(ax - x, ay) - math.hypot(sx - x, sy)
+    sigma = distance[v] - math.hypot(ax - x, ay)  # of a strip, the distance at x
+    if sw > 0.0:
+        sigma -= math.hypot(sx - x, sy)
     # Where other faces may be tried: what was known there, and which one was the last
     forks, fork_ints = np.empty((FORKS, 4)), np.empty((FORKS, 4), np.int32)
     fork_count, after = 0, -1
@@ -262,7 +279,7 @@ def trace_line(
             length = geometry[m, LENGTH]
             sy = -sy
             if not same:
-                x, sx = length - x, length - sx
+                x, sx = length - x, sw * length - sx
             if count >= len(nodes):
                 return NO_ROOM, count, -1
             nodes[count], parameters[count], face = h, x / length, h // 3
@@ -270,40 +287,42 @@ def trace_line(
             count += 1
             # At (x, 0) on h, its face and the pseudosource ahead
             # The root may be in this face, but elsewhere, where the path did not come from it.
-            rest = math.sqrt((sx - x) * (sx - x) + sy * sy)
+            rest = math.sqrt((sx - x) * (sx - x) + sy * sy) if sw > 0.0 else 0.0
             most = rest if fork_count > 0 else math.inf
             if row_in_face(winners, root, face) >= 0:
                 px, py = target_in_frame(topology, winners, root, h)
-                if math.hypot(px - x, py) <= most * (1.0 + SAME_PLACE):
+                if math.hypot(px - x, py) <= most * (1.0 + SAME_PLACE) + GAP * length:
+                    return TRACED, count, root
+            k = piece_in_face(winners, root, face)
+            if k >= 0:
+                ends = pointer(winners.piece_ends)
+                reach = distance_to_piece(pointer(geometry), ends, k, h, x, 0.0)
+                if fork_count == 0 or distance[root] + reach <= sigma + SAME_PLACE * length:
                     return TRACED, count, root
             apex = links[h, APEX]
             ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
             ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
             reach = math.sqrt((ax - x) * (ax - x) + ay * ay)
-            is_root = apex == root and reach <= most * (1.0 + SAME_PLACE)
+            is_root = apex == root and reach <= most * (1.0 + SAME_PLACE) + GAP * length
             if is_root or is_on_path(winners, apex, reach, sigma + rest, v):
                 return TRACED, count, apex
-            if (ax - x) * sy - ay * (sx - x) >= 0.0:  # s is left of the apex
-                side = geometry[h, LENGTH_LEFT]
-                x, sx, sy = cross_edge(
-                    x, sx, sy, side, geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
-                )
-                m, x, sx = previous(h), side - x, side - sx
+            if (ax - x) * sy - ay * (sx - sw * x) >= 0.0:  # s is left of the apex
+                m, side = previous(h), geometry[h, LENGTH_LEFT]
+                cosine, sine = geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
             else:  # the same, in the mirror
-                side = geometry[h, LENGTH_RIGHT]
-                x, sx, sy = cross_edge(
-                    length - x,
-                    length - sx,
-                    sy,
-                    side,
-                    geometry[h, COS_RIGHT],
-                    geometry[h, SIN_RIGHT],
-                )
-                m = following(h)
-            # In a face that the path did not come from, the line ends where there is no root; or
-            # before it meets the edge on which windows were merged.
-            is_due = reference >= 0 and winners.merge_ints[reference, MERGED_ON] == m
-            is_lost = fork_count > 0 and not is_due and sy <= SAME_PLACE * side
+                m, side = following(h), geometry[h, LENGTH_RIGHT]
+                cosine, sine = geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT]
+                x, sx = length - x, sw * length - sx
+            u, sx, sy = cross_edge(x, sx, sy, sw, side, cosine, sine)
+            left = sy  # how far the root is, at least
+            if sw == 0.0:
+                sigma -= math.hypot(u * cosine - x, u * sine)
+                left = sigma - distance[root]
+            x = u
+            if m == previous(h):
+                x, sx = side - u, sw * side - sx
+            # In a face that the path did not come from, the line ends where there is no root.
+            is_lost = fork_count > 0 and left <= 0.0
             sy, after = -sy, -1
         if is_lost:
             if fork_count == 0:

@@ -2,8 +2,9 @@
 
 All that crosses a half-edge into its face was propagated from its list. So the least distance of a
 point of a face is that by a window of one of its three half-edges, from one of its corners, or from
-a source inside it: paths that reach it over an edge, along one, and within. A list may have been
-propagated several times. What later ones improve is then kept as well: it costs time, no accuracy.
+a source inside it, a point or a piece of a curve: paths that reach it over an edge, along one, and
+within. A list may have been propagated several times. What later ones improve is then kept as well:
+it costs time, no accuracy.
 """
 
 import math
@@ -13,7 +14,8 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Longs, aligned_rows
 from geodesic_core.kernels.arrival import precedence
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import kernel, pointer
+from geodesic_core.kernels.pieces import distance_to_piece, is_piece
 from geodesic_core.kernels.sites import way_through
 from geodesic_core.kernels.topology import LENGTH, TAIL, point_in_frame
 from geodesic_core.kernels.wavefront import FACE, KEPT, NODE, Wavefront
@@ -92,7 +94,8 @@ def reach_point(
         gap = GAP * geometry[h, LENGTH]
         for i in range(kept.first[h], kept.first[h + 1]):
             w = kept.windows[i]
-            there = w[SIGMA] + way_through(x, y, w[B0], w[B1], w[SX], w[SY], gap)
+            sw = 0.0 if is_piece(winners.piece_ints, ints[i, ROOT]) else 1.0
+            there = way_through(x, y, w[B0], w[B1], w[SX], w[SY], sw, w[SIGMA], gap)
             source = nearest[ints[i, ROOT]]
             if precedence(there, source, best, best_source):
                 best, best_source, via, root = min(best, there), source, h, ints[i, ROOT]
@@ -110,4 +113,13 @@ def reach_point(
                 if precedence(there, nearest[node], best, best_source):
                     best, best_source, via, root = min(best, there), nearest[node], h, node
                     sx, sy = px, py
+        for k in range(len(winners.piece_ints) if h == 3 * face else 0):
+            if winners.piece_ints[k, FACE] == face:
+                node = winners.piece_ints[k, NODE]
+                ends = pointer(winners.piece_ends)
+                there = distance_to_piece(pointer(geometry), ends, k, h, x, y)
+                there += winners.distance[node]
+                if precedence(there, nearest[node], best, best_source):
+                    best, best_source, via, root = min(best, there), nearest[node], h, node
+                    sx, sy = 0.0, 0.0
     return Reach(best, via, sx, sy, root)

@@ -18,6 +18,7 @@ from geodesic_core.kernels.wavefront import (
     MARKS,
     SIZE,
     merging,
+    source_weight,
 )
 from geodesic_core.kernels.window import (
     B0,
@@ -122,6 +123,7 @@ def send_across(wave: Any, g: int, slot: int) -> None:
     root, xi, reference = wave.window_ints[INTS * slot + ROOT], 0.0, -1
     if merging(wave):
         xi, reference = wave.windows[w + XI], wave.window_ints[INTS * slot + REFERENCE]
+    sw = source_weight(wave, root)
     same, h = True, g
     while True:
         code = links[ROW * h + AROUND]
@@ -131,9 +133,8 @@ def send_across(wave: Any, g: int, slot: int) -> None:
         if h == g:
             break
         if same:
-            copy = put_window(
-                wave, length - b1, length - b0, length - sx, sy, sigma, root, xi, reference
-            )
+            mx, m_sigma = length * sw - sx, sigma if sw == 1.0 else sigma - sx * length
+            copy = put_window(wave, length - b1, length - b0, mx, sy, m_sigma, root, xi, reference)
         else:
             copy = put_window(wave, b0, b1, sx, sy, sigma, root, xi, reference)
         insert_sorted(wave, h, copy)

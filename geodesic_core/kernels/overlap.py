@@ -1,7 +1,7 @@
 """Two windows that overlap on one edge: who keeps what (sections 3.3 and 3.4)."""
 
 from geodesic_core.kernels.jit import inlined
-from geodesic_core.kernels.planar import bisector
+from geodesic_core.kernels.planar import bisector, bracketed
 from geodesic_core.kernels.window import distance_at
 
 
@@ -15,12 +15,23 @@ def wins_throughout(
     lx: float,
     ly: float,
     l_sigma: float,
+    ww: float = 1.0,
+    lw: float = 1.0,
 ) -> bool:
     """Whether a window that wins at both ends of [lo, hi] wins between them too.
 
     The loser's lead is stationary only where the point and both sources are collinear. There is one
     such point; if it lies outside, or the winner leads there as well, the winner leads throughout.
+    Between a strip and another window there is one, too; distances of a strip are linear, the
+    others' convex, so that only the latter can win between two ends that they lost.
     """
+    if ww * lw == 0.0:
+        if lw == 0.0:
+            return True
+        x = lx - wx * abs(ly / wy)  # where the ray from the loser runs along the strip's
+        if x <= lo or x >= hi:
+            return True
+        return w_sigma - wx * x <= distance_at(x, lx, ly, l_sigma)
     if w_sigma >= l_sigma or wy == ly:
         return True
     x = (wx * ly - lx * wy) / (ly - wy)
@@ -53,6 +64,8 @@ def trim(
     c_sigma: float,
     least: float,
     least_uneven: float,
+    pw: float = 1.0,
+    cw: float = 1.0,
 ) -> tuple[float, float, float, float]:
     """Trim the windows p and c of one edge to where each is nearest; return p0, p1, c0, c1.
 
@@ -66,7 +79,7 @@ def trim(
     lo, hi = max(p0, c0), min(p1, c1)
     if hi - lo <= (least if p_sigma == c_sigma else least_uneven):
         return p0, p1, c0, c1
-    if p_sigma == c_sigma:
+    if p_sigma == c_sigma and pw * cw == 1.0:
         # Mostly two images of one pseudosource: their bisector is a straight line, and squares of
         # distances compare as well. Saves four roots and a division, 15 % of the sweep.
         x0, x1 = px - lo, cx - lo
@@ -86,16 +99,19 @@ def trim(
             c0, c1 = without(c0, c1, x, hi)
             p0, p1 = without(p0, p1, lo, x)
         return p0, p1, c0, c1
-    lead_lo = distance_at(lo, cx, cy, c_sigma) - distance_at(lo, px, py, p_sigma)
-    lead_hi = distance_at(hi, cx, cy, c_sigma) - distance_at(hi, px, py, p_sigma)
+    lead_lo = distance_at(lo, cx, cy, c_sigma, cw) - distance_at(lo, px, py, p_sigma, pw)
+    lead_hi = distance_at(hi, cx, cy, c_sigma, cw) - distance_at(hi, px, py, p_sigma, pw)
     if lead_lo >= 0.0 and lead_hi >= 0.0:
-        if wins_throughout(lo, hi, px, py, p_sigma, cx, cy, c_sigma):
+        if wins_throughout(lo, hi, px, py, p_sigma, cx, cy, c_sigma, pw, cw):
             c0, c1 = without(c0, c1, lo, hi)
     elif lead_lo <= 0.0 and lead_hi <= 0.0:
-        if wins_throughout(lo, hi, cx, cy, c_sigma, px, py, p_sigma):
+        if wins_throughout(lo, hi, cx, cy, c_sigma, px, py, p_sigma, cw, pw):
             p0, p1 = without(p0, p1, lo, hi)
     else:
-        x = bisector(lo, hi, px, py, p_sigma, cx, cy, c_sigma)
+        if pw * cw == 0.0:
+            x = bracketed(lo, hi, px, py, cx, cy, c_sigma - p_sigma, pw, cw)
+        else:
+            x = bisector(lo, hi, px, py, p_sigma, cx, cy, c_sigma)
         if lead_lo > 0.0:  # p wins below x
             c0, c1 = without(c0, c1, lo, x)
             p0, p1 = without(p0, p1, x, hi)
@@ -119,6 +135,8 @@ def leaves_gap(
     c_upper: float,
     p_sigma: float,
     c_sigma: float,
+    pw: float = 1.0,
+    cw: float = 1.0,
 ) -> bool:
     """Whether trimming left a shadow between two windows that a shortest path may run into.
 
@@ -130,12 +148,13 @@ def leaves_gap(
     if p1 <= p0 or c1 <= c0:
         return False
     if p1 == c0:
-        x, ahead = p1, (p1 - px) * cy - (p1 - cx) * py  # > 0: p's ray leans less to the right
+        # > 0: p's ray leans less to the right
+        x, ahead = p1, (p1 * pw - px) * cy - (p1 * cw - cx) * py
     elif c1 == p0:
-        x, ahead = p0, (p0 - cx) * py - (p0 - px) * cy
+        x, ahead = p0, (p0 * cw - cx) * py - (p0 * pw - px) * cy
     else:
         return False
     if ahead <= 1e-12 * (py * cy):
         return False
-    p_least, c_least = distance_at(x, px, py, 0.0), distance_at(x, cx, cy, 0.0)
+    p_least, c_least = distance_at(x, px, py, 0.0, pw), distance_at(x, cx, cy, 0.0, cw)
     return p_least + p_upper >= c_least + c_sigma and c_least + c_upper >= p_least + p_sigma

@@ -1,7 +1,8 @@
 r"""Plane geometry of one unfolded triangle: scalars in, scalars out.
 
 The frame of a half-edge has its tail at the origin, its head at (length, 0) and its face on y > 0.
-The unfolded source of a window lies at (sx, sy) with sy <= 0::
+The unfolded source of a window lies at (sx, sy) with sy <= 0; if its weight sw is 0, at infinity in
+that direction::
 
                  apex
                  /|\
@@ -21,31 +22,43 @@ _MOST_STEPS = 100  # of false position, which takes less than ten
 
 
 @inlined
-def hit_left(b: float, sy: float, sy_left: float, sin_left: float, length_left: float) -> float:
+def hit_left(
+    b: float, sy: float, sy_left: float, sin_left: float, length_left: float, sw: float = 1.0
+) -> float:
     """Distance from the tail at which the ray from s through (b, 0) meets the edge (tail, apex).
 
     ``sy_left`` is the source's y in the frame of that edge. A ray that passes the apex on the other
     side, or never meets the line, gives the apex.
     """
-    height = sy_left + b * sin_left
+    height = sy_left + b * sw * sin_left
     if height >= 0.0:
         return length_left
     return min(b * sy / height, length_left)
 
 
 @inlined
-def distance(x: float, sx: float, sy: float) -> float:
-    """Distance from (x, 0) to (sx, sy)."""
+def distance(x: float, sx: float, sy: float, sw: float = 1.0) -> float:
+    """Distance from (x, 0) to (sx, sy); to one at infinity, less that from the origin."""
+    if sw == 0.0:
+        return -sx * x
     return math.sqrt((x - sx) * (x - sx) + sy * sy)
 
 
 @kernel
 def bracketed(
-    lo: float, hi: float, s0x: float, s0y: float, s1x: float, s1y: float, delta: float
+    lo: float,
+    hi: float,
+    s0x: float,
+    s0y: float,
+    s1x: float,
+    s1y: float,
+    delta: float,
+    s0w: float = 1.0,
+    s1w: float = 1.0,
 ) -> float:
     """Find what `bisector` looks for by false position (Illinois), to within rounding."""
-    lead_lo = distance(lo, s1x, s1y) + delta - distance(lo, s0x, s0y)
-    lead_hi = distance(hi, s1x, s1y) + delta - distance(hi, s0x, s0y)
+    lead_lo = distance(lo, s1x, s1y, s1w) + delta - distance(lo, s0x, s0y, s0w)
+    lead_hi = distance(hi, s1x, s1y, s1w) + delta - distance(hi, s0x, s0y, s0w)
     if lead_lo * lead_hi >= 0.0:  # no sign change: by rounding alone, at an end
         return lo if abs(lead_lo) <= abs(lead_hi) else hi
     x, moved = lo, 0
@@ -53,9 +66,9 @@ def bracketed(
         x = lo - lead_lo * ((hi - lo) / (lead_hi - lead_lo))
         if x <= lo or x >= hi:
             break
-        r0, r1 = distance(x, s0x, s0y), distance(x, s1x, s1y)
+        r0, r1 = distance(x, s0x, s0y, s0w), distance(x, s1x, s1y, s1w)
         lead = r1 + delta - r0
-        if abs(lead) <= _ROUNDING * (r0 + r1):
+        if abs(lead) <= _ROUNDING * (abs(r0) + abs(r1)):
             break
         if (lead > 0.0) == (lead_lo > 0.0):
             lo, lead_lo = x, lead

@@ -15,7 +15,7 @@ from geodesic_core.kernels.lists import (
 )
 from geodesic_core.kernels.merge import merged
 from geodesic_core.kernels.overlap import leaves_gap, trim
-from geodesic_core.kernels.planar import hit_left
+from geodesic_core.kernels.planar import distance, hit_left
 from geodesic_core.kernels.sites import reach_sites
 from geodesic_core.kernels.topology import (
     APEX,
@@ -59,6 +59,7 @@ from geodesic_core.kernels.wavefront import (
     SPLIT,
     WORK,
     merging,
+    source_weight,
 )
 from geodesic_core.kernels.window import (
     B0,
@@ -73,6 +74,8 @@ from geodesic_core.kernels.window import (
     WIDTH,
     XI,
     reaches,
+    straight_distance,
+    within,
 )
 from geodesic_core.tolerances import BEND, GAP, LOOSE_OVERLAP, OVERLAP, RUNS, SLACK
 
@@ -109,7 +112,8 @@ def collect(wave: Any, h: int) -> int:
     uneven_overlap = overlap if merging(wave) else LOOSE_OVERLAP * length
     limited = wave.max_distance < math.inf
     count = 0
-    p0, p1, px, py, p_sigma = 0.0, 0.0, 0.0, 0.0, 0.0  # the window last kept, also in scratch
+    # The window last kept, also in scratch
+    p0, p1, px, py, pw, p_sigma = 0.0, 0.0, 0.0, 0.0, 1.0, 0.0
     xi, p_xi = 0.0, 0.0
     slot = wave.lists[LIST * h + FIRST]
     for _ in range(wave.lists[LIST * h + SIZE]):
@@ -117,19 +121,19 @@ def collect(wave: Any, h: int) -> int:
         b0, b1 = wave.windows[w + B0], wave.windows[w + B1]
         sx, sy, sigma = wave.windows[w + SX], wave.windows[w + SY], wave.windows[w + SIGMA]
         root = wave.window_ints[INTS * slot + ROOT]
-        reference = -1
+        sw, reference = source_weight(wave, root), -1
         if merging(wave):
             xi, reference = wave.windows[w + XI], wave.window_ints[INTS * slot + REFERENCE]
         slot = wave.window_ints[INTS * slot + NEXT]
-        if limited and not reaches(b0, b1, sx, sy, sigma, wave.max_distance):
+        if limited and not reaches(b0, b1, sx, sy, sigma, wave.max_distance, sw):
             continue
         while count > 0 and p1 >= b0:
             old_p0, old_p1, old_b0, old_b1 = p0, p1, b0, b1
             p0, p1, b0, b1 = trim(
-                p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, overlap, uneven_overlap
+                p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, overlap, uneven_overlap, pw, sw
             )
             if merging(wave) and leaves_gap(
-                p0, p1, px, py, p_sigma + p_xi, b0, b1, sx, sy, sigma + xi, p_sigma, sigma
+                p0, p1, px, py, p_sigma + p_xi, b0, b1, sx, sy, sigma + xi, p_sigma, sigma, pw, sw
             ):
                 p0, p1, b0, b1 = old_p0, old_p1, old_b0, old_b1
                 break
@@ -143,19 +147,19 @@ def collect(wave: Any, h: int) -> int:
                 p0, p1 = wave.scratch[p + B0], wave.scratch[p + B1]
                 px, py = wave.scratch[p + SX], wave.scratch[p + SY]
                 p_sigma = wave.scratch[p + SIGMA]
+                pw = source_weight(wave, wave.scratch_ints[INTS * (count - 1) + ROOT])
                 if merging(wave):
                     p_xi = wave.scratch[p + XI]
         if b1 <= b0:
             continue
         if count == 0:
-            room = from_tail + b1 - sigma
-            if room <= 0.0 or room * room < (sx - b1) * (sx - b1) + sy * sy:
+            if not within(b1, sx, sy, sw, sigma, from_tail + b1):
                 continue
         elif b0 > p1 and b0 - p1 <= gap:
             b0 = p1
         if merging(wave) and count > 0 and p0 <= b0 <= p1 <= b1:
             p_root = wave.scratch_ints[INTS * (count - 1) + ROOT]
-            if wave.origin[p_root] == wave.origin[root]:
+            if wave.origin[p_root] == wave.origin[root] and pw * sw == 1.0:
                 can, nx, ny, n_sigma, n_xi = merged(
                     wave, p0, p1, px, py, p_sigma, p_xi, b0, b1, sx, sy, sigma, xi
                 )
@@ -165,7 +169,7 @@ def collect(wave: Any, h: int) -> int:
                     put_scratch(wave, count - 1, p0, p1, px, py, p_sigma)
                     wave.scratch[WIDTH * (count - 1) + XI] = p_xi
                     continue
-        p0, p1, px, py, p_sigma = b0, b1, sx, sy, sigma
+        p0, p1, px, py, pw, p_sigma = b0, b1, sx, sy, sw, sigma
         put_scratch(wave, count, b0, b1, sx, sy, sigma)
         wave.scratch_ints[INTS * count + ROOT] = root
         if merging(wave):
@@ -176,8 +180,8 @@ def collect(wave: Any, h: int) -> int:
     while count > 0:
         p = WIDTH * (count - 1)
         b0, sx, sy = wave.scratch[p + B0], wave.scratch[p + SX], wave.scratch[p + SY]
-        room = from_head - b0 - wave.scratch[p + SIGMA]
-        if room > 0.0 and room * room >= (sx - b0) * (sx - b0) + sy * sy:
+        sw = source_weight(wave, wave.scratch_ints[INTS * (count - 1) + ROOT])
+        if within(b0, sx, sy, sw, wave.scratch[p + SIGMA], from_head - b0):
             break
         count -= 1
     return count
@@ -243,7 +247,8 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
     for i in range(count):
         w = WIDTH * i
         sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
-        rise = ay - sy
+        sw = source_weight(wave, wave.scratch_ints[INTS * i + ROOT])
+        rise = ay * sw - sy
         x = sx * ay - ax * sy  # times rise: where the ray to the apex crosses
         if x > (wave.scratch[w + B1] + gap) * rise:
             last_left = i
@@ -251,7 +256,7 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
             if first_right < 0:
                 first_right = i
         else:
-            d = math.sqrt((ax - sx) * (ax - sx) + rise * rise) + wave.scratch[w + SIGMA]
+            d = straight_distance(ax, ay, sx, sy, sw, wave.scratch[w + SIGMA])
             origin = wave.origin[wave.scratch_ints[INTS * i + ROOT]]
             if merging(wave):
                 upper = min(upper, d + wave.scratch[w + XI])
@@ -262,10 +267,10 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
     if nearest < 0:
         surcharge += BEND
         if last_left >= 0:
-            best, crossing = bent_distance(wave, WIDTH * last_left, ax, ay)
+            best, crossing = bent_distance(wave, last_left, ax, ay)
             nearest = last_left
         if first_right >= 0:
-            d, b = bent_distance(wave, WIDTH * first_right, ax, ay)
+            d, b = bent_distance(wave, first_right, ax, ay)
             if d < best:
                 best, nearest, crossing = d, first_right, b
     w, v, reference = WIDTH * nearest, wave.links[ROW * h + APEX], -1
@@ -297,24 +302,26 @@ def light_apex(
     for i in range(count):
         w = WIDTH * i
         sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
-        rise = ay - sy
+        sw = source_weight(wave, wave.scratch_ints[INTS * i + ROOT])
+        rise = ay * sw - sy
         x = sx * ay - ax * sy
         covers = (wave.scratch[w + B0] - gap) * rise <= x <= (wave.scratch[w + B1] + gap) * rise
         if covers:
-            d = math.sqrt((ax - sx) * (ax - sx) + rise * rise) + wave.scratch[w + SIGMA]
-            light_vertex(wave, v, d, h, sx, sy)
+            d = straight_distance(ax, ay, sx, sy, sw, wave.scratch[w + SIGMA])
+            light_vertex(wave, v, d, h, sx, sy, sw)
         elif i == nearest:
-            light_vertex(wave, v, best, h, sx, sy)
+            light_vertex(wave, v, best, h, sx, sy, sw)
 
 
 @kernel
-def bent_distance(wave: Any, w: int, ax: float, ay: float) -> tuple[float, float]:
+def bent_distance(wave: Any, i: int, ax: float, ay: float) -> tuple[float, float]:
     """Distance to the apex through the end of a window that does not cover it, and that end."""
+    w, sw = WIDTH * i, source_weight(wave, wave.scratch_ints[INTS * i + ROOT])
     sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
     b = wave.scratch[w + B0]
-    if b * (ay - sy) <= sx * ay - ax * sy:
+    if b * (ay * sw - sy) <= sx * ay - ax * sy:
         b = wave.scratch[w + B1]
-    there = math.sqrt((sx - b) * (sx - b) + sy * sy)
+    there = distance(b, sx, sy, sw)
     onward = math.sqrt((ax - b) * (ax - b) + ay * ay)
     return there + onward + wave.scratch[w + SIGMA], b
 
@@ -345,7 +352,8 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
         xi, reference = 0.0, -1
         if merging(wave):
             xi, reference = wave.scratch[w + XI], wave.scratch_ints[INTS * i + REFERENCE]
-        rise, x = ay - sy, sx * ay - ax * sy
+        sw = source_weight(wave, wave.scratch_ints[INTS * i + ROOT])
+        rise, x = ay * sw - sy, sx * ay - ax * sy
         goes_left = x > b0 * rise
         goes_right = x < b1 * rise
         ends_at_apex = goes_left and goes_right
@@ -360,16 +368,16 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
                     goes_right = goes_right or b1 > crossing
                     goes_left = goes_left or b0 < crossing
             elif goes_left:
-                if b0 >= crossing and bent_distance(wave, w, ax, ay)[0] >= least:
+                if b0 >= crossing and bent_distance(wave, i, ax, ay)[0] >= least:
                     continue
-            elif b1 <= crossing and bent_distance(wave, w, ax, ay)[0] >= least:
+            elif b1 <= crossing and bent_distance(wave, i, ax, ay)[0] >= least:
                 continue
         if goes_left and left != NO_FACE:
             s_left = sy * cos_left - sx * sin_left
-            u0 = hit_left(b0, sy, s_left, sin_left, length_left)
+            u0 = hit_left(b0, sy, s_left, sin_left, length_left, sw)
             u1 = length_left
             if not ends_at_apex:
-                u1 = hit_left(b1, sy, s_left, sin_left, length_left)
+                u1 = hit_left(b1, sy, s_left, sin_left, length_left, sw)
             if u1 > u0:
                 along = sx * cos_left + sy * sin_left
                 root = wave.scratch_ints[INTS * i + ROOT]
@@ -381,14 +389,16 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
                 left_last = slot
                 left_size += 1
         if goes_right and right != NO_FACE:
-            s_right = (sx - length) * sin_right + sy * cos_right
-            u0 = hit_left(length - b1, sy, s_right, sin_right, length_right)
+            s_right = (sx - length * sw) * sin_right + sy * cos_right
+            u0 = hit_left(length - b1, sy, s_right, sin_right, length_right, sw)
             u1 = length_right
             if not ends_at_apex:
-                u1 = hit_left(length - b0, sy, s_right, sin_right, length_right)
+                u1 = hit_left(length - b0, sy, s_right, sin_right, length_right, sw)
             if u1 > u0:
-                along = length_right + (sx - length) * cos_right - sy * sin_right
+                along = length_right * sw + (sx - length * sw) * cos_right - sy * sin_right
                 root = wave.scratch_ints[INTS * i + ROOT]
+                if sw == 0.0:  # the frame begins at the apex
+                    sigma -= sx * ax + sy * ay
                 u0, u1 = length_right - u1, length_right - u0
                 slot = put_window(wave, u0, u1, along, s_right, sigma, root, xi, reference)
                 if right_last >= 0:

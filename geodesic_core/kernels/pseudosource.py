@@ -32,6 +32,7 @@ from geodesic_core.kernels.topology import (
 )
 from geodesic_core.kernels.wavefront import (
     CREATED,
+    FROM,
     LIGHT,
     LIT_FROM,
     LIT_TO,
@@ -41,6 +42,7 @@ from geodesic_core.kernels.wavefront import (
     VIA,
     WINNER,
     merging,
+    source_weight,
 )
 from geodesic_core.tolerances import FLAT, SECTOR_MARGIN
 
@@ -67,7 +69,8 @@ def emit_pseudosource(wave: Any, v: int) -> None:
         emit_shadows(wave, v)
     else:
         via = wave.winner_ints[WINNER * v + VIA]
-        lit = incoming_angle(wave, via, wave.winner[2 * v], wave.winner[2 * v + 1])
+        weight = source_weight(wave, wave.winner_ints[WINNER * v + FROM])
+        lit = incoming_angle(wave, via, wave.winner[2 * v], wave.winner[2 * v + 1], weight)
         if wave.flags[v] & BOUNDARY:
             emit_between(wave, v, lit + math.pi - SECTOR_MARGIN, total)
             emit_between(wave, v, 0.0, lit - math.pi + SECTOR_MARGIN)
@@ -161,7 +164,7 @@ def walk_edge(wave: Any, v: int, u: int, reach: float, via: int, place: float) -
     if merging(wave):
         bound_vertex(wave, u, wave.upper[v] + reach)
         if wave.flags[u]:
-            light_vertex(wave, u, distance, via, place, 0.0)
+            light_vertex(wave, u, distance, via, place, 0.0, 1.0)
     improve_vertex(wave, u, distance, via, place, 0.0, v, -1 - v)
 
 

@@ -10,8 +10,9 @@ import math
 from typing import Any
 
 from geodesic_core.kernels.arrival import bound_vertex, improve_vertex, light_vertex, precedence
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import kernel, pointer
 from geodesic_core.kernels.lists import insert_sorted, put_window, send_across
+from geodesic_core.kernels.pieces import distance_to_piece
 from geodesic_core.kernels.topology import (
     APEX,
     COS_LEFT,
@@ -32,14 +33,28 @@ from geodesic_core.kernels.wavefront import (
     MARKS,
     NEXT_SITE,
     NODE,
+    PIECE,
     SITE,
     SITE_SHIFT,
     VIA,
     WINNER,
     merging,
+    source_weight,
     view_of,
 )
-from geodesic_core.kernels.window import B0, B1, INTS, REFERENCE, ROOT, SIGMA, SX, SY, WIDTH
+from geodesic_core.kernels.window import (
+    B0,
+    B1,
+    INTS,
+    REFERENCE,
+    ROOT,
+    SIGMA,
+    SX,
+    SY,
+    WIDTH,
+    distance_at,
+    straight_distance,
+)
 from geodesic_core.tolerances import BEND, GAP
 
 
@@ -78,7 +93,7 @@ def emit_site(wave: Any, k: int) -> None:
         if merging(wave):
             bound_vertex(wave, apex, distance)
             if wave.flags[apex]:
-                light_vertex(wave, apex, distance, h, x, y)
+                light_vertex(wave, apex, distance, h, x, y, 1.0)
         improve_vertex(wave, apex, distance, h, x, y, node, -1 - node)
 
 
@@ -116,29 +131,40 @@ def reach_site(wave: Any, h: int, count: int, k: int) -> None:
         w = WIDTH * i
         sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
         b0, b1 = wave.scratch[w + B0], wave.scratch[w + B1]
+        root = wave.scratch_ints[INTS * i + ROOT]
+        sw, sigma = source_weight(wave, root), wave.scratch[w + SIGMA]
         improve_site(
             wave,
             node,
-            way_through(x, y, b0, b1, sx, sy, gap) + wave.scratch[w + SIGMA],
+            way_through(x, y, b0, b1, sx, sy, sw, sigma, gap),
             h,
             sx,
             sy,
-            wave.scratch_ints[INTS * i + ROOT],
+            root,
             wave.scratch_ints[INTS * i + REFERENCE] if merging(wave) else -1,
         )
 
 
 @kernel
 def way_through(
-    x: float, y: float, b0: float, b1: float, sx: float, sy: float, gap: float
+    x: float,
+    y: float,
+    b0: float,
+    b1: float,
+    sx: float,
+    sy: float,
+    sw: float,
+    sigma: float,
+    gap: float,
 ) -> float:
-    """Distance from s through a window to a point of the face; bent at its end where it must."""
-    rise = y - sy
+    """Distance through a window of a point of the face; the way is bent at its end if it must."""
+    rise = y * sw - sy
     crossing = (sx * y - x * sy) / rise if rise > 0.0 else x
     if b0 - gap <= crossing <= b1 + gap:
-        return math.hypot(x - sx, rise)
+        return straight_distance(x, y, sx, sy, sw, sigma)
     crossing = min(max(crossing, b0), b1)
-    return (math.hypot(crossing - sx, sy) + math.hypot(x - crossing, y)) * (1.0 + BEND)
+    there = distance_at(crossing, sx, sy, sigma, sw)
+    return (there + math.hypot(x - crossing, y)) * (1.0 + BEND)
 
 
 @kernel
@@ -162,7 +188,7 @@ def improve_site(
 def reach_sites_inside(topology: Any, wavefront: Any, bounds: Any, first: int) -> None:
     """Offer the sites from row ``first`` on the paths that cross no edge, after the sweep.
 
-    They come from the corners of their faces, or from sources in the same face.
+    They come from the corners of their faces, or from sources and pieces in the same face.
     """
     wave = view_of(topology, wavefront, bounds)
     for k in range(first, wave.site_count):
@@ -181,3 +207,10 @@ def reach_sites_inside(topology: Any, wavefront: Any, bounds: Any, first: int) -
                 sx, sy = site_in_frame(wave, source, h)
                 distance = wave.distance[root] + math.hypot(x - sx, y - sy)
                 improve_site(wave, node, distance, h, sx, sy, root, -1 - root)
+        ints, ends = pointer(wavefront.piece_ints), pointer(wavefront.piece_ends)
+        for piece in range(len(wavefront.piece_ints)):
+            if ints[PIECE * piece + FACE] == face:
+                root = ints[PIECE * piece + NODE]
+                distance = distance_to_piece(wave.geometry, ends, piece, h, x, y)
+                distance += wave.distance[root]
+                improve_site(wave, node, distance, h, 0.0, 0.0, root, -1 - root)

@@ -7,8 +7,9 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.arrival import bound_vertex, improve_vertex
-from geodesic_core.kernels.jit import inlined, kernel, prefetch
+from geodesic_core.kernels.jit import inlined, kernel, pointer, prefetch
 from geodesic_core.kernels.lists import faces_beyond, free_windows, queue_list
+from geodesic_core.kernels.pieces import emit_piece
 from geodesic_core.kernels.propagate import POOL_FULL, PROPAGATED, propagate_list
 from geodesic_core.kernels.prune import touch
 from geodesic_core.kernels.pseudosource import emit_pseudosource, is_pseudosource
@@ -36,6 +37,7 @@ from geodesic_core.kernels.wavefront import (
     LIST,
     MARKS,
     NODE,
+    PIECE,
     SITE,
     SIZE,
     VIA,
@@ -52,24 +54,37 @@ RUNNING = 4
 
 @kernel
 def start_sweep(
-    topology: Any, wavefront: Any, sources: Ints, start_distances: Floats, bounds: Any
+    topology: Any,
+    wavefront: Any,
+    sources: Ints,
+    origins: Ints,
+    start_distances: Floats,
+    bounds: Any,
 ) -> None:
-    """Reach the source nodes at their start distances; sites among them emit their windows."""
+    """Reach the nodes of the sources; sites and pieces among them emit their windows.
+
+    ``origins`` are the sources that the nodes belong to, of which each has a start distance.
+    """
     wave = view_of(topology, wavefront, bounds)
     for i in range(len(sources)):
-        v = sources[i]
-        if start_distances[i] >= wave.distance[v]:
+        v, start = sources[i], start_distances[origins[i]]
+        if start >= wave.distance[v]:
             continue
-        wave.origin[v] = i
+        wave.origin[v] = origins[i]
         if v < wave.vertex_count:
             if merging(wave):
-                bound_vertex(wave, v, start_distances[i])
-            improve_vertex(wave, v, start_distances[i], -1, 0.0, 0.0, v, -1 - v)
+                bound_vertex(wave, v, start)
+            improve_vertex(wave, v, start, -1, 0.0, 0.0, v, -1 - v)
         else:
-            wave.distance[v], wave.winner_ints[WINNER * v + FROM] = start_distances[i], v
+            wave.distance[v], wave.winner_ints[WINNER * v + FROM] = start, v
     for k in range(wave.site_count):
         if wave.distance[wave.site_ints[SITE * k + NODE]] < math.inf:
             emit_site(wave, k)
+    if len(wave.strips) > 0:
+        ints, ends = pointer(wavefront.piece_ints), pointer(wavefront.piece_ends)
+        for k in range(len(wavefront.piece_ints)):
+            if wave.distance[ints[PIECE * k + NODE]] < math.inf:
+                emit_piece(wave, ints, ends, k)
 
 
 @kernel

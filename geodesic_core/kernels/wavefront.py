@@ -31,7 +31,13 @@ FACE = 1
 NEXT_SITE = 2  # row of the next site to reach in the same face; -1 at the end
 SITE = 3
 
-# Columns of Wavefront.winner_ints, a row per node: the vertices, and after them the sites
+# Columns of Wavefront.piece_ints (the first two of those above) and piece_ends, a row per piece of
+# a curve and face that it lies in
+PIECE = 2
+PIECE_END = 3  # barycentric coordinates of the one end from 0 on, of the other from here on
+PIECE_ENDS = 6
+
+# Columns of Wavefront.winner_ints, a row per node: the vertices, after them sites and pieces
 VIA = 0  # half-edge whose apex the vertex is and whose window reached it; -1 at a source
 FROM = 1  # node of that window's pseudosource; -1 where unreached, itself at a source
 WINNER = 2
@@ -120,18 +126,30 @@ NO_GOAL = goal_at(np.zeros(3), math.inf)
 
 
 class Sites(NamedTuple):
-    """Points that are no vertices, as a sweep needs them; see `sites`."""
+    """Points that are no vertices, and pieces of curves, as a sweep needs them; see `sites`."""
 
     nodes: int
+    """How many points and pieces"""
     ints: Ints
     """(S, 3): NODE, FACE, NEXT_SITE; a site's rows follow each other, in the order of the nodes"""
     weights: Floats
     """(S, 3): barycentric, at the corners of the face"""
     windows: int
     """How many windows they may emit, at most"""
+    piece_ints: Ints
+    """(P, 2): NODE, FACE; a piece's rows follow each other, its node comes after all points'"""
+    piece_ends: Floats
+    """(P, 6): barycentric, of both ends"""
 
 
-NO_SITES = Sites(0, np.empty((0, SITE), np.int32), np.empty((0, 3)), 0)
+NO_SITES = Sites(
+    0,
+    np.empty((0, SITE), np.int32),
+    np.empty((0, 3)),
+    0,
+    np.empty((0, PIECE), np.int32),
+    np.empty((0, PIECE_ENDS)),
+)
 
 
 class Bounds(NamedTuple):
@@ -147,22 +165,34 @@ class Bounds(NamedTuple):
     """Empty in an exact sweep. Its length is part of its type: kernels are compiled twice, and the
     exact ones carry nothing of merging"""
     goal: Goal
+    strips: tuple[int, ...]
+    """Empty where no source is a curve; the same for windows that are strips"""
+    first_piece: int
+    """The first node that is a piece of a curve, if there are any"""
 
 
 def exact_bounds(max_distance: float, goal: Goal = NO_GOAL) -> Bounds:
     """Return the bounds of a sweep that never merges."""
-    return Bounds(max_distance, 0.0, 0.0, (), goal)
+    return Bounds(max_distance, 0.0, 0.0, (), goal, (), 0)
 
 
 def merging_bounds(
-    max_distance: float, relative_error: float, absolute_error: float, goal: Goal = NO_GOAL
+    max_distance: float,
+    relative_error: float,
+    absolute_error: float,
+    goal: Goal = NO_GOAL,
 ) -> Bounds:
     """Return the bounds of a sweep that merges windows within both errors."""
-    return Bounds(max_distance, relative_error, absolute_error, (1,), goal)
+    return Bounds(max_distance, relative_error, absolute_error, (1,), goal, (), 0)
+
+
+def with_strips(bounds: Bounds, first_piece: int) -> Bounds:
+    """Return the bounds of the same sweep from curves whose pieces are the nodes from there on."""
+    return bounds._replace(strips=(1,), first_piece=first_piece)
 
 
 class Wavefront(NamedTuple):
-    """All that changes while a sweep runs; N counts vertices and sites."""
+    """All that changes while a sweep runs; N counts vertices, sites and pieces."""
 
     distance: Floats
     """(N,): least distance known, infinite where unreached; final when the sweep has finished"""
@@ -189,6 +219,10 @@ class Wavefront(NamedTuple):
     """(S, 3): NODE, FACE, NEXT_SITE; the sources' rows first"""
     site_weights: Floats
     """(S, 3): barycentric, at the corners of the face"""
+    piece_ints: Ints
+    """(P, 2): NODE, FACE"""
+    piece_ends: Floats
+    """(P, 6): barycentric, of both ends"""
     touched: Ints
     """(V,): the vertices that are not as they were at first"""
     toward: Floats
@@ -264,6 +298,8 @@ class View(NamedTuple):
     relative_error: float
     absolute_error: float
     merging: tuple[int, ...]
+    strips: tuple[int, ...]
+    first_piece: int
     pruned: bool
     limit: float
     landmark_count: int
@@ -326,6 +362,8 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         bounds.relative_error,
         bounds.absolute_error,
         bounds.merging,
+        bounds.strips,
+        bounds.first_piece,
         wave.toward.shape[0] > 0,
         bounds.goal.limit,
         bounds.goal.landmark_count,
@@ -338,6 +376,14 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
 def merging(wave: Any) -> bool:
     """Whether the sweep merges windows; known when it is compiled."""
     return len(wave.merging) > 0
+
+
+@inlined
+def source_weight(wave: Any, root: int) -> float:
+    """SW of a window with this root: 0 for a strip, which comes from a piece of a curve, else 1."""
+    if len(wave.strips) > 0 and root >= wave.first_piece:
+        return 0.0
+    return 1.0
 
 
 def new_wavefront(
@@ -375,6 +421,8 @@ def new_wavefront(
         counters=counters,
         site_ints=sites.ints.copy(),
         site_weights=sites.weights,
+        piece_ints=sites.piece_ints,
+        piece_ends=sites.piece_ends,
         touched=np.empty(vertices, np.int32),
         toward=np.empty(vertices if pruned else 0),
         kept=aligned_rows(4096 if windows else 0, WIDTH, np.float64),

@@ -67,7 +67,7 @@ class Vertex:
         turn = angle - starts[place]
         toward_tail = complex(*-apex)
         s = complex(*apex) + 9 * toward_tail * complex(math.cos(turn), math.sin(turn))
-        light_vertex(self.view, self.v, distance, via, s.real, s.imag)
+        light_vertex(self.view, self.v, distance, via, s.real, s.imag, 1.0)
 
     def lit(self) -> tuple[float, float]:
         lo, hi = self.wave.light[self.v, [LIT_FROM, LIT_TO]]

@@ -321,3 +321,37 @@ def test_the_nearest_source_of_points(case, approximate):
 def test_positions_too_large_for_vertices(position):
     with pytest.raises(gc.errors.InvalidPoint, match=r"at most 1e\+50 in size"):
         mesh_of(zoo.SMALL["octahedron"]).locate(position)
+
+
+@pytest.mark.parametrize("weight", [0.0, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 7e-9, 1e-8, 1e-6])
+def test_points_hard_by_an_irregular_edge_are_found_again(weight):
+    """The line toward them ends just beyond the edge: not before it, as in the other faces."""
+    mesh = mesh_of(zoo.IRREGULAR["three_faces_at_an_edge"])
+    start = gc.SurfacePoint.face(1, (5e-4, 0.9685, 0.031))
+    beside = gc.SurfacePoint.face(2, (0.9765 - weight, 0.0235, weight))
+    there = gc.exact_distance(mesh, start)
+    back = gc.exact_distance(mesh, beside)
+    distance = there.distance_at(beside)
+    assert back.distance_at(start) == pytest.approx(distance, rel=SAME)
+    check_path(mesh, there.path_to(beside), start, beside, distance)
+    check_path(mesh, back.path_to(start), beside, start, distance)
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(3), *(pytest.param(i, marks=pytest.mark.full) for i in range(3, 20))]
+)
+@zoo.each({name: case for name, case in zoo.IRREGULAR.items() if name.startswith("complex")})
+def test_approximate_paths_take_the_right_face_beyond_an_irregular_edge(case, seed):
+    """Where windows were merged, a face that the path did not come from leads nowhere."""
+    mesh, rng = mesh_of(case), np.random.default_rng(seed)
+    for _ in range(12):
+        points = [
+            gc.SurfacePoint.face(int(face), tuple(rng.dirichlet(np.ones(3)).tolist()))
+            for face in rng.integers(len(mesh.faces), size=4)
+        ]
+        exact = gc.exact_distance(mesh, points[:2], targets=points)
+        field = gc.approximate_distance(mesh, points[:2], 1e-3, targets=points, keep_windows=True)
+        for target in [*points, *range(len(mesh.vertices))]:
+            distance = exact.distance_at(target)
+            length = field.path_to(target).length
+            assert distance * (1 - 1e-9) - 1e-15 <= length <= distance * (1 + 1e-3) + 1e-15

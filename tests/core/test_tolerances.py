@@ -34,15 +34,18 @@ from geodesic_core.kernels.topology import (
 )
 from geodesic_core.kernels.wavefront import (
     FIRST,
+    FRESH,
     LAST,
     NO_SITES,
     SIZE,
     exact_bounds,
     merging_bounds,
     new_wavefront,
+    with_strips,
 )
 from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.landmarks import Landmarks
+from geodesic_core.nodes import nodes_of
 from geodesic_core.polygons import triangulated
 from geodesic_core.run import Control, run_sweep
 from geodesic_core.tolerances import (
@@ -64,6 +67,7 @@ from geodesic_core.tolerances import (
     SEARCH_SLACK,
     SECTOR_MARGIN,
     SLACK,
+    SLANT,
     SNAP,
     STRAIGHT,
     TIE,
@@ -324,6 +328,8 @@ def winners(distance, nearest=(0, 0)) -> Winners:
         none,
         NO_SITES.ints,
         NO_SITES.weights,
+        NO_SITES.piece_ints,
+        NO_SITES.piece_ends,
     )
 
 
@@ -473,7 +479,9 @@ def sought(mesh, source, target, exact, limit) -> float:
     goal = goal_at_vertex(mesh, start, limit, known=exact[topology.outer_vertex])
     bounds = exact_bounds(math.inf, goal)
     wave = new_wavefront(topology, pruned=True)
-    sweep.start_sweep(topology, wave, np.array([start], np.int32), np.zeros(1), bounds)
+    sweep.start_sweep(
+        topology, wave, np.array([start], np.int32), np.zeros(1, np.int32), np.zeros(1), bounds
+    )
     return float(run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0).distance[end])
 
 
@@ -574,6 +582,28 @@ def test_snap_is_how_near_a_position_must_be(scale, share, snaps):
     assert carrier(mesh, mesh.locate(0.6 * a + 0.4 * b + inward)) == (2 if snaps else 3)
     along = away * (b - a) / np.linalg.norm(b - a)
     assert carrier(mesh, mesh.locate(a + along)) == (1 if snaps else 2)
+
+
+@SCALES
+@pytest.mark.parametrize(("slope", "strips"), [(0.5, 2), (2.0, 3)])
+def test_slant_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope, strips):
+    """A piece that stands on the edge between two cells; those above are always lit by it."""
+    points, faces = zoo.grid(2, 2)
+    mesh = gc.TriangleMesh(points * scale, faces)
+    foot, head = (
+        scale * np.array(place) for place in ((0.5, 1, 0), (0.5 + slope * SLANT * 0.2, 1.2, 0))
+    )
+    line = tuple(mesh.locate(place) for place in (foot, head))
+    nodes = nodes_of(mesh, [line], [])
+    wave = new_wavefront(mesh.topology, nodes.sites)
+    bounds = with_strips(exact_bounds(math.inf), int(nodes.sources[-1]))
+    sweep.start_sweep(mesh.topology, wave, nodes.sources, nodes.origins, np.zeros(1), bounds)
+    roots = wave.windows[: wave.counters[FRESH]].view(np.int32)[:, ROOT]
+    assert (roots == nodes.sources[-1]).sum() == strips
+    found = gc.exact_distance(mesh, gc.Curve(line)).distances
+    share = np.clip((mesh.vertices - foot) @ (head - foot) / ((head - foot) @ (head - foot)), 0, 1)
+    expected = np.linalg.norm(foot + share[:, None] * (head - foot) - mesh.vertices, axis=1)
+    np.testing.assert_allclose(found, expected, rtol=1e-14, atol=0)
 
 
 @SCALES

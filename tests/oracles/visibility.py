@@ -26,6 +26,24 @@ def distance_matrix(points, faces) -> np.ndarray:
     return all_pairs(direct)
 
 
+def distances_to_segment(points, faces, start, end) -> np.ndarray:
+    """Exact distances (V,) from a segment within the union of the faces; all by integers.
+
+    The last piece of a shortest path leaves a vertex for the nearest point of the segment: were
+    there a wall in between, the path would bend at a vertex of that wall first.
+    """
+    points = [(int(x), int(y)) for x, y in points]
+    triangles = [tuple(points[v] for v in face) for face in np.asarray(faces).tolist()]
+    walls, (sx, sy), (dx, dy) = _boundary(points, faces), start, np.subtract(end, start).tolist()
+    straight = np.full(len(points), np.inf)
+    for i, (x, y) in enumerate(points):
+        share = Fraction((x - sx) * dx + (y - sy) * dy, dx * dx + dy * dy)
+        foot = _at(start, end, min(max(share, Fraction(0)), Fraction(1)))
+        if foot == (x, y) or _is_free((x, y), foot, walls, triangles):
+            straight[i] = math.dist((x, y), foot)
+    return (distance_matrix(points, faces) + straight).min(axis=1)
+
+
 def _boundary(points, faces):
     """Segments with a face on one side only."""
     seen: dict[tuple[int, int], int] = {}

@@ -32,7 +32,8 @@ def started(topology, sources, starts=None, limit=math.inf) -> Wavefront:
     wave = new_wavefront(topology)
     inner = topology.inner_vertex[np.atleast_1d(sources)]
     starts = np.zeros(len(inner)) if starts is None else np.asarray(starts, dtype=float)
-    sweep.start_sweep(topology, wave, inner, starts, exact_bounds(limit))
+    origins = np.arange(len(inner), dtype=np.int32)
+    sweep.start_sweep(topology, wave, inner, origins, starts, exact_bounds(limit))
     return wave
 
 

@@ -130,7 +130,14 @@ def test_what_an_earlier_sweep_knows_bounds_the_rest(case, count):
             goal = goal_at_vertex(mesh, start, limit, landmarks)
             bounds = merging_bounds(math.inf, GUIDE, math.inf, goal)
             wave = new_wavefront(topology, merges=True, pruned=True)
-            sweep.start_sweep(topology, wave, np.array([end], np.int32), np.zeros(1), bounds)
+            sweep.start_sweep(
+                topology,
+                wave,
+                np.array([end], np.int32),
+                np.zeros(1, np.int32),
+                np.zeros(1),
+                bounds,
+            )
             wave = run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0)
             view = view_toward(mesh, landmarks, start, known=wave.distance, ceiling=limit)
             rest = np.array([least_rest(view, v) for v in range(len(exact))])
@@ -171,7 +178,9 @@ def after(mesh, start, end, *, merges, budget):
     bounds = (
         merging_bounds(math.inf, GUIDE, math.inf, goal) if merges else exact_bounds(math.inf, goal)
     )
-    sweep.start_sweep(topology, wave, np.array([start], np.int32), np.zeros(1), bounds)
+    sweep.start_sweep(
+        topology, wave, np.array([start], np.int32), np.zeros(1, np.int32), np.zeros(1), bounds
+    )
     sweep.advance(topology, wave, bounds, budget)
     return wave, bounds
 
