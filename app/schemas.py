@@ -95,8 +95,9 @@ class PositionSource(PositionPoint, Start):
     """A source at the point of the surface that is nearest to a position."""
 
 
-POINT_TAGS = {name: f"by {name}" for name in ("vertex", "edge", "face", "position")}
-"""What tells the ways to write a point apart: a field that each has, and what pydantic calls it."""
+POINT_TAGS = {name: f"by {name}" for name in ("vertex", "edge", "face", "position", "polyline")}
+"""What tells points, written in any way, and curves apart: a field that each has, and what pydantic
+calls it."""
 
 
 def _tag(written: Any) -> str | None:
@@ -108,10 +109,14 @@ def _tag(written: Any) -> str | None:
     return None
 
 
+_WAYS = "vertex, edge and t, face and barycentric, or position"
 _BY_FIELD = Discriminator(
+    _tag, custom_error_type="point", custom_error_message=f"A point has {_WAYS}"
+)
+_BY_FIELD_OR_CURVE = Discriminator(
     _tag,
-    custom_error_type="point",
-    custom_error_message="A point has vertex, edge and t, face and barycentric, or position",
+    custom_error_type="source",
+    custom_error_message=f"A point has {_WAYS}; a curve has polyline",
 )
 
 Point = Annotated[
@@ -123,14 +128,40 @@ Point = Annotated[
 ]
 """A point of the surface, in any of four ways."""
 
+
+class Polyline(Wire):
+    """A curve on the surface: straight from each point to the next, in a face that both are in."""
+
+    polyline: list[Point] = Field(
+        min_length=1,
+        description="The `locations` of a path are such points",
+        examples=[[{"vertex": 0}, {"vertex": 1}]],
+    )
+
+
+class CurveSource(Polyline, Start):
+    """A source that is a curve: distances start at all of its points."""
+
+
+Origin = Annotated[
+    Annotated[VertexPoint, Tag(POINT_TAGS["vertex"])]
+    | Annotated[EdgePoint, Tag(POINT_TAGS["edge"])]
+    | Annotated[FacePoint, Tag(POINT_TAGS["face"])]
+    | Annotated[PositionPoint, Tag(POINT_TAGS["position"])]
+    | Annotated[Polyline, Tag(POINT_TAGS["polyline"])],
+    _BY_FIELD_OR_CURVE,
+]
+"""A point, or a curve, where paths start."""
+
 Source = Annotated[
     Annotated[VertexSource, Tag(POINT_TAGS["vertex"])]
     | Annotated[EdgeSource, Tag(POINT_TAGS["edge"])]
     | Annotated[FaceSource, Tag(POINT_TAGS["face"])]
-    | Annotated[PositionSource, Tag(POINT_TAGS["position"])],
-    _BY_FIELD,
+    | Annotated[PositionSource, Tag(POINT_TAGS["position"])]
+    | Annotated[CurveSource, Tag(POINT_TAGS["polyline"])],
+    _BY_FIELD_OR_CURVE,
 ]
-"""A point where distances start, at ``start_distance``."""
+"""A point, or a curve, where distances start, at ``start_distance``."""
 
 
 class Accuracy(Wire):
@@ -252,7 +283,7 @@ class PathsRequest(Accuracy, AmongBarriers):
         }
     )
 
-    source: Point
+    source: Origin
     targets: list[Point] = Field(min_length=1)
     max_distance: NonNegative | None = Field(
         default=None, description="There is no path to what is farther than this"
@@ -462,8 +493,20 @@ class ResolvedPoint(BaseModel):
     position: tuple[float, float, float]
 
 
+class ResolvedCurve(BaseModel):
+    """A curve as it was understood."""
+
+    polyline: list[ResolvedPoint]
+
+
 class ResolvedSource(ResolvedPoint):
     """A source as it was understood."""
+
+    start_distance: float
+
+
+class ResolvedCurveSource(ResolvedCurve):
+    """A source that is a curve, as it was understood."""
 
     start_distance: float
 
@@ -482,7 +525,7 @@ class DistancesAnswer(BaseModel):
     method: Method
     exact: bool
     error_bound: ErrorBound
-    sources: list[ResolvedSource]
+    sources: list[ResolvedSource | ResolvedCurveSource]
     targets: list[ResolvedPoint] | None = Field(default=None, description="Where given")
     distances: list[float | None]
     nearest_source: list[int | None] | None = Field(
@@ -527,7 +570,7 @@ class IsolinesAnswer(BaseModel):
     exact: bool
     error_bound: ErrorBound = Field(description="Of the distance that each line is at")
     chord_error: float = Field(description="How far chords stray from lines at most, mesh units")
-    sources: list[ResolvedSource]
+    sources: list[ResolvedSource | ResolvedCurveSource]
     isolines: list[IsolineLevel]
     stats: dict[str, Any]
     warnings: list[str]
@@ -590,12 +633,12 @@ class PathTo(Outline):
 
 
 class PathsAnswer(BaseModel):
-    """The paths from a point, in the order of their targets."""
+    """The paths from a source, in the order of their targets."""
 
     mesh_id: str
     method: Method
     exact: bool
-    source: ResolvedPoint
+    source: ResolvedPoint | ResolvedCurve
     paths: list[PathTo]
     stats: dict[str, Any]
     warnings: list[str]

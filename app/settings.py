@@ -41,7 +41,7 @@ class Settings(BaseSettings):
     max_faces: PositiveInt = 5_000_000
     """Most faces of a mesh."""
     max_sources: PositiveInt = 10_000
-    """Most sources of a query."""
+    """Most sources of a query; each point of a curve counts."""
     max_matrix_cells: PositiveInt = 10_000_000
     """Most cells of a matrix, sources by targets, or pairs."""
     max_waypoints: PositiveInt = 100

@@ -58,12 +58,19 @@ def polyline_of(mesh: TriangleMesh, curve: Curve, name: str) -> Polyline:
     if not points:
         raise InvalidArgument(f"{name} is a curve without points; give at least one")
     for i, (start, end) in enumerate(pairwise(points)):
-        if start != end and not weights_by_face(mesh, start).keys() & weights_by_face(mesh, end):
+        if not share_a_face(mesh, start, end):
             raise InvalidPoint(
                 f"the points {i} and {i + 1} of {name}, {start} and {end}, have no face in common; "
                 f"add those at which the curve crosses edges: a shortest path has them"
             )
     return points
+
+
+def share_a_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> bool:
+    """Whether a piece of a curve may join two canonical points."""
+    if start == end:
+        return True
+    return bool(weights_by_face(mesh, start).keys() & weights_by_face(mesh, end))
 
 
 def pieces_of(mesh: TriangleMesh, polyline: Polyline) -> list[list[PieceInFace]]:

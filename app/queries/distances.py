@@ -24,7 +24,7 @@ from app.queries.costs import (
 from app.queries.places import Places, components_of, positions_of, unreachable
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_more, refuse_places
-from app.queries.sources import described_sources, starts_of
+from app.queries.sources import described_sources, named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
 from app.settings import Settings
 
@@ -51,7 +51,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
 
     def refuse(self, settings: Settings) -> None:
         """Refuse too many sources."""
-        refuse_more("sources", len(self.request.sources), settings, "max_sources")
+        refuse_more("sources", point_count(*self.request.sources), settings, "max_sources")
 
     def refuse_format(self, media_type: str) -> None:
         """Refuse a second array in binary."""
@@ -69,9 +69,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
     def points(self) -> Named:
         """Yield the sources, then the targets."""
         request = self.request
-        return chain(
-            numbered("sources", request.sources), numbered("targets", request.targets or ())
-        )
+        return chain(named_sources(request.sources), numbered("/targets", request.targets or ()))
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep once."""
@@ -80,7 +78,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         field = solve_field(
             opened.solver,
             request,
-            starts_of(request.sources, sources),
+            starts_of(opened.mesh, request.sources, sources),
             paths="gradient" in self._included,
             max_distance=request.max_distance,
             targets=[place for place in targets or () if place.vertex_index is None],
@@ -100,6 +98,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         """Return what one sweep costs; the numbers of the answer are straight distances."""
         request, mesh = self.request, opened.mesh
         sources, targets = self._parted(places)
+        starts_of(mesh, request.sources, sources)  # refuses curves that jump
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(sources) * float(share_within(mesh, request.max_distance)))
@@ -122,7 +121,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
 
     def _parted(self, places: Places) -> tuple[Places, Places | None]:
         """Return sources and targets, None where those are all vertices."""
-        count = len(self.request.sources)
+        count = point_count(*self.request.sources)
         return places[:count], None if self.request.targets is None else places[count:]
 
     def _answer(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 import geodesic_core as gc
 from app import schemas
 from app.encoding import JSON, Answer
+from app.errors import pointer
 from app.mesh_store import OpenMesh
 from app.queries.accuracy import bound_of, likely_bound, method_of, solve_field, with_its_error
 from app.queries.costs import (
@@ -25,9 +26,9 @@ from app.queries.costs import (
     typical_edge,
 )
 from app.queries.places import Places, look_up
-from app.queries.query import Grant, Likely, Query, numbered
+from app.queries.query import Grant, Likely, Query
 from app.queries.refusals import Named, refuse_large_json, refuse_more, refuse_places
-from app.queries.sources import described_sources, starts_of
+from app.queries.sources import described_sources, named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
 from app.settings import Settings
 from geodesic_core.isolines import as_chord_error, spaced_levels
@@ -45,21 +46,33 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
 
     @classmethod
     def normal(cls, request: schemas.IsolinesRequest) -> schemas.IsolinesRequest:
-        """Name the error that is granted; refuse levels that are told twice or not at all."""
+        """Name the error that is granted.
+
+        Refuse levels that are told twice or not at all, and curves: the library would, after the
+        sweep.
+        """
         if request.levels is None and request.count is None:
             raise refuse_places(["/levels"], "give levels, or count for some evenly spaced")
         if request.levels is not None and request.count is not None:
             raise refuse_places(["/count"], "does not go with levels")
+        curves = [
+            pointer("sources", i)
+            for i, source in enumerate(request.sources)
+            if isinstance(source, schemas.CurveSource)
+        ]
+        if curves:
+            message = "curves have no isolines yet: give points instead, as close as need be"
+            raise refuse_places(curves, message)
         return with_its_error(request)
 
     def refuse(self, settings: Settings) -> None:
         """Refuse too many sources or levels."""
-        refuse_more("sources", len(self.request.sources), settings, "max_sources")
+        refuse_more("sources", point_count(*self.request.sources), settings, "max_sources")
         refuse_more("levels", self._level_count, settings, "max_levels")
 
     def points(self) -> Named:
         """Yield the sources."""
-        return numbered("sources", self.request.sources)
+        return named_sources(self.request.sources)
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep once, and draw level after level, as long as they fit into the answer."""
@@ -67,7 +80,7 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         field = solve_field(
             opened.solver,
             self.request,
-            starts_of(self.request.sources, places),
+            starts_of(opened.mesh, self.request.sources, places),
             isolines=True,
             max_distance=self.request.max_distance,
             **grant.options,

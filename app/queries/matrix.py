@@ -72,7 +72,7 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
     def points(self) -> Named:
         """Yield the sources, then the targets."""
         request = self.request
-        return chain(numbered("sources", request.sources), numbered("targets", request.targets))
+        return chain(numbered("/sources", request.sources), numbered("/targets", request.targets))
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep from the smaller side."""

@@ -41,7 +41,7 @@ class NearestQuery(Query[schemas.NearestRequest]):
     def points(self) -> Named:
         """Yield the source, then the candidates."""
         request = self.request
-        return chain([("/source", request.source)], numbered("candidates", request.candidates))
+        return chain([("/source", request.source)], numbered("/candidates", request.candidates))
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep to the k-th nearest."""

@@ -59,7 +59,7 @@ class PathQuery(Query[schemas.PathRequest]):
     def points(self) -> Named:
         """Yield the source, the target, then the waypoints."""
         ends = ("/source", self.request.source), ("/target", self.request.target)
-        return chain(ends, numbered("waypoints", self.request.waypoints))
+        return chain(ends, numbered("/waypoints", self.request.waypoints))
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Search, or sweep where the path is to be approximate."""

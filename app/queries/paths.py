@@ -15,15 +15,17 @@ from app.queries.costs import (
     PER_POINT,
     Cost,
     share_within,
-    straight_between,
+    straight_to_nearest,
     sweep_cost,
     typical_edge,
 )
 from app.queries.outline import likely_outline, no_outline, outline_of
-from app.queries.places import Places, look_up
+from app.queries.places import Places, look_up, positions_of
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
-from app.queries.refusals import MeshSize, Named, refuse_large_json
+from app.queries.refusals import MeshSize, Named, refuse_large_json, refuse_more
+from app.queries.sources import described_origin, named_origin, origin_of, point_count
 from app.queries.stats import likely_stats, stats_of
+from app.settings import Settings
 
 _TRIED = 64
 """Targets to which a straight path is laid for an estimate, about."""
@@ -47,15 +49,20 @@ class PathsQuery(Query[schemas.PathsRequest]):
 
     def points(self) -> Named:
         """Yield the source, then the targets."""
-        return chain([("/source", self.request.source)], numbered("targets", self.request.targets))
+        request = self.request
+        return chain(named_origin("/source", request.source), numbered("/targets", request.targets))
+
+    def refuse(self, settings: Settings) -> None:
+        """Refuse too many points of a curve."""
+        refuse_more("sources", point_count(self.request.source), settings, "max_sources")
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep once, and trace path after path, as long as they fit into the answer."""
-        source, *targets = places
+        starts, targets = self._parted(places)
         field = solve_field(
             opened.solver,
             self.request,
-            source,
+            origin_of(opened.mesh, "/source", self.request.source, starts),
             max_distance=self.request.max_distance,
             targets=targets,
             paths=True,
@@ -78,19 +85,26 @@ class PathsQuery(Query[schemas.PathsRequest]):
     def likely(self, opened: OpenMesh, places: Places) -> Likely:
         """Return what a sweep and as many paths cost; those lead straight to their targets."""
         mesh, limit = opened.mesh, self.request.max_distance
-        source, *targets = places
+        starts, targets = self._parted(places)
+        origin_of(mesh, "/source", self.request.source, starts)  # refuses a curve that jumps
         share = 1.0 if limit is None else float(share_within(mesh, limit))
         sweep = sweep_cost(mesh, self.request, share, paths=True)
         seconds = sweep.seconds + (PER_PATH + PER_POINT) * len(targets)
         some = targets[:: 1 + len(targets) // _TRIED]
-        start, edge = mesh.position(source), typical_edge(mesh)
-        lengths = straight_between(mesh, [source], some, limit)[0].tolist()
+        edge = typical_edge(mesh)
+        lengths, nearest = straight_to_nearest(mesh, starts, some, limit)
+        ends = positions_of(mesh, starts)[nearest], positions_of(mesh, some)
         found = [
-            likely_outline(mesh, start, mesh.position(target), length, edge)
-            for target, length in zip(some, lengths, strict=True)
+            likely_outline(mesh, start, end, length, edge)
+            for start, end, length in zip(*ends, lengths.tolist(), strict=True)
         ]
-        answer = self._answer(opened, [source, *some], found, likely_stats(mesh, share))
+        answer = self._answer(opened, [*starts, *some], found, likely_stats(mesh, share))
         return Likely(Cost(seconds, sweep.memory_bytes), answer, len(targets) / len(some))
+
+    def _parted(self, places: Places) -> tuple[Places, Places]:
+        """Return the points of the source, and the targets."""
+        count = point_count(self.request.source)
+        return places[:count], places[count:]
 
     def _answer(
         self,
@@ -99,13 +113,17 @@ class PathsQuery(Query[schemas.PathsRequest]):
         found: Sequence[Mapping[str, Any]],
         stats: Mapping[str, Any],
     ) -> Answer:
-        source, *targets = (described(opened.mesh, place) for place in places)
-        paths = [{"target": target, **path} for target, path in zip(targets, found, strict=True)]
+        mesh = opened.mesh
+        starts, targets = self._parted(places)
+        paths = [
+            {"target": described(mesh, target), **path}
+            for target, path in zip(targets, found, strict=True)
+        ]
         return Answer(
             {
                 "mesh_id": self.mesh_id,
                 **method_of(self.request),
-                "source": source,
+                "source": described_origin(mesh, self.request.source, starts),
                 "paths": paths,
                 "stats": stats,
                 "warnings": opened.warnings,

@@ -58,7 +58,7 @@ def unreachable(missed: NDArray[np.bool_], connected: NDArray[np.bool_]) -> dict
     }
 
 
-def _at_fault(point: schemas.Point | schemas.Source) -> str:
+def _at_fault(point: schemas.Point) -> str:
     """Return the member that is wrong with a point whose indices are sound."""
     match point:
         case schemas.EdgePoint():

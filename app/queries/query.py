@@ -198,8 +198,6 @@ def result_key(query: Query[Any], media_type: str) -> str:
     return digest.hexdigest()
 
 
-def numbered(
-    name: str, written: Sequence[schemas.Point | schemas.Source]
-) -> Iterator[tuple[str, schemas.Point | schemas.Source]]:
+def numbered(where: str, written: Sequence[schemas.Point]) -> Iterator[tuple[str, schemas.Point]]:
     """Yield the points of a list, each with its place."""
-    return ((f"/{name}/{i}", point) for i, point in enumerate(written))
+    return ((f"{where}/{i}", point) for i, point in enumerate(written))

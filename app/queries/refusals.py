@@ -11,7 +11,7 @@ from geodesic_core.tolerances import WEIGHT_ERROR
 
 FAULTS_SHOWN = 10
 
-Named = Iterator[tuple[str, schemas.Point | schemas.Source]]
+Named = Iterator[tuple[str, schemas.Point]]
 """Points, each with the place in the body that it was written at."""
 
 
@@ -72,7 +72,7 @@ def detail_of(faults: Sequence[Fault]) -> str:
     return f"{faults[0].pointer}: {faults[0].message}"
 
 
-def _faults(place: str, point: schemas.Point | schemas.Source, size: MeshSize) -> Iterator[Fault]:
+def _faults(place: str, point: schemas.Point, size: MeshSize) -> Iterator[Fault]:
     match point:
         case schemas.VertexPoint(vertex=vertex):
             yield from _outside(f"{place}/vertex", "vertex", vertex, size.vertices)

@@ -1,20 +1,77 @@
-"""The sources of a sweep: where they are, and what answers say of them."""
+"""Where sweeps start: points and curves, as they were written, as the library has them, as told."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain, islice, pairwise
 from typing import Any
 
 import geodesic_core as gc
 from app import schemas
+from app.errors import Fault
 from app.points import described
 from app.queries.places import Places
+from app.queries.query import numbered
+from app.queries.refusals import FAULTS_SHOWN, Named, refuse_points
+from geodesic_core.curve import share_a_face
+
+_JUMPS = (
+    "shares no face with the point before it; add those at which the curve crosses edges: a "
+    "shortest path has them"
+)
 
 
-def starts_of(written: Sequence[schemas.Source], places: Places) -> list[gc.Source]:
-    """Return sources as the library has them."""
+def named_origin(where: str, written: schemas.Origin | schemas.Source) -> Named:
+    """Yield a point, or those of a curve, each with its place."""
+    if isinstance(written, schemas.Polyline):
+        return numbered(f"{where}/polyline", written.polyline)
+    return iter([(where, written)])
+
+
+def named_sources(written: Sequence[schemas.Source]) -> Named:
+    """Yield the points of sources, each with its place."""
+    return chain.from_iterable(
+        named_origin(f"/sources/{i}", source) for i, source in enumerate(written)
+    )
+
+
+def point_count(*written: schemas.Origin | schemas.Source) -> int:
+    """Return how many points there are, those of curves counted one by one."""
+    return sum(len(each.polyline) if isinstance(each, schemas.Polyline) else 1 for each in written)
+
+
+def origin_of(
+    mesh: gc.TriangleMesh, where: str, written: schemas.Origin | schemas.Source, places: Places
+) -> gc.SurfacePoint | gc.Curve:
+    """Return a point, or a curve, as the library has it; refuse a curve that jumps."""
+    if not isinstance(written, schemas.Polyline):
+        return places[0]
+    faults = (
+        Fault(f"{where}/polyline/{i}", _JUMPS)
+        for i, (start, end) in enumerate(pairwise(places), 1)
+        if not share_a_face(mesh, start, end)
+    )
+    shown = tuple(islice(faults, FAULTS_SHOWN))
+    if shown:
+        raise refuse_points(shown)
+    return gc.Curve(places)
+
+
+def starts_of(
+    mesh: gc.TriangleMesh, written: Sequence[schemas.Source], places: Places
+) -> list[gc.Source]:
+    """Return sources as the library has them; refuse curves that jump."""
     return [
-        gc.Source(place, source.start_distance)
-        for source, place in zip(written, places, strict=True)
+        gc.Source(origin_of(mesh, f"/sources/{i}", source, points), source.start_distance)
+        for i, (source, points) in enumerate(_with_points(written, places))
     ]
+
+
+def described_origin(
+    mesh: gc.TriangleMesh, written: schemas.Origin | schemas.Source, places: Places
+) -> Mapping[str, Any]:
+    """Return what answers say of a resolved point or curve."""
+    if isinstance(written, schemas.Polyline):
+        return {"polyline": [described(mesh, place) for place in places]}
+    return described(mesh, places[0])
 
 
 def described_sources(
@@ -22,6 +79,13 @@ def described_sources(
 ) -> list[Mapping[str, Any]]:
     """Return what answers say of resolved sources."""
     return [
-        {**described(mesh, place), "start_distance": source.start_distance}
-        for source, place in zip(written, places, strict=True)
+        {**described_origin(mesh, source, points), "start_distance": source.start_distance}
+        for source, points in _with_points(written, places)
     ]
+
+
+def _with_points(
+    written: Sequence[schemas.Source], places: Places
+) -> Iterator[tuple[schemas.Source, Places]]:
+    rest = iter(places)
+    return ((source, tuple(islice(rest, point_count(source)))) for source in written)

@@ -31,6 +31,7 @@ MESHES = {"knot": 8000, "sphere": 5000, "plane": 10_000}
 _RNG = np.random.default_rng(8)
 SOME, MANY = ([{"vertex": i} for i in _RNG.integers(0, 2000, n).tolist()] for n in (40, 700))
 INSIDE = {"face": 1040, "barycentric": [0.2, 0.3, 0.5]}
+CORNER = {"face": 1040, "barycentric": [1, 0, 0]}
 ROUGH = {"method": "approximate", "relative_error": 0.01}
 PAIRS = {"layout": "pairs"}
 JSON_ONLY: tuple[str, ...] = ("json",)
@@ -58,6 +59,8 @@ QUERIES: dict[str, tuple[str, dict[str, Any], tuple[str, ...], float]] = {
     "fine": ("isolines", {"sources": [INSIDE], "count": 3, "chord_error": 1e-6}, JSON_ONLY, 3),
     "paths": ("paths", {"source": INSIDE, "targets": MANY}, JSON_ONLY, 3),
     "rough paths": ("paths", {"source": INSIDE, "targets": SOME, **ROUGH}, JSON_ONLY, 3),
+    "curve": ("distances", {"sources": [{"polyline": [CORNER] * 9}]}, JSON_ONLY, 1.05),
+    "curve paths": ("paths", {"source": {"polyline": [CORNER]}, "targets": SOME}, JSON_ONLY, 3),
     "locate": ("locate", {"points": [[0.1 * i, 0.3, 0.2] for i in range(30)]}, JSON_ONLY, 1.15),
 }  # fmt: skip
 KINDS: dict[str, type[Query[Any]]] = {

@@ -52,6 +52,9 @@ ENDS = [{"vertex": 0}, {"vertex": 4}]
 ASKED = [
     ("distances", {"sources": ENDS, "targets": ENDS, "include": ["nearest_source"]}),
     ("distances", {"sources": ENDS, "include": ["gradient"], "barriers": [1]}),
+    ("distances", {"sources": [ENDS[1], {"polyline": [{"vertex": 0}, {"vertex": 1}]}]}),
+    ("isolines", {"sources": ENDS, "levels": [0.5, 9.0]}),
+    ("paths", {"source": {"polyline": [{"vertex": 0}, {"vertex": 1}]}, "targets": ENDS}),
     ("path", {"source": ENDS[0], "target": ENDS[1]}),
     ("path", {"source": ENDS[0], "target": {"vertex": 1}, "explain": True}),
     ("paths", {"source": ENDS[0], "targets": [*ENDS, {"vertex": 1}]}),

@@ -206,6 +206,15 @@ def test_levels_are_spaced_evenly():
             field.levels(count)
 
 
+def test_there_are_no_levels_where_nothing_is_away():
+    mesh = mesh_of(zoo.SMALL["two_components"])
+    for source in (0, gc.SurfacePoint.face(0, (0.2, 0.3, 0.5))):
+        field = gc.exact_distance(mesh, source, max_distance=1e-6)
+        with pytest.raises(InvalidArgument, match="only sources are reached"):
+            field.levels(3)
+        assert field.isolines([1e-7, 9.0])[1] == []
+
+
 def test_levels_in_their_order_and_more_than_once():
     mesh = mesh_of(zoo.SMALL["octahedron"])
     first, second, none, again = gc.exact_distance(mesh, 0).isolines([0.9, 0.2, 99.0, 0.9])
