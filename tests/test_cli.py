@@ -606,6 +606,12 @@ def test_what_fails_says_why_in_one_line(
             "there are 1 sources and 2 targets; pairs need as many",
         ),
         ("matrix plane.ply --source 0 --target 1", "--out"),
+        ("isolines plane.ply --source 0 --out l.obj", "give --count, or --level"),
+        ("isolines plane.ply --source 0 --out l.obj --count 2 --level 1", "not both"),
+        ("isolines plane.ply --source 0 --out l.obj --count 0", "--count"),
+        ("isolines plane.ply --source 0 --out l.npy --count 1", ".obj or .json"),
+        ("path plane.ply --source 0 --target 1 --out p.obj --barriers 3;4", "'3;4' is not a list"),
+        ("nearest plane.ply --source 0 --candidate 1 --barriers -3", "--barriers"),
         ("nearest plane.ply --source 0", "--candidate"),
         ("nearest plane.ply --source 0 --candidate 1 -k 2", "-k is 2, but there are only 1"),
         ("nearest plane.ply --source 0 --candidate 1 -k 0", "-k"),
@@ -621,6 +627,65 @@ def test_a_wrong_command_line_says_so_in_one_line(
     ran = run(*arguments.split())
     assert ran.code == 2
     assert message in error_line(ran)
+    assert list(Path().iterdir()) == [plane]
+
+
+def test_isolines_are_drawn(run: Run, plane: Path) -> None:
+    field = gc.exact_distance(gc.load_mesh(plane), 60)
+    for name in ("lines.obj", "lines.json"):
+        ran = run("isolines", plane, "--source", 60, "--level", 0.3, "--level", 0.6, "--out", name)
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.figure("level       0.3").startswith(": 1 closed, 0 open, 1.88")
+        assert ran.figure("level       0.6").startswith(": 0 closed, 4 open")
+        assert ran.figure("written") == name
+    expected = field.isolines([0.3, 0.6])
+    drawn = json.loads(Path("lines.json").read_text())["isolines"]
+    assert [level["level"] for level in drawn] == [0.3, 0.6]
+    for level, lines in zip(drawn, expected, strict=True):
+        assert [line["points"] for line in level["lines"]] == [i.points.tolist() for i in lines]
+        assert [line["closed"] for line in level["lines"]] == [i.closed for i in lines]
+    rows = Path("lines.obj").read_text().splitlines()
+    groups = [row for row in rows if row.startswith("g")]
+    assert groups == ["g level_0.3", "g level_0.6"]
+    circle, *arcs = ([int(i) for i in row.split()[1:]] for row in rows if row.startswith("l"))
+    assert circle[0] == circle[-1] == 1
+    assert len(circle) - 1 == len(expected[0][0].points)
+    joined = [i for indices in (circle[:-1], *arcs) for i in indices]
+    assert joined == list(range(1, len(joined) + 1)), "each vertex in turn, and none twice"
+    spaced = run("isolines", plane, "--source", 60, "--count", 2, "--out", "lines.json")
+    assert spaced.out.count("level ") == 2
+    rough = run(
+        *("isolines", plane, "--source", 60, "--count", 2, "--out", "lines.json"),
+        *("--method", "approximate", "--chord-error", 0.01),
+    )
+    assert rough.figure("error bound") == "0.001 (relative, guaranteed)"
+
+
+def test_barriers_are_in_the_way(run: Run, plane: Path) -> None:
+    walled = gc.load_mesh(plane).with_barriers(range(100, 116))
+    ends = ("--source", 0, "--target", 10)
+    block = ("--barriers", "100,101-114,115")
+    assert run("path", plane, *ends, "--out", "p.json", *block).code == 0
+    length = json.loads(Path("p.json").read_text())["length"]
+    assert length == gc.shortest_path(walled, 0, 10).length > 1.9
+    assert (
+        run("paths", plane, *ends, "--out", "ps.json", *block)
+        .figure("path")
+        .endswith(f"{length!r}, error bound 0.0 (relative, guaranteed)")
+    )
+    run("matrix", plane, *ends, "--out", "m.npy", *block)
+    assert np.load("m.npy") == pytest.approx(length, rel=1e-12)
+    run("distance", plane, "--source", 0, "--out", "d.npy", *block)
+    assert np.load("d.npy")[10] == pytest.approx(length, rel=1e-12)
+    near = ("--candidate", 10, "--candidate", 110)
+    assert run("nearest", plane, "--source", 0, *near, *block).figure("nearest").startswith("110 ")
+
+
+def test_barriers_that_are_no_faces(run: Run, plane: Path) -> None:
+    for faces, message in (("3,200", "face 200"), ("0-199", "block every face")):
+        ran = run("distance", plane, "--source", 0, "--out", "d.npy", "--barriers", faces)
+        assert ran.code == 1
+        assert message in error_line(ran)
     assert list(Path().iterdir()) == [plane]
 
 
@@ -713,6 +778,7 @@ def test_version_and_help(run: Run) -> None:
         "distance",
         "path",
         "paths",
+        "isolines",
         "matrix",
         "nearest",
         "locate",

@@ -1,7 +1,7 @@
 """Arguments that several commands share."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -70,6 +70,20 @@ def position(text: str) -> Point:
         raise typer.BadParameter(f"{text!r} is not a position: write it as x,y,z") from None
 
 
+def faces(text: str) -> Sequence[int]:
+    """Return the faces that an option lists: ids, and ranges with both ends."""
+    if not _FACES.fullmatch(text):
+        raise typer.BadParameter(f"{text!r} is not a list of faces: write it as 3,7,40-59")
+    found: list[int] = []
+    for part in text.split(","):
+        first, _, last = part.partition("-")
+        found += range(int(first), int(last or first) + 1)
+    return found
+
+
+_FACES = re.compile(r"[0-9]{1,9}(-[0-9]{1,9})?(,[0-9]{1,9}(-[0-9]{1,9})?)*")
+
+
 def writable(*suffixes: str) -> Callable[[Path], Path]:
     """Return a check of an output path, made before any work begins."""
 
@@ -111,6 +125,12 @@ Targets = Annotated[
     list[Point],
     typer.Option(
         "--target", parser=Point.parse, metavar="POINT", help="A target; may be given again."
+    ),
+]
+Barriers = Annotated[
+    Sequence[int] | None,
+    typer.Option(
+        parser=faces, metavar="FACES", help="Faces that are blocked, as 3,7,40-59: holes."
     ),
 ]
 MethodOption = Annotated[

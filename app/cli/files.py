@@ -1,6 +1,6 @@
 """Answers as files, each written as a whole or not at all."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -8,8 +8,12 @@ from typing import IO, TYPE_CHECKING, Any
 from app.cli.steps import Failure
 
 if TYPE_CHECKING:
-    from geodesic_core import DistanceField, GeodesicPath
+    from geodesic_core import DistanceField, GeodesicPath, Isoline
+    from geodesic_core.arrays import Floats
     from geodesic_core.errors import NoPath
+
+    Drawn = tuple[DistanceField, Sequence[float], Sequence[Sequence[Isoline]]]
+    """Lines, their levels, and the field that they are of"""
 
 Writer = Callable[[IO[bytes], Any], None]
 
@@ -63,17 +67,53 @@ def _path_to_obj(file: IO[bytes], path: "GeodesicPath") -> None:
 
 def _paths_to_obj(file: IO[bytes], paths: "Sequence[GeodesicPath | NoPath]") -> None:
     """Write a polyline for each path that there is."""
+    _polylines_to_obj(
+        file, ((path.points, False) for path in paths if not isinstance(path, Exception))
+    )
+
+
+def _isolines_to_obj(file: IO[bytes], what: "Drawn") -> None:
+    """Write a group of polylines for each level; closed ones end at the vertex they begin with."""
+    _, levels, found = what
     first = 1
-    for path in paths:
-        if isinstance(path, Exception):
-            continue
-        for x, y, z in path.points.tolist():
+    for level, lines in zip(levels, found, strict=True):
+        file.write(b"g level_%a\n" % level)
+        first = _polylines_to_obj(file, ((line.points, line.closed) for line in lines), first)
+
+
+def _polylines_to_obj(
+    file: IO[bytes], polylines: "Iterable[tuple[Floats, bool]]", first: int = 1
+) -> int:
+    """Write points, and whether the last is joined to the first; return the next vertex."""
+    for points, closed in polylines:
+        for x, y, z in points.tolist():
             file.write(b"v %a %a %a\n" % (x, y, z))
-        count = len(path.points)
+        count = len(points)
         element = b"l " if count > 1 else b"p "
-        indices = range(first, first + count)
+        indices = [*range(first, first + count), *([first] if closed else ())]
         file.write(element + b" ".join(b"%d" % i for i in indices) + b"\n")
         first += count
+    return first
+
+
+def _isolines_to_json(file: IO[bytes], what: "Drawn") -> None:
+    field, levels, found = what
+    lines = [
+        {
+            "level": level,
+            "lines": [
+                {
+                    "closed": line.closed,
+                    "length": line.length,
+                    "points": line.points,
+                    "faces": line.faces,
+                }
+                for line in lines
+            ],
+        }
+        for level, lines in zip(levels, found, strict=True)
+    ]
+    _dump_json(file, {"isolines": lines, "error_bound": field.error_bound})
 
 
 def _path_to_json(file: IO[bytes], path: "GeodesicPath") -> None:
@@ -183,6 +223,10 @@ DISTANCES: Mapping[str, Writer] = {
 PATH: Mapping[str, Writer] = {
     ".obj": _path_to_obj,
     ".json": _path_to_json,
+}
+ISOLINES: Mapping[str, Writer] = {
+    ".obj": _isolines_to_obj,
+    ".json": _isolines_to_json,
 }
 PATHS: Mapping[str, Writer] = {
     ".obj": _paths_to_obj,

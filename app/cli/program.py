@@ -67,6 +67,7 @@ for command in (
     queries.distance,
     queries.path,
     queries.paths,
+    queries.isolines,
     queries.matrix,
     queries.nearest,
     meshes.locate,

@@ -9,6 +9,7 @@ import typer
 from app.cli import files
 from app.cli.arguments import (
     AbsoluteError,
+    Barriers,
     Layout,
     MaxDistance,
     Merge,
@@ -44,11 +45,12 @@ def distance(
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
+    barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute the distance of every vertex from the nearest source."""
     granted = granted_errors(method, relative_error, absolute_error)
-    mesh, seconds = read(mesh_file, merge)
+    mesh, seconds = read(mesh_file, merge, barriers)
     import numpy as np
 
     from geodesic_core import approximate_distance, exact_distance
@@ -99,6 +101,7 @@ def path(
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
+    barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute a shortest path over the surface between two points."""
@@ -106,7 +109,7 @@ def path(
     if granted is not None and (via or explain):
         name = "--via" if via else "--explain"
         raise typer.BadParameter(f"{name} goes with --method exact only")
-    mesh, seconds = read(mesh_file, merge)
+    mesh, seconds = read(mesh_file, merge, barriers)
     from geodesic_core import approximate_distance, shortest_path
 
     first, last = point_of(mesh, "--source", source), point_of(mesh, "--target", target)
@@ -150,11 +153,12 @@ def paths(
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
+    barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute shortest paths from one point to several others, in one sweep."""
     granted = granted_errors(method, relative_error, absolute_error)
-    mesh, seconds = read(mesh_file, merge)
+    mesh, seconds = read(mesh_file, merge, barriers)
     from geodesic_core import approximate_distance, exact_distance
     from geodesic_core.errors import NoPath
 
@@ -187,6 +191,66 @@ def paths(
     typer.echo(f"written     {out}")
 
 
+def isolines(
+    mesh_file: MeshFile,
+    source: Sources,
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Where the lines go: .obj (polylines) or .json.",
+            callback=writable(".obj", ".json"),
+        ),
+    ],
+    level: Annotated[
+        list[float] | None,
+        typer.Option(help="A distance at which to draw lines; may be given again."),
+    ] = None,
+    count: Annotated[
+        int | None,
+        typer.Option(min=1, help="Instead: how many levels to space evenly."),
+    ] = None,
+    chord_error: Annotated[
+        float | None,
+        typer.Option(help="How far lines may stray inside faces, in mesh units."),
+    ] = None,
+    max_distance: MaxDistance = None,
+    method: MethodOption = Method.EXACT,
+    relative_error: RelativeError = None,
+    absolute_error: AbsoluteError = None,
+    barriers: Barriers = None,
+    merge: MergeOption = Merge.NONE,
+) -> None:
+    """Draw lines of equal distance from the nearest source."""
+    granted = granted_errors(method, relative_error, absolute_error)
+    if (count is None) == (level is None):
+        raise typer.BadParameter("give --count, or --level at least once, and not both")
+    mesh, seconds = read(mesh_file, merge, barriers)
+    from geodesic_core import approximate_distance, exact_distance
+
+    sources = [point_of(mesh, "--source", written) for written in source]
+    with showing("Drawing isolines") as step:
+        began = perf_counter()
+        options = {**step._asdict(), "keep_windows": True}
+        if granted is None:
+            field = exact_distance(mesh, sources, max_distance, **options)
+        else:
+            field = approximate_distance(mesh, sources, *granted, max_distance, **options)
+        levels = level or field.levels(count or 0).tolist()
+        found = field.isolines(levels, chord_error)
+        solved = perf_counter() - began
+    files.write_file(out, files.ISOLINES[out.suffix.lower()], (field, levels, found))
+    _tell_size(mesh)
+    for distance, lines in zip(levels, found, strict=True):
+        closed, length = sum(line.closed for line in lines), sum(line.length for line in lines)
+        typer.echo(
+            f"level       {distance!r}: {closed} closed, {len(lines) - closed} open, "
+            f"{float(length)!r} long"
+        )
+    typer.echo(f"error bound {_bound_in_words(field.error_bound)}")
+    typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
+    typer.echo(f"written     {out}")
+
+
 def matrix(
     mesh_file: MeshFile,
     source: Sources,
@@ -207,6 +271,7 @@ def matrix(
         ),
     ] = Layout.DENSE,
     max_distance: MaxDistance = None,
+    barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute the distances from several points to several others."""
@@ -218,7 +283,7 @@ def matrix(
         raise typer.BadParameter(
             f"there are {len(source)} sources and {len(target)} targets; pairs need as many"
         )
-    mesh, seconds = read(mesh_file, merge)
+    mesh, seconds = read(mesh_file, merge, barriers)
     import numpy as np
 
     from geodesic_core import distance_matrix
@@ -247,12 +312,13 @@ def nearest(
     ],
     k: Annotated[int, typer.Option("-k", min=1, help="How many to find.")] = 1,
     max_distance: MaxDistance = None,
+    barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Find the candidates that are nearest to a point along the surface."""
     if k > len(candidate):
         raise typer.BadParameter(f"-k is {k}, but there are only {len(candidate)} candidates")
-    mesh, seconds = read(mesh_file, merge)
+    mesh, seconds = read(mesh_file, merge, barriers)
     from geodesic_core import nearest
 
     start = point_of(mesh, "--source", source)

@@ -1,7 +1,7 @@
 """What commands do before they answer: read a mesh, find points, and show that they are at it."""
 
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
@@ -18,15 +18,20 @@ class Failure(Exception):  # noqa: N818 - not an error of this program
     """A one-line message for the user, who can do something about it."""
 
 
-def read(mesh_file: Path, merge: Merge) -> "tuple[TriangleMesh, float]":
-    """Return the mesh of a file, and the seconds that took once the kernels were there."""
+def read(
+    mesh_file: Path, merge: Merge, barriers: Sequence[int] | None = None
+) -> "tuple[TriangleMesh, float]":
+    """Return the mesh of a file, with its barriers.
+
+    Also the seconds that took once the kernels were there.
+    """
     with showing("Loading kernels (compiled on the first run)"):
         from geodesic_core import load_mesh, warm_up
 
         warm_up()
     with showing(f"Reading {mesh_file.name}"):
         start = perf_counter()
-        mesh = load_mesh(mesh_file, merge=merge.value)
+        mesh = load_mesh(mesh_file, merge=merge.value).with_barriers(barriers or ())
         seconds = perf_counter() - start
     return mesh, seconds
 
