@@ -715,8 +715,8 @@ class Estimate(BaseModel):
         "of 3"
     )
     response_bytes: int = Field(
-        description="Of the body, within 5 %; with `max_distance`, and for paths, as if geodesics "
-        "were straight, so that paths where the surface winds take some times as much"
+        description="Of the body, within 5 %; with `max_distance`, and for paths and isolines, as "
+        "if geodesics were straight, so that these take some times as much where surfaces wind"
     )
     media_type: str = Field(description="Of the response that is estimated")
 

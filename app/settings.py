@@ -31,7 +31,7 @@ class Settings(BaseSettings):
     workers: PositiveInt = Field(default_factory=_cores)
     """Worker processes; one for each core, unless set."""
     worker_mesh_bytes: PositiveInt = 2 * GIB
-    """Size of the meshes that a worker keeps open, with what it keeps for paths on them."""
+    """Size of the meshes that a worker keeps open, and of what it keeps for paths on them."""
     results_bytes: PositiveInt = 4 * GIB
     """Size of the finished results that the store keeps."""
     max_upload_bytes: PositiveInt = 512 * MIB
