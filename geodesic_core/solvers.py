@@ -114,8 +114,8 @@ def approximate_distance(
     absolute_error
         The same in mesh units. Where both are given, both hold.
     keep_windows
-        Keep what `DistanceField.path_to` and `DistanceField.isolines` need: what was merged, and
-        the windows of all faces, 64 bytes each. Else the first of them runs the sweep again.
+        Keep what `DistanceField.path_to` needs, at most about as much as the mesh's own arrays.
+        Else the first path runs the sweep again; so do the first isolines in any case.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
@@ -147,7 +147,7 @@ def approximate_distance(
         promise,
         control,
         paths=keep_windows,
-        windows=keep_windows,
+        windows=False,
     )
 
 
@@ -315,6 +315,8 @@ def warm_up() -> None:
     field.isolines([0.5])
     field.distance_at(SurfacePoint.face(1, (0.5, 0.25, 0.25)))
     approximate_distance(mesh, 0, keep_windows=True).path_to(3)
+    exact_distance(mesh, Curve([0, 1]))
+    approximate_distance(mesh, Curve([0, 1]))
     shortest_path(mesh, 0, 3, explain=True)
     mesh.report  # noqa: B018 - computed on access
 

@@ -311,7 +311,8 @@ def test_all_spellings_of_a_point_give_one_answer(run: Run, knot: Path) -> None:
         assert run("path", knot, *stops, "--out", "p.obj").code == 0
         paths.add(Path("p.obj").read_text())
     assert (len(answers), len(paths)) == (1, 1)
-    assert answer["sources"][1] == {"vertex": start, "position": mesh.vertices[start].tolist()}
+    place = {"vertex": start, "position": mesh.vertices[start].tolist(), "start_distance": 0.0}
+    assert answer["sources"][1] == place
     assert answer["sources"][0]["face"] == 40
     assert answer["sources"][0]["barycentric"] == [0.2, 0.3, 0.5]
     sources = [gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), start]
