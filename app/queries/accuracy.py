@@ -44,13 +44,12 @@ def solve_field(
 ) -> gc.DistanceField:
     """Return the field of distances from some sources, as exact as it has to be.
 
-    It keeps what ``paths`` or ``isolines`` need; exact fields keep what paths need anyway.
+    It keeps what ``paths`` or ``isolines`` need, where it can: exact fields keep what paths need
+    anyway, approximate ones run again for isolines.
     """
     if request.method == "exact":
         return solver.exact_distance(sources, keep_windows=isolines, **options)
-    return solver.approximate_distance(
-        sources, **errors_of(request), keep_windows=paths or isolines, **options
-    )
+    return solver.approximate_distance(sources, **errors_of(request), keep_windows=paths, **options)
 
 
 def method_of(request: schemas.Accuracy) -> dict[str, Any]:

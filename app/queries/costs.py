@@ -46,8 +46,8 @@ PER_PATH = 0.3e-3
 # Bytes of state, beside the mesh
 SWEEP_BYTES, SWEEP_BYTES_PER_FACE = 82_000, 100
 MERGING_BYTES_PER_FACE = 120
-KEEPING_BYTES_PER_FACE = 600
-"""Of an approximate sweep, and where it keeps its windows."""
+TRACING_BYTES_PER_FACE, KEEPING_BYTES_PER_FACE = 170, 600
+"""Of an approximate sweep, where it keeps what paths need, and where it keeps its windows."""
 BYTES_OF_WINDOWS_KEPT = 30
 """Of an exact sweep that keeps its windows, for the n√n of n faces."""
 SEARCH_BYTES, SEARCH_BYTES_PER_FACE = 230_000, 275
@@ -87,8 +87,11 @@ def sweep_cost(
             memory += round(BYTES_OF_WINDOWS_KEPT * (share * faces) ** 1.5)
     else:
         seconds = PER_SWEEP + PER_FACE_MERGED * share * faces
-        per_face = KEEPING_BYTES_PER_FACE if paths or isolines else MERGING_BYTES_PER_FACE
-        memory += per_face * faces
+        if isolines:  # it runs a second time, and keeps its windows then
+            seconds *= 2.0
+            memory += KEEPING_BYTES_PER_FACE * faces
+        else:
+            memory += (TRACING_BYTES_PER_FACE if paths else MERGING_BYTES_PER_FACE) * faces
     return Cost(seconds + PER_FACE_UNSWEPT * faces, memory)
 
 

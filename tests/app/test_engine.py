@@ -18,8 +18,8 @@ from app.engine.worker import Clock, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
 from app.mesh_store import MeshStore
-from app.queries import PathQuery
-from app.schemas import PathRequest, VertexPoint
+from app.queries import DistancesQuery, PathQuery
+from app.schemas import DistancesRequest, PathRequest, VertexPoint
 from app.settings import Settings
 from geodesic_core import TriangleMesh, samples
 
@@ -287,6 +287,12 @@ def config(store: Path, **settings: Any) -> WorkerConfig:
     return WorkerConfig(Settings(store=store, **settings), store / "results")
 
 
+def asked(mesh_id: str, *barriers: int) -> DistancesQuery:
+    return DistancesQuery(
+        mesh_id, DistancesRequest(sources=[{"vertex": 0}], barriers=list(barriers))
+    )
+
+
 def test_a_worker_closes_meshes_that_do_not_fit(tmp_path: Path) -> None:
     store = MeshStore(tmp_path)
     store.prepare()
@@ -296,9 +302,25 @@ def test_a_worker_closes_meshes_that_do_not_fit(tmp_path: Path) -> None:
     state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0))
 
     for mesh_id in ids:
-        state._open(mesh_id)
+        state._open(asked(mesh_id))
 
-    assert list(state.meshes) == ids[1:]
+    assert list(state.meshes) == [(mesh_id, b"") for mesh_id in ids[1:]]
+
+
+def test_a_worker_keeps_meshes_with_barriers_as_it_keeps_others(tmp_path: Path) -> None:
+    store = MeshStore(tmp_path)
+    store.prepare()
+    mesh = TriangleMesh(*samples.plane(200))
+    mesh_id, _ = store.add(mesh)
+    state = Worker(config(tmp_path, worker_mesh_bytes=2 * mesh.nbytes), c_longlong(0))
+
+    blocked = state._open(asked(mesh_id, 3, 9))
+
+    assert blocked.mesh.barriers.tolist() == [3, 9]
+    assert state._open(asked(mesh_id, 3, 9)) is blocked
+    assert len(state._open(asked(mesh_id)).mesh.barriers) == 0
+    assert state._open(asked(mesh_id, 5)) is not blocked
+    assert [len(name[1]) // 8 for name in state.meshes] == [0, 1], "the first had to go"
 
 
 def test_what_paths_need_counts_as_part_of_an_open_mesh(tmp_path: Path) -> None:
@@ -310,12 +332,12 @@ def test_what_paths_need_counts_as_part_of_an_open_mesh(tmp_path: Path) -> None:
     state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0))
 
     for mesh_id in ids:
-        state._open(mesh_id)
-    assert list(state.meshes) == ids
-    state.meshes[ids[1]].solver.shortest_path(0, 60)
-    state._open(ids[1])
+        opened = state._open(asked(mesh_id))
+    assert list(state.meshes) == [(mesh_id, b"") for mesh_id in ids]
+    opened.solver.shortest_path(0, 60)
+    state._open(asked(ids[1]))
 
-    assert list(state.meshes) == ids[1:]
+    assert list(state.meshes) == [(ids[1], b"")]
 
 
 def test_the_clock_measures_each_phase() -> None:
