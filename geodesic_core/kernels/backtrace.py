@@ -301,9 +301,12 @@ def trace_line(
                 )
                 m = following(h)
             # In a face that the path did not come from, the line ends where there is no root; or
-            # before it meets the edge on which windows were merged.
+            # before it meets the edge on which windows were merged. A root that lies on the edge
+            # may be beyond, in a face of no area.
             is_due = reference >= 0 and winners.merge_ints[reference, MERGED_ON] == m
-            is_lost = fork_count > 0 and not is_due and sy <= SAME_PLACE * side
+            close = SAME_PLACE * side
+            ends = sy < -close or (sy <= close and rest <= close)
+            is_lost = fork_count > 0 and not is_due and ends
             sy, after = -sy, -1
         if is_lost:
             if fork_count == 0:
