@@ -67,6 +67,18 @@ class Landmarks:
         wave = run_sweep(mesh, wave, bounds, control, lambda _: 1.0)
         if self.count == 0:
             self.distances = aligned_rows(len(mesh.vertices), LANDMARKS, np.float32)
-        self.distances[:, self.count] = wave.distance
+        self.distances[:, self.count] = _in_single_precision(wave.distance)
         self.count += 1
         self._nearest = np.minimum(self._nearest, wave.distance)
+
+
+def _in_single_precision(distance: Floats) -> Singles:
+    """Return distances rounded, or all infinite, which tell nothing, where one has no such number.
+
+    Single precision ends far before the largest mesh that is taken, and far above the smallest.
+    """
+    known = distance[(distance > 0.0) & (distance < math.inf)]
+    limits = np.finfo(np.float32)
+    if ((known < limits.tiny) | (known > limits.max)).any():
+        return np.full(len(distance), math.inf, np.float32)
+    return distance.astype(np.float32)

@@ -96,18 +96,20 @@ class PathSearch:
         ends = start, end
         try:
             log = _Log(self, explain)
-            return self._search(_Leg(*ends, SEARCH_SLACK, GUIDE_ERROR, control, log))
+            return self._search(_Leg(*ends, SEARCH_SLACK, control, log))
         except (_LostError, NotConverged):
             # Rounding on slivers can exceed any slack; without bounds there is nothing to lose.
             # Where many faces lie near each other, merging may go in circles.
             log = _Log(self, explain)
-            return self._search(_Leg(*ends, math.inf, SEARCH_SLACK, control, log))
+            return self._search(_Leg(*ends, math.inf, control, log))
 
     def _search(self, leg: "_Leg") -> GeodesicPath:
         try:
             upper = self._search_edges(leg)
-            upper, toward = self._sweep_toward(leg, upper)
-            path = self._sweep_outward(leg, upper, toward)
+            goal = self._goal(leg.start, math.inf)
+            if leg.slack < math.inf:
+                upper, goal = self._sweep_toward(leg, upper)
+            path = self._sweep_outward(leg, upper, goal)
         finally:
             self._forget()
         return replace(path, steps=leg.log.steps)
@@ -154,7 +156,7 @@ class PathSearch:
         """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
         limit = upper * (1.0 + leg.slack) + self._margin
         goal = self._goal(leg.start, limit)
-        bounds = wavefront.merging_bounds(math.inf, leg.guide_error, math.inf, goal)
+        bounds = wavefront.merging_bounds(math.inf, GUIDE_ERROR, math.inf, goal)
         nodes = nodes_of(self.mesh, [(leg.end.point,)], [leg.start.point])
         self._toward = with_sites(self._toward, nodes.sites)
         wave = self._toward = self._run(self._toward, nodes, bounds, leg.control, _AFTER_EDGES)
@@ -224,9 +226,7 @@ class _Leg(NamedTuple):
     start: _End
     end: _End
     slack: float
-    """Relative amount by which it looks beyond its bounds"""
-    guide_error: float
-    """Relative error of step 2"""
+    """Relative amount by which it looks beyond its bounds; infinite where it is not to have any"""
     control: Control
     log: "_Log"
 

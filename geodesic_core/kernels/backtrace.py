@@ -321,8 +321,13 @@ def trace_line(
             x = u
             if m == previous(h):
                 x, sx = side - u, sw * side - sx
-            # In a face that the path did not come from, the line ends where there is no root.
-            is_lost = fork_count > 0 and left <= 0.0
+            # In a face that the path did not come from, the line ends where there is no root; or
+            # before it meets the edge on which windows were merged. A root that lies on the edge
+            # may be beyond, in a face of no area.
+            is_due = reference >= 0 and winners.merge_ints[reference, MERGED_ON] == m
+            close = SAME_PLACE * side
+            ends = left < -close or (sw > 0.0 and left <= close and rest <= close)
+            is_lost = fork_count > 0 and not is_due and ends
             sy, after = -sy, -1
         if is_lost:
             if fork_count == 0:

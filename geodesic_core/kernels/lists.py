@@ -3,6 +3,7 @@
 from typing import Any
 
 from geodesic_core.kernels.jit import kernel, prefetch
+from geodesic_core.kernels.passed import keep_passed, mirror, passes
 from geodesic_core.kernels.queue import ring_push
 from geodesic_core.kernels.topology import AROUND, HEAD, LENGTH, ROW, TAIL
 from geodesic_core.kernels.wavefront import (
@@ -18,7 +19,6 @@ from geodesic_core.kernels.wavefront import (
     MARKS,
     SIZE,
     merging,
-    source_weight,
 )
 from geodesic_core.kernels.window import (
     B0,
@@ -117,30 +117,35 @@ def send_across(wave: Any, g: int, slot: int) -> None:
     way, its face is seen in the mirror.
     """
     links, w = wave.links, WIDTH * slot
-    length = wave.geometry[ROW * g + LENGTH]
-    b0, b1 = wave.windows[w + B0], wave.windows[w + B1]
-    sx, sy, sigma = wave.windows[w + SX], wave.windows[w + SY], wave.windows[w + SIGMA]
-    root, xi, reference = wave.window_ints[INTS * slot + ROOT], 0.0, -1
-    if merging(wave):
-        xi, reference = wave.windows[w + XI], wave.window_ints[INTS * slot + REFERENCE]
-    sw = source_weight(wave, root)
-    same, h = True, g
-    while True:
-        code = links[ROW * h + AROUND]
-        h = code >> 1
-        if code & 1 == 0:
-            same = not same
-        if h == g:
-            break
-        if same:
-            mx, m_sigma = length * sw - sx, sigma if sw == 1.0 else sigma - sx * length
-            copy = put_window(wave, length - b1, length - b0, mx, sy, m_sigma, root, xi, reference)
-        else:
-            copy = put_window(wave, b0, b1, sx, sy, sigma, root, xi, reference)
+    wave.counters[CREATED] -= 1
+    if not passes(wave, g, slot):
+        free_window(wave, slot)
+        return
+    h = links[ROW * g + AROUND] >> 1
+    while h != g:
+        copy = put_window(
+            wave,
+            wave.windows[w + B0],
+            wave.windows[w + B1],
+            wave.windows[w + SX],
+            wave.windows[w + SY],
+            wave.windows[w + SIGMA],
+            wave.window_ints[INTS * slot + ROOT],
+            wave.windows[w + XI],
+            wave.window_ints[INTS * slot + REFERENCE],
+        )
+        if links[ROW * h + TAIL] == links[ROW * g + TAIL]:
+            mirror(wave, copy, wave.geometry[ROW * g + LENGTH])
         insert_sorted(wave, h, copy)
         wave.counters[CREATED] += 1
         queue_if_due(wave, h, links[ROW * h + TAIL], links[ROW * h + HEAD])
-    wave.counters[CREATED] -= 1
+        h = links[ROW * h + AROUND] >> 1
+    keep_passed(wave, g, slot)
+
+
+@kernel
+def free_window(wave: Any, slot: int) -> None:
+    """Give a window back to the pool."""
     wave.window_ints[INTS * slot + NEXT] = wave.counters[FREE_FIRST]
     wave.counters[FREE_FIRST] = slot
     wave.counters[FREE_SIZE] += 1

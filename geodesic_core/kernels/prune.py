@@ -12,7 +12,7 @@ from typing import Any
 
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.topology import TAIL
+from geodesic_core.kernels.topology import SEAM, TAIL
 from geodesic_core.kernels.wavefront import (
     COUNTERS,
     FACE,
@@ -80,10 +80,13 @@ def straight_to_start(wave: Any, v: int) -> float:
 def least_to_start(wave: Any, v: int, straight: float) -> float:
     """Lower bound of the distance from v to the start: straight, or by a landmark.
 
-    The exact distance from a landmark is known to be from LEAST to MOST times the stored one.
+    The exact distance from a landmark is known to be from LEAST to MOST times the stored one. A
+    landmark of another component tells nothing.
     """
     least = straight
     for i in range(wave.landmark_count):
+        if wave.least[i] == math.inf:
+            continue
         here = wave.landmarks[LANDMARKS * v + i]
         bound = max(LEAST * here - wave.most[i], wave.least[i] - MOST * here)
         if bound > least:
@@ -96,6 +99,8 @@ def steepest_to_start(wave: Any, v: int, straight: float) -> float:
     """Return what `least_to_start`, at any point q, exceeds by the distance of v and q at most."""
     steepest = straight
     for i in range(wave.landmark_count):
+        if wave.least[i] == math.inf:
+            continue
         here = wave.landmarks[LANDMARKS * v + i]
         bound = max(MOST * here - wave.most[i], wave.least[i] - LEAST * here)
         if bound > steepest:
@@ -133,6 +138,8 @@ def forget(topology: Any, wavefront: Any, bounds: Any) -> None:
             for h in range(3 * face, 3 * face + 3):
                 wave.lists[LIST * h + SIZE] = 0
                 wave.lists[LIST * h + MARKS] = 0
+                if wave.flags[v] & SEAM:
+                    wave.passed[h] = -1
                 if merging(wave):
                     wave.runs[h] = 0
     for k in range(wave.site_count):

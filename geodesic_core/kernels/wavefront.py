@@ -12,7 +12,7 @@ import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs, Singles, aligned_rows
 from geodesic_core.kernels.jit import inlined, kernel, pointer
-from geodesic_core.kernels.topology import Topology
+from geodesic_core.kernels.topology import SEAM, Topology
 from geodesic_core.kernels.window import WIDTH
 
 # Columns of Wavefront.lists, a row per half-edge
@@ -229,6 +229,9 @@ class Wavefront(NamedTuple):
     """(V,): lower bound of the rest of a path from a touched vertex on; empty unless pruned"""
     kept: Floats
     """(K, 8): windows that were propagated, as in the pool, NEXT their half-edge; or empty"""
+    passed: Ints
+    """(3F,): slot of what last passed an irregular edge, by its lowest half-edge; -1 at the end;
+    empty where there are none"""
     # The following are empty unless the sweep merges.
     upper: Floats
     """(V,): upper bound of the exact distance"""
@@ -281,6 +284,7 @@ class View(NamedTuple):
     start: Any
     least: Any
     most: Any
+    passed: Any
     upper: Any
     light: Any
     reference: Any
@@ -345,6 +349,7 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         pointer(bounds.goal.position),
         pointer(bounds.goal.least),
         pointer(bounds.goal.most),
+        pointer(wave.passed),
         pointer(wave.upper),
         pointer(wave.light),
         pointer(wave.reference),
@@ -402,6 +407,7 @@ def new_wavefront(
     """
     vertices, half_edges = len(topology.total_angle), len(topology.links)
     nodes = vertices + sites.nodes
+    irregular = bool((topology.flags & SEAM).any())
     merged_vertices, merged_nodes = (vertices, nodes) if merges else (0, 0)
     counters = np.zeros(COUNTERS, np.int64)
     counters[FREE_FIRST] = -1
@@ -426,6 +432,7 @@ def new_wavefront(
         touched=np.empty(vertices, np.int32),
         toward=np.empty(vertices if pruned else 0),
         kept=aligned_rows(4096 if windows else 0, WIDTH, np.float64),
+        passed=np.full(half_edges if irregular else 0, -1, np.int32),
         upper=np.full(merged_vertices, np.inf),
         light=np.tile([1.0, -1.0, 1.0, -1.0, np.inf], (merged_vertices, 1)),
         reference=np.full(merged_nodes, -1, np.int32),

@@ -195,3 +195,14 @@ def test_what_stops_a_landmark_does_not_lose_the_path(stop):
         assert max(asks) == for_the_path + 1, "a landmark was due"
     solver.shortest_path(*ends)
     assert landmark_count(solver) == 1
+
+
+@pytest.mark.parametrize("scale", [1e-49, 1e49])
+def test_paths_where_single_precision_ends(scale):
+    vertices, faces = zoo.torus(8, 6)
+    small = gc.Solver(gc.TriangleMesh(vertices, faces))
+    solver = gc.Solver(gc.TriangleMesh(vertices * scale, faces))
+    for source, target in [(0, 20), (3, 40), (11, 30), (47, 5), (2, 25), (8, 33)]:
+        expected = small.shortest_path(source, target).length
+        found = solver.shortest_path(source, target).length
+        assert found == pytest.approx(scale * expected, rel=1e-9, abs=0)

@@ -3,6 +3,8 @@
 The table is that of ``docs/accuracy.md``.
 """
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -204,19 +206,76 @@ def test_a_pillow_of_one_triangle_and_its_back():
     np.testing.assert_allclose(gc.exact_distance(mesh, 1).distances, [3, 0, 5], rtol=1e-15)
 
 
-@pytest.mark.jit
-@pytest.mark.xfail(strict=True, raises=gc.errors.DeadlineExceeded, reason="windows without end")
-def test_three_needles_upon_each_other():
-    """Windows wind about the tip from sheet to sheet, each time in two more ways."""
-    vertices = [
+NEEDLES = [(0, 2, 1), (1, 2, 0), (2, 0, 1)]
+NEEDLE = np.array(
+    [
         (-0.15211269660704663, 1.0566645623318836, 0.9966675671761641),
         (-0.15162187405516467, -0.04385665101193417, 0.038200165017030135),
         (-0.1487304589151138, -0.032884343650413754, 0.07894510119180953),
     ]
-    mesh = gc.TriangleMesh(vertices, [(0, 2, 1), (1, 2, 0), (2, 0, 1)])
-    found = gc.exact_distance(mesh, 2, deadline_s=2).distances
-    expected = np.linalg.norm(mesh.vertices - mesh.vertices[2], axis=1)
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
+)
+
+
+@pytest.mark.parametrize("source", [0, 1, 2])
+def test_three_needles_upon_each_other(source):
+    """Windows would wind about the tip from sheet to sheet, each time in two more ways."""
+    mesh = gc.TriangleMesh(NEEDLE, NEEDLES)
+    expected = np.linalg.norm(NEEDLE - NEEDLE[source], axis=1)
+    found = gc.exact_distance(mesh, source, deadline_s=2)
+    assert found.stats.windows_created < 30
+    np.testing.assert_allclose(found.distances, expected, rtol=1e-12)
+    near = gc.approximate_distance(mesh, source, 1e-3, deadline_s=2).distances
+    np.testing.assert_allclose(near, expected, rtol=1e-3)
+    for target in range(3):
+        path = gc.shortest_path(mesh, source, target)
+        assert path.length == pytest.approx(expected[target], rel=1e-12)
+
+
+def test_points_inside_three_sheets_upon_each_other():
+    """The way from inside one sheet into another is over the nearest edge, in its mirror image."""
+    corners = np.array([(0, 0, 0), (4, 0, 0), (1, 3, 0)])
+    mesh = gc.TriangleMesh(corners, NEEDLES)
+    weights = [(0.2, 0.5, 0.3), (0.6, 0.1, 0.3), (0.3, 0.3, 0.4), (0.05, 0.05, 0.9)]
+    places = np.array(weights) @ corners
+
+    def over_an_edge(p, q):
+        found = []
+        for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+            normal = np.cross((0, 0, 1), b - a) / np.linalg.norm(b - a)
+            image = q - 2 * ((q - a) @ normal) * normal
+            share = ((p - a) @ normal) / ((p - image) @ normal)
+            along = (p + share * (image - p) - a) @ (b - a) / ((b - a) @ (b - a))
+            end = a if along < 0 else b
+            bent = np.linalg.norm(p - end) + np.linalg.norm(q - end)
+            found.append(np.linalg.norm(p - image) if 0 <= along <= 1 else bent)
+        return min(found)
+
+    def point(sheet, weight):
+        order = [weight[v] for v in NEEDLES[sheet]]
+        return gc.SurfacePoint.face(sheet, order)
+
+    for i, j in itertools.product(range(3), range(3)):
+        targets = [point(j, weight) for weight in weights]
+        for p, weight in zip(places, weights, strict=True):
+            field = gc.exact_distance(mesh, point(i, weight), targets=targets)
+            for q, target in zip(places, targets, strict=True):
+                expected = np.linalg.norm(p - q) if i == j else over_an_edge(p, q)
+                assert field.distance_at(target) == pytest.approx(expected, rel=1e-12)
+                path = gc.shortest_path(mesh, point(i, weight), target)
+                assert path.length == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_path_that_ends_on_the_edge_of_a_face_of_no_area():
+    """Behind an edge of several faces, where the end may lie in another one."""
+    vertices = np.array(
+        [(0, 0, 0), (1, 0, 2), (2, 1, 2), (1, 2, 0), (0, 2, 2), (0, 1, 1), (0, 2, 0)], float
+    )
+    faces = [(2, 1, 0), (6, 2, 4), (0, 4, 3), (0, 4, 5), (2, 4, 6), (4, 3, 6)]
+    matrix = unfolding.distance_matrix(vertices, faces)
+    mesh = gc.TriangleMesh(vertices, faces)
+    for source, target in itertools.permutations(range(7), 2):
+        path = gc.exact_distance(mesh, source).path_to(target)
+        assert path.length == pytest.approx(matrix[source, target], rel=1e-12)
 
 
 def test_an_unreferenced_last_vertex():

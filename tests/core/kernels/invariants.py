@@ -169,7 +169,7 @@ def _ints(wave) -> np.ndarray:
 
 
 def check_pool(wave) -> None:
-    """Every slot ever used is in one list, or free, and nowhere twice."""
+    """Every slot ever used is in one list, or free, or passed an edge, and nowhere twice."""
     free, slot = [], int(wave.counters[FREE_FIRST])
     for _ in range(wave.counters[FREE_SIZE]):
         free.append(slot)
@@ -180,6 +180,11 @@ def check_pool(wave) -> None:
         slots = slots_of(wave, h)
         assert slots[-1] == wave.lists[h, LAST]
         used += slots
+    for last in wave.passed[wave.passed >= 0].tolist():
+        slot = last
+        while slot >= 0:
+            used.append(slot)
+            slot = int(_ints(wave)[slot, NEXT])
     assert sorted(free + used) == list(range(wave.counters[FRESH]))
     assert wave.counters[FRESH] <= len(wave.windows)
 
