@@ -22,7 +22,7 @@ from geodesic_core.nearest_source import NearestSource, find_nearest_source
 from geodesic_core.nodes import Nodes, component_of, disconnected
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, traced_path
 from geodesic_core.surface_point import Point, SurfacePoint
-from geodesic_core.tolerances import PATH_LENGTH
+from geodesic_core.tolerances import LEVEL, PATH_LENGTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +219,9 @@ class DistanceField:
         """
         heights, error = as_levels(levels), as_chord_error(self.mesh, chord_error)
         windows = self._swept_again[1] if self._windows is None else self._windows
-        within = [level for level in heights if level <= self.max_distance]
+        # At its very limit the sweep is cut off by rounding: a line stays clear of that.
+        highest = self.max_distance * (1.0 - 3.0 * LEVEL)
+        within = [min(level, highest) for level in heights if level <= self.max_distance]
         lines = iter(
             find_isolines(self.mesh, windows, self._node_distances, self._nodes, within, error)
         )

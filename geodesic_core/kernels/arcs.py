@@ -33,6 +33,7 @@ from geodesic_core.kernels.regions import (
     REGION,
     SIDE,
     is_line,
+    runs_along,
     span_in_half_plane,
     span_on_line,
 )
@@ -160,24 +161,10 @@ def clip_to_region(intervals: Floats, front: Floats, region: Floats, slack: floa
 
 
 @kernel
-def runs_along_edge(geometry: Floats, face: int, arc: Floats, slack: float) -> bool:
-    """Whether a line in a face runs along one of its edges."""
-    x0, y0 = point_on(arc, arc[FROM])
-    x1, y1 = point_on(arc, arc[TO])
-    for h in range(3 * face, 3 * face + 3):
-        ox, oy, ux, uy = half_edge_in_face(geometry, h)
-        first, last = ux * (y0 - oy) - uy * (x0 - ox), ux * (y1 - oy) - uy * (x1 - ox)
-        if max(first, last) <= slack:
-            return True
-    return False
-
-
-@kernel
 def arcs_within(topology: Any, face: int, regions: Floats, slack: float) -> tuple[Floats, Any]:
     """Return the arcs of the regions' fronts in the face and between their sides; whose each is.
 
-    Lines along an edge of the face are left out: which of its faces they are in, rounding would
-    say. They come back where crossings of the edges are joined, which all faces know the same.
+    Lines along an edge, within ``slack``, are in the faces beyond: rounding must not say.
     """
     geometry = topology.geometry
     arcs, owners, count = np.empty((len(regions), ARC)), np.empty((len(regions), 1), np.int32), 0
@@ -196,6 +183,10 @@ def arcs_within(topology: Any, face: int, regions: Floats, slack: float) -> tupl
             intervals[0, 1] = intervals[0, 0] + TURN
         for h in range(3 * face, 3 * face + 3):
             ox, oy, ux, uy = half_edge_in_face(geometry, h)
+            if runs_along(region, slack, ox, oy, ux, uy, geometry[h, LENGTH]):
+                if region[EX] * ux + region[EY] * uy > 0.0:  # what is nearer is in this face
+                    left = 0
+                continue
             depth = ux * (y - oy) - uy * (x - ox)
             left = clip_to_half_plane(intervals, left, region, depth, -uy, ux)
         left = clip_to_sides(intervals, left, region, region)
@@ -203,8 +194,7 @@ def arcs_within(topology: Any, face: int, regions: Floats, slack: float) -> tupl
         for k in range(left):
             put_arc(arcs[count], region, intervals[k, 0], intervals[k, 1])
             owners[count, 0] = i
-            if not (is_line(region) and runs_along_edge(geometry, face, arcs[count], slack)):
-                count += 1
+            count += 1
     return arcs[:count], owners[:count]
 
 
@@ -251,13 +241,24 @@ def is_apart(chord: Any, region: Floats, slack: float) -> bool:
 
 
 @kernel
+def yields_to(arc: Floats, owner: int, region: Floats, rank: int) -> bool:
+    """Whether an arc does not count where the front of another region coincides with it.
+
+    Lines come before circles, which may touch them, then what is first. Of lines that face each
+    other neither counts: nothing is farther between them.
+    """
+    if is_line(arc) != is_line(region):
+        return is_line(region)
+    return rank < owner or arc[EX] * region[EX] + arc[EY] * region[EY] < 0.0
+
+
+@kernel
 def outer_arcs(topology: Any, face: int, regions: Floats, level: float, shortest: float) -> Floats:
     """Return the edge of the union of the regions in the face: arcs that no other one reaches.
 
-    Where fronts coincide within `LEVEL`, the first counts: of it nothing is taken that another
-    does not reach by more, and from the others all that it reaches but for as much. Lines that face
-    each other are both taken away: nothing is farther between them. What is not longer than
-    ``shortest`` is left out. O(n² log n) for n regions.
+    Where fronts coincide within `LEVEL`, one of them counts (`yields_to`): of it nothing is taken
+    that another does not reach by more, and from the others all that it reaches but for as much.
+    What is not longer than ``shortest`` is left out. O(n² log n) for n regions.
     """
     slack = LEVEL * level
     arcs, owners = arcs_within(topology, face, regions, slack)
@@ -268,8 +269,7 @@ def outer_arcs(topology: Any, face: int, regions: Floats, level: float, shortest
         lo, hi, chord = arc[FROM], arc[TO], chord_of(arc)
         for j in range(len(regions)):
             region = regions[j]
-            faces_it = arc[EX] * region[EX] + arc[EY] * region[EY] < 0.0
-            beyond = slack if j < owner or faces_it else -slack
+            beyond = slack if yields_to(arc, owner, region, j) else -slack
             if j == owner or is_apart(chord, region, beyond):
                 continue
             intervals[0, 0], intervals[0, 1] = lo, hi

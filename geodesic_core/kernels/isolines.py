@@ -16,7 +16,7 @@ from geodesic_core.arrays import Flags, Floats, Ints, Longs
 from geodesic_core.kernels.arcs import ARC, FROM, TO, outer_arcs, point_on, with_room
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.kept import Kept
-from geodesic_core.kernels.regions import RADIUS, is_line, regions_of_face, span_on_line
+from geodesic_core.kernels.regions import RADIUS, is_line, regions_of_face, runs_along, span_on_line
 from geodesic_core.kernels.topology import (
     COS_LEFT,
     HEAD,
@@ -155,7 +155,9 @@ def cut_faces(
             length, begin = geometry[h, LENGTH], span_count
             spans = with_room(spans, span_count + len(regions))
             for i in range(len(regions)):
-                lo, hi = span_on_line(regions[i], 0.0, ox, oy, ux, uy, 0.0, length)
+                along = runs_along(regions[i], slack, ox, oy, ux, uy, length)
+                beyond = slack if along else 0.0  # at the level counts as nearer
+                lo, hi = span_on_line(regions[i], beyond, ox, oy, ux, uy, 0.0, length)
                 if lo <= hi:
                     spans[span_count, 0], spans[span_count, 1] = lo, hi
                     span_count += 1
@@ -202,9 +204,10 @@ def united(spans: Floats, gap: float) -> int:
 def cross_edges(topology: Any, distance: Floats, cuts: Any, level: float, place: Ints) -> Crossings:
     """Find where a level crosses the edges of the faces that it may pass, each edge once.
 
-    A vertex at the level counts as nearer, and no end of an edge is anything but what its vertex
-    is: so that what crosses the edges around a face does so in pairs.
+    A vertex at the level, within `LEVEL`, counts as nearer, and no end of an edge is anything but
+    what its vertex is: so that what crosses the edges around a face does so in pairs.
     """
+    reach = level * (1.0 + LEVEL)
     links, geometry = topology.links, topology.geometry
     count = 3 * len(cuts.faces)
     places, half_edges, total = np.empty((64, 1)), np.empty((64, 1), np.int32), 0
@@ -216,8 +219,8 @@ def cross_edges(topology: Any, distance: Floats, cuts: Any, level: float, place:
             continue
         h = 3 * cuts.faces[n // 3, 0] + n % 3
         length, gap = geometry[h, LENGTH], CROSSING * geometry[h, LENGTH]
-        tail_inside = distance[links[h, TAIL]] <= level
-        head_inside = distance[links[h, HEAD]] <= level
+        tail_inside = distance[links[h, TAIL]] <= reach
+        head_inside = distance[links[h, HEAD]] <= reach
         size, begin, g = 0, total, h
         if tail_inside:
             spans[size, 0], spans[size, 1] = 0.0, 0.0
@@ -290,7 +293,7 @@ def ends_of_face(
     for i in range(3):
         h, n = 3 * face + i, 3 * k + i
         ox, oy, ux, uy = half_edge_in_face(topology.geometry, h)
-        inside = distance[topology.links[h, TAIL]] <= level
+        inside = distance[topology.links[h, TAIL]] <= level * (1.0 + LEVEL)
         for j in range(crossings.number[n, 0]):
             c = crossings.first[n, 0] + j
             x = crossings.places[c, 0]

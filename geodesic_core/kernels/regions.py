@@ -2,9 +2,9 @@ r"""What reaches within a level in one face: discs and strips.
 
 A window reaches, within a level L, what lies in a disc of radius L - σ around its unfolded
 pseudosource and between its two rays. A corner of the face, and a source inside it, reach a whole
-disc. Where rays are parallel, the disc is a half-plane: what lies before the line D = L, a strip.
-Pieces of curves in the face reach a strip to each side. So a region is what is on the near side of
-its *front*, a circle or a line, and within up to three *sides*, which are straight::
+disc. Where the rays are parallel, what lies between them before the line D = L is a strip. Pieces
+of curves in the face reach a strip to each side. So a region is what is on the near side of its
+*front*, a circle or a line, and within up to three *sides*, which are straight::
 
              .---.   front: a circle       +<--e---+ C   front: a line
             /     \                        |       |
@@ -74,6 +74,18 @@ def put_strip(region: Floats, x: float, y: float, ex: float, ey: float, width: f
     region[EX], region[EY] = ex, ey
     put_side(region, 0, ex, ey, 0.0)
     put_side(region, 1, -ex, -ey, width)
+
+
+@kernel
+def runs_along(
+    front: Floats, slack: float, ox: float, oy: float, ux: float, uy: float, length: float
+) -> bool:
+    """Whether a front is a line that runs along an edge."""
+    if not is_line(front):
+        return False
+    depth = front[EX] * (oy - front[CY]) - front[EY] * (ox - front[CX])
+    rise = length * (front[EX] * uy - front[EY] * ux)
+    return max(abs(depth), abs(depth + rise)) <= slack
 
 
 @kernel
