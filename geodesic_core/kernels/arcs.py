@@ -30,8 +30,8 @@ from geodesic_core.kernels.regions import (
     NX,
     NY,
     RADIUS,
-    REGION,
     SIDE,
+    end_of_sides,
     is_line,
     runs_along,
     span_in_half_plane,
@@ -136,7 +136,7 @@ def clip_to_disc(
 def clip_to_sides(intervals: Floats, count: int, front: Floats, region: Floats) -> int:
     """Cut intervals of a front to the sides of a region."""
     dx, dy = front[CX] - region[CX], front[CY] - region[CY]
-    for side in range(FRONT, REGION, SIDE):
+    for side in range(FRONT, end_of_sides(region), SIDE):
         nx, ny = region[side + NX], region[side + NY]
         depth = region[side + DEPTH] + nx * dx + ny * dy
         count = clip_to_half_plane(intervals, count, front, depth, nx, ny)
@@ -228,7 +228,7 @@ def is_apart(chord: Any, region: Floats, slack: float) -> bool:
     """
     x0, y0, x1, y1, sagitta, half = chord
     x0, y0, x1, y1 = x0 - region[CX], y0 - region[CY], x1 - region[CX], y1 - region[CY]
-    for side in range(FRONT, REGION, SIDE):
+    for side in range(FRONT, end_of_sides(region), SIDE):
         nx, ny = region[side + NX], region[side + NY]
         depth = region[side + DEPTH] + sagitta
         if max(nx * x0 + ny * y0, nx * x1 + ny * y1) + depth < 0.0:

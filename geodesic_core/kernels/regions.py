@@ -55,6 +55,12 @@ def is_line(front: Floats) -> bool:
 
 
 @kernel
+def end_of_sides(region: Floats) -> int:
+    """Return the column after the last side that a region may have: discs have two."""
+    return REGION if is_line(region) else REGION - SIDE
+
+
+@kernel
 def put_side(region: Floats, rank: int, nx: float, ny: float, depth: float) -> None:
     """Set one of a region's sides."""
     side = FRONT + SIDE * rank
@@ -200,7 +206,7 @@ def span_on_line(
             return 1.0, 0.0
         half = math.sqrt((radius - height) * (radius + height))
         lo, hi = max(lo, middle - half), min(hi, middle + half)
-    for side in range(FRONT, REGION, SIDE):
+    for side in range(FRONT, end_of_sides(region), SIDE):
         nx, ny = region[side + NX], region[side + NY]
         depth = region[side + DEPTH] + nx * wx + ny * wy
         lo, hi = span_in_half_plane(lo, hi, depth, nx * ex + ny * ey)
