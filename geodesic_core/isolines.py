@@ -13,6 +13,7 @@ from geodesic_core.kernels import isolines as kernels
 from geodesic_core.kernels.isolines import Field
 from geodesic_core.kernels.kept import Kept
 from geodesic_core.kernels.topology import LENGTH
+from geodesic_core.kernels.wavefront import FACE
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nodes import Nodes
 from geodesic_core.path import length_of
@@ -106,8 +107,18 @@ def find_isolines(
 
     O(windows + F), and for each level O(F + n² log n) for n windows in each face that it passes.
     """
-    topology, source_rows = mesh.topology, nodes.first_target
-    field = Field(kept, distances, nodes.sites.ints, nodes.sites.weights, source_rows)
+    topology, sites = mesh.topology, nodes.sites
+    site_rows = np.argsort(sites.ints[: nodes.first_target, FACE], kind="stable")
+    piece_rows = np.argsort(sites.piece_ints[:, FACE], kind="stable")
+    field = Field(
+        kept=kept,
+        distance=distances,
+        site_ints=sites.ints[site_rows],
+        site_weights=sites.weights[site_rows],
+        piece_ints=sites.piece_ints[piece_rows],
+        piece_ends=sites.piece_ends[piece_rows],
+        first_piece=nodes.first_piece,
+    )
     least, most = kernels.face_ranges(topology, field)
     place = np.full(len(least), -1, np.int32)
     found = []

@@ -11,7 +11,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.arrival import Arrival, arrival_at, with_target
 from geodesic_core.curve import Curve, Polyline
-from geodesic_core.errors import InternalError, InvalidArgument, NoPath
+from geodesic_core.errors import InternalError, NoPath
 from geodesic_core.gradient import gradient_at_vertices
 from geodesic_core.isolines import Isoline, as_chord_error, as_levels, find_isolines, spaced_levels
 from geodesic_core.kernels.backtrace import Winners
@@ -22,7 +22,7 @@ from geodesic_core.nearest_source import NearestSource, find_nearest_source
 from geodesic_core.nodes import Nodes, component_of, disconnected
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, traced_path
 from geodesic_core.surface_point import Point, SurfacePoint
-from geodesic_core.tolerances import PATH_LENGTH
+from geodesic_core.tolerances import LEVEL, PATH_LENGTH
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +193,8 @@ class DistanceField:
 
         They are where the surface within that distance ends: closed, or open where they end at the
         boundary or at an edge of more than two faces. In each face they consist of circular arcs,
-        whose ends, and what crosses edges, are exact; between them arcs become chords. A vertex at
+        and of straight lines beside curves; their ends, and what crosses edges, are exact, and
+        between them arcs become chords. A vertex at
         the level itself counts as within. Levels beyond all distances, or beyond ``max_distance``,
         have no lines. Of an approximate field they are those of its own distances, which the same
         error bounds.
@@ -209,7 +210,7 @@ class DistanceField:
         Raises
         ------
         InvalidArgument
-            A level or the chord error is out of its domain; or a source is a curve.
+            A level or the chord error is out of its domain.
 
         Notes
         -----
@@ -217,13 +218,10 @@ class DistanceField:
         each level O(n² log n) for n windows in each face that it passes.
         """
         heights, error = as_levels(levels), as_chord_error(self.mesh, chord_error)
-        if self._bounds.strips:
-            raise InvalidArgument(
-                "a source of the field is a curve, of which no isolines are known yet: give the "
-                "curve's points as sources instead, as close as need be"
-            )
         windows = self._swept_again[1] if self._windows is None else self._windows
-        within = [level for level in heights if level <= self.max_distance]
+        # At its very limit the sweep is cut off by rounding: a line stays clear of that.
+        highest = self.max_distance * (1.0 - 3.0 * LEVEL)
+        within = [min(level, highest) for level in heights if level <= self.max_distance]
         lines = iter(
             find_isolines(self.mesh, windows, self._node_distances, self._nodes, within, error)
         )

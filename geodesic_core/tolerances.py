@@ -178,7 +178,8 @@ edge from its end that the rays of that end are as near: the square of this shar
 LEVEL = 1e-12
 """Relative difference within which two ways to a point of an isoline count as equally long.
 
-Circles that should be one, or touch, differ by rounding; the first of them is taken.
+Circles and lines that should be one, or touch, or run along an edge, differ by rounding; of them
+one is taken, and what is at the level counts as within.
 """
 
 CROSSING = 1e-11

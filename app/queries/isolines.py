@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 import geodesic_core as gc
 from app import schemas
 from app.encoding import JSON, Answer
-from app.errors import pointer
 from app.mesh_store import OpenMesh
 from app.queries.accuracy import bound_of, likely_bound, method_of, solve_field, with_its_error
 from app.queries.costs import (
@@ -46,23 +45,11 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
 
     @classmethod
     def normal(cls, request: schemas.IsolinesRequest) -> schemas.IsolinesRequest:
-        """Name the error that is granted.
-
-        Refuse levels that are told twice or not at all, and curves: the library would, after the
-        sweep.
-        """
+        """Name the error that is granted; refuse levels that are told twice or not at all."""
         if request.levels is None and request.count is None:
             raise refuse_places(["/levels"], "give levels, or count for some evenly spaced")
         if request.levels is not None and request.count is not None:
             raise refuse_places(["/count"], "does not go with levels")
-        curves = [
-            pointer("sources", i)
-            for i, source in enumerate(request.sources)
-            if isinstance(source, schemas.CurveSource)
-        ]
-        if curves:
-            message = "curves have no isolines yet: give points instead, as close as need be"
-            raise refuse_places(curves, message)
         return with_its_error(request)
 
     def refuse(self, settings: Settings) -> None:

@@ -1,17 +1,16 @@
 r"""One level in one face: the edge of all that is nearer, in closed form.
 
-A window reaches, within a level L, what lies in a disc of radius L - σ around its unfolded
-pseudosource and between its two rays. A corner of the face, and a source inside it, reach a whole
-disc. What is no farther than L is the union of these, cut to the face. Its edge consists of arcs of
-their circles: of each what lies in the face, between its rays, and in none of the others::
+What is no farther than a level is the union of all that reaches it (`regions`), cut to the face.
+Its edge consists of arcs of their fronts: of each what lies in the face, between its sides, and in
+none of the others::
 
               .---.
              / \ / \        Two discs of rays from below: of each circle that part counts
             /  |X|  \       which the other does not reach.
            |  / | \  |
 
-All is planar, in the frame of the face's first half-edge. Arcs are intervals of angles,
-counter-clockwise, so that the nearer side is on their left.
+Arcs are intervals of *places*: of a circle angles, counter-clockwise, and of a line distances from
+where it begins; so that the nearer side is on their left.
 """
 
 import math
@@ -21,51 +20,33 @@ import numpy as np
 
 from geodesic_core.arrays import Floats
 from geodesic_core.kernels.jit import kernel
-from geodesic_core.kernels.topology import (
-    COS_LEFT,
-    COS_RIGHT,
-    LENGTH,
-    LENGTH_LEFT,
-    SIN_LEFT,
-    SIN_RIGHT,
-    TAIL,
-    point_in_frame,
+from geodesic_core.kernels.regions import (
+    CX,
+    CY,
+    DEPTH,
+    EX,
+    EY,
+    FRONT,
+    NX,
+    NY,
+    RADIUS,
+    SIDE,
+    end_of_sides,
+    is_line,
+    runs_along,
+    span_in_half_plane,
+    span_on_line,
 )
-from geodesic_core.kernels.wavefront import FACE, NODE
-from geodesic_core.kernels.window import B0, B1, SIGMA, SX, SY, reaches
-from geodesic_core.tolerances import GAP, LEVEL
+from geodesic_core.kernels.topology import LENGTH, half_edge_in_face
+from geodesic_core.tolerances import LEVEL
 
-# Columns of a disc
-CX = 0
-CY = 1
-RADIUS = 2
-N0X = 3  # the normal, inward, of the ray at b0; zero where there is no ray
-N0Y = 4
-N1X = 5
-N1Y = 6
-DISC = 7
-
-# Columns of an arc, of the circle around (CX, CY)
-FROM_ANGLE = 3
-TO_ANGLE = 4
-ARC = 5
+# Columns of an arc, after those of its front
+FROM = FRONT  # places
+TO = FRONT + 1
+ARC = FRONT + 2
 
 TURN = 2.0 * math.pi
-_INTERVALS = 16  # that a circle, a face and a window's two rays can have in common, at most
-
-
-@kernel
-def half_edge_in_face(geometry: Floats, h: int) -> tuple[float, float, float, float]:
-    """Tail and direction of h in the frame of its face's first half-edge."""
-    first = h - h % 3
-    if h == first:
-        return 0.0, 0.0, 1.0, 0.0
-    if h == first + 1:
-        x = geometry[first, LENGTH]
-        return x, 0.0, -geometry[first, COS_RIGHT], geometry[first, SIN_RIGHT]
-    cosine, sine = geometry[first, COS_LEFT], geometry[first, SIN_LEFT]
-    reach = geometry[first, LENGTH_LEFT]
-    return reach * cosine, reach * sine, -cosine, -sine
+_INTERVALS = 16  # that a circle, a face and a region can have in common, at most
 
 
 @kernel
@@ -81,74 +62,18 @@ def with_room(rows: Any, needed: int) -> Any:
 
 
 @kernel
-def discs_of_face(topology: Any, field: Any, face: int, level: float) -> Floats:
-    """Return what the windows, the corners and the sources of a face reach within a level.
-
-    Windows come first: of what reaches equally far, they count.
-    """
-    geometry, kept = topology.geometry, field.kept
-    rows = kept.first[3 * face + 3] - kept.first[3 * face]
-    discs = np.zeros((rows + 3 + field.source_rows, DISC))
-    count, reach = 0, level * (1.0 + LEVEL)
-    for h in range(3 * face, 3 * face + 3):
-        ox, oy, ux, uy = half_edge_in_face(geometry, h)
-        gap = GAP * geometry[h, LENGTH]
-        for i in range(kept.first[h], kept.first[h + 1]):
-            w = kept.windows[i]
-            sx, sy = w[SX], w[SY]
-            if not reaches(w[B0], w[B1], sx, sy, w[SIGMA], reach):
-                continue
-            disc = discs[count]
-            count += 1
-            disc[CX], disc[CY] = ox + sx * ux - sy * uy, oy + sx * uy + sy * ux
-            disc[RADIUS] = level - w[SIGMA]
-            for end in range(2):
-                x = w[B0] - gap - sx if end == 0 else w[B1] + gap - sx
-                length = math.hypot(x, sy)
-                if length > 0.0:
-                    turn = 1.0 if end == 0 else -1.0
-                    nx, ny = -turn * sy / length, -turn * x / length
-                    disc[N0X + 2 * end] = nx * ux - ny * uy
-                    disc[N0Y + 2 * end] = nx * uy + ny * ux
-    for k in range(field.source_rows):
-        if field.site_ints[k, FACE] == face:
-            radius = level - field.distance[field.site_ints[k, NODE]]
-            if radius >= 0.0:
-                disc = discs[count]
-                count += 1
-                disc[CX], disc[CY] = point_in_frame(geometry, 3 * face, field.site_weights[k])
-                disc[RADIUS] = radius
-    for h in range(3 * face, 3 * face + 3):
-        radius = level - field.distance[topology.links[h, TAIL]]
-        if radius >= 0.0:
-            disc = discs[count]
-            count += 1
-            disc[CX], disc[CY], _, _ = half_edge_in_face(geometry, h)
-            disc[RADIUS] = radius
-    return discs[:count]
+def point_on(front: Floats, place: float) -> tuple[float, float]:
+    """Point of a front."""
+    x, y = front[CX], front[CY]
+    if is_line(front):
+        return x + place * front[EX], y + place * front[EY]
+    return x + front[RADIUS] * math.cos(place), y + front[RADIUS] * math.sin(place)
 
 
 @kernel
-def span_on_edge(
-    disc: Floats, ox: float, oy: float, ux: float, uy: float, length: float
-) -> tuple[float, float]:
-    """Where a disc, between its rays, meets an edge: from, to; nowhere if from > to."""
-    wx, wy = ox - disc[CX], oy - disc[CY]
-    height, middle = abs(ux * wy - uy * wx), -(wx * ux + wy * uy)
-    if height > disc[RADIUS]:
-        return 1.0, 0.0
-    half = math.sqrt((disc[RADIUS] - height) * (disc[RADIUS] + height))
-    lo, hi = max(middle - half, 0.0), min(middle + half, length)
-    for n in (N0X, N1X):
-        rate = disc[n] * ux + disc[n + 1] * uy
-        depth = disc[n] * wx + disc[n + 1] * wy
-        if rate > 0.0:
-            lo = max(lo, -depth / rate)
-        elif rate < 0.0:
-            hi = min(hi, -depth / rate)
-        elif depth < 0.0:
-            return 1.0, 0.0
-    return lo, hi
+def pace(front: Floats) -> float:
+    """Length of a front per unit of its places."""
+    return 1.0 if is_line(front) else front[RADIUS]
 
 
 @kernel
@@ -171,10 +96,18 @@ def clip(intervals: Floats, count: int, start: float, width: float) -> int:
 
 @kernel
 def clip_to_half_plane(
-    intervals: Floats, count: int, radius: float, depth: float, nx: float, ny: float
+    intervals: Floats, count: int, front: Floats, depth: float, nx: float, ny: float
 ) -> int:
-    """Cut intervals of a circle to n·p >= 0, its centre at ``depth`` inside; n a unit, or zero."""
-    if count == 0 or depth >= radius or (nx == 0.0 and ny == 0.0):
+    """Cut intervals of a front to n·p >= 0, its (CX, CY) ``depth`` inside; n a unit, or zero."""
+    if count == 0 or (nx == 0.0 and ny == 0.0):
+        return count
+    if is_line(front):
+        lo, hi = intervals[0, 0], intervals[0, 1]
+        lo, hi = span_in_half_plane(lo, hi, depth, nx * front[EX] + ny * front[EY])
+        intervals[0, 0], intervals[0, 1] = lo, hi
+        return 1 if lo < hi else 0
+    radius = front[RADIUS]
+    if depth >= radius:
         return count
     if depth <= -radius:
         return 0
@@ -200,92 +133,147 @@ def clip_to_disc(
 
 
 @kernel
-def arcs_within(topology: Any, face: int, discs: Floats) -> tuple[Floats, Any]:
-    """Return the arcs of the discs' circles in the face and between their rays; whose each is."""
+def clip_to_sides(intervals: Floats, count: int, front: Floats, region: Floats) -> int:
+    """Cut intervals of a front to the sides of a region."""
+    dx, dy = front[CX] - region[CX], front[CY] - region[CY]
+    for side in range(FRONT, end_of_sides(region), SIDE):
+        nx, ny = region[side + NX], region[side + NY]
+        depth = region[side + DEPTH] + nx * dx + ny * dy
+        count = clip_to_half_plane(intervals, count, front, depth, nx, ny)
+    return count
+
+
+@kernel
+def clip_to_region(intervals: Floats, front: Floats, region: Floats, slack: float) -> int:
+    """Cut an interval of a front to a region, whose own front is moved outward by ``slack``."""
+    if is_line(front):
+        x, y, ex, ey = front[CX], front[CY], front[EX], front[EY]
+        lo, hi = intervals[0, 0], intervals[0, 1]
+        lo, hi = span_on_line(region, slack, x, y, ex, ey, lo, hi)
+        intervals[0, 0], intervals[0, 1] = lo, hi
+        return 1 if lo < hi else 0
+    count = clip_to_sides(intervals, 1, front, region)
+    dx, dy = front[CX] - region[CX], front[CY] - region[CY]
+    if is_line(region):
+        nx, ny = -region[EY], region[EX]
+        return clip_to_half_plane(intervals, count, front, nx * dx + ny * dy + slack, nx, ny)
+    return clip_to_disc(intervals, count, front[RADIUS], dx, dy, region[RADIUS] + slack)
+
+
+@kernel
+def arcs_within(topology: Any, face: int, regions: Floats, slack: float) -> tuple[Floats, Any]:
+    """Return the arcs of the regions' fronts in the face and between their sides; whose each is.
+
+    Lines along an edge, within ``slack``, are in the faces beyond: rounding must not say.
+    """
     geometry = topology.geometry
-    arcs, owners, count = np.empty((len(discs), ARC)), np.empty((len(discs), 1), np.int32), 0
+    arcs, owners, count = np.empty((len(regions), ARC)), np.empty((len(regions), 1), np.int32), 0
     intervals = np.empty((_INTERVALS, 2))
     ax, ay, _, _ = half_edge_in_face(geometry, 3 * face + 2)
     middle_x, middle_y = (geometry[3 * face, LENGTH] + ax) / 3.0, ay / 3.0
-    for i in range(len(discs)):
-        disc = discs[i]
-        radius = disc[RADIUS]
-        if radius <= 0.0:
+    for i in range(len(regions)):
+        region, left = regions[i], 1
+        x, y = region[CX], region[CY]
+        if region[RADIUS] <= 0.0:
             continue
-        # A whole circle begins where it is farthest from the face.
-        intervals[0, 0] = math.atan2(disc[CY] - middle_y, disc[CX] - middle_x)
-        intervals[0, 1], left = intervals[0, 0] + TURN, 1
+        if is_line(region):
+            intervals[0, 0], intervals[0, 1] = -math.inf, math.inf
+        else:  # a whole circle begins where it is farthest from the face
+            intervals[0, 0] = math.atan2(y - middle_y, x - middle_x)
+            intervals[0, 1] = intervals[0, 0] + TURN
         for h in range(3 * face, 3 * face + 3):
             ox, oy, ux, uy = half_edge_in_face(geometry, h)
-            depth = ux * (disc[CY] - oy) - uy * (disc[CX] - ox)
-            left = clip_to_half_plane(intervals, left, radius, depth, -uy, ux)
-        for n in (N0X, N1X):
-            left = clip_to_half_plane(intervals, left, radius, 0.0, disc[n], disc[n + 1])
+            if runs_along(region, slack, ox, oy, ux, uy, geometry[h, LENGTH]):
+                if region[EX] * ux + region[EY] * uy > 0.0:  # what is nearer is in this face
+                    left = 0
+                continue
+            depth = ux * (y - oy) - uy * (x - ox)
+            left = clip_to_half_plane(intervals, left, region, depth, -uy, ux)
+        left = clip_to_sides(intervals, left, region, region)
         arcs, owners = with_room(arcs, count + left), with_room(owners, count + left)
         for k in range(left):
-            arcs[count, CX], arcs[count, CY], arcs[count, RADIUS] = disc[CX], disc[CY], radius
-            arcs[count, FROM_ANGLE], arcs[count, TO_ANGLE] = intervals[k, 0], intervals[k, 1]
+            put_arc(arcs[count], region, intervals[k, 0], intervals[k, 1])
             owners[count, 0] = i
             count += 1
     return arcs[:count], owners[:count]
 
 
 @kernel
-def is_apart(arc: Floats, disc: Floats, reach: float) -> bool:
-    """Whether an arc surely is beyond a disc or one of its rays: asked first, without arctangents.
+def put_arc(arc: Floats, front: Floats, start: float, end: float) -> None:
+    """Make an arc of a front."""
+    for column in range(FRONT):
+        arc[column] = front[column]
+    arc[FROM], arc[TO] = start, end
+
+
+@kernel
+def chord_of(arc: Floats) -> tuple[float, float, float, float, float, float]:
+    """Return an arc's ends, how far it strays from their chord, and half its length."""
+    width, radius = arc[TO] - arc[FROM], arc[RADIUS]
+    x0, y0 = point_on(arc, arc[FROM])
+    x1, y1 = point_on(arc, arc[TO])
+    sagitta = 0.0
+    if not is_line(arc):
+        sagitta = 2.0 * radius
+        if width < math.pi:
+            sagitta = radius * (1.0 - math.cos(0.5 * width))
+    return x0, y0, x1, y1, sagitta, 0.5 * pace(arc) * width
+
+
+@kernel
+def is_apart(chord: Any, region: Floats, slack: float) -> bool:
+    """Whether an arc surely is beyond a region: asked first, without arctangents.
 
     An arc strays from its chord by no more than its sagitta.
     """
-    width = arc[TO_ANGLE] - arc[FROM_ANGLE]
-    sagitta = 2.0 * arc[RADIUS]
-    if width < math.pi:
-        sagitta = arc[RADIUS] * (1.0 - math.cos(0.5 * width))
-    x0, y0 = point_on(arc, arc[FROM_ANGLE])
-    x1, y1 = point_on(arc, arc[TO_ANGLE])
-    x0, y0, x1, y1 = x0 - disc[CX], y0 - disc[CY], x1 - disc[CX], y1 - disc[CY]
-    for n in (N0X, N1X):
-        nx, ny = disc[n], disc[n + 1]
-        if max(nx * x0 + ny * y0, nx * x1 + ny * y1) + sagitta < 0.0:
+    x0, y0, x1, y1, sagitta, half = chord
+    x0, y0, x1, y1 = x0 - region[CX], y0 - region[CY], x1 - region[CX], y1 - region[CY]
+    for side in range(FRONT, end_of_sides(region), SIDE):
+        nx, ny = region[side + NX], region[side + NY]
+        depth = region[side + DEPTH] + sagitta
+        if max(nx * x0 + ny * y0, nx * x1 + ny * y1) + depth < 0.0:
             return True
-    nearest = min(math.hypot(x0, y0), math.hypot(x1, y1))
-    return nearest - 0.5 * arc[RADIUS] * width > reach
+    ex, ey = region[EX], region[EY]
+    if is_line(region):
+        return max(ex * y0 - ey * x0, ex * y1 - ey * x1) + sagitta + slack < 0.0
+    nearest = math.sqrt(min(x0 * x0 + y0 * y0, x1 * x1 + y1 * y1))
+    return nearest - half > region[RADIUS] + slack
 
 
 @kernel
-def point_on(arc: Floats, angle: float) -> tuple[float, float]:
-    """Point of an arc's circle."""
-    return (
-        arc[CX] + arc[RADIUS] * math.cos(angle),
-        arc[CY] + arc[RADIUS] * math.sin(angle),
-    )
+def yields_to(arc: Floats, owner: int, region: Floats, rank: int) -> bool:
+    """Whether an arc does not count where the front of another region coincides with it.
 
-
-@kernel
-def outer_arcs(topology: Any, face: int, discs: Floats, level: float, shortest: float) -> Floats:
-    """Return the edge of the union of the discs in the face: arcs that no other disc reaches.
-
-    Where circles coincide within `LEVEL`, the first counts: of it nothing is taken that another
-    does not reach by more, and from the others all that it reaches but for as much. What is not
-    longer than ``shortest`` is left out. O(n² log n) for n discs.
+    Lines come before circles, which may touch them, then what is first. Of lines that face each
+    other neither counts: nothing is farther between them.
     """
-    arcs, owners = arcs_within(topology, face, discs)
-    outer, count = np.empty((len(arcs) + 4, ARC)), 0
+    if is_line(arc) != is_line(region):
+        return is_line(region)
+    return rank < owner or arc[EX] * region[EX] + arc[EY] * region[EY] < 0.0
+
+
+@kernel
+def outer_arcs(topology: Any, face: int, regions: Floats, level: float, shortest: float) -> Floats:
+    """Return the edge of the union of the regions in the face: arcs that no other one reaches.
+
+    Where fronts coincide within `LEVEL`, one of them counts (`yields_to`): of it nothing is taken
+    that another does not reach by more, and from the others all that it reaches but for as much.
+    What is not longer than ``shortest`` is left out. O(n² log n) for n regions.
+    """
     slack = LEVEL * level
+    arcs, owners = arcs_within(topology, face, regions, slack)
+    outer, count = np.empty((len(arcs) + 4, ARC)), 0
     hidden, intervals = np.empty((64, 2)), np.empty((_INTERVALS, 2))
     for a in range(len(arcs)):
         arc, owner, hidden_count = arcs[a], owners[a, 0], 0
-        lo, hi, radius = arc[FROM_ANGLE], arc[TO_ANGLE], arc[RADIUS]
-        for j in range(len(discs)):
-            disc = discs[j]
-            reach = disc[RADIUS] + (slack if j < owner else -slack)
-            if j == owner or is_apart(arc, disc, reach):
+        lo, hi, chord = arc[FROM], arc[TO], chord_of(arc)
+        for j in range(len(regions)):
+            region = regions[j]
+            beyond = slack if yields_to(arc, owner, region, j) else -slack
+            if j == owner or is_apart(chord, region, beyond):
                 continue
-            dx, dy = arc[CX] - disc[CX], arc[CY] - disc[CY]
-            intervals[0, 0], intervals[0, 1], left = lo, hi, 1
-            for n in (N0X, N1X):
-                depth = disc[n] * dx + disc[n + 1] * dy
-                left = clip_to_half_plane(intervals, left, radius, depth, disc[n], disc[n + 1])
-            left = clip_to_disc(intervals, left, radius, dx, dy, reach)
+            intervals[0, 0], intervals[0, 1] = lo, hi
+            left = clip_to_region(intervals, arc, region, beyond)
             hidden = with_room(hidden, hidden_count + left)
             for k in range(left):  # kept in order
                 place = hidden_count
@@ -297,9 +285,8 @@ def outer_arcs(topology: Any, face: int, discs: Floats, level: float, shortest: 
         outer = with_room(outer, count + hidden_count + 1)
         for k in range(hidden_count + 1):
             end = hidden[k, 0] if k < hidden_count else hi
-            if (end - lo) * radius > shortest:
-                outer[count, CX], outer[count, CY], outer[count, RADIUS] = arc[CX], arc[CY], radius
-                outer[count, FROM_ANGLE], outer[count, TO_ANGLE] = lo, end
+            if (end - lo) * pace(arc) > shortest:
+                put_arc(outer[count], arc, lo, end)
                 count += 1
             if k < hidden_count:
                 lo = max(lo, hidden[k, 1])

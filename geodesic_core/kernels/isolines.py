@@ -13,19 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs
-from geodesic_core.kernels.arcs import (
-    FROM_ANGLE,
-    RADIUS,
-    TO_ANGLE,
-    discs_of_face,
-    half_edge_in_face,
-    outer_arcs,
-    point_on,
-    span_on_edge,
-    with_room,
-)
+from geodesic_core.kernels.arcs import ARC, FROM, TO, outer_arcs, point_on, with_room
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.kept import Kept
+from geodesic_core.kernels.regions import RADIUS, is_line, regions_of_face, runs_along, span_on_line
 from geodesic_core.kernels.topology import (
     COS_LEFT,
     HEAD,
@@ -33,10 +24,11 @@ from geodesic_core.kernels.topology import (
     LENGTH_LEFT,
     SIN_LEFT,
     TAIL,
+    half_edge_in_face,
     next_around,
 )
 from geodesic_core.kernels.wavefront import FACE, NODE
-from geodesic_core.kernels.window import B0, B1, SIGMA, SX, SY
+from geodesic_core.kernels.window import B0, B1, ROOT, SIGMA, SX, SY, distance_at
 from geodesic_core.tolerances import CROSSING, LEVEL, PIECE
 
 
@@ -47,9 +39,13 @@ class Field(NamedTuple):
     distance: Floats
     """(N,) by node"""
     site_ints: Ints
+    """Those of sources only, by face"""
     site_weights: Floats
-    source_rows: int
-    """How many rows of sites are sources; they come first."""
+    piece_ints: Ints
+    """By face"""
+    piece_ends: Floats
+    first_piece: int
+    """The least node of a piece"""
 
 
 class Cuts(NamedTuple):
@@ -62,7 +58,7 @@ class Cuts(NamedTuple):
     first_span: Ints
     """(3n + 1, 1): of each half-edge of the faces"""
     arcs: Floats
-    """(A, 5)"""
+    """(A, ARC)"""
     first_arc: Ints
     """(n + 1, 1): of each face"""
 
@@ -101,18 +97,23 @@ def face_ranges(topology: Any, field: Any) -> tuple[Floats, Floats]:
     geometry, kept = topology.geometry, field.kept
     count = len(topology.links) // 3
     least, most = np.full(count, np.inf), np.full(count, np.inf)
+    ints = kept.windows.view(np.int32)
     for face in range(count):
         for h in range(3 * face, 3 * face + 3):
             for i in range(kept.first[h], kept.first[h + 1]):
                 w = kept.windows[i]
-                x = min(max(w[SX], w[B0]), w[B1]) - w[SX]
-                least[face] = min(least[face], w[SIGMA] + math.sqrt(x * x + w[SY] * w[SY]))
+                if ints[i, ROOT] >= field.first_piece:  # least at an end
+                    x, sw = w[B1] if w[SX] > 0.0 else w[B0], 0.0
+                else:
+                    x, sw = min(max(w[SX], w[B0]), w[B1]), 1.0
+                least[face] = min(least[face], distance_at(x, w[SX], w[SY], w[SIGMA], sw))
             corner = field.distance[topology.links[h, TAIL]]
             farthest = max(geometry[h, LENGTH], geometry[h, LENGTH_LEFT])
             least[face], most[face] = min(least[face], corner), min(most[face], corner + farthest)
-    for k in range(field.source_rows):
-        face = field.site_ints[k, FACE]
-        least[face] = min(least[face], field.distance[field.site_ints[k, NODE]])
+    for inside in (field.site_ints, field.piece_ints):
+        for k in range(len(inside)):
+            face = inside[k, FACE]
+            least[face] = min(least[face], field.distance[inside[k, NODE]])
     return least, most
 
 
@@ -133,17 +134,17 @@ def cut_faces(
             faces[count, 0], place[f] = f, count
             count += 1
     spans, span_count = np.empty((64, 2)), 0
-    arcs, arc_count = np.empty((64, 5)), 0
+    arcs, arc_count = np.empty((64, ARC)), 0
     first_span = np.zeros((3 * count + 1, 1), np.int32)
     first_arc = np.zeros((count + 1, 1), np.int32)
     k = 0
     while k < count:
         f = faces[k, 0]
-        discs = discs_of_face(topology, field, f, level)
-        outer = outer_arcs(topology, f, discs, level, shortest)
+        regions = regions_of_face(topology, field, f, level)
+        outer = outer_arcs(topology, f, regions, level, shortest)
         arcs = with_room(arcs, arc_count + len(outer))
         for i in range(len(outer)):
-            for column in range(5):
+            for column in range(ARC):
                 arcs[arc_count, column] = outer[i, column]
             arc_count += 1
         first_arc = with_room(first_arc, k + 2)
@@ -152,9 +153,11 @@ def cut_faces(
         for h in range(3 * f, 3 * f + 3):
             ox, oy, ux, uy = half_edge_in_face(geometry, h)
             length, begin = geometry[h, LENGTH], span_count
-            spans = with_room(spans, span_count + len(discs))
-            for i in range(len(discs)):
-                lo, hi = span_on_edge(discs[i], ox, oy, ux, uy, length)
+            spans = with_room(spans, span_count + len(regions))
+            for i in range(len(regions)):
+                along = runs_along(regions[i], slack, ox, oy, ux, uy, length)
+                beyond = slack if along else 0.0  # at the level counts as nearer
+                lo, hi = span_on_line(regions[i], beyond, ox, oy, ux, uy, 0.0, length)
                 if lo <= hi:
                     spans[span_count, 0], spans[span_count, 1] = lo, hi
                     span_count += 1
@@ -201,9 +204,10 @@ def united(spans: Floats, gap: float) -> int:
 def cross_edges(topology: Any, distance: Floats, cuts: Any, level: float, place: Ints) -> Crossings:
     """Find where a level crosses the edges of the faces that it may pass, each edge once.
 
-    A vertex at the level counts as nearer, and no end of an edge is anything but what its vertex
-    is: so that what crosses the edges around a face does so in pairs.
+    A vertex at the level, within `LEVEL`, counts as nearer, and no end of an edge is anything but
+    what its vertex is: so that what crosses the edges around a face does so in pairs.
     """
+    reach = level * (1.0 + LEVEL)
     links, geometry = topology.links, topology.geometry
     count = 3 * len(cuts.faces)
     places, half_edges, total = np.empty((64, 1)), np.empty((64, 1), np.int32), 0
@@ -215,8 +219,8 @@ def cross_edges(topology: Any, distance: Floats, cuts: Any, level: float, place:
             continue
         h = 3 * cuts.faces[n // 3, 0] + n % 3
         length, gap = geometry[h, LENGTH], CROSSING * geometry[h, LENGTH]
-        tail_inside = distance[links[h, TAIL]] <= level
-        head_inside = distance[links[h, HEAD]] <= level
+        tail_inside = distance[links[h, TAIL]] <= reach
+        head_inside = distance[links[h, HEAD]] <= reach
         size, begin, g = 0, total, h
         if tail_inside:
             spans[size, 0], spans[size, 1] = 0.0, 0.0
@@ -282,14 +286,14 @@ def ends_of_face(
     starts, start_ids, start_count = np.empty((room, 2)), np.empty(room, np.int32), 0
     for a in range(arc0, arc1):
         arc = cuts.arcs[a]
-        ends[end_count, 0], ends[end_count, 1] = point_on(arc, arc[TO_ANGLE])
-        starts[start_count, 0], starts[start_count, 1] = point_on(arc, arc[FROM_ANGLE])
+        ends[end_count, 0], ends[end_count, 1] = point_on(arc, arc[TO])
+        starts[start_count, 0], starts[start_count, 1] = point_on(arc, arc[FROM])
         end_ids[end_count], start_ids[start_count] = a, a
         end_count, start_count = end_count + 1, start_count + 1
     for i in range(3):
         h, n = 3 * face + i, 3 * k + i
         ox, oy, ux, uy = half_edge_in_face(topology.geometry, h)
-        inside = distance[topology.links[h, TAIL]] <= level
+        inside = distance[topology.links[h, TAIL]] <= level * (1.0 + LEVEL)
         for j in range(crossings.number[n, 0]):
             c = crossings.first[n, 0] + j
             x = crossings.places[c, 0]
@@ -346,7 +350,9 @@ def step_of(radius: float, chord_error: float) -> float:
 
 
 @kernel
-def put_arc(topology: Any, face: int, arc: Floats, error: float, points: Floats, count: int) -> Any:
+def trace_arc(
+    topology: Any, face: int, arc: Floats, error: float, points: Floats, count: int
+) -> Any:
     """Append an arc's points, both ends included; return the points and how many there are."""
     links, geometry, positions = topology.links, topology.geometry, topology.positions
     h = 3 * face
@@ -355,11 +361,12 @@ def put_arc(topology: Any, face: int, arc: Floats, error: float, points: Floats,
     length = geometry[h, LENGTH]
     ax = geometry[h, LENGTH_LEFT] * geometry[h, COS_LEFT]
     ay = geometry[h, LENGTH_LEFT] * geometry[h, SIN_LEFT]
-    width = arc[TO_ANGLE] - arc[FROM_ANGLE]
-    chords = max(math.ceil(width / step_of(arc[RADIUS], error)), 1)
+    width, chords = arc[TO] - arc[FROM], 1
+    if not is_line(arc):
+        chords = max(math.ceil(width / step_of(arc[RADIUS], error)), 1)
     points = with_room(points, count + chords + 1)
     for i in range(chords + 1):
-        x, y = point_on(arc, arc[FROM_ANGLE] + width * (i / chords))
+        x, y = point_on(arc, arc[FROM] + width * (i / chords))
         up = min(max(y / ay, 0.0), 1.0) if ay > 0.0 else 0.0
         along = min(max((x - up * ax) / length, 0.0), 1.0 - up)
         for axis in range(3):
@@ -413,7 +420,7 @@ def chain_pieces(
                 s = joined[e]
             while s < arcs and not done[s]:
                 done[s] = 1
-                points, count = put_arc(
+                points, count = trace_arc(
                     topology, face, cuts.arcs[arc0 + s], chord_error, points, count
                 )
                 s = joined[s]

@@ -129,6 +129,20 @@ def point_in_frame(geometry: Floats, h: int, weights: Floats) -> tuple[float, fl
 
 
 @kernel
+def half_edge_in_face(geometry: Floats, h: int) -> tuple[float, float, float, float]:
+    """Tail and direction of h in the frame of its face's first half-edge."""
+    first = h - h % 3
+    if h == first:
+        return 0.0, 0.0, 1.0, 0.0
+    if h == first + 1:
+        x = geometry[first, LENGTH]
+        return x, 0.0, -geometry[first, COS_RIGHT], geometry[first, SIN_RIGHT]
+    cosine, sine = geometry[first, COS_LEFT], geometry[first, SIN_LEFT]
+    reach = geometry[first, LENGTH_LEFT]
+    return reach * cosine, reach * sine, -cosine, -sine
+
+
+@kernel
 def next_around(links: Ints, h: int) -> int:
     """Half-edge of the same edge in the next of its faces; negative if there is none."""
     if links[h, OPPOSITE] == IRREGULAR:

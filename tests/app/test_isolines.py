@@ -89,6 +89,19 @@ def test_lines_in_the_plane_are_circles(client: TestClient, plane: str) -> None:
     assert inner["lines"][0]["length"] == pytest.approx(2 * np.pi * 0.3, rel=1e-3)
 
 
+def test_lines_around_a_curve_are_straight_beside_it(client: TestClient, plane: str) -> None:
+    ends = [[0.46, 0.41, 0], [0.49, 0.41, 0]]
+    curve = {"polyline": [{"position": end} for end in ends]}
+    answer = isolines(client, plane, sources=[curve], levels=[0.2], chord_error=1e-5).json()
+
+    (line,) = answer["isolines"][0]["lines"]
+    assert line["closed"]
+    assert line["length"] == pytest.approx(2 * np.pi * 0.2 + 2 * 0.03, rel=1e-3)
+    assert [point["position"] for point in answer["sources"][0]["polyline"]] == [
+        pytest.approx(end) for end in ends
+    ]
+
+
 def test_lines_end_at_barriers(client: TestClient, plane: str) -> None:
     wall = list(range(100, 116))
     field = gc.exact_distance(mesh_of(client, plane), 0, barriers=wall)
@@ -146,7 +159,6 @@ def test_the_same_lines_are_not_drawn_again(client: TestClient, knot: str) -> No
         ({"chord_error": "fine"}, "/chord_error"),
         ({"sources": []}, "/sources"),
         ({"sources": None}, "/sources"),
-        ({"sources": [{"polyline": [{"vertex": 0}, {"vertex": 1}]}]}, "/sources/0"),
         ({"source": {"vertex": 0}}, "/source"),
         ({"targets": []}, "/targets"),
         ({"method": "heat"}, "/method"),

@@ -179,13 +179,6 @@ def test_distances_on_a_plane_are_those_of_segments(seed):
     np.testing.assert_allclose(later[0].gradient, away, atol=1e-9)
 
 
-def test_isolines_of_curves_are_refused():
-    """Until straight ones are drawn: a wrong line would be worse."""
-    field = gc.exact_distance(mesh_of(zoo.SMALL["octahedron"]), gc.Curve([0, 2, 0]))
-    with pytest.raises(gc.errors.InvalidArgument, match="is a curve"):
-        field.isolines([0.5])
-
-
 @pytest.mark.parametrize("seed", range(2 if WITHOUT_JIT else 8))
 def test_distances_on_a_box_are_least_over_the_curve(seed):
     rng = np.random.default_rng(seed)

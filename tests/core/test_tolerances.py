@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import geodesic_core as gc
 from geodesic_core import tolerances
 from geodesic_core.kernels import sweep, wavefront
-from geodesic_core.kernels.arcs import CX, CY, DISC, RADIUS, outer_arcs
+from geodesic_core.kernels.arcs import outer_arcs
 from geodesic_core.kernels.arrival import precedence
 from geodesic_core.kernels.backtrace import Winners, is_on_path
 from geodesic_core.kernels.isolines import united
@@ -19,6 +19,7 @@ from geodesic_core.kernels.merge import accuracy, directionality, merged
 from geodesic_core.kernels.planar import bisector
 from geodesic_core.kernels.propagate import collect, reach_apex
 from geodesic_core.kernels.prune import least_to_start
+from geodesic_core.kernels.regions import CX, CY, RADIUS, REGION
 from geodesic_core.kernels.straighten import LEFT, NEITHER, RIGHT, shortened_part
 from geodesic_core.kernels.topology import (
     APEX,
@@ -611,7 +612,7 @@ def test_slant_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope,
 def test_level_is_how_near_two_circles_count_as_one(scale, share):
     """Of circles that are one the first counts; of others, around one point, the larger."""
     mesh = gc.TriangleMesh(scale * zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
-    discs, level = np.zeros((2, DISC)), 0.1 * scale
+    discs, level = np.zeros((2, REGION)), 0.1 * scale
     discs[:, [CX, CY]] = 0.3 * scale, 0.01 * scale
     discs[:, RADIUS] = level, level * (1.0 + share * tolerances.LEVEL)
     arcs = outer_arcs(mesh.topology, 0, discs, level, 0.0)
