@@ -29,7 +29,7 @@ def with_middles(line):
     return np.vstack([points, 0.5 * (points[1:] + points[:-1])])
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(1 if WITHOUT_JIT else 4))
 def test_stadiums_around_a_segment(seed):
     rng = np.random.default_rng(seed)
     points, faces = zoo.grid(8, 8, seed=seed, jitter=0.2)
@@ -49,7 +49,7 @@ def test_stadiums_around_a_segment(seed):
         check_pieces(mesh, line)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(1 if WITHOUT_JIT else 4))
 def test_around_a_polyline_is_the_edge_of_its_stadiums(seed):
     """All points at the level; within, as much area as a fine raster says."""
     rng = np.random.default_rng(seed)
@@ -92,7 +92,7 @@ def test_open_lines_where_the_domain_ends(jitter):
             check_ends(mesh, line)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(1 if WITHOUT_JIT else 6))
 @pytest.mark.parametrize("scale", [1.0, 1.37])
 @pytest.mark.parametrize("limited", [False, True])
 def test_lines_along_edges_do_not_depend_on_rounding(seed, scale, limited):
@@ -162,11 +162,11 @@ def test_points_on_a_box_are_at_the_level_by_unfolding():
     start, end = np.array([0.3, 0.4, 0.0]), np.array([0.9, 0.8, 0.0])
     path = gc.shortest_path(mesh, mesh.locate(start), mesh.locate(end))
     field = gc.exact_distance(mesh, gc.Curve(path.locations), keep_windows=True)
-    shares = np.linspace(0.0, 1.0, 401)
+    shares = np.linspace(0.0, 1.0, 101)
     for level, lines in zip((0.6, 1.9), field.isolines([0.6, 1.9]), strict=True):
-        for place in lines[0].points[:: max(len(lines[0].points) // 12, 1)]:
+        for place in lines[0].points[:: max(len(lines[0].points) // 6, 1)]:
             known = [closed_forms.box(size, (1 - t) * start + t * end, place) for t in shares]
-            assert level * (1 - 1e-9) <= min(known) <= level + 1e-5
+            assert level * (1 - 1e-9) <= min(known) <= level + 2e-5
 
 
 @pytest.mark.jit
