@@ -8,6 +8,7 @@ import pytest
 
 import geodesic_core as gc
 from tests import zoo
+from tests.conftest import WITHOUT_JIT
 from tests.core.isoline_checks import check_ends, check_pieces, check_points, line_points
 from tests.core.test_curves import random_curve
 from tests.core.test_isolines import FINE, check_all, some_levels, total_length
