@@ -10,7 +10,7 @@ from starlette.requests import ClientDisconnect
 
 from app.encoding import FORMATS, negotiate
 from app.errors import refuse
-from app.service import Service
+from app.service import Asker, Service
 
 T = TypeVar("T")
 
@@ -36,6 +36,43 @@ def get_deadline(
 
 
 Deadline = Annotated[float, Depends(get_deadline)]
+
+
+def get_client(request: Request) -> str:
+    """Return who asks, as far as turns are concerned: an address."""
+    return request.client.host if request.client else ""
+
+
+def get_owner() -> str:
+    """Return whose jobs are asked for: those of all, since there are no keys."""
+    return ""
+
+
+OwnerDep = Annotated[str, Depends(get_owner)]
+
+
+def get_asker(
+    request: Request,
+    deadline_s: Deadline,
+    client: Annotated[str, Depends(get_client)],
+    owner: OwnerDep,
+) -> Asker:
+    """Return who asks and how long they would wait."""
+    return Asker(client, owner, deadline_s, request.state.request_id)
+
+
+AskerDep = Annotated[Asker, Depends(get_asker)]
+
+
+def prefers_async(
+    prefer: Annotated[
+        str | None,
+        Header(description="`respond-async`: answer at once with a job, RFC 7240"),
+    ] = None,
+) -> bool:
+    """Return whether the client would rather have a job than wait."""
+    preferences = [part.partition(";")[0].strip().lower() for part in (prefer or "").split(",")]
+    return "respond-async" in preferences
 
 
 def require_json(request: Request) -> None:

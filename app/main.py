@@ -9,7 +9,7 @@ from fastapi import FastAPI
 from app import __version__, handlers
 from app.errors import PROBLEM_JSON
 from app.middleware import RequestMiddleware
-from app.routes import about, meshes, queries
+from app.routes import about, jobs, meshes, queries
 from app.service import Service
 from app.settings import Settings
 
@@ -36,6 +36,7 @@ def create_app(settings: Settings) -> FastAPI:
     handlers.install(app, settings)
     app.include_router(about.router, max_body_size=settings.max_query_bytes)
     app.include_router(meshes.router, prefix="/v1", max_body_size=settings.max_upload_bytes)
+    app.include_router(jobs.router, prefix="/v1", max_body_size=settings.max_query_bytes)
     app.include_router(queries.router, prefix="/v1", max_body_size=settings.max_query_bytes)
     return app
 

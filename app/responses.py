@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from datetime import datetime
 from functools import partial
 from typing import Any
 
@@ -13,6 +14,7 @@ from starlette.types import Receive, Scope, Send
 
 from app.encoding import JSON
 from app.errors import CODES, PROBLEM_JSON, Problem
+from app.jobs import Job
 from app.queries import Estimate
 from app.result_store import ResultStore
 from app.schemas import ProblemDocument
@@ -69,6 +71,36 @@ def estimate_response(
     """Return an estimate: what it is of may cost another time tomorrow."""
     members = {"mesh_id": mesh_id, "is_estimate": True, **vars(estimate), "media_type": media_type}
     return Response(orjson.dumps(members), 200, {**UNSTORED, **server_timing(seconds)}, JSON)
+
+
+def job_document(job: Job) -> dict[str, Any]:
+    """Return a job as clients see it."""
+    here = f"/v1/jobs/{job.id}"
+    members = {
+        "id": job.id,
+        "kind": job.errand.kind,
+        "mesh_id": job.errand.mesh_id,
+        "status": job.status,
+        "progress": job.progress,
+        "created": _written(job.created),
+        "started": _written(job.started),
+        "finished": _written(job.finished),
+        "links": {"self": here, "results": f"{here}/results", "events": f"{here}/events"},
+    }
+    if job.problem is not None:
+        members["problem"] = job.problem.document(f"{here}/results", job.errand.request_id)
+    return members
+
+
+def accepted_response(job: Job) -> Response:
+    """Return a job that a query has become."""
+    document = job_document(job)
+    location = {"Location": document["links"]["self"], "Preference-Applied": "respond-async"}
+    return Response(orjson.dumps(document), 202, {**UNSTORED, **location}, JSON)
+
+
+def _written(moment: datetime | None) -> str | None:
+    return None if moment is None else moment.isoformat(timespec="milliseconds")
 
 
 class StoredFileResponse(FileResponse):

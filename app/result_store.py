@@ -56,7 +56,8 @@ def write_result(
 class ResultStore:
     """The results under ``root``, at most ``capacity`` bytes; the least recently used go first.
 
-    One process keeps the books. A result taken is not removed before it is given back.
+    One process keeps the books. A result taken is not removed before it is given back, one that is
+    held not before it is released.
     """
 
     def __init__(self, root: Path, capacity: int) -> None:
@@ -65,6 +66,7 @@ class ResultStore:
         self._sizes: OrderedDict[str, int] = OrderedDict()
         self._total = 0
         self._taken: Counter[str] = Counter()
+        self._held: Counter[str] = Counter()
 
     def prepare(self) -> None:
         """Count what a former service left, the oldest first, and remove what has no seal."""
@@ -102,14 +104,27 @@ class ResultStore:
     def give_back(self, result: Result) -> None:
         """Say that ``result`` has been sent."""
         self._let_go(result.name)
-        if not result.is_kept:
+        if not result.is_kept and result.name not in self._held:
             self._remove(result.name)
         self._evict()
 
+    def has_room_to_hold(self, name: str) -> bool:
+        """Tell whether all that is held would fit with the result ``name``."""
+        return sum(self._sizes.get(held, 0) for held in {*self._held, name}) <= self._capacity
+
+    def hold(self, name: str) -> None:
+        """Do not remove the result ``name``, be it used or not."""
+        self._held[name] += 1
+
+    def release(self, name: str) -> None:
+        """Say that whoever held the result ``name`` does so no longer."""
+        self._held -= Counter([name])
+        self._evict()
+
     def forget_mesh(self, mesh_id: str) -> None:
-        """Remove all results of a mesh that nobody is being sent."""
+        """Remove all results of a mesh that are neither held nor just being sent."""
         for name in [name for name in self._sizes if name.startswith(f"{mesh_id}/")]:
-            if name not in self._taken:
+            if self._is_free(name):
                 self._remove(name)
 
     def _take(self, name: str, seal: _Seal) -> Result:
@@ -132,10 +147,13 @@ class ResultStore:
         if self._total <= self._capacity:
             return
         for name in list(self._sizes):
-            if name not in self._taken:
+            if self._is_free(name):
                 self._remove(name)
             if self._total <= self._capacity:
                 return
+
+    def _is_free(self, name: str) -> bool:
+        return name not in self._taken and name not in self._held
 
     def _remove(self, name: str) -> None:
         _seal(self._root, name).unlink(missing_ok=True)

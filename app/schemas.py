@@ -18,6 +18,7 @@ Merge = Literal["none", "exact"]
 MeshFormat = Literal["obj", "off", "ply", "stl", "glb"]
 SampleName = Literal["knot", "sphere", "plane"]
 Method = Literal["exact", "approximate"]
+JobStatus = Literal["accepted", "running", "successful", "failed", "dismissed"]
 Layout = Literal["dense", "sparse", "pairs"]
 StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
 NonNegative = Annotated[FiniteFloat, Field(ge=0)]
@@ -735,6 +736,52 @@ class LocateAnswer(BaseModel):
     warnings: list[str]
 
 
+class FaultDocument(BaseModel):
+    """One element of the request that is wrong."""
+
+    pointer: str = Field(description="JSON pointer into the body, or `/query/…`, `/header/…`")
+    message: str
+
+
+class ProblemDocument(BaseModel):
+    """An error, as RFC 9457 has it."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    instance: str
+    code: str
+    request_id: str
+    errors: list[FaultDocument] | None = None
+    limit: float | None = None
+    actual: float | None = None
+    setting: str | None = None
+    hint: str | None = None
+
+
+class JobDocument(BaseModel):
+    """A query that is answered whether its client waits or not."""
+
+    id: str
+    kind: str = Field(description="Of query, such as `distances`")
+    mesh_id: str
+    status: JobStatus
+    progress: float = Field(description="Share of the work that is done, 0 to 1")
+    created: str = Field(description="RFC 3339, as all times")
+    started: str | None = Field(default=None, description="When a worker began")
+    finished: str | None = None
+    problem: ProblemDocument | None = Field(default=None, description="Of one that failed")
+    links: dict[str, str] = Field(description="Where its results and events are")
+
+
+class JobList(BaseModel):
+    """A part of the jobs, the newest first."""
+
+    jobs: list[JobDocument]
+    next_cursor: str | None = None
+
+
 class Health(BaseModel):
     """Whether the service lives, or is ready."""
 
@@ -767,27 +814,3 @@ class ProblemCode(BaseModel):
     status: int
     title: str
     meaning: str
-
-
-class FaultDocument(BaseModel):
-    """One element of the request that is wrong."""
-
-    pointer: str = Field(description="JSON pointer into the body, or `/query/…`, `/header/…`")
-    message: str
-
-
-class ProblemDocument(BaseModel):
-    """An error, as RFC 9457 has it."""
-
-    type: str
-    title: str
-    status: int
-    detail: str
-    instance: str
-    code: str
-    request_id: str
-    errors: list[FaultDocument] | None = None
-    limit: float | None = None
-    actual: float | None = None
-    setting: str | None = None
-    hint: str | None = None

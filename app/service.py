@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from anyio import to_thread
@@ -16,16 +17,30 @@ from app.engine import (
     LocalEngine,
     MeshFromFile,
     MeshFromSample,
+    Order,
     StoredMesh,
-    Work,
 )
 from app.errors import ProblemError, refuse
+from app.flights import Flights, Told
+from app.jobs import Errand, Job, JobBook, Jobs
 from app.mesh_store import PUBLIC_ARRAYS, MeshStore
-from app.queries import Estimate, MeshSize, Query, result_key
+from app.queries import Estimate, MeshSize, Query, fingerprint, result_key
 from app.result_store import Result, ResultStore, result_name
 from app.settings import Settings, variable_of
 
 Seconds = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Asker:
+    """Who asks, and how long they would wait."""
+
+    client: str
+    """Clients take turns at the workers"""
+    owner: str
+    """Whose jobs are whose"""
+    deadline_s: float
+    request_id: str
 
 
 @dataclass(frozen=True)
@@ -45,23 +60,32 @@ class Service:
         self.meshes = MeshStore(settings.store)
         self.results = ResultStore(results, settings.results_bytes)
         self.engine: Engine = LocalEngine(settings, results)
+        self.jobs = Jobs(JobBook(settings.store / "jobs.sqlite3"), self.results, settings.job_ttl)
+        self._flights: Flights[Done] = Flights()
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        """Sweep the store and keep workers while inside."""
+        """Sweep the store, keep workers, and run jobs while inside."""
         self.meshes.prepare()
         self.results.prepare()
         await self.engine.start()
         try:
-            yield
+            async with self.jobs.running():
+                yield
         finally:
             await self.engine.stop()
 
+    def drain(self) -> None:
+        """Finish what runs, and refuse all else: the service is about to stop."""
+        self.engine.drain()
+        self.jobs.end_events()
+
     async def add_mesh(
-        self, work: MeshFromFile | MeshFromSample, deadline_s: float
+        self, work: MeshFromFile | MeshFromSample, asker: Asker
     ) -> tuple[StoredMesh, Seconds]:
         """Have a worker read or make a mesh and store it."""
-        done = await self._run(work, deadline_s)
+        async with self._deadline(asker.deadline_s, "deadline_s"):
+            done = await self.engine.run(Order(work, asker.client), _nobody)
         assert done.mesh is not None, "this kind of work stores a mesh"  # noqa: S101
         return done.mesh, done.seconds
 
@@ -78,9 +102,9 @@ class Service:
         }
 
     def size(self, mesh_id: str) -> MeshSize:
-        """Return how many vertices and faces a mesh has."""
+        """Return how large a mesh is."""
         report = self.meshes.manifest(mesh_id)["report"]
-        return MeshSize(report["vertices"], report["faces"])
+        return MeshSize(report["vertices"], report["faces"], report["mean_edge_length"])
 
     async def list_meshes(self, limit: int, after: str) -> tuple[list[dict[str, Any]], str | None]:
         """Return the reports of ``limit`` meshes after an id, and where to go on, if anywhere."""
@@ -100,32 +124,75 @@ class Service:
         await to_thread.run_sync(self.meshes.delete, mesh_id)
         self.results.forget_mesh(mesh_id)
 
-    async def answer(self, query: Query[Any], media_type: str, deadline_s: float) -> Answered:
+    async def answer(self, query: Query[Any], media_type: str, asker: Asker) -> Answered:
         """Answer ``query``: from a kept result, or by a worker."""
+        async with self._deadline(asker.deadline_s, "deadline_s"):
+            return await self._answer(query, media_type, asker.client, _nobody)
+
+    async def estimate(
+        self, query: Query[Any], media_type: str, asker: Asker
+    ) -> tuple[Estimate, Seconds]:
+        """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
         query.refuse_answer(media_type, self.size(query.mesh_id), self.settings)
+        order = Order(Estimating(query, media_type), asker.client, query.mesh_id, is_small=True)
+        async with self._deadline(asker.deadline_s, "deadline_s"):
+            done = await self.engine.run(order, _nobody)
+        assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
+        return done.estimate, done.seconds
+
+    async def submit(
+        self, query: Query[Any], media_type: str, asker: Asker, key: str | None
+    ) -> Job:
+        """Accept a job that answers ``query``; one for all with the same idempotency ``key``."""
+        query.refuse_answer(media_type, self.size(query.mesh_id), self.settings)
+        self.engine.refuse_when_full(asker.client)
+
+        async def solve(told: Told) -> Result:
+            async with self._deadline(self.settings.job_deadline_s, "job_deadline_s"):
+                return (await self._answer(query, media_type, asker.client, told)).result
+
+        errand = Errand(
+            owner=asker.owner,
+            kind=query.kind,
+            mesh_id=query.mesh_id,
+            media_type=media_type,
+            fingerprint=fingerprint(query, media_type),
+            idempotency_key=key,
+            request_id=asker.request_id,
+        )
+        return await self.jobs.submit(errand, solve)
+
+    async def _answer(
+        self, query: Query[Any], media_type: str, client: str, told: Told
+    ) -> Answered:
+        size = self.size(query.mesh_id)
+        query.refuse_answer(media_type, size, self.settings)
         name = result_name(query.mesh_id, result_key(query, media_type))
         kept = await self.results.find(name)
         if kept is not None:
             return Answered(kept, {})
-        done = await self._run(Answering(query, media_type, name), deadline_s, query.mesh_id)
+        work = Answering(query, media_type, name)
+        order = Order(work, client, query.mesh_id, query.is_small(size))
+        done = await self._flights.join(name, partial(self.engine.run, order), told)
         result = self.results.take_new(name, is_kept=query.is_repeatable)
         return Answered(result, done.seconds)
 
-    async def estimate(
-        self, query: Query[Any], media_type: str, deadline_s: float
-    ) -> tuple[Estimate, Seconds]:
-        """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
-        query.refuse_answer(media_type, self.size(query.mesh_id), self.settings)
-        done = await self._run(Estimating(query, media_type), deadline_s, query.mesh_id)
-        assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
-        return done.estimate, done.seconds
-
-    async def _run(self, work: Work, deadline_s: float, mesh_id: str = "") -> Done:
+    @asynccontextmanager
+    async def _deadline(self, seconds: float, setting: str) -> AsyncIterator[None]:
+        """Stop what is inside after so many seconds, which ``setting`` bounds."""
         try:
-            async with asyncio.timeout(deadline_s):
-                return await self.engine.run(work, mesh_id or None)
+            async with asyncio.timeout(seconds):
+                yield
         except TimeoutError:
-            own = deadline_s >= self.settings.deadline_s
-            setting = variable_of("deadline_s") if own else None
-            detail = f"not finished within {deadline_s:g} s"
-            raise refuse("deadline_exceeded", detail, limit=deadline_s, setting=setting) from None
+            own = seconds >= getattr(self.settings, setting)
+            detail = f"not finished within {seconds:g} s"
+            raise refuse(
+                "deadline_exceeded",
+                detail,
+                limit=seconds,
+                setting=variable_of(setting) if own else None,
+            ) from None
+
+
+def _nobody(_share: float) -> None:
+    """Tell nobody which share is done."""

@@ -56,6 +56,12 @@ class Settings(BaseSettings):
     """Requests that may wait for a worker."""
     deadline_s: PositiveFloat = 120.0
     """Seconds that a request may take."""
+    job_deadline_s: PositiveFloat = 86_400.0
+    """Seconds that a job may take."""
+    job_ttl: PositiveFloat = 86_400.0
+    """Seconds for which a job is kept after it has finished, with its answer."""
+    drain_s: PositiveFloat = 20.0
+    """Seconds granted to what runs when the service is told to stop."""
     cancel_grace_s: PositiveFloat = 2.0
     """Seconds in which a query has to stop when asked to, before its worker is killed."""
 

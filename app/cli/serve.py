@@ -1,11 +1,10 @@
 """``geodesic serve``."""
 
+import math
+from types import FrameType
 from typing import Annotated
 
 import typer
-
-_DRAIN_S = 20
-"""Granted to requests that run when the server is told to stop."""
 
 
 def serve(
@@ -27,4 +26,18 @@ def serve(
             for fault in error.errors()
         ]
         raise typer.BadParameter("; ".join(faults)) from error
-    uvicorn.run(create_app(settings), host=host, port=port, timeout_graceful_shutdown=_DRAIN_S)
+    app = create_app(settings)
+
+    class Server(uvicorn.Server):
+        """Tells the service at once that it is to stop: uvicorn itself does so last of all."""
+
+        def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            app.state.service.drain()
+            super().handle_exit(sig, frame)
+
+    # uvicorn takes whole seconds.
+    grace = math.ceil(settings.drain_s)
+    server = Server(uvicorn.Config(app, host, port, timeout_graceful_shutdown=grace))
+    server.run()
+    if not server.started:
+        raise typer.Exit(1)

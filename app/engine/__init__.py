@@ -11,6 +11,7 @@ from app.engine.work import (
     Estimating,
     MeshFromFile,
     MeshFromSample,
+    Order,
     StoredMesh,
     Work,
 )
@@ -23,6 +24,7 @@ __all__ = [
     "LocalEngine",
     "MeshFromFile",
     "MeshFromSample",
+    "Order",
     "StoredMesh",
     "Work",
 ]

@@ -1,8 +1,12 @@
 """What the service expects of whatever computes its answers."""
 
+from collections.abc import Callable
 from typing import Protocol
 
-from app.engine.work import Done, Work
+from app.engine.work import Done, Order
+
+Told = Callable[[float], None]
+"""Is told which share of some work is done: 0 when it begins, never less than before."""
 
 
 class Engine(Protocol):
@@ -12,14 +16,24 @@ class Engine(Protocol):
     def is_ready(self) -> bool:
         """Whether work would begin now, or as soon as other work is done."""
 
+    @property
+    def is_draining(self) -> bool:
+        """Whether new work is refused, since the engine is about to stop."""
+
     async def start(self) -> None:
         """Begin to get ready; returns at once."""
+
+    def drain(self) -> None:
+        """Refuse new work from now on; what runs or waits goes on."""
 
     async def stop(self) -> None:
         """End all work."""
 
-    async def run(self, work: Work, mesh_id: str | None = None) -> Done:
-        """Do ``work``, best where the mesh is open already; cancel the call to stop the work.
+    def refuse_when_full(self, client: str) -> None:
+        """Raise what ``run`` would, did the work of a client have to wait, and had no room to."""
+
+    async def run(self, order: Order, told: Told) -> Done:
+        """Do the work of an order; cancel the call to stop it.
 
         Raises
         ------

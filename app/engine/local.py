@@ -2,15 +2,16 @@
 
 import asyncio
 import logging
-from collections import deque
 from collections.abc import Coroutine
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from app.engine.interface import Told
+from app.engine.queue import FairQueue
 from app.engine.slot import Slot, WorkerLostError
-from app.engine.work import Done, Work
+from app.engine.work import Done, Order, Outcome, Work
 from app.engine.worker import WorkerConfig
 from app.errors import Problem, ProblemError, over_limit, refuse
 from app.settings import Settings
@@ -19,30 +20,54 @@ logger = logging.getLogger(__name__)
 
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 30.0
 _RETRY_AFTER = {"Retry-After": "1"}
+_TELL_S = 0.1
+_STEP_BACK = 10
+"""Niceness of the workers for long work: small work and the API process go first."""
+_SMALL_S = 0.5
+"""Granted to work in the slot for small work: ten times what it is likely to take."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """A place in the queue."""
+
+    order: Order
+    slot: "asyncio.Future[Slot]"
 
 
 class LocalEngine:
-    """The engine of a service on one machine."""
+    """The engine of a service on one machine.
+
+    One slot more than the setting asks for takes small work only: that never waits behind long
+    work. What proves not to be small is begun anew in another slot.
+    """
 
     def __init__(self, settings: Settings, results: Path) -> None:
         self._settings = settings
-        self._slots = [Slot(WorkerConfig(settings, results)) for _ in range(settings.workers)]
+        self._small = Slot(WorkerConfig(settings, results))
+        stepping_back = WorkerConfig(settings, results, niceness=_STEP_BACK)
+        self._slots = [self._small, *(Slot(stepping_back) for _ in range(settings.workers))]
         self._idle: list[Slot] = []
-        self._waiting: deque[asyncio.Future[Slot]] = deque()
+        self._waiting: FairQueue[_Place] = FairQueue()
         self._open: set[Slot] = set()
         self._is_failing = False
+        self.is_draining = False
         self._kernels_are_compiled = asyncio.Event()
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
     def is_ready(self) -> bool:
-        """Whether at least one worker is warm and alive."""
-        return bool(self._open)
+        """Whether a worker that takes any work is warm and alive."""
+        return bool(self._open - {self._small})
 
     async def start(self) -> None:
         """Start the workers, in the background."""
-        for number, slot in enumerate(self._slots):
+        for number, slot in enumerate(reversed(self._slots)):
             self._spawn(self._keep(slot, goes_first=number == 0))
+
+    def drain(self) -> None:
+        """Refuse new work, see ``Engine``."""
+        self.is_draining = True
 
     async def stop(self) -> None:
         """Kill the workers."""
@@ -51,29 +76,47 @@ class LocalEngine:
         await asyncio.gather(*self._tasks, return_exceptions=True)
         await asyncio.gather(*(slot.close() for slot in self._slots))
 
-    async def run(self, work: Work, mesh_id: str | None = None) -> Done:
-        """Do ``work`` in the next free worker, see ``Engine``."""
+    def refuse_when_full(self, client: str) -> None:
+        """Refuse what would have to wait and has no room to, see ``Engine``."""
+        self._refuse_when_draining()
+        if not any(self._takes(slot, is_small=False) for slot in self._idle):
+            self._refuse_to_wait(client)
+
+    async def run(self, order: Order, told: Told) -> Done:
+        """Do the work of an order in the next free worker, see ``Engine``."""
+        self._refuse_when_draining()
         start = perf_counter()
-        for dead_ones_left in reversed(range(len(self._slots) + 1)):
-            slot = await self._take(mesh_id)
+        deaths = 0
+        while True:
+            slot = await self._take(order)
             queued = perf_counter() - start
             try:
-                outcome = await self._run_in(slot, work)
+                outcome = await self._run_in(slot, order, told)
             except WorkerLostError as error:
-                if error.had_begun or not dead_ones_left:
+                deaths += 1
+                if error.had_begun or deaths > len(self._slots):
                     raise refuse("worker_died", "the worker process of this request died") from None
                 continue  # it had died idle, unnoticed: nothing was tried yet
+            if outcome is None:  # it proved not to be small
+                order = replace(order, is_small=False)
+                continue
             if isinstance(outcome, Problem):
                 raise ProblemError(outcome)
             return replace(outcome, seconds={"queue": queued, **outcome.seconds})
-        raise AssertionError("the last try returns or raises")
 
-    async def _run_in(self, slot: Slot, work: Work) -> Done | Problem:
-        outcome = slot.begin(work)
+    async def _run_in(self, slot: Slot, order: Order, told: Told) -> Outcome:
+        outcome = slot.begin(order.work)
+        began = perf_counter()
+        told(0.0)
         try:
-            result = await asyncio.shield(outcome)
+            while not outcome.done():
+                await asyncio.wait({outcome}, timeout=_TELL_S)
+                told(slot.progress)
+                if slot is self._small and perf_counter() - began > _SMALL_S:
+                    slot.ask_to_stop()
+            result = outcome.result()
         except asyncio.CancelledError:
-            self._spawn(self._end(slot, outcome, work))
+            self._spawn(self._end(slot, outcome, order.work))
             raise
         except WorkerLostError:
             slot.give_up()
@@ -81,7 +124,7 @@ class LocalEngine:
         self._give_back(slot)
         return result
 
-    async def _end(self, slot: Slot, outcome: "asyncio.Future[Done | Problem]", work: Work) -> None:
+    async def _end(self, slot: Slot, outcome: "asyncio.Future[Outcome]", work: Work) -> None:
         """Stop work that nobody waits for: ask, if it listens, and kill where that fails."""
         slot.ask_to_stop()
         grace = self._settings.cancel_grace_s if work.stops_when_asked else 0
@@ -119,56 +162,69 @@ class LocalEngine:
                 self._idle.remove(slot)
             await slot.close()
 
-    async def _take(self, mesh_id: str | None) -> Slot:
+    async def _take(self, order: Order) -> Slot:
         """Wait for a free slot, best one that has the mesh open."""
+        mesh_id = order.mesh_id
         self._idle = [slot for slot in self._idle if slot.is_alive]
-        if self._idle:
-            slot = max(self._idle, key=lambda s: (mesh_id in s.known_meshes, -len(s.known_meshes)))
+        fit = [slot for slot in self._idle if self._takes(slot, order.is_small)]
+        if fit:
+            slot = max(fit, key=lambda s: (mesh_id in s.known_meshes, -len(s.known_meshes)))
             self._idle.remove(slot)
         else:
-            slot = await self._wait()
+            slot = await self._wait(order)
         if mesh_id is not None and mesh_id not in slot.known_meshes:
             slot.known_meshes.append(mesh_id)
         return slot
 
-    async def _wait(self) -> Slot:
+    def _takes(self, slot: Slot, is_small: bool) -> bool:
+        return is_small or slot is not self._small
+
+    async def _wait(self, order: Order) -> Slot:
+        self._refuse_to_wait(order.client)
+        place = _Place(order, asyncio.get_running_loop().create_future())
+        self._waiting.put(order.client, place)
+        try:
+            return await place.slot
+        except asyncio.CancelledError:
+            self._waiting.remove(order.client, place)
+            if place.slot.done() and not place.slot.cancelled():
+                self._give_back(place.slot.result())  # it came just as its taker left
+            raise
+
+    def _refuse_when_draining(self) -> None:
+        if self.is_draining:
+            raise refuse("draining", "the service is about to stop", headers=_RETRY_AFTER)
+
+    def _refuse_to_wait(self, client: str) -> None:
         if self._is_failing:
             raise _unavailable()
         size = self._settings.queue_size
-        if len(self._waiting) >= size:
+        # One client cannot lock out the others: a few more places are for who has nothing waiting.
+        room = size if self._waiting.has(client) else size + 1 + size // 4
+        if len(self._waiting) >= room:
             waiting = len(self._waiting) + 1
             raise over_limit(
                 "queue_full", "waiting requests", waiting, size, "queue_size", headers=_RETRY_AFTER
             )
-        place: asyncio.Future[Slot] = asyncio.get_running_loop().create_future()
-        self._waiting.append(place)
-        try:
-            return await place
-        except asyncio.CancelledError:
-            if place.done() and not place.cancelled():
-                self._give_back(place.result())  # it came just as its taker left
-            elif place in self._waiting:
-                self._waiting.remove(place)
-            raise
 
     def _give_back(self, slot: Slot) -> None:
         if not slot.is_alive:
             return  # its keeper replaces it and gives it back then
-        while self._waiting:
-            place = self._waiting.popleft()
-            if not place.done():
-                place.set_result(slot)
-                return
-        self._idle.append(slot)
+        place = self._waiting.take(
+            lambda place: not place.slot.done() and self._takes(slot, place.order.is_small)
+        )
+        if place is None:
+            self._idle.append(slot)
+        else:
+            place.slot.set_result(slot)
 
     def _fail_if_none_is_open(self) -> None:
-        if self._open:
+        if self.is_ready:
             return
         self._is_failing = True
-        while self._waiting:
-            place = self._waiting.popleft()
-            if not place.done():
-                place.set_exception(_unavailable())
+        for place in self._waiting.take_all():
+            if not place.slot.done():
+                place.slot.set_exception(_unavailable())
 
     def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
         task = asyncio.create_task(coroutine)

@@ -13,8 +13,7 @@ from typing import Any
 from pebble import ProcessPool
 
 from app.engine import worker
-from app.engine.work import Done, Work
-from app.errors import Problem
+from app.engine.work import Outcome, Work
 
 logger = logging.getLogger(__name__)
 
@@ -43,14 +42,16 @@ class Slot:
         self._config = config
         self._numbers = count(1)
         self._number = 0
-        self._outcome: asyncio.Future[Done | Problem] | None = None
+        self._outcome: asyncio.Future[Outcome] | None = None
         self._begun: Future[Any] | None = None
         self._given_up = asyncio.Event()
         self._pool: ProcessPool | None = None
         self._closing = threading.Lock()  # close() can be called again while it is at work
-        # Shared with the worker: the number of the work to stop, and the worker's process id.
+        # Shared with the worker: the number of the work to stop, the worker's process id, and which
+        # share of its work is done.
         self._stop_number = _SPAWN.RawValue("q", 0)
         self._pid = _SPAWN.RawValue("q", 0)
+        self._progress = _SPAWN.RawValue("d", 0.0)
         self.known_meshes: deque[str] = deque(maxlen=_KNOWN_MESHES)
 
     async def open(self) -> None:
@@ -61,7 +62,7 @@ class Slot:
         self._pool = ProcessPool(
             max_workers=1,
             initializer=worker.initialize,
-            initargs=(self._config, self._stop_number, self._pid),
+            initargs=(self._config, self._stop_number, self._pid, self._progress),
             context=_SPAWN,
         )
         try:
@@ -75,6 +76,11 @@ class Slot:
         """Whether work given to the slot now would be done."""
         return self._pool is not None and self._pool.active and not self._given_up.is_set()
 
+    @property
+    def progress(self) -> float:
+        """Which share of the work given last is done."""
+        return float(self._progress.value)
+
     async def until_dead(self) -> None:
         """Wait until the worker is gone or given up."""
         while self.is_alive:
@@ -87,16 +93,17 @@ class Slot:
         """Say that this worker is not to be used again, so that its keeper replaces it."""
         self._given_up.set()
 
-    def begin(self, work: Work) -> "asyncio.Future[Done | Problem]":
+    def begin(self, work: Work) -> "asyncio.Future[Outcome]":
         """Hand ``work`` to the worker; the future fails with ``WorkerLostError`` if that dies."""
         loop = asyncio.get_running_loop()
-        outcome: asyncio.Future[Done | Problem] = loop.create_future()
+        outcome: asyncio.Future[Outcome] = loop.create_future()
         self._number, self._outcome = next(self._numbers), outcome
+        self._progress.value = 0.0
         assert self._pool is not None, "only open slots are given work"  # noqa: S101
         try:
             begun = self._pool.schedule(worker.do, args=(self._number, work))
         except RuntimeError:  # the pool broke since it was looked at
-            outcome.set_exception(WorkerLostError(had_begun=False))
+            _lose(outcome, had_begun=False)
             return outcome
         self._begun = begun
         begun.add_done_callback(lambda done: loop.call_soon_threadsafe(_settle, outcome, done))
@@ -111,8 +118,7 @@ class Slot:
         self.give_up()
         await asyncio.to_thread(self._kill)
         if self._outcome is not None and not self._outcome.done():
-            had_begun = self._begun is not None and self._begun.running()
-            self._outcome.set_exception(WorkerLostError(had_begun=had_begun))
+            _lose(self._outcome, had_begun=self._begun is not None and self._begun.running())
 
     def _kill(self) -> None:
         with self._closing:
@@ -126,7 +132,7 @@ class Slot:
             pool.join()
 
 
-def _settle(outcome: "asyncio.Future[Done | Problem]", done: Future[Any]) -> None:
+def _settle(outcome: "asyncio.Future[Outcome]", done: Future[Any]) -> None:
     if outcome.done():
         return
     error = done.exception()
@@ -134,5 +140,9 @@ def _settle(outcome: "asyncio.Future[Done | Problem]", done: Future[Any]) -> Non
         outcome.set_result(done.result())
     else:
         # A pool breaks when its worker dies idle; of one that dies at work it says that it expired.
-        had_begun = not isinstance(error, BrokenProcessPool)
-        outcome.set_exception(WorkerLostError(had_begun=had_begun))
+        _lose(outcome, had_begun=not isinstance(error, BrokenProcessPool))
+
+
+def _lose(outcome: "asyncio.Future[Outcome]", *, had_begun: bool) -> None:
+    outcome.set_exception(WorkerLostError(had_begun=had_begun))
+    outcome.exception()  # who waited may have left: that is nothing to warn of

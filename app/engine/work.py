@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from app.errors import Problem
 from app.queries import Estimate, Query
 from app.schemas import Merge
 
@@ -56,6 +57,19 @@ Work = MeshFromFile | MeshFromSample | Answering | Estimating
 
 
 @dataclass(frozen=True)
+class Order:
+    """Work, and what decides when and where it is done."""
+
+    work: Work
+    client: str
+    """On whose behalf: clients take turns"""
+    mesh_id: str | None = None
+    """The mesh that it is about: best done where that is open"""
+    is_small: bool = False
+    """Whether it is likely to be done at once, so that it need not wait behind long work"""
+
+
+@dataclass(frozen=True)
 class StoredMesh:
     """A mesh that is in the store, and whether it is new there."""
 
@@ -73,3 +87,7 @@ class Done:
     seconds: Mapping[str, float]
     mesh: StoredMesh | None = None
     estimate: Estimate | None = None
+
+
+Outcome = Done | Problem | None
+"""Of work: done, refused, or stopped when asked to."""

@@ -6,7 +6,7 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from ctypes import c_longlong
+from ctypes import c_double, c_longlong
 from dataclasses import dataclass, field
 from multiprocessing import connection, parent_process
 from pathlib import Path
@@ -23,10 +23,11 @@ from app.engine.work import (
     Estimating,
     MeshFromFile,
     MeshFromSample,
+    Outcome,
     StoredMesh,
     Work,
 )
-from app.errors import Problem, over_limit, problem_of
+from app.errors import over_limit, problem_of
 from app.json_mesh import read_json_mesh
 from app.mesh_store import MeshStore, OpenMesh
 from app.queries import Grant, Query, estimate
@@ -45,6 +46,8 @@ class WorkerConfig:
 
     settings: Settings
     results: Path
+    niceness: int = 0
+    """How far the process steps back behind others when there is more to do than cores"""
 
 
 @dataclass
@@ -53,6 +56,7 @@ class Worker:
 
     config: WorkerConfig
     stop_number: c_longlong
+    progress: c_double
     meshes: OrderedDict[tuple[str, bytes], OpenMesh] = field(default_factory=OrderedDict)
     """By id and barriers, the one that was used last at the end"""
 
@@ -87,7 +91,7 @@ class Worker:
 
     def _answer(self, work: Answering, clock: "Clock", cancel: Callable[[], bool]) -> Done:
         settings = self.settings
-        grant = Grant(cancel, settings.query_memory_bytes, settings.max_json_values)
+        grant = Grant(cancel, self._report, settings.query_memory_bytes, settings.max_json_values)
         with clock.phase("load"):
             opened = self._open(work.query)
         with clock.phase("compute"):
@@ -105,6 +109,9 @@ class Worker:
         with clock.phase("compute"):
             found = estimate(work.query, work.media_type, opened, cancel)
         return Done(clock.seconds, estimate=found)
+
+    def _report(self, share: float) -> None:
+        self.progress.value = share
 
     def _open(self, query: Query[Any]) -> OpenMesh:
         """Return the mesh of a query, with its barriers."""
@@ -157,12 +164,15 @@ SAMPLES = {"knot": gc.samples.knot, "sphere": gc.samples.sphere, "plane": gc.sam
 _worker: Worker | None = None
 
 
-def initialize(config: WorkerConfig, stop_number: c_longlong, pid: c_longlong) -> None:
+def initialize(
+    config: WorkerConfig, stop_number: c_longlong, pid: c_longlong, progress: c_double
+) -> None:
     """Make this process a worker; called once, by its pool."""
     global _worker  # noqa: PLW0603
     setproctitle(TITLE)
     threading.Thread(target=_die_with_parent, daemon=True).start()
-    _worker = Worker(config, stop_number)
+    os.nice(config.niceness)
+    _worker = Worker(config, stop_number, progress)
     pid.value = os.getpid()
 
 
@@ -171,13 +181,13 @@ def warm_up() -> None:
     gc.warm_up()
 
 
-def do(number: int, work: Work) -> Done | Problem:
+def do(number: int, work: Work) -> Outcome:
     """Do ``work``; what goes wrong is a value, since not every exception survives a pipe."""
     assert _worker is not None, "the pool calls initialize first"  # noqa: S101
     try:
         return _worker.do(number, work)
     except gc.errors.Cancelled:
-        return Done({})  # who asked for it has gone
+        return None
     except Exception as error:
         problem = problem_of(error)
         if problem.code == "internal_error":

@@ -17,6 +17,7 @@ from scipy.spatial.distance import cdist
 
 import geodesic_core as gc
 from app.queries.places import Places, components_of, positions_of
+from app.queries.refusals import MeshSize
 from app.schemas import Accuracy
 
 # Seconds
@@ -69,15 +70,14 @@ class Cost:
 
 
 def sweep_cost(
-    mesh: gc.TriangleMesh,
+    faces: int,
     request: Accuracy,
     share: float = 1.0,
     *,
     paths: bool = False,
     isolines: bool = False,
 ) -> Cost:
-    """Return the cost of one sweep over a share of the mesh, and of what it keeps."""
-    faces = len(mesh.faces)
+    """Return the cost of one sweep over a share of so many faces, and of what it keeps."""
     memory = SWEEP_BYTES
     if request.method == "exact":
         seconds = _sweep_seconds(share * faces)
@@ -95,17 +95,15 @@ def sweep_cost(
     return Cost(seconds + PER_FACE_UNSWEPT * faces, memory)
 
 
-def sweeps_cost(mesh: gc.TriangleMesh, shares: Sequence[float], threads: int) -> Cost:
-    """Return the cost of exact sweeps over shares of the mesh, in some threads."""
-    faces = len(mesh.faces)
+def sweeps_cost(faces: int, shares: Sequence[float], threads: int) -> Cost:
+    """Return the cost of exact sweeps over shares of so many faces, in some threads."""
     seconds = sum(_sweep_seconds(share * faces) for share in shares)
     memory = SWEEP_BYTES + SWEEP_BYTES_PER_FACE * faces
     return Cost(PER_FACE_UNSWEPT * faces * threads + seconds / threads, memory * threads)
 
 
-def search_cost(mesh: gc.TriangleMesh, count: int) -> Cost:
-    """Return the cost of searches between two points each."""
-    faces = len(mesh.faces)
+def search_cost(faces: int, count: int) -> Cost:
+    """Return the cost of searches between two points each, on so many faces."""
     seconds = count * (PER_SEARCH + PER_FACE_SEARCHED * faces)
     return Cost(seconds, SEARCH_BYTES + SEARCH_BYTES_PER_FACE * faces)
 
@@ -148,8 +146,20 @@ def straight_to_nearest(
 
 def share_within(mesh: gc.TriangleMesh, radius: Any) -> Any:
     """Return the share of the surface within a radius of a point, were it flat; of an array too."""
+    return _share(radius, _area(mesh))
+
+
+def rough_share(size: MeshSize, sources: int, radius: float | None) -> float:
+    """Return about which share of the surface is within a radius of so many points, or all."""
+    if radius is None:
+        return 1.0
+    area = size.faces * math.sqrt(3.0) / 4.0 * size.edge**2
+    return min(1.0, sources * float(_share(radius, area or math.inf)))
+
+
+def _share(radius: Any, area: float) -> Any:
     with np.errstate(over="ignore"):
-        return np.minimum(1.0, math.pi * np.square(radius) / _area(mesh))
+        return np.minimum(1.0, math.pi * np.square(radius) / area)
 
 
 def typical_edge(mesh: gc.TriangleMesh) -> float:

@@ -17,6 +17,7 @@ from app.queries.accuracy import bound_of, likely_bound, method_of, solve_field,
 from app.queries.costs import (
     PER_POINT,
     Cost,
+    rough_share,
     share_within,
     straight_to_nearest,
     sweep_cost,
@@ -35,6 +36,7 @@ _VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3}
 class DistancesQuery(Query[schemas.DistancesRequest]):
     """Distances from ``sources`` to all vertices, or to ``targets`` only."""
 
+    kind = "distances"
     model = schemas.DistancesRequest
 
     @classmethod
@@ -71,6 +73,14 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         request = self.request
         return chain(named_sources(request.sources), numbered("/targets", request.targets or ()))
 
+    def rough_seconds(self, size: MeshSize) -> float:
+        """Return the cost of a sweep to the limit."""
+        request = self.request
+        share = rough_share(size, point_count(*request.sources), request.max_distance)
+        paths = "gradient" in self._included
+        points = point_count(*request.sources) + len(request.targets or ())
+        return sweep_cost(size.faces, request, share, paths=paths).seconds + PER_POINT * points
+
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep once."""
         request = self.request
@@ -102,7 +112,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(sources) * float(share_within(mesh, request.max_distance)))
-        sweep = sweep_cost(mesh, request, share, paths="gradient" in self._included)
+        sweep = sweep_cost(len(mesh.faces), request, share, paths="gradient" in self._included)
         away, nearest = straight_to_nearest(mesh, sources, targets, request.max_distance)
         cost = Cost(sweep.seconds + PER_POINT * len(places), sweep.memory_bytes)
         bound = likely_bound(request)

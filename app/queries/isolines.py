@@ -19,6 +19,7 @@ from app.queries.costs import (
     PIECES_BY_WINDOWS,
     PIECES_IN_FACE,
     Cost,
+    rough_share,
     share_within,
     straight_to_nearest,
     sweep_cost,
@@ -26,7 +27,7 @@ from app.queries.costs import (
 )
 from app.queries.places import Places, look_up
 from app.queries.query import Grant, Likely, Query
-from app.queries.refusals import Named, refuse_large_json, refuse_more, refuse_places
+from app.queries.refusals import MeshSize, Named, refuse_large_json, refuse_more, refuse_places
 from app.queries.sources import described_sources, named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
 from app.settings import Settings
@@ -39,6 +40,7 @@ _VALUES_OF_POINT, _VALUES_OF_LEVEL = 4, 1
 class IsolinesQuery(Query[schemas.IsolinesRequest]):
     """The points at some distances from ``sources``, as polylines."""
 
+    kind = "isolines"
     model = schemas.IsolinesRequest
     offers: Sequence[str] = (JSON,)
     hint = "ask for fewer levels at once, or grant a larger chord_error"
@@ -60,6 +62,13 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
     def points(self) -> Named:
         """Yield the sources."""
         return named_sources(self.request.sources)
+
+    def rough_seconds(self, size: MeshSize) -> float:
+        """Return the cost of a sweep to the limit, and of the lines."""
+        request = self.request
+        share = rough_share(size, point_count(*request.sources), request.max_distance)
+        lines = PER_FACE_AND_LEVEL * self._level_count * share * size.faces
+        return sweep_cost(size.faces, request, share, isolines=True).seconds + lines
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep once, and draw level after level, as long as they fit into the answer."""
@@ -91,7 +100,7 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(places) * float(share_within(mesh, request.max_distance)))
-        sweep = sweep_cost(mesh, request, share, isolines=True)
+        sweep = sweep_cost(len(mesh.faces), request, share, isolines=True)
         lines = self._level_count * share * len(mesh.faces)
         seconds = sweep.seconds + PER_POINT * len(places) + PER_FACE_AND_LEVEL * lines
         away, _ = straight_to_nearest(mesh, places, None, request.max_distance)

@@ -20,6 +20,7 @@ from app.queries.refusals import MeshSize, refuse_points
 class LocateQuery(Query[schemas.LocateRequest]):
     """The points of the surface nearest to positions, where they are near enough."""
 
+    kind = "locate"
     model = schemas.LocateRequest
     offers: Sequence[str] = (JSON,)
     hint = "ask for fewer points at once"
@@ -27,6 +28,10 @@ class LocateQuery(Query[schemas.LocateRequest]):
     def value_count(self, size: MeshSize) -> int:
         """Return the number of values of all points."""
         return VALUES_OF_POINT * len(self.request.points)
+
+    def rough_seconds(self, size: MeshSize) -> float:
+        """Return the cost of looking for each point."""
+        return PER_POSITION * len(self.request.points)
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Look for one position after the other."""

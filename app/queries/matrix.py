@@ -19,6 +19,7 @@ from app.queries.accuracy import CERTAIN
 from app.queries.costs import (
     PER_POINT,
     Cost,
+    rough_share,
     search_cost,
     share_within,
     straight_along,
@@ -36,6 +37,7 @@ from geodesic_core.threads import available_cores
 class MatrixQuery(Query[schemas.MatrixRequest]):
     """Distances from each of N sources to each of M targets, or from each to one target."""
 
+    kind = "matrix"
     model = schemas.MatrixRequest
 
     @classmethod
@@ -73,6 +75,14 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
         """Yield the sources, then the targets."""
         request = self.request
         return chain(numbered("/sources", request.sources), numbered("/targets", request.targets))
+
+    def rough_seconds(self, size: MeshSize) -> float:
+        """Return the cost of a sweep to the limit from each point of the smaller side."""
+        request = self.request
+        points = len(request.sources) + len(request.targets)
+        sweeps = min(len(request.sources), len(request.targets))
+        share = rough_share(size, 1, request.max_distance)
+        return sweeps_cost(size.faces, [share] * sweeps, 1).seconds + PER_POINT * points
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep from the smaller side."""
@@ -163,7 +173,7 @@ def _farthest(distances: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _cost_of_sweeps(mesh: gc.TriangleMesh, radii: NDArray[np.float64]) -> Cost:
     threads = min(available_cores(), len(radii))
-    return sweeps_cost(mesh, share_within(mesh, radii).tolist(), threads)
+    return sweeps_cost(len(mesh.faces), share_within(mesh, radii).tolist(), threads)
 
 
 def _cost_of_pairs(
@@ -177,7 +187,7 @@ def _cost_of_pairs(
     for end, away in zip(ends, distances.tolist(), strict=True):
         if end in radii and away < math.inf:
             radii[end] = max(radii[end], away)
-    costs = [search_cost(mesh, searches)] if searches else []
+    costs = [search_cost(len(mesh.faces), searches)] if searches else []
     if radii:
         costs.append(_cost_of_sweeps(mesh, np.array(list(radii.values()))))
     return Cost(sum(cost.seconds for cost in costs), sum(cost.memory_bytes for cost in costs))

@@ -12,7 +12,14 @@ from app.encoding import JSON, Answer
 from app.mesh_store import OpenMesh
 from app.points import described
 from app.queries.accuracy import CERTAIN
-from app.queries.costs import PER_POINT, Cost, share_within, straight_between, sweeps_cost
+from app.queries.costs import (
+    PER_POINT,
+    Cost,
+    rough_share,
+    share_within,
+    straight_between,
+    sweeps_cost,
+)
 from app.queries.places import Places, components_of, unreachable
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_places
@@ -21,6 +28,7 @@ from app.queries.refusals import MeshSize, Named, refuse_places
 class NearestQuery(Query[schemas.NearestRequest]):
     """The ``k`` candidates that are geodesically nearest to a point."""
 
+    kind = "nearest"
     model = schemas.NearestRequest
     offers: Sequence[str] = (JSON,)
     hint = "ask for a smaller k"
@@ -42,6 +50,12 @@ class NearestQuery(Query[schemas.NearestRequest]):
         """Yield the source, then the candidates."""
         request = self.request
         return chain([("/source", request.source)], numbered("/candidates", request.candidates))
+
+    def rough_seconds(self, size: MeshSize) -> float:
+        """Return the cost of a sweep to the limit."""
+        share = rough_share(size, 1, self.request.max_distance)
+        sweep = sweeps_cost(size.faces, [share], 1)
+        return sweep.seconds + PER_POINT * len(self.request.candidates)
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep to the k-th nearest."""
@@ -65,7 +79,7 @@ class NearestQuery(Query[schemas.NearestRequest]):
             share = float(share_within(mesh, self.request.max_distance))
         else:
             share = 1.0
-        sweep = sweeps_cost(mesh, [share], 1)
+        sweep = sweeps_cost(len(mesh.faces), [share], 1)
         cost = Cost(sweep.seconds + PER_POINT * len(places), sweep.memory_bytes)
         return Likely(cost, self._answer(opened, places, order, away[order]))
 

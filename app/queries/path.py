@@ -20,13 +20,21 @@ from app.queries.costs import PER_PATH, PER_POINT, Cost, search_cost, sweep_cost
 from app.queries.outline import likely_outline, no_outline, outline_of
 from app.queries.places import Places, components_of, positions_of
 from app.queries.query import Grant, Likely, Query, numbered
-from app.queries.refusals import Named, detail_of, refuse_more, refuse_places, refuse_points
+from app.queries.refusals import (
+    MeshSize,
+    Named,
+    detail_of,
+    refuse_more,
+    refuse_places,
+    refuse_points,
+)
 from app.settings import Settings
 
 
 class PathQuery(Query[schemas.PathRequest]):
     """The shortest path between two points, past ``waypoints`` in their order."""
 
+    kind = "path"
     model = schemas.PathRequest
 
     @classmethod
@@ -61,6 +69,13 @@ class PathQuery(Query[schemas.PathRequest]):
         ends = ("/source", self.request.source), ("/target", self.request.target)
         return chain(ends, numbered("/waypoints", self.request.waypoints))
 
+    def rough_seconds(self, size: MeshSize) -> float:
+        """Return the cost of a search for each leg, or of a sweep."""
+        request = self.request
+        if request.method == "approximate":
+            return sweep_cost(size.faces, request, paths=True).seconds
+        return search_cost(size.faces, 1 + len(request.waypoints)).seconds
+
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Search, or sweep where the path is to be approximate."""
         request = self.request
@@ -93,9 +108,9 @@ class PathQuery(Query[schemas.PathRequest]):
         mesh = opened.mesh
         source, target, *waypoints = places
         if self.request.method == "exact":
-            cost = search_cost(mesh, len(places) - 1)
+            cost = search_cost(len(mesh.faces), len(places) - 1)
         else:
-            cost = sweep_cost(mesh, self.request, paths=True)
+            cost = sweep_cost(len(mesh.faces), self.request, paths=True)
         stops = positions_of(mesh, [source, *waypoints, target])
         length = sum(float(np.linalg.norm(there - here)) for here, there in pairwise(stops))
         if len(set(components_of(mesh, places).tolist())) > 1:

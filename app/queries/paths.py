@@ -14,6 +14,7 @@ from app.queries.costs import (
     PER_PATH,
     PER_POINT,
     Cost,
+    rough_share,
     share_within,
     straight_to_nearest,
     sweep_cost,
@@ -34,6 +35,7 @@ _TRIED = 64
 class PathsQuery(Query[schemas.PathsRequest]):
     """The shortest paths from a point to each of some targets."""
 
+    kind = "paths"
     model = schemas.PathsRequest
     offers: Sequence[str] = (JSON,)
     hint = "ask for fewer targets at once"
@@ -55,6 +57,13 @@ class PathsQuery(Query[schemas.PathsRequest]):
     def refuse(self, settings: Settings) -> None:
         """Refuse too many points of a curve."""
         refuse_more("sources", point_count(self.request.source), settings, "max_sources")
+
+    def rough_seconds(self, size: MeshSize) -> float:
+        """Return the cost of a sweep to the limit, and of the paths."""
+        request = self.request
+        share = rough_share(size, point_count(request.source), request.max_distance)
+        sweep = sweep_cost(size.faces, request, share, paths=True)
+        return sweep.seconds + (PER_PATH + PER_POINT) * len(request.targets)
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep once, and trace path after path, as long as they fit into the answer."""
@@ -88,7 +97,7 @@ class PathsQuery(Query[schemas.PathsRequest]):
         starts, targets = self._parted(places)
         origin_of(mesh, "/source", self.request.source, starts)  # refuses a curve that jumps
         share = 1.0 if limit is None else float(share_within(mesh, limit))
-        sweep = sweep_cost(mesh, self.request, share, paths=True)
+        sweep = sweep_cost(len(mesh.faces), self.request, share, paths=True)
         seconds = sweep.seconds + (PER_PATH + PER_POINT) * len(targets)
         some = targets[:: 1 + len(targets) // _TRIED]
         edge = typical_edge(mesh)

@@ -16,7 +16,7 @@ import geodesic_core as gc
 from app import __version__, schemas
 from app.encoding import JSON, NPY, OCTETS, Answer
 from app.mesh_store import OpenMesh
-from app.queries.costs import Cost
+from app.queries.costs import PER_FACE_BLOCKED, Cost
 from app.queries.places import Places, resolved
 from app.queries.refusals import (
     MeshSize,
@@ -32,6 +32,8 @@ from geodesic_core.kernels.jit import sources_digest
 VALUES_OF_POINT = 8
 """What the JSON of a point has: position, distance, and a face with three weights."""
 
+SMALL_SECONDS = 0.05
+
 R = TypeVar("R", bound=schemas.Wire)
 
 
@@ -40,6 +42,7 @@ class Grant:
     """What the answer to a query may take, and how it learns that it is to stop."""
 
     cancel: Callable[[], bool]
+    progress: Callable[[float], None]
     memory_limit: int
     max_values: int
     """Most values of the answer, where it is written as JSON."""
@@ -47,7 +50,11 @@ class Grant:
     @property
     def options(self) -> dict[str, Any]:
         """The same as the solvers have it."""
-        return {"cancel": self.cancel, "memory_limit": self.memory_limit}
+        return {
+            "cancel": self.cancel,
+            "progress": self.progress,
+            "memory_limit": self.memory_limit,
+        }
 
 
 @dataclass(frozen=True)
@@ -73,6 +80,8 @@ class Query(ABC, Generic[R]):
     request: R
     """In the one spelling that stands for all that mean the same."""
 
+    kind: ClassVar[str]
+    """As clients call it"""
     model: ClassVar[type[schemas.Wire]]
     """Of the request"""
 
@@ -139,6 +148,10 @@ class Query(ABC, Generic[R]):
         return iter(())
 
     @abstractmethod
+    def rough_seconds(self, size: MeshSize) -> float:
+        """Return about how long ``solve`` takes, as far as the size of the mesh tells."""
+
+    @abstractmethod
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Answer on an open mesh, for these ``points``."""
 
@@ -147,6 +160,11 @@ class Query(ABC, Generic[R]):
         """Return what ``solve`` is likely to cost, without solving."""
 
     # What all have
+
+    def is_small(self, size: MeshSize) -> bool:
+        """Tell whether the answer takes so little that nobody should have to wait for it."""
+        blocked = PER_FACE_BLOCKED * size.faces if len(self.barriers) else 0.0
+        return self.rough_seconds(size) + blocked < SMALL_SECONDS
 
     def refuse_answer(self, media_type: str, size: MeshSize, settings: Settings) -> None:
         """Refuse an answer that this media type is not good for, where that is known before."""
@@ -190,8 +208,11 @@ def result_key(query: Query[Any], media_type: str) -> str:
 
     It is the same in any run, unless the answer is not: that of each run has a name of its own.
     """
-    if not query.is_repeatable:
-        return uuid4().hex
+    return fingerprint(query, media_type) if query.is_repeatable else uuid4().hex
+
+
+def fingerprint(query: Query[Any], media_type: str) -> str:
+    """Return the hash that stands for ``query`` in ``media_type``, answered by this code."""
     names = [type(query).__name__, query.mesh_id, media_type, code_version()]
     digest = hashlib.blake2b(orjson.dumps(names), digest_size=16)
     digest.update(_written(query.request))

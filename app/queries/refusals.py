@@ -16,10 +16,11 @@ Named = Iterator[tuple[str, schemas.Point]]
 
 
 class MeshSize(NamedTuple):
-    """How many elements a mesh has."""
+    """How many elements a mesh has, and how long its edges are on average, mesh units."""
 
     vertices: int
     faces: int
+    edge: float
 
 
 def refuse_places(places: Sequence[str], message: str) -> ProblemError:

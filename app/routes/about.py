@@ -27,6 +27,8 @@ _LIMITS = (
     "query_memory_bytes",
     "queue_size",
     "deadline_s",
+    "job_deadline_s",
+    "job_ttl",
 )
 
 
@@ -48,10 +50,12 @@ async def get_liveness() -> Health:
     operation_id="getReadiness",
     summary="Can it compute?",
     response_model=Health,
-    responses=problems("engine_unavailable"),
+    responses=problems("engine_unavailable", "draining"),
 )
 async def get_readiness(service: ServiceDep) -> Health:
     """Return 200 once a worker has its kernels compiled, 503 before."""
+    if service.engine.is_draining:
+        raise refuse("draining", "the service is about to stop", headers={"Retry-After": "1"})
     if not service.engine.is_ready:
         detail = "no worker is ready yet: kernels are being compiled or loaded"
         raise refuse("engine_unavailable", detail, headers={"Retry-After": "1"})

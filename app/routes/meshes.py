@@ -4,7 +4,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from app.dependencies import Deadline, ServiceDep, while_connected
+from app.dependencies import AskerDep, ServiceDep, while_connected
 from app.encoding import NPY
 from app.engine import MeshFromFile, MeshFromSample, StoredMesh
 from app.errors import Fault, over_limit, refuse
@@ -18,7 +18,7 @@ from app.responses import (
     server_timing,
 )
 from app.schemas import ListParameters, MeshDocument, MeshList, UploadParameters
-from app.service import Seconds, Service
+from app.service import Asker, Seconds, Service
 from app.uploads import spool
 
 router = APIRouter(prefix="/meshes", tags=["meshes"])
@@ -101,7 +101,7 @@ async def create_mesh(
     request: Request,
     response: Response,
     service: ServiceDep,
-    deadline: Deadline,
+    asker: AskerDep,
 ) -> dict[str, object]:
     """Read, check and store a mesh; the id is a hash of its content.
 
@@ -110,9 +110,9 @@ async def create_mesh(
     triangles in their place, and `face_map` leads back to them.
     """
     if parameters.sample is None:
-        stored, seconds = await _add_upload(service, parameters, request, deadline)
+        stored, seconds = await _add_upload(service, parameters, request, asker)
     else:
-        making = service.add_mesh(_sample(service, parameters), deadline)
+        making = service.add_mesh(_sample(service, parameters), asker)
         stored, seconds = await while_connected(request, making)
     response.status_code = 201 if stored.is_new else 200
     response.headers.update(server_timing(seconds))
@@ -187,7 +187,7 @@ async def get_mesh_array(
 
 
 async def _add_upload(
-    service: Service, parameters: UploadParameters, request: Request, deadline: float
+    service: Service, parameters: UploadParameters, request: Request, asker: Asker
 ) -> tuple[StoredMesh, Seconds]:
     if parameters.faces is not None:
         fault = Fault("/query/faces", "only a sample can be asked for with so many faces")
@@ -195,7 +195,7 @@ async def _add_upload(
     with service.meshes.scratch_file() as path:
         file_format = await spool(request, path, parameters.format)
         work = MeshFromFile(path, file_format, parameters.merge)
-        return await while_connected(request, service.add_mesh(work, deadline))
+        return await while_connected(request, service.add_mesh(work, asker))
 
 
 def _sample(service: Service, parameters: UploadParameters) -> MeshFromSample:

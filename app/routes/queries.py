@@ -3,9 +3,16 @@
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Query, Request, Response
+from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
-from app.dependencies import Deadline, ServiceDep, media_type_of, require_json, while_connected
+from app.dependencies import (
+    AskerDep,
+    ServiceDep,
+    media_type_of,
+    prefers_async,
+    require_json,
+    while_connected,
+)
 from app.encoding import NPY, NPZ, OCTETS
 from app.queries import (
     DistancesQuery,
@@ -24,6 +31,7 @@ from app.responses import (
     CACHED,
     UNSTORED,
     ResultResponse,
+    accepted_response,
     estimate_response,
     etag_of,
     not_modified,
@@ -36,6 +44,7 @@ from app.schemas import (
     Estimate,
     IsolinesAnswer,
     IsolinesRequest,
+    JobDocument,
     LocateAnswer,
     LocateRequest,
     MatrixAnswer,
@@ -64,6 +73,7 @@ _CODES = (
     "mesh_damaged",
     "queue_full",
     "engine_unavailable",
+    "draining",
     "deadline_exceeded",
     "storage_full",
 )
@@ -72,7 +82,10 @@ _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *
 
 def _answers(model: type, description: str, *binary: str) -> dict[int | str, dict[str, Any]]:
     content = {name: {"schema": {"type": "string", "format": "binary"}} for name in binary}
-    return {200: {"model": model | Estimate, "content": content, "description": description}}
+    return {
+        200: {"model": model | Estimate, "content": content, "description": description},
+        202: {"model": JobDocument, "description": "With `Prefer: respond-async`: the job"},
+    }
 
 
 def _in_binary(model: type, array: str) -> dict[int | str, dict[str, Any]]:
@@ -92,32 +105,48 @@ def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[s
 
 
 class Asked:
-    """Of what a query is asked, and by whom."""
+    """Of what a query is asked, by whom, and how it is to be answered."""
 
     def __init__(
-        self, mesh_id: str, request: Request, service: ServiceDep, deadline: Deadline
+        self,
+        mesh_id: str,
+        request: Request,
+        service: ServiceDep,
+        asker: AskerDep,
+        is_async: Annotated[bool, Depends(prefers_async)],
+        idempotency_key: Annotated[
+            str | None,
+            Header(
+                min_length=1,
+                max_length=255,
+                description="Of a job, freely chosen: what is sent again with it is the same job",
+            ),
+        ] = None,
     ) -> None:
         self.mesh_id = mesh_id
         self._request = request
         self._service = service
-        self._deadline = deadline
+        self._asker = asker
+        self._is_async = is_async
+        self._key = idempotency_key
 
     async def answer(
         self, kind: type[ValidQuery[Any]], body: Any, parameters: AnswerParameters
     ) -> Response:
         """Answer the query of a kind that a body asks, or tell what that would take."""
-        service, request = self._service, self._request
+        service, request, asker = self._service, self._request, self._asker
         query = kind.ask(self.mesh_id, service.size(self.mesh_id), body, service.settings)
         media_type = media_type_of(request, parameters.format, query.offers)
         if parameters.estimate:
-            estimating = service.estimate(query, media_type, self._deadline)
+            estimating = service.estimate(query, media_type, asker)
             estimate, seconds = await while_connected(request, estimating)
             return estimate_response(self.mesh_id, estimate, media_type, seconds)
+        if self._is_async:
+            return accepted_response(await service.submit(query, media_type, asker, self._key))
         unchanged = not_modified(request, etag_of(result_key(query, media_type)), CACHED)
         if unchanged is not None:
             return unchanged
-        answering = service.answer(query, media_type, self._deadline)
-        answered = await while_connected(request, answering)
+        answered = await while_connected(request, service.answer(query, media_type, asker))
         is_cacheable = request.method == "GET" and query.is_repeatable
         headers = CACHED if is_cacheable else UNSTORED
         return ResultResponse(answered, media_type, service.results, headers)

@@ -81,7 +81,7 @@ def test_spellings_of_barriers_are_one_query(
 
     assert (again.content, again.headers["server-timing"]) == (first.content, "kept")
     assert first.json()["unreachable"] == {"disconnected": 0, "beyond_max_distance": 0}
-    size = MeshSize(len(walled.vertices), len(walled.faces))
+    size = MeshSize(len(walled.vertices), len(walled.faces), 1.0)
     asked = [
         DistancesQuery.ask(
             "m", size, DistancesRequest(sources=[{"vertex": 0}], barriers=given), Settings()

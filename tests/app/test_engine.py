@@ -1,11 +1,12 @@
 """What becomes of requests when workers are busy, slow or killed."""
 
+import asyncio
 import os
 import signal
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from ctypes import c_longlong
+from ctypes import c_double, c_longlong
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -13,13 +14,14 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.engine import Answering, Done, MeshFromSample, worker
+from app.engine import Answering, MeshFromSample, local, worker
 from app.engine.worker import Clock, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
 from app.mesh_store import MeshStore
 from app.queries import DistancesQuery, PathQuery
 from app.schemas import DistancesRequest, PathRequest, VertexPoint
+from app.service import Asker
 from app.settings import Settings
 from geodesic_core import TriangleMesh, samples
 
@@ -31,16 +33,22 @@ SLOW_FACES = 300_000
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
-    """A service of two workers, with places for two to wait."""
+    """A service of two workers and the one for small work, with places for two to wait."""
     store = tmp_path_factory.mktemp("two")
     with serving(store, workers=2, queue_size=2, cancel_grace_s=5) as client:
-        wait_until(lambda: len(workers(client)) == 2)
+        wait_until(lambda: len(workers(client)) == 3)
         yield client
 
 
 @pytest.fixture(scope="module")
 def small(two: TestClient) -> str:
     return upload_sample(two, "plane", 200)
+
+
+@pytest.fixture(scope="module")
+def medium(two: TestClient) -> str:
+    """The id of a mesh on which distances are no small work, but take a tenth of a second."""
+    return upload_sample(two, "sphere", 80_000)
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +79,11 @@ def workers(client: TestClient) -> set[int]:
     return {slot._pid.value for slot in engine_of(client)._open}
 
 
+def busy_workers(client: TestClient) -> set[int]:
+    engine = engine_of(client)
+    return {slot._pid.value for slot in engine._open - set(engine._idle)}
+
+
 def wait_until_busy(client: TestClient, running: int = 2, waiting: int = 0) -> None:
     engine = engine_of(client)
     wait_until(
@@ -79,7 +92,7 @@ def wait_until_busy(client: TestClient, running: int = 2, waiting: int = 0) -> N
 
 
 def wait_until_whole(client: TestClient) -> None:
-    wait_until(lambda: len(engine_of(client)._idle) == 2)
+    wait_until(lambda: len(engine_of(client)._idle) == 3)
 
 
 @pytest.fixture(autouse=True)
@@ -130,7 +143,7 @@ def test_a_busy_worker_killed(
 ) -> None:
     running = start_slow(two, slow, threads)
     time.sleep(0.2)
-    os.kill(min(workers(two)), signal.SIGKILL)
+    os.kill(min(busy_workers(two)), signal.SIGKILL)
     responses = sorted((future.result() for future in running), key=lambda r: r.status_code)
 
     assert responses[0].status_code == 200
@@ -139,10 +152,10 @@ def test_a_busy_worker_killed(
 
 
 def test_all_killed_while_others_wait(
-    two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
+    two: TestClient, medium: str, slow: str, threads: ThreadPoolExecutor
 ) -> None:
     running = start_slow(two, slow, threads)
-    waiting = [threads.submit(ask, two, small) for _ in range(2)]
+    waiting = [threads.submit(ask, two, medium) for _ in range(2)]
     wait_until_busy(two, 2, 2)
     time.sleep(0.2)
     for pid in workers(two):
@@ -154,14 +167,14 @@ def test_all_killed_while_others_wait(
 
 
 def test_a_full_queue_refuses_at_once(
-    two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
+    two: TestClient, medium: str, slow: str, threads: ThreadPoolExecutor
 ) -> None:
     start_slow(two, slow, threads, timeout_ms=1000)
-    waiting = [threads.submit(ask, two, small) for _ in range(2)]
+    waiting = [threads.submit(ask, two, medium) for _ in range(2)]
     wait_until_busy(two, 2, 2)
 
     start = time.monotonic()
-    response = ask(two, small)
+    response = ask(two, medium)
 
     assert time.monotonic() - start < 0.2
     problem = check_problem(response, 503, "queue_full")
@@ -191,16 +204,16 @@ def test_a_deadline_stops_the_query_and_spares_the_worker(two: TestClient, slow:
 
     assert time.monotonic() - start < 0.6
     assert check_problem(response, 504, "deadline_exceeded")["limit"] == 0.3
-    wait_until(lambda: len(engine_of(two)._idle) == 2, seconds=1)
+    wait_until(lambda: len(engine_of(two)._idle) == 3, seconds=1)
     assert workers(two) == before
 
 
 def test_a_deadline_counts_in_the_queue(
-    two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
+    two: TestClient, medium: str, slow: str, threads: ThreadPoolExecutor
 ) -> None:
     start_slow(two, slow, threads, timeout_ms=1000)
 
-    response = ask(two, small, **{"X-Timeout-Ms": "100"})
+    response = ask(two, medium, **{"X-Timeout-Ms": "100"})
 
     check_problem(response, 504, "deadline_exceeded")
     assert len(engine_of(two)._waiting) == 0
@@ -217,7 +230,7 @@ def test_reading_a_mesh_is_killed_at_its_deadline(two: TestClient, small: str) -
 
     check_problem(response, 504, "deadline_exceeded")
     wait_until_whole(two)
-    assert len(workers(two) & before) == 1
+    assert len(workers(two) & before) == 2
     assert ask(two, small).status_code == 200
 
 
@@ -233,6 +246,58 @@ def test_a_query_goes_where_its_mesh_is_open(two: TestClient, small: str) -> Non
         for mesh_id in (small, other):
             load = ask(two, mesh_id).headers["server-timing"].split("load;dur=")[1]
             assert float(load.split(",")[0]) < 1
+
+
+def test_small_work_does_not_wait_behind_long_work(
+    two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
+) -> None:
+    running = start_slow(two, slow, threads, timeout_ms=2000)
+    waiting = threads.submit(ask, two, slow, **{"X-Timeout-Ms": "2000"})
+    wait_until_busy(two, 2, 1)
+
+    for _ in range(10):
+        assert ask(two, small).status_code == 200
+
+    assert not any(future.done() for future in [*running, waiting])
+
+
+def test_what_proves_not_to_be_small_begins_anew_elsewhere(
+    two: TestClient, slow: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(DistancesQuery, "is_small", lambda *_: True)
+    engine = engine_of(two)
+    engine._idle.sort(key=lambda slot: slot is not engine._small)
+    for slot in engine._slots:
+        slot.known_meshes.clear()
+
+    response = ask(two, slow)
+
+    assert response.status_code == 200
+    queued = float(response.headers["server-timing"].split("queue;dur=")[1].split(",")[0])
+    assert queued > 1e3 * local._SMALL_S, "the first try counts as waiting"
+
+
+def test_clients_take_turns(two: TestClient, slow: str, medium: str) -> None:
+    """A client that asks for much keeps no other waiting for all of it."""
+    done = []
+
+    async def ask_as(client: str, mesh_id: str) -> None:
+        query = asked(mesh_id, vertex=next(_starts))
+        asker = Asker(client, "", 60.0, "")
+        await two.app.state.service.answer(query, "application/json", asker)
+        done.append(client)
+
+    async def ask_all() -> None:
+        running = [asyncio.create_task(ask_as("greedy", slow)) for _ in range(2)]
+        await asyncio.sleep(0.2)
+        greedy = [asyncio.create_task(ask_as("greedy", medium)) for _ in range(2)]
+        await asyncio.sleep(0.05)
+        modest = asyncio.create_task(ask_as("modest", medium))
+        await asyncio.gather(*running, *greedy, modest)
+
+    two.portal.call(ask_all)
+
+    assert done.index("modest") < 4, "it came last, and did not go last"
 
 
 def test_many_at_once(two: TestClient, small: str) -> None:
@@ -287,9 +352,9 @@ def config(store: Path, **settings: Any) -> WorkerConfig:
     return WorkerConfig(Settings(store=store, **settings), store / "results")
 
 
-def asked(mesh_id: str, *barriers: int) -> DistancesQuery:
+def asked(mesh_id: str, *barriers: int, vertex: int = 0) -> DistancesQuery:
     return DistancesQuery(
-        mesh_id, DistancesRequest(sources=[{"vertex": 0}], barriers=list(barriers))
+        mesh_id, DistancesRequest(sources=[{"vertex": vertex}], barriers=list(barriers))
     )
 
 
@@ -299,7 +364,7 @@ def test_a_worker_closes_meshes_that_do_not_fit(tmp_path: Path) -> None:
     meshes = [TriangleMesh(*samples.plane(faces)) for faces in (100, 200, 300)]
     ids = [store.add(mesh)[0] for mesh in meshes]
     room = meshes[1].nbytes + meshes[2].nbytes
-    state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0))
+    state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0), c_double(0.0))
 
     for mesh_id in ids:
         state._open(asked(mesh_id))
@@ -312,7 +377,9 @@ def test_a_worker_keeps_meshes_with_barriers_as_it_keeps_others(tmp_path: Path) 
     store.prepare()
     mesh = TriangleMesh(*samples.plane(200))
     mesh_id, _ = store.add(mesh)
-    state = Worker(config(tmp_path, worker_mesh_bytes=2 * mesh.nbytes), c_longlong(0))
+    state = Worker(
+        config(tmp_path, worker_mesh_bytes=2 * mesh.nbytes), c_longlong(0), c_double(0.0)
+    )
 
     blocked = state._open(asked(mesh_id, 3, 9))
 
@@ -329,7 +396,7 @@ def test_what_paths_need_counts_as_part_of_an_open_mesh(tmp_path: Path) -> None:
     meshes = [TriangleMesh(*samples.plane(faces)) for faces in (200, 300)]
     ids = [store.add(mesh)[0] for mesh in meshes]
     room = sum(mesh.nbytes for mesh in meshes) + 100
-    state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0))
+    state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0), c_double(0.0))
 
     for mesh_id in ids:
         opened = state._open(asked(mesh_id))
@@ -351,7 +418,7 @@ def test_the_clock_measures_each_phase() -> None:
 def test_a_defect_in_a_worker_is_logged_there_and_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(worker, "_worker", Worker(config(tmp_path), c_longlong(0)))
+    monkeypatch.setattr(worker, "_worker", Worker(config(tmp_path), c_longlong(0), c_double(0.0)))
     monkeypatch.setattr(worker, "_make_mesh", lambda _: 1 / 0)
 
     outcome = worker.do(1, MeshFromSample("plane", 10, "none"))
@@ -366,7 +433,7 @@ def test_work_that_was_asked_to_stop_stops(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accuracy: dict[str, Any]
 ) -> None:
     asked = c_longlong(0)
-    state = Worker(config(tmp_path), asked)
+    state = Worker(config(tmp_path), asked, c_double(0.0))
     state.store.prepare()
     mesh_id, _ = state.store.add(TriangleMesh(*samples.sphere(100_000)))
     monkeypatch.setattr(worker, "_worker", state)
@@ -376,6 +443,6 @@ def test_work_that_was_asked_to_stop_stops(
     (tmp_path / "results").mkdir()
 
     asked.value = 2
-    assert worker.do(2, work) == Done({})
+    assert worker.do(2, work) is None
     assert not list((tmp_path / "results").rglob("*"))
     assert "encode" in worker.do(3, work).seconds

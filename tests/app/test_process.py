@@ -15,12 +15,7 @@ import pytest
 from .conftest import is_ready, upload_sample, wait_until
 from .test_engine import SLOW_FACES
 
-SERVE = """
-import sys, uvicorn
-from app.main import create_app
-from app.settings import Settings
-uvicorn.run(create_app(Settings()), port=int(sys.argv[1]), log_level="warning")
-"""
+SERVE = "from app.cli import main; main()"
 
 
 class Server:
@@ -30,7 +25,7 @@ class Server:
             port = probe.getsockname()[1]
         environment = os.environ | {"GEODESIC_STORE": str(store), "GEODESIC_WORKERS": "1"}
         self.process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
-            [sys.executable, "-c", SERVE, str(port)],
+            [sys.executable, "-c", SERVE, "serve", "--port", str(port)],
             env=environment,
             cwd=Path(__file__).parents[2],
         )
@@ -97,8 +92,8 @@ def is_running(pid: int) -> bool:
 
 def test_workers_die_with_their_parent_however_busy(server: Server) -> None:
     mesh_id = upload_sample(server.client, "sphere", SLOW_FACES)
+    wait_until(lambda: len(server.workers()) == 2)
     workers = server.workers()
-    assert len(workers) == 1
 
     with server.begin_slow_query(mesh_id):
         server.process.kill()
@@ -107,6 +102,7 @@ def test_workers_die_with_their_parent_however_busy(server: Server) -> None:
 
 def test_a_client_that_hangs_up_stops_its_query(server: Server) -> None:
     mesh_id = upload_sample(server.client, "sphere", SLOW_FACES)
+    wait_until(lambda: len(server.workers()) == 2)
     workers = server.workers()
 
     server.begin_slow_query(mesh_id).close()
@@ -136,6 +132,66 @@ def test_ends_in_good_order(server: Server) -> None:
 
     assert server.process.wait(5) in (0, -signal.SIGTERM)
     assert are_gone(workers)
+
+
+def test_what_runs_when_the_service_is_to_stop_ends_well_and_all_else_is_refused(
+    server: Server,
+) -> None:
+    mesh_id = upload_sample(server.client, "sphere", SLOW_FACES)
+    with server.begin_slow_query(mesh_id) as running:
+        server.process.send_signal(signal.SIGTERM)
+        answer = running.recv(20)
+
+    assert answer.startswith(b"HTTP/1.1 200")
+    assert server.process.wait(5) in (0, -signal.SIGTERM)
+
+
+ASYNC = {"Prefer": "respond-async"}
+SLOW_QUERY = {"sources": [{"vertex": 0}], "targets": [{"vertex": 1}]}
+
+
+def submit(server: Server, mesh_id: str) -> str:
+    asked = server.client.post(f"/v1/meshes/{mesh_id}/distances", json=SLOW_QUERY, headers=ASYNC)
+    assert asked.status_code == 202
+    return str(asked.headers["location"])
+
+
+def test_jobs_survive_a_restart(tmp_path: Path) -> None:
+    """One that had finished has its answer still, one that ran says why it failed."""
+    first = Server(tmp_path)
+    small = upload_sample(first.client, "plane", 200)
+    slow = upload_sample(first.client, "sphere", SLOW_FACES)
+    done, lost = submit(first, small), submit(first, slow)
+    wait_until(lambda: first.client.get(done).json()["status"] == "successful")
+    answer = first.client.get(f"{done}/results").json()
+    assert first.client.get(lost).json()["status"] == "running"
+    first.process.kill()
+    first.close()
+
+    second = Server(tmp_path)
+    try:
+        assert second.client.get(f"{done}/results").json() == answer
+        job = second.client.get(lost).json()
+        assert job["status"] == "failed"
+        assert job["problem"]["code"] == "engine_unavailable"
+        assert job["problem"]["hint"] == "send the query again"
+        response = second.client.get(f"{lost}/results")
+        assert (response.status_code, response.json()["code"]) == (503, "engine_unavailable")
+        again = submit(second, slow)
+        wait_until(lambda: second.client.get(again).json()["status"] == "successful")
+    finally:
+        second.close()
+
+
+def test_who_watches_a_job_does_not_keep_the_service_from_stopping(server: Server) -> None:
+    job = submit(server, upload_sample(server.client, "sphere", 4 * SLOW_FACES))
+    with server.client.stream("GET", f"{job}/events") as events:
+        lines = events.iter_lines()
+        next(lines)
+        server.process.send_signal(signal.SIGTERM)
+
+        assert server.process.wait(5) in (0, -signal.SIGTERM)
+        assert not any('"status": "failed"' in line for line in lines), "it is still to be told"
 
 
 def test_exact_distances_of_a_real_mesh(server: Server, horse: bytes) -> None:
