@@ -62,6 +62,5 @@ _FASTAPI_S_OWN = "Validation Error"  # what it supposes of each operation with p
 
 def _as_problem(response: dict[str, Any]) -> dict[str, Any]:
     # FastAPI writes the media type of the answer to the errors as well.
-    content = response["content"]
-    model = content.get("application/json") or content[PROBLEM_JSON]
+    (model,) = response["content"].values()
     return {**response, "content": {PROBLEM_JSON: model}}

@@ -14,14 +14,13 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.engine import Answering, MeshFromSample, local, worker
+from app.engine import Answering, MeshFromSample, Order, local, worker
 from app.engine.worker import Clock, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
 from app.mesh_store import MeshStore
 from app.queries import DistancesQuery, PathQuery
 from app.schemas import DistancesRequest, PathRequest, VertexPoint
-from app.service import Asker
 from app.settings import Settings
 from geodesic_core import TriangleMesh, samples
 
@@ -279,25 +278,30 @@ def test_what_proves_not_to_be_small_begins_anew_elsewhere(
 
 def test_clients_take_turns(two: TestClient, slow: str, medium: str) -> None:
     """A client that asks for much keeps no other waiting for all of it."""
-    done = []
+    begun: list[str] = []
 
     async def ask_as(client: str, mesh_id: str) -> None:
-        query = asked(mesh_id, vertex=next(_starts))
-        asker = Asker(client, "", 60.0, "")
-        await two.app.state.service.answer(query, "application/json", asker)
-        done.append(client)
+        vertex = next(_starts)
+        work = Answering(asked(mesh_id, vertex=vertex), "application/json", f"{mesh_id}/{vertex}")
+
+        def note(share: float) -> None:
+            if share == 0.0:
+                begun.append(client)
+
+        await engine_of(two).run(Order(work, client, mesh_id), note)
 
     async def ask_all() -> None:
         running = [asyncio.create_task(ask_as("greedy", slow)) for _ in range(2)]
         await asyncio.sleep(0.2)
+        begun.clear()
         greedy = [asyncio.create_task(ask_as("greedy", medium)) for _ in range(2)]
         await asyncio.sleep(0.05)
-        modest = asyncio.create_task(ask_as("modest", medium))
-        await asyncio.gather(*running, *greedy, modest)
+        await asyncio.gather(*running, *greedy, ask_as("modest", medium))
 
     two.portal.call(ask_all)
 
-    assert done.index("modest") < 4, "it came last, and did not go last"
+    assert list(dict.fromkeys(begun)) == ["greedy", "modest"]
+    assert begun[-1] == "greedy", "the modest one came last, and does not go last"
 
 
 def test_many_at_once(two: TestClient, small: str) -> None:
