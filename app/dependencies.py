@@ -1,4 +1,8 @@
-"""What handlers are given: the service, the deadline, the format, and a client that may hang up."""
+"""What handlers are given: the service, the deadline, the format, and a client that may hang up.
+
+Dependencies are coroutines, though they wait for nothing: FastAPI runs plain functions in a thread,
+each for a fifth of a millisecond.
+"""
 
 import asyncio
 import re
@@ -15,7 +19,7 @@ from app.service import Asker, Service
 T = TypeVar("T")
 
 
-def get_service(request: Request) -> Service:
+async def get_service(request: Request) -> Service:
     """Return the service of this application."""
     service: Service = request.app.state.service
     return service
@@ -24,7 +28,7 @@ def get_service(request: Request) -> Service:
 ServiceDep = Annotated[Service, Depends(get_service)]
 
 
-def get_deadline(
+async def get_deadline(
     service: ServiceDep,
     x_timeout_ms: Annotated[
         int | None, Header(gt=0, description="Milliseconds the client would wait")
@@ -38,12 +42,12 @@ def get_deadline(
 Deadline = Annotated[float, Depends(get_deadline)]
 
 
-def get_client(request: Request) -> str:
+async def get_client(request: Request) -> str:
     """Return who asks, as far as turns are concerned: an address."""
     return request.client.host if request.client else ""
 
 
-def get_owner() -> str:
+async def get_owner() -> str:
     """Return whose jobs are asked for: those of all, since there are no keys."""
     return ""
 
@@ -51,7 +55,7 @@ def get_owner() -> str:
 OwnerDep = Annotated[str, Depends(get_owner)]
 
 
-def get_asker(
+async def get_asker(
     request: Request,
     deadline_s: Deadline,
     client: Annotated[str, Depends(get_client)],
@@ -64,7 +68,7 @@ def get_asker(
 AskerDep = Annotated[Asker, Depends(get_asker)]
 
 
-def prefers_async(
+async def prefers_async(
     prefer: Annotated[
         str | None,
         Header(description="`respond-async`: answer at once with a job, RFC 7240"),
@@ -75,7 +79,7 @@ def prefers_async(
     return "respond-async" in preferences
 
 
-def require_json(request: Request) -> None:
+async def require_json(request: Request) -> None:
     """Refuse a body that does not say it is JSON, with what to do about it."""
     media_type = request.headers.get("content-type", "")
     if not re.match(r"application/([\w.-]+\+)?json\b", media_type, re.IGNORECASE):

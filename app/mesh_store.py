@@ -23,6 +23,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +115,7 @@ class MeshStore:
         """Return what is known of a mesh without opening its arrays."""
         path = self._folder(mesh_id) / "manifest.json"
         try:
-            manifest: dict[str, Any] = orjson.loads(path.read_bytes())
+            manifest = _read_manifest(path, path.stat().st_mtime_ns)
             version = manifest["version"]
         except (OSError, ValueError, TypeError, KeyError) as error:
             raise _damaged(mesh_id, "its manifest cannot be read") from error
@@ -168,6 +169,12 @@ class MeshStore:
         if not is_id or not folder.is_dir():
             raise _unknown(mesh_id)
         return folder
+
+
+@lru_cache(maxsize=256)
+def _read_manifest(path: Path, _changed: int) -> Mapping[str, Any]:
+    manifest: dict[str, Any] = orjson.loads(path.read_bytes())
+    return manifest
 
 
 def _content_hash(arrays: Mapping[str, NDArray[Any]]) -> str:

@@ -1,6 +1,7 @@
 """Queries on a mesh: one handler for each kind."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
@@ -58,6 +59,7 @@ from app.schemas import (
     PathsAnswer,
     PathsRequest,
 )
+from app.service import Asker, Service
 
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"])
 
@@ -104,45 +106,30 @@ def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[s
     }
 
 
+@dataclass(frozen=True)
 class Asked:
     """Of what a query is asked, by whom, and how it is to be answered."""
 
-    def __init__(
-        self,
-        mesh_id: str,
-        request: Request,
-        service: ServiceDep,
-        asker: AskerDep,
-        is_async: Annotated[bool, Depends(prefers_async)],
-        idempotency_key: Annotated[
-            str | None,
-            Header(
-                min_length=1,
-                max_length=255,
-                description="Of a job, freely chosen: what is sent again with it is the same job",
-            ),
-        ] = None,
-    ) -> None:
-        self.mesh_id = mesh_id
-        self._request = request
-        self._service = service
-        self._asker = asker
-        self._is_async = is_async
-        self._key = idempotency_key
+    mesh_id: str
+    request: Request
+    service: Service
+    asker: Asker
+    is_async: bool
+    key: str | None
 
     async def answer(
         self, kind: type[ValidQuery[Any]], body: Any, parameters: AnswerParameters
     ) -> Response:
         """Answer the query of a kind that a body asks, or tell what that would take."""
-        service, request, asker = self._service, self._request, self._asker
+        service, request, asker = self.service, self.request, self.asker
         query = kind.ask(self.mesh_id, service.size(self.mesh_id), body, service.settings)
         media_type = media_type_of(request, parameters.format, query.offers)
         if parameters.estimate:
             estimating = service.estimate(query, media_type, asker)
             estimate, seconds = await while_connected(request, estimating)
             return estimate_response(self.mesh_id, estimate, media_type, seconds)
-        if self._is_async:
-            return accepted_response(await service.submit(query, media_type, asker, self._key))
+        if self.is_async:
+            return accepted_response(await service.submit(query, media_type, asker, self.key))
         unchanged = not_modified(request, etag_of(result_key(query, media_type)), CACHED)
         if unchanged is not None:
             return unchanged
@@ -152,7 +139,26 @@ class Asked:
         return ResultResponse(answered, media_type, service.results, headers)
 
 
-AskedDep = Annotated[Asked, Depends()]
+async def get_asked(
+    mesh_id: str,
+    request: Request,
+    service: ServiceDep,
+    asker: AskerDep,
+    is_async: Annotated[bool, Depends(prefers_async)],
+    idempotency_key: Annotated[
+        str | None,
+        Header(
+            min_length=1,
+            max_length=255,
+            description="Of a job, freely chosen: what is sent again with it is the same job",
+        ),
+    ] = None,
+) -> Asked:
+    """Return what a request for a query says beside the query."""
+    return Asked(mesh_id, request, service, asker, is_async, idempotency_key)
+
+
+AskedDep = Annotated[Asked, Depends(get_asked)]
 Parameters = Annotated[AnswerParameters, Query()]
 
 
