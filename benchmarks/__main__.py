@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from benchmarks import approximate, exact, matrix, path, service, topology
+from benchmarks import approximate, exact, load, matrix, path, service, topology
 from benchmarks.inputs import Inputs
 from benchmarks.tables import keep
 
@@ -18,6 +18,7 @@ BENCHMARKS = {
     "landmarks": path.run_landmarks,
     "matrix": matrix.run,
     "service": service.run,
+    "load": load.run,
 }
 ROOT = Path(__file__).parents[1]
 

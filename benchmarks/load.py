@@ -1,0 +1,178 @@
+"""How small questions fare: alone, many at once, and while long ones keep the workers busy."""
+
+import json
+import threading
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import partial
+from itertools import count
+from random import Random
+from statistics import median, quantiles
+
+import geodesic_core as gc
+from benchmarks.inputs import Inputs
+from benchmarks.serving import Client, serving
+from benchmarks.tables import Section, rated
+from benchmarks.timing import timed
+
+SMALL_FACES, LONG_FACES = 5_000, 1_000_000
+SECONDS = 8.0
+"""How long clients ask, for each row."""
+WORKERS = 2
+HEAVY = 120
+"""Long questions asked at once."""
+
+
+def run(_inputs: Inputs, _runs: int) -> Section:
+    """Ask for paths on a small mesh, by one client and by four."""
+    gc.warm_up()
+    rows: list[list[str]] = []
+    with serving(GEODESIC_WORKERS=str(WORKERS)) as port, ProcessPoolExecutor(4) as pool:
+        client = Client(port)
+        small = client.upload_sample("sphere", SMALL_FACES)
+        long = client.upload_sample("sphere", LONG_FACES)
+        solve_s = _solve_seconds()
+        for clients in (1, 4):
+            asked = partial(_ask_from, pool, clients, port, small)
+            asked()  # brings the mesh into each worker
+            alone = asked()
+            rows.append(_row("alone", clients, alone, solve_s, alone))
+            for busy in range(1, WORKERS + 1):
+                with _kept_busy(port, long, busy):
+                    rows.append(_row(f"while {busy} long", clients, asked(), solve_s, alone))
+        rows.append(_cached_path(Client(port), small))
+        heavy = _many_heavy(port, long)
+    return Section(
+        "Load",
+        f"Exact paths between random vertices of a sphere of {SMALL_FACES:,} faces, asked for "
+        f"{SECONDS:g} s by clients that each wait for their answer, in processes of their own; "
+        f"long questions are exact distances on a sphere of {LONG_FACES:,} faces. "
+        f"{WORKERS} workers and the one for small work. The solve alone takes "
+        f"{1e3 * solve_s:.2f} ms, and a request so much more at the median. {heavy}",
+        ["paths", "clients", "a second", "p50, ms", "p99, ms", "over the solve, ms", "p99 : p50"],
+        rows,
+    )
+
+
+def _row(
+    name: str, clients: int, times: Sequence[float], solve_s: float, alone: Sequence[float]
+) -> list[str]:
+    p50, p99 = median(times), quantiles(times, n=100)[98]
+    is_alone = times is alone
+    rate, over = len(times) / SECONDS, 1e3 * (p50 - solve_s)
+    return [
+        name,
+        str(clients),
+        rated(rate, 400 if is_alone and clients == 4 else None, at_least=True, digits=0),
+        f"{1e3 * p50:.2f}",
+        f"{1e3 * p99:.2f}",
+        rated(over, 2.5 if is_alone and clients == 1 else None, at_least=False),
+        rated(p99 / median(alone), None if is_alone else 3.0, at_least=False),
+    ]
+
+
+def _solve_seconds() -> float:
+    solver = gc.Solver(gc.TriangleMesh(*gc.samples.sphere(SMALL_FACES)))
+    pairs = _pairs(0)
+    return median(timed(partial(solver.shortest_path, *next(pairs)))[0] for _ in range(200))
+
+
+def _pairs(seed: int) -> Iterator[tuple[int, int]]:
+    random = Random(seed)  # noqa: S311 - the same in every run, and no secret
+    while True:
+        yield tuple(random.sample(range(SMALL_FACES // 2), 2))  # type: ignore[misc]
+
+
+_seeds = count()
+
+
+def _ask_from(pool: ProcessPoolExecutor, clients: int, port: int, mesh: str) -> list[float]:
+    """Return how long each request took, of some clients at once."""
+    asking = [pool.submit(_ask_paths, port, mesh, next(_seeds)) for _ in range(clients)]
+    return [seconds for task in asking for seconds in task.result()]
+
+
+def _ask_paths(port: int, mesh: str, seed: int) -> list[float]:
+    client, pairs, times = Client(port), _pairs(seed), []
+    end = time.perf_counter() + SECONDS
+    while (start := time.perf_counter()) < end:
+        source, target = next(pairs)
+        client.get(f"{mesh}/path", {"source": {"vertex": source}, "target": {"vertex": target}})
+        times.append(time.perf_counter() - start)
+    client.close()
+    return times
+
+
+_starts = count()
+
+
+def _long_question() -> dict[str, object]:
+    """Return a question that nobody has asked before."""
+    start = {"vertex": 0, "start_distance": next(_starts)}
+    return {"sources": [start], "targets": [{"vertex": 1}]}
+
+
+@contextmanager
+def _kept_busy(port: int, mesh: str, count: int) -> Iterator[None]:
+    """Keep some workers busy with long questions."""
+    over = threading.Event()
+
+    def ask() -> None:
+        client = Client(port)
+        while not over.is_set():
+            client.ask(f"{mesh}/distances", _long_question(), {"X-Timeout-Ms": "60000"})
+        client.close()
+
+    threads = [threading.Thread(target=ask) for _ in range(count)]
+    for thread in threads:
+        thread.start()
+    time.sleep(1.0)
+    yield
+    over.set()
+    for thread in threads:
+        thread.join()
+
+
+def _cached_path(client: Client, mesh: str) -> list[str]:
+    """Ask for paths to vertices from a source whose distances are known already."""
+    client.get(f"{mesh}/distances", {"sources": [{"vertex": 0}]})
+    times = []
+    for vertex in range(1, 301):
+        body = {"source": {"vertex": 0}, "targets": [{"vertex": vertex}]}
+        times.append(timed(partial(client.get, f"{mesh}/paths", body))[0])
+    p50, p99 = median(times), quantiles(times, n=100)[98]
+    cells = ["of a field that is known", "1", "", rated(1e3 * p50, 3.0, at_least=False)]
+    return [*cells, f"{1e3 * p99:.2f}", "", ""]
+
+
+def _many_heavy(port: int, mesh: str) -> str:
+    """Ask many long questions at once; return what became of them, and of a small one meanwhile."""
+
+    def ask(_: int) -> tuple[int, bool]:
+        client = Client(port)
+        headers = {"X-Timeout-Ms": "20000"}
+        response, answer = client.ask(f"{mesh}/distances", _long_question(), headers)
+        client.close()
+        status = response.status
+        code = json.loads(answer).get("code")
+        known = status == 200 or code in ("queue_full", "rate_limited", "deadline_exceeded")
+        return status, known and (status not in (429, 503) or "retry-after" in response.headers)
+
+    with ThreadPoolExecutor(HEAVY) as pool:
+        asked = [pool.submit(ask, i) for i in range(HEAVY)]
+        client, times = Client(port), []
+        while not all(future.done() for future in asked):
+            times.append(timed(partial(client.get, "/v1"))[0])
+            time.sleep(0.01)
+        found = [future.result() for future in asked]
+    statuses = Counter(status for status, _ in found)
+    told = ", ".join(f"{statuses[status]} × {status}" for status in sorted(statuses))
+    right = "each as it should be" if all(fine for _, fine in found) else "**some malformed**"
+    slowest = rated(1e3 * max(times), 50.0, at_least=False, digits=1)
+    return (
+        f"{HEAVY} long questions at once were answered {told}, {right}; `GET /v1` meanwhile took "
+        f"{slowest} ms at most, {1e3 * median(times):.1f} ms at the median of {len(times)}."
+    )
