@@ -8,7 +8,7 @@ import os
 import tempfile
 import zlib
 from collections import Counter, OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -41,15 +41,23 @@ class Result:
 
 
 def write_result(
-    root: Path, name: str, parts: Sequence[Buffer], headers: Mapping[str, str]
+    root: Path, name: str, parts: Iterable[Buffer], headers: Mapping[str, str]
 ) -> None:
-    """Write the result ``name`` under ``root``, body first and seal last, each atomically."""
-    checksum = 0
-    for part in parts:
-        checksum = zlib.crc32(part, checksum)
-    size = sum(memoryview(part).nbytes for part in parts)
+    """Write the result ``name`` under ``root``, body first and seal last, each atomically.
+
+    The parts are written as they are made, so that they need not be in memory together.
+    """
+    size = checksum = 0
+
+    def noted() -> Iterator[Buffer]:
+        nonlocal size, checksum
+        for part in parts:
+            size += len(part)
+            checksum = zlib.crc32(part, checksum)
+            yield part
+
+    _write_atomically(_body(root, name), noted())
     seal = _Seal(headers=dict(headers), size=size, crc32=checksum)
-    _write_atomically(_body(root, name), parts)
     _write_atomically(_seal(root, name), [seal.model_dump_json().encode()])
 
 
@@ -156,7 +164,7 @@ def _seal(root: Path, name: str) -> Path:
     return root / f"{name}.json"
 
 
-def _write_atomically(path: Path, parts: Sequence[Buffer]) -> None:
+def _write_atomically(path: Path, parts: Iterable[Buffer]) -> None:
     path.parent.mkdir(exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=path.parent, prefix="tmp", delete=False) as file:
         try:

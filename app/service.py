@@ -8,6 +8,7 @@ from typing import Any
 
 from anyio import to_thread
 
+from app.encoding import Form
 from app.engine import (
     Answering,
     Done,
@@ -100,23 +101,23 @@ class Service:
         await to_thread.run_sync(self.meshes.delete, mesh_id)
         self.results.forget_mesh(mesh_id)
 
-    async def answer(self, query: Query[Any], media_type: str, deadline_s: float) -> Answered:
+    async def answer(self, query: Query[Any], form: Form, deadline_s: float) -> Answered:
         """Answer ``query``: from a kept result, or by a worker."""
-        query.refuse_answer(media_type, self.size(query.mesh_id), self.settings)
-        name = result_name(query.mesh_id, result_key(query, media_type))
+        query.refuse_answer(form.media_type, self.size(query.mesh_id), self.settings)
+        name = result_name(query.mesh_id, result_key(query, form))
         kept = await self.results.find(name)
         if kept is not None:
             return Answered(kept, {})
-        done = await self._run(Answering(query, media_type, name), deadline_s, query.mesh_id)
+        done = await self._run(Answering(query, form, name), deadline_s, query.mesh_id)
         result = self.results.take_new(name, is_kept=query.is_repeatable)
         return Answered(result, done.seconds)
 
     async def estimate(
-        self, query: Query[Any], media_type: str, deadline_s: float
+        self, query: Query[Any], form: Form, deadline_s: float
     ) -> tuple[Estimate, Seconds]:
         """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
-        query.refuse_answer(media_type, self.size(query.mesh_id), self.settings)
-        done = await self._run(Estimating(query, media_type), deadline_s, query.mesh_id)
+        query.refuse_answer(form.media_type, self.size(query.mesh_id), self.settings)
+        done = await self._run(Estimating(query, form), deadline_s, query.mesh_id)
         assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
         return done.estimate, done.seconds
 

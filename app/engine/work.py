@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from app.encoding import Form
 from app.queries import Estimate, Query
 from app.schemas import Merge
 
@@ -36,7 +37,7 @@ class Answering:
     """Answer ``query`` into the result ``result_name``."""
 
     query: Query[Any]
-    media_type: str
+    form: Form
     result_name: str
 
     stops_when_asked: ClassVar[bool] = True
@@ -47,7 +48,7 @@ class Estimating:
     """Tell what the answer to ``query`` would take."""
 
     query: Query[Any]
-    media_type: str
+    form: Form
 
     stops_when_asked: ClassVar[bool] = True
 

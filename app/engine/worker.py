@@ -92,10 +92,10 @@ class Worker:
             opened = self._open(work.query)
         with clock.phase("compute"):
             found = work.query.answer(opened, grant)
-        if work.media_type == JSON:
+        if work.form.media_type == JSON:
             refuse_large_json(found.values, settings.max_json_values, work.query.hint)
         with clock.phase("encode"):
-            encoded = encode(found, work.media_type)
+            encoded = encode(found, work.form)
             write_result(self.config.results, work.result_name, encoded.parts, encoded.headers)
         return Done(clock.seconds)
 
@@ -103,7 +103,7 @@ class Worker:
         with clock.phase("load"):
             opened = self._open(work.query)
         with clock.phase("compute"):
-            found = estimate(work.query, work.media_type, opened, cancel)
+            found = estimate(work.query, work.form, opened, cancel)
         return Done(clock.seconds, estimate=found)
 
     def _open(self, query: Query[Any]) -> OpenMesh:

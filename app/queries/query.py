@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app import __version__, schemas
-from app.encoding import JSON, NPY, OCTETS, Answer
+from app.encoding import JSON, NPY, OCTETS, Answer, Form
 from app.mesh_store import OpenMesh
 from app.queries.costs import Cost
 from app.queries.places import Places, resolved
@@ -185,14 +185,14 @@ def code_version() -> str:
     return f"{__version__}+{sources_digest()}"
 
 
-def result_key(query: Query[Any], media_type: str) -> str:
-    """Return the hash that names the answer to ``query`` in ``media_type``.
+def result_key(query: Query[Any], form: Form) -> str:
+    """Return the hash that names the answer to ``query`` in a form.
 
     It is the same in any run, unless the answer is not: that of each run has a name of its own.
     """
     if not query.is_repeatable:
         return uuid4().hex
-    names = [type(query).__name__, query.mesh_id, media_type, code_version()]
+    names = [type(query).__name__, query.mesh_id, form, code_version()]
     digest = hashlib.blake2b(orjson.dumps(names), digest_size=16)
     digest.update(_written(query.request))
     return digest.hexdigest()

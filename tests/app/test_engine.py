@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.encoding import Form
 from app.engine import Answering, Done, MeshFromSample, worker
 from app.engine.worker import Clock, Worker, WorkerConfig
 from app.errors import Problem
@@ -372,7 +373,7 @@ def test_work_that_was_asked_to_stop_stops(
     monkeypatch.setattr(worker, "_worker", state)
     ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
     query = PathQuery(mesh_id, PathRequest(**ends, **accuracy))
-    work = Answering(query, "application/json", f"{mesh_id}/key")
+    work = Answering(query, Form("application/json"), f"{mesh_id}/key")
     (tmp_path / "results").mkdir()
 
     asked.value = 2

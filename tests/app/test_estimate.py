@@ -10,6 +10,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
+from app.encoding import JSON, Form
 from app.mesh_store import OpenMesh
 from app.queries import (
     DistancesQuery,
@@ -148,7 +149,7 @@ ALLOCATED = [name for name in STATEFUL if QUERIES[name][0] != "paths"]
 def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mesh: str) -> None:
     opened = OpenMesh(gc.Solver(mesh_of(client, ids[mesh])), [])
     query = query_of(name)
-    told = estimate(query, "application/json", opened, lambda: False)
+    told = estimate(query, Form(JSON), opened, lambda: False)
     tracemalloc.start()
     try:
         query.answer(opened, Grant(lambda: False, 2**40, 10**7))
@@ -168,7 +169,7 @@ def test_memory_that_suffices(
         monkeypatch.setattr(f"{module}.available_cores", lambda: 1)
     opened = OpenMesh(gc.Solver(mesh_of(client, ids["sphere"])), [])
     query = query_of(name)
-    told = estimate(query, "application/json", opened, lambda: False)
+    told = estimate(query, Form(JSON), opened, lambda: False)
 
     with pytest.raises(gc.errors.MemoryLimitExceeded):
         query.answer(opened, Grant(lambda: False, told.memory_bytes // 3, 10**7))
