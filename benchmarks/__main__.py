@@ -18,6 +18,7 @@ BENCHMARKS = {
     "landmarks": path.run_landmarks,
     "matrix": matrix.run,
     "service": service.run,
+    "large-answers": service.run_large,
 }
 ROOT = Path(__file__).parents[1]
 

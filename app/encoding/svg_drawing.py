@@ -8,13 +8,16 @@ import numpy as np
 from app.encoding.answer import Answer, Buffer, Encoded
 from app.encoding.colours import hex_colour
 from app.encoding.headers import headers_of
+from app.encoding.json_document import dumped
 from app.encoding.views import Line
 
 _MARGIN = 0.02
 """Around the drawing, as a share of its longer side."""
+_STROKE = 0.003
+"""The same for the width of lines; many a viewer knows no width in pixels."""
 _HEAD = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="%r %r %r %r" fill="none" '
-    'stroke-width="1.5" stroke-linejoin="round" stroke-linecap="round">\n'
+    'stroke-width="%r" stroke-linejoin="round" stroke-linecap="round">\n'
     "<desc>Seen along z; mesh units</desc>\n"
 )
 
@@ -26,7 +29,8 @@ def to_svg(answer: Answer) -> Encoded:
 
 
 def _written(lines: Sequence[Line]) -> Iterator[Buffer]:
-    yield (_HEAD % _view_box(lines)).encode()
+    box = _view_box(lines)
+    yield (_HEAD % (*box, _STROKE * max(box[2:]))).encode()
     for line in lines:
         if len(line.points):
             yield _element(line).encode()
@@ -51,11 +55,11 @@ def _element(line: Line) -> str:
     if len(flat) == 1:
         points = f"{points} {points}"  # a dot, by its round caps
     told = "".join(
-        f" data-{name.replace('_', '-')}={quoteattr(str(value))}"
+        f" data-{name}={quoteattr(value if isinstance(value, str) else dumped(value).decode())}"
         for name, value in line.told.items()
         if value is not None
     )
     return (
-        f'<{"polygon" if line.is_closed else "polyline"} stroke="{hex_colour(line.shade)}" '
-        f'vector-effect="non-scaling-stroke"{told} points="{points}"/>\n'
+        f'<{"polygon" if line.is_closed else "polyline"} stroke="{hex_colour(line.shade)}"{told} '
+        f'points="{points}"/>\n'
     )

@@ -73,7 +73,7 @@ _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *
 
 def _answers(model: type, description: str, *others: str) -> dict[int | str, dict[str, Any]]:
     """Describe an answer in JSON, and in ``others``, which have no room for all of it."""
-    description += "; but for JSON, what the format has no room for comes as `Geodesic-…` headers"
+    description += ". In formats other than JSON the rest comes as `Geodesic-…` headers"
     content = {name: {"schema": _TEXT if name in TEXTS else _BINARY} for name in others}
     return {200: {"model": model | Estimate, "content": content, "description": description}}
 
