@@ -8,7 +8,7 @@ from app.encoding.headers import headers_of
 from app.encoding.json_document import dumped
 from app.encoding.views import Line, Place
 
-_UNITS = "mesh units: x, y and z of the mesh, neither longitude nor latitude"
+_UNITS = "those of the mesh, x, y and z: neither longitude nor latitude"
 
 
 def to_geojson(answer: Answer) -> Encoded:
@@ -23,7 +23,7 @@ def to_geojson(answer: Answer) -> Encoded:
 
 
 def _written(told: Mapping[str, Any], features: Iterable[Mapping[str, Any]]) -> Iterator[Buffer]:
-    head = dumped({"type": "FeatureCollection", "coordinates": _UNITS, **told})
+    head = dumped({"type": "FeatureCollection", "units": _UNITS, **told})
     yield head[:-1] + b',"features":['
     for i, feature in enumerate(features):
         yield (b",\n" if i else b"\n") + dumped({"type": "Feature", **feature})

@@ -104,13 +104,17 @@ def cells(column: Column) -> Sequence[Any]:
     return text[1:-1].decode().replace("null", "").split(",")
 
 
+def _cell(value: Any) -> Any:
+    return str(value).lower() if isinstance(value, bool) else value
+
+
 def table_of_lines(lines: Sequence[Line]) -> Table:
     """Return a row for each point; one without, where there is no line."""
     first = lines[0]
 
     def rows() -> Iterator[Sequence[Any]]:
         for line in lines:
-            told = tuple(line.told.values())
+            told = tuple(map(_cell, line.told.values()))
             if not len(line.points):
                 yield told + (None,) * (4 + len(first.at_points))
                 continue

@@ -45,13 +45,18 @@ def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
     return [
         Line(
             line["points"],
-            {"level": each["level"], "closed": line["closed"], "length": line["length"]},
+            {
+                "level": each["level"],
+                "line": i if each["lines"] else None,
+                "closed": line["closed"],
+                "length": line["length"],
+            },
             f"level_{each['level']!r}",
             is_closed=bool(line["closed"]),
             shade=each["level"] / highest,
         )
         for each in levels
-        for line in each["lines"] or [none]
+        for i, line in enumerate(each["lines"] or [none])
     ]
 
 

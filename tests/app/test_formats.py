@@ -260,7 +260,8 @@ def test_a_path_in_each_format_is_the_same(client: TestClient, knot: str) -> Non
     collection = ask(client, knot, "path", "geojson", **body).json()
     (feature,) = collection["features"]
     assert collection["type"] == "FeatureCollection"
-    assert "mesh units" in collection["coordinates"]
+    assert "those of the mesh" in collection["units"]
+    assert not {"coordinates", "geometry", "geometries", "properties"} & set(collection), "RFC 7946"
     assert collection["target"] == told["target"]
     assert feature["type"] == "Feature"
     assert feature["geometry"] == {"type": "LineString", "coordinates": points}
@@ -342,7 +343,11 @@ def test_paths_are_told_apart_also_those_that_are_not_there(client: TestClient, 
 
 def test_isolines_closed_open_and_none(client: TestClient, plane: str) -> None:
     told = ask(client, plane, "isolines", "json").json()["isolines"]
-    lines = [(level["level"], line) for level in told for line in level["lines"]]
+    lines = [
+        (level["level"], line | {"line": i})
+        for level in told
+        for i, line in enumerate(level["lines"])
+    ]
     assert {line["closed"] for _, line in lines} == {True, False}
     assert told[2] == {"level": 9.0, "lines": []}
     ends = [line["points"] + line["points"][:1] * line["closed"] for _, line in lines]
@@ -353,17 +358,21 @@ def test_isolines_closed_open_and_none(client: TestClient, plane: str) -> None:
     rows = rows_of(ask(client, plane, "isolines", "csv"))
     points = [point for _, line in lines for point in line["points"]]
     assert numbers(rows[:-1], *POINT) == points
-    levels = [level for level, line in lines for _ in line["points"]]
-    assert numbers(rows[:-1], "level") == levels
+    told_of_points = [
+        [str(level), str(line["line"]), str(line["closed"]).lower()]
+        for level, line in lines
+        for _ in line["points"]
+    ]
+    assert [[row["level"], row["line"], row["closed"]] for row in rows[:-1]] == told_of_points
     assert rows[-1] == dict.fromkeys(rows[0], "") | {"level": "9.0"}
 
     *features, last = ask(client, plane, "isolines", "geojson").json()["features"]
     assert [feature["geometry"]["coordinates"] for feature in features] == ends
     for feature, (level, line) in zip(features, lines, strict=True):
-        expected = {"level": level, "closed": line["closed"], "length": line["length"]}
-        assert feature["properties"] == expected
+        expected = {name: line[name] for name in ("line", "closed", "length")}
+        assert feature["properties"] == {"level": level, **expected}
     assert last["geometry"] is None
-    assert last["properties"] == {"level": 9.0, "closed": None, "length": None}
+    assert last["properties"] == {"level": 9.0, "line": None, "closed": None, "length": None}
 
     box, drawn = drawing_of(ask(client, plane, "isolines", "svg"))
     assert [each for _, each in drawn] == [flat(line["points"]) for _, line in lines]
