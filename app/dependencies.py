@@ -12,8 +12,10 @@ from typing import Annotated, Any, TypeVar
 from fastapi import Depends, Header, Request
 from starlette.requests import ClientDisconnect
 
-from app.encoding import FORMATS, negotiate
-from app.errors import refuse
+from app.encoding import Form, negotiate, negotiate_coding
+from app.encoding.form import ARRAYS, TEXTS
+from app.errors import Fault, refuse
+from app.schemas import AnswerParameters
 from app.service import Asker, Service
 
 T = TypeVar("T")
@@ -88,14 +90,19 @@ async def require_json(request: Request) -> None:
         raise refuse("unsupported_media_type", detail, hint=hint)
 
 
-def media_type_of(
-    request: Request, name: str | None, offers: Sequence[str] = tuple(FORMATS.values())
-) -> str:
-    """Return the media type to answer in, one of the ``offers``."""
-    media_type = negotiate(request.headers.get("accept"), name, offers)
+def form_of(request: Request, parameters: AnswerParameters, offers: Sequence[str]) -> Form:
+    """Return the form to answer in, its media type one of the ``offers``."""
+    headers = request.headers
+    media_type = negotiate(headers.get("accept"), parameters.format, offers)
     if media_type is None:
         raise refuse("not_acceptable", f"this answer comes as {', '.join(offers)}")
-    return media_type
+    if parameters.dtype != Form.dtype and media_type not in ARRAYS:
+        fault = Fault("/query/dtype", f"goes with npy, npz and octets, not with {media_type}")
+        raise refuse("invalid_request", fault.message, errors=(fault,))
+    coding = None
+    if media_type in TEXTS and "range" not in headers:
+        coding = negotiate_coding(headers.get("accept-encoding"))
+    return Form(media_type, parameters.dtype, coding)
 
 
 async def while_connected(request: Request, work: Coroutine[Any, Any, T]) -> T:

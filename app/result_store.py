@@ -8,20 +8,37 @@ import os
 import tempfile
 import zlib
 from collections import Counter, OrderedDict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from anyio import to_thread
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 Buffer = bytes | memoryview
 
 
-class _Seal(BaseModel):
+_SMALL = 2**16
+"""Bytes of an answer that is kept in memory as well: most, but for fields and long lines"""
+
+
+class Seal(BaseModel):
+    """What is known of an answer that is complete on disk."""
+
+    model_config = ConfigDict(frozen=True)
+
     headers: dict[str, str]
     size: int
     crc32: int
+
+
+@dataclass(frozen=True)
+class Written:
+    """An answer that has just been written."""
+
+    seal: Seal
+    body: bytes | None
+    """All of it, where it is small"""
 
 
 @dataclass(frozen=True)
@@ -31,6 +48,8 @@ class Result:
     name: str
     path: Path
     headers: Mapping[str, str]
+    body: bytes | None
+    """All of it, where that is in memory"""
     is_kept: bool = True
     """Whether it stays when it has been sent."""
 
@@ -41,28 +60,44 @@ class Result:
 
 
 def write_result(
-    root: Path, name: str, parts: Sequence[Buffer], headers: Mapping[str, str]
-) -> None:
-    """Write the result ``name`` under ``root``, body first and seal last, each atomically."""
-    checksum = 0
-    for part in parts:
-        checksum = zlib.crc32(part, checksum)
-    size = sum(memoryview(part).nbytes for part in parts)
-    seal = _Seal(headers=dict(headers), size=size, crc32=checksum)
-    _write_atomically(_body(root, name), parts)
+    root: Path, name: str, parts: Iterable[Buffer], headers: Mapping[str, str]
+) -> Written:
+    """Write the result ``name`` under ``root``, body first and seal last, each atomically.
+
+    The parts are written as they are made, so that they need not be in memory together.
+    """
+    size = checksum = 0
+    small: list[Buffer] = []
+
+    def noted() -> Iterator[Buffer]:
+        nonlocal size, checksum
+        for part in parts:
+            size += len(part)
+            checksum = zlib.crc32(part, checksum)
+            if size <= _SMALL:
+                small.append(part)
+            yield part
+
+    _write_atomically(_body(root, name), noted())
+    seal = Seal(headers=dict(headers), size=size, crc32=checksum)
     _write_atomically(_seal(root, name), [seal.model_dump_json().encode()])
+    return Written(seal, b"".join(small) if size <= _SMALL else None)
 
 
 class ResultStore:
     """The results under ``root``, at most ``capacity`` bytes; the least recently used go first.
 
+    Of those, small ones are in memory as well, up to ``memory`` bytes.
     One process keeps the books. A result taken is not removed before it is given back, one that is
     held not before it is released.
     """
 
-    def __init__(self, root: Path, capacity: int) -> None:
+    def __init__(self, root: Path, capacity: int, memory: int) -> None:
         self._root = root
         self._capacity = capacity
+        self._memory = memory
+        self._small: OrderedDict[str, Written] = OrderedDict()
+        self._small_total = 0
         self._sizes: OrderedDict[str, int] = OrderedDict()
         self._total = 0
         self._taken: Counter[str] = Counter()
@@ -86,20 +121,26 @@ class ResultStore:
         """Take the result ``name``, if it is there and whole."""
         if name not in self._sizes:
             return None
+        if name in self._small:
+            self._small.move_to_end(name)
+            return self._take(name, self._small[name])
         self._taken[name] += 1  # held while it is read, off the event loop
         try:
-            seal = await to_thread.run_sync(_read_seal, self._root, name)
-            if seal is not None:
-                return self._take(name, seal)
+            written = await to_thread.run_sync(_read, self._root, name)
+            if written is not None:
+                os.utime(_body(self._root, name))  # the order of use, for the next start
+                self._keep_small(name, written)
+                return self._take(name, written)
         finally:
             self._let_go(name)
         self._remove(name)
         return None
 
-    def take_new(self, name: str, *, is_kept: bool = True) -> Result:
+    def take_new(self, name: str, written: Written, *, is_kept: bool = True) -> Result:
         """Take the result that a worker has just written."""
-        seal = _Seal.model_validate_json(_seal(self._root, name).read_bytes())
-        return replace(self._take(name, seal), is_kept=is_kept)
+        if is_kept:
+            self._keep_small(name, written)
+        return replace(self._take(name, written), is_kept=is_kept)
 
     def give_back(self, result: Result) -> None:
         """Say that ``result`` has been sent."""
@@ -127,12 +168,10 @@ class ResultStore:
             if self._is_free(name):
                 self._remove(name)
 
-    def _take(self, name: str, seal: _Seal) -> Result:
-        self._count(name, seal.size)
+    def _take(self, name: str, written: Written) -> Result:
+        self._count(name, written.seal.size)
         self._taken[name] += 1
-        path = _body(self._root, name)
-        os.utime(path)  # the order of use, for the next start
-        return Result(name, path, seal.headers)
+        return Result(name, _body(self._root, name), written.seal.headers, written.body)
 
     def _count(self, name: str, size: int) -> None:
         self._total += size - self._sizes.pop(name, 0)
@@ -155,7 +194,20 @@ class ResultStore:
     def _is_free(self, name: str) -> bool:
         return name not in self._taken and name not in self._held
 
+    def _keep_small(self, name: str, written: Written) -> None:
+        if written.body is None or name in self._small:
+            return
+        self._small[name] = written
+        self._small_total += written.seal.size
+        while self._small_total > self._memory:
+            self._forget_small(next(iter(self._small)))
+
+    def _forget_small(self, name: str) -> None:
+        if name in self._small:
+            self._small_total -= self._small.pop(name).seal.size
+
     def _remove(self, name: str) -> None:
+        self._forget_small(name)
         _seal(self._root, name).unlink(missing_ok=True)
         _body(self._root, name).unlink(missing_ok=True)
         self._total -= self._sizes.pop(name, 0)
@@ -174,7 +226,7 @@ def _seal(root: Path, name: str) -> Path:
     return root / f"{name}.json"
 
 
-def _write_atomically(path: Path, parts: Sequence[Buffer]) -> None:
+def _write_atomically(path: Path, parts: Iterable[Buffer]) -> None:
     path.parent.mkdir(exist_ok=True)
     with tempfile.NamedTemporaryFile(dir=path.parent, prefix="tmp", delete=False) as file:
         try:
@@ -187,15 +239,20 @@ def _write_atomically(path: Path, parts: Sequence[Buffer]) -> None:
             raise
 
 
-def _read_seal(root: Path, name: str) -> _Seal | None:
-    """Return the seal of a result, if it is whole."""
+def _read(root: Path, name: str) -> Written | None:
+    """Return a result, if it is whole."""
     checksum = size = 0
+    small: list[bytes] = []
     try:
-        seal = _Seal.model_validate_json(_seal(root, name).read_bytes())
+        seal = Seal.model_validate_json(_seal(root, name).read_bytes())
         with _body(root, name).open("rb") as file:
             while chunk := file.read(2**20):
                 checksum = zlib.crc32(chunk, checksum)
                 size += len(chunk)
+                if size <= _SMALL:
+                    small.append(chunk)
     except (FileNotFoundError, ValidationError):
         return None
-    return seal if (size, checksum) == (seal.size, seal.crc32) else None
+    if (size, checksum) != (seal.size, seal.crc32):
+        return None
+    return Written(seal, b"".join(small) if size <= _SMALL else None)

@@ -213,7 +213,8 @@ class DistancesRequest(Accuracy, AmongBarriers):
     )
     include: list[Literal["nearest_source", "gradient"]] = Field(
         default=[],
-        description="What else to tell of each, in JSON: `nearest_source`, its index in `sources`; "
+        description="What else to tell of each, but in bare arrays: `nearest_source`, its index in "
+        "`sources`; "
         "`gradient`, the direction in which distance grows fastest, of all vertices only",
     )
 
@@ -351,13 +352,16 @@ class LocateRequest(Wire):
     )
 
 
-AnswerFormat = Literal["json", "npy", "npz", "octets"]
+AnswerFormat = Literal["json", "npy", "npz", "octets", "obj", "ply", "csv", "svg", "geojson"]
 
 
 class AnswerParameters(Wire):
     """How the answer is to be written, or whether only to tell what it would take."""
 
     format: AnswerFormat | None = Field(default=None, description="Overrides `Accept`")
+    dtype: Literal["float64", "float32"] = Field(
+        default="float64", description="Of the numbers in `npy`, `npz` and `octets`"
+    )
     estimate: bool = Field(
         default=False,
         description="Do not compute: answer with an `Estimate` of what it would take, in JSON",
@@ -716,8 +720,9 @@ class Estimate(BaseModel):
         "of 3"
     )
     response_bytes: int = Field(
-        description="Of the body, within 5 %; with `max_distance`, and for paths and isolines, as "
-        "if geodesics were straight, so that these take some times as much where surfaces wind"
+        description="Of the body, before compression, within 5 %; with `max_distance`, and for "
+        "paths and isolines, as if geodesics were straight, so that these take some times as much "
+        "where surfaces wind"
     )
     media_type: str = Field(description="Of the response that is estimated")
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from anyio import to_thread
 
+from app.encoding import Form
 from app.engine import (
     Answering,
     Done,
@@ -58,7 +59,7 @@ class Service:
         self.settings = settings
         results = settings.store / "results"
         self.meshes = MeshStore(settings.store)
-        self.results = ResultStore(results, settings.results_bytes)
+        self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
         self.engine: Engine = LocalEngine(settings, results)
         self.jobs = Jobs(JobBook(settings.store / "jobs.sqlite3"), self.results, settings.job_ttl)
         self._flights: Flights[Done] = Flights()
@@ -124,57 +125,54 @@ class Service:
         await to_thread.run_sync(self.meshes.delete, mesh_id)
         self.results.forget_mesh(mesh_id)
 
-    async def answer(self, query: Query[Any], media_type: str, asker: Asker) -> Answered:
+    async def answer(self, query: Query[Any], form: Form, asker: Asker) -> Answered:
         """Answer ``query``: from a kept result, or by a worker."""
         async with self._deadline(asker.deadline_s, "deadline_s"):
-            return await self._answer(query, media_type, asker.client, _nobody)
+            return await self._answer(query, form, asker.client, _nobody)
 
     async def estimate(
-        self, query: Query[Any], media_type: str, asker: Asker
+        self, query: Query[Any], form: Form, asker: Asker
     ) -> tuple[Estimate, Seconds]:
         """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
-        query.refuse_answer(media_type, self.size(query.mesh_id), self.settings)
-        order = Order(Estimating(query, media_type), asker.client, query.mesh_id, is_small=True)
+        query.refuse_answer(form.media_type, self.size(query.mesh_id), self.settings)
+        order = Order(Estimating(query, form), asker.client, query.mesh_id, is_small=True)
         async with self._deadline(asker.deadline_s, "deadline_s"):
             done = await self.engine.run(order, _nobody)
         assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
         return done.estimate, done.seconds
 
-    async def submit(
-        self, query: Query[Any], media_type: str, asker: Asker, key: str | None
-    ) -> Job:
+    async def submit(self, query: Query[Any], form: Form, asker: Asker, key: str | None) -> Job:
         """Accept a job that answers ``query``; one for all with the same idempotency ``key``."""
-        query.refuse_answer(media_type, self.size(query.mesh_id), self.settings)
+        query.refuse_answer(form.media_type, self.size(query.mesh_id), self.settings)
         self.engine.refuse_when_full(asker.client)
 
         async def solve(told: Told) -> Result:
             async with self._deadline(self.settings.job_deadline_s, "job_deadline_s"):
-                return (await self._answer(query, media_type, asker.client, told)).result
+                return (await self._answer(query, form, asker.client, told)).result
 
         errand = Errand(
             owner=asker.owner,
             kind=query.kind,
             mesh_id=query.mesh_id,
-            media_type=media_type,
-            fingerprint=fingerprint(query, media_type),
+            media_type=form.media_type,
+            fingerprint=fingerprint(query, form),
             idempotency_key=key,
             request_id=asker.request_id,
         )
         return await self.jobs.submit(errand, solve)
 
-    async def _answer(
-        self, query: Query[Any], media_type: str, client: str, told: Told
-    ) -> Answered:
+    async def _answer(self, query: Query[Any], form: Form, client: str, told: Told) -> Answered:
         size = self.size(query.mesh_id)
-        query.refuse_answer(media_type, size, self.settings)
-        name = result_name(query.mesh_id, result_key(query, media_type))
+        query.refuse_answer(form.media_type, size, self.settings)
+        name = result_name(query.mesh_id, result_key(query, form))
         kept = await self.results.find(name)
         if kept is not None:
             return Answered(kept, {})
-        work = Answering(query, media_type, name)
+        work = Answering(query, form, name)
         order = Order(work, client, query.mesh_id, query.is_small(size))
         done = await self._flights.join(name, partial(self.engine.run, order), told)
-        result = self.results.take_new(name, is_kept=query.is_repeatable)
+        assert done.answer is not None, "this kind of work answers"  # noqa: S101
+        result = self.results.take_new(name, done.answer, is_kept=query.is_repeatable)
         return Answered(result, done.seconds)
 
     @asynccontextmanager

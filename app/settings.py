@@ -34,6 +34,8 @@ class Settings(BaseSettings):
     """Size of the meshes that a worker keeps open, and of what it keeps for paths on them."""
     results_bytes: PositiveInt = 4 * GIB
     """Size of the finished results that the store keeps."""
+    results_memory_bytes: PositiveInt = 256 * MIB
+    """Size of those among them that are kept in memory as well: small ones."""
     max_upload_bytes: PositiveInt = 512 * MIB
     """Largest body of an upload."""
     max_query_bytes: PositiveInt = 4 * MIB

@@ -19,6 +19,7 @@ BENCHMARKS = {
     "matrix": matrix.run,
     "service": service.run,
     "load": load.run,
+    "large-answers": service.run_large,
 }
 ROOT = Path(__file__).parents[1]
 

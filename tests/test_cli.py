@@ -1,5 +1,6 @@
 """The command line, as its users meet it: what it prints, what it writes, how it fails."""
 
+import csv
 import json
 import re
 import signal
@@ -9,9 +10,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+import trimesh
 import uvicorn
 from fastapi import FastAPI
 from scipy.sparse import load_npz
@@ -135,6 +138,55 @@ def test_distance_writes_npy_csv_and_json(run: Run, plane: Path) -> None:
     assert answer["nearest_source"] == expected.nearest_source.tolist()
     farthest = int(np.argmax(expected.distances))
     assert ran.figure("farthest") == f"vertex {farthest} at {float(expected.distances.max())!r}"
+
+
+def rows_of(name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(Path(name).read_text().splitlines()))
+
+
+def test_distances_on_the_mesh(run: Run, plane: Path) -> None:
+    expected = gc.exact_distance(gc.load_mesh(plane), 0, 0.35).distances
+    args = ("--source", 0, "--max-distance", 0.35)
+    assert run("distance", plane, *args, "--out", "d.PLY").code == 0
+    mesh = trimesh.load("d.PLY", process=False)
+    assert mesh.faces.tolist() == gc.load_mesh(plane).faces.tolist()
+    assert mesh.metadata["_ply_raw"]["vertex"]["data"]["distance"].tolist() == expected.tolist()
+    assert run("distance", plane, *args, "--out", "d.csv").code == 0
+    rows = rows_of("d.csv")
+    reached = np.isfinite(expected)
+    assert [bool(row["distance"]) for row in rows] == reached.tolist()
+    assert [float(row["distance"]) for row in rows if row["distance"]] == expected[reached].tolist()
+
+
+def test_lines_in_each_format(run: Run, knot: Path) -> None:
+    """What the formats hold is checked over HTTP: the encoders are the same."""
+    commands = {
+        "path": ["--source", 3, "--target", 700],
+        "paths": ["--source", 3, "--target", 700, "--target", 20],
+        "isolines": ["--source", 3, "--level", 2.5],
+    }
+    for command, arguments in commands.items():
+        for suffix in ("csv", "svg", "geojson"):
+            assert run(command, knot, *arguments, "--out", f"{command}.{suffix}").code == 0
+        features = json.loads(Path(f"{command}.geojson").read_text())["features"]
+        rows = rows_of(f"{command}.csv")
+        lines = [feature["geometry"]["coordinates"] for feature in features]
+        closed = [feature["properties"].get("closed", False) for feature in features]
+        points = [
+            p
+            for line, is_closed in zip(lines, closed, strict=True)
+            for p in line[: len(line) - is_closed]
+        ]
+        assert [[float(row[x]) for x in "xyz"] for row in rows] == points
+        drawn = [*ET.parse(f"{command}.svg").getroot()][1:]  # noqa: S314 - our own
+        assert len(drawn) == len(lines) > 0
+    path = gc.shortest_path(gc.load_mesh(knot), 3, 700)
+    assert json.loads(Path("path.geojson").read_text())["features"][0]["geometry"] == {
+        "type": "LineString",
+        "coordinates": path.points.tolist(),
+    }
+    assert run("path", knot, *commands["path"], "--out", "p.npy").code == 0
+    assert np.load("p.npy").tolist() == path.points.tolist()
 
 
 def test_distance_stops_at_max_distance(run: Run, plane: Path) -> None:
@@ -354,7 +406,8 @@ def test_paths_are_written_with_those_that_are_not_there(run: Run, knot: Path) -
     assert (ran.code, ran.err) == (0, "")
     assert ran.figure("no path") == "to 700: beyond_max_distance"
     answer = json.loads(Path("p.json").read_text())["paths"]
-    assert answer[0] == {"status": "no_path", "reason": "beyond_max_distance"}
+    reason = answer[0]["status"], answer[0]["reason"], answer[0]["points"]
+    assert reason == ("no_path", "beyond_max_distance", None)
     for found, target in zip(answer[1:], (inside, 3, 20), strict=True):
         path = field.path_to(target)
         assert (found["status"], found["length"]) == ("ok", path.length)
@@ -403,7 +456,7 @@ def test_matrices_are_the_library_s(run: Run, knot: Path, limit: float | None) -
     answer = json.loads(Path("dense.json").read_text())["distances"]
     assert answer == [[d if np.isfinite(d) else None for d in row] for row in expected.tolist()]
     for layout, cells in (("dense", rows), ("sparse", near)):
-        table = np.loadtxt(f"{layout}.csv", delimiter=",", skiprows=1)
+        table = np.genfromtxt(f"{layout}.csv", delimiter=",", skip_header=1, filling_values=np.inf)
         assert [tuple(row) for row in table.tolist()] == cells
     table = load_npz("sparse.npz").tocoo()
     assert list(zip(table.row, table.col, table.data, strict=True)) == near
@@ -421,8 +474,10 @@ def test_pairs(run: Run, knot: Path) -> None:
         assert ran.figure("reached") == "2 of 2 distances"
     assert np.load("d.npy").tolist() == expected.tolist()
     assert json.loads(Path("d.json").read_text())["distances"] == expected.tolist()
-    rows = [f"{i},{i},{d!r}" for i, d in enumerate(expected.tolist())]
-    assert Path("d.csv").read_text().splitlines() == ["source,target,distance", *rows]
+    rows = [row.split(",") for row in Path("d.csv").read_text().splitlines()]
+    assert rows[0] == ["source", "target", "distance"]
+    found = [(int(i), int(j), float(d)) for i, j, d in rows[1:]]
+    assert found == [(i, i, d) for i, d in enumerate(expected.tolist())]
 
 
 def test_nearest_prints_candidates_as_they_were_written(run: Run, knot: Path) -> None:
@@ -570,7 +625,7 @@ def test_what_fails_says_why_in_one_line(
         ("locate plane.ply --at 1,2,nan", "'1,2,nan' is not a position"),
         ("distance plane.ply --source 0 --out d.txt", "d.txt must end in .npy or .csv or .json"),
         ("distance plane.ply --source 0 --out no/d.npy", "folder"),
-        ("path plane.ply --source 0 --target 1 --out p.npy", ".obj or .json"),
+        ("path plane.ply --source 0 --target 1 --out p.ply", ".json or .npy"),
         ("distance plane.ply --source 0 --out d.npy --method heat", "heat"),
         ("distance plane.ply --source 0 --out d.npy --relative-error much", "--relative-error"),
         (
@@ -590,7 +645,7 @@ def test_what_fails_says_why_in_one_line(
             "--explain goes with --method exact only",
         ),
         ("paths plane.ply --source 0 --out p.obj", "--target"),
-        ("paths plane.ply --source 0 --target 1 --out p.npy", ".obj or .json"),
+        ("paths plane.ply --source 0 --target 1 --out p.npy", ".geojson or .json"),
         (
             "paths plane.ply --source 0 --target 1 --out p.obj --relative-error 0.1",
             "--relative-error goes with --method approximate only",
@@ -610,7 +665,7 @@ def test_what_fails_says_why_in_one_line(
         ("isolines plane.ply --source 0 --out l.obj", "give --count, or --level"),
         ("isolines plane.ply --source 0 --out l.obj --count 2 --level 1", "not both"),
         ("isolines plane.ply --source 0 --out l.obj --count 0", "--count"),
-        ("isolines plane.ply --source 0 --out l.npy --count 1", ".obj or .json"),
+        ("isolines plane.ply --source 0 --out l.npy --count 1", ".geojson or .json"),
         ("path plane.ply --source 0 --target 1 --out p.obj --barriers 3;4", "'3;4' is not a list"),
         ("nearest plane.ply --source 0 --candidate 1 --barriers -3", "--barriers"),
         ("nearest plane.ply --source 0", "--candidate"),
@@ -750,11 +805,11 @@ def test_ctrl_c_pressed_twice_does_not_wait(
 def test_ctrl_c_while_the_output_is_written_leaves_nothing(
     run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def press_ctrl_c(*_: Any) -> None:
+    def press_ctrl_c(*_: Any, **__: Any) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(np, "save", press_ctrl_c)
-    assert run("distance", plane, "--source", 0, "--out", "d.npy").code == 130
+    monkeypatch.setattr(csv, "writer", press_ctrl_c)
+    assert run("distance", plane, "--source", 0, "--out", "d.csv").code == 130
     assert list(Path().iterdir()) == [plane]
 
 

@@ -89,7 +89,9 @@ def writable(*suffixes: str) -> Callable[[Path], Path]:
 
     def check(path: Path) -> Path:
         if path.suffix.lower() not in suffixes:
-            raise typer.BadParameter(f"{path} must end in {' or '.join(suffixes)}")
+            *others, last = suffixes
+            ends = f"{', '.join(others)} or {last}" if others else last
+            raise typer.BadParameter(f"{path} must end in {ends}")
         if not path.absolute().parent.is_dir():
             raise typer.BadParameter(f"the folder of {path} does not exist")
         return path

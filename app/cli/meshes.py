@@ -52,10 +52,12 @@ def sample(
     faces: Annotated[int, typer.Option(help="About how many faces.")] = 20_000,
 ) -> None:
     """Make a mesh to try things on."""
+    from app.encoding import Surface
+    from app.encoding.ply_mesh import ply_of
     from geodesic_core.samples import SAMPLES
 
     vertices, triangles = SAMPLES[name](faces)
-    files.write_file(out, files.write_ply, (vertices, triangles))
+    files.write_file(out, ply_of(Surface(vertices, triangles)))
     typer.echo(f"mesh        {len(vertices)} vertices, {len(triangles)} faces")
     typer.echo(f"written     {out}")
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from app.cli import files
+from app.cli import answers, files
 from app.cli.arguments import (
     AbsoluteError,
     Barriers,
@@ -30,6 +30,9 @@ from app.cli.steps import point_of, read, showing
 if TYPE_CHECKING:
     from geodesic_core import ErrorBound, GeodesicPath, TriangleMesh
 
+LINES = ".obj", ".csv", ".svg", ".geojson", ".json"
+"""What lines can be written to."""
+
 
 def distance(
     mesh_file: MeshFile,
@@ -37,8 +40,8 @@ def distance(
     out: Annotated[
         Path,
         typer.Option(
-            help="Where the distances go: .npy, .csv or .json.",
-            callback=writable(".npy", ".csv", ".json"),
+            help="Where the distances go: .npy, .csv, .json or .ply (the mesh, coloured).",
+            callback=writable(".npy", ".csv", ".json", ".ply"),
         ),
     ],
     max_distance: MaxDistance = None,
@@ -61,7 +64,7 @@ def distance(
             field = exact_distance(mesh, sources, max_distance, **step._asdict())
         else:
             field = approximate_distance(mesh, sources, *granted, max_distance, **step._asdict())
-    files.write_file(out, files.DISTANCES[out.suffix.lower()], field)
+    files.write_answer(out, answers.of_distances(field))
     reached = np.isfinite(field.distances)
     farthest = int(np.argmax(np.where(reached, field.distances, -1.0)))
     _tell_size(mesh)
@@ -82,8 +85,9 @@ def path(
     out: Annotated[
         Path,
         typer.Option(
-            help="Where the path goes: .obj (a polyline) or .json.",
-            callback=writable(".obj", ".json"),
+            help="Where the path goes: .obj (a polyline), .csv, .svg, .geojson or .json; its "
+            "points alone to .npy.",
+            callback=writable(*LINES, ".npy"),
         ),
     ],
     via: Annotated[
@@ -124,7 +128,7 @@ def path(
             )
             found = field.path_to(last)
         solved = perf_counter() - start
-    files.write_file(out, files.PATH[out.suffix.lower()], found)
+    files.write_answer(out, answers.of_path(found))
     _tell_size(mesh)
     typer.echo(f"length      {found.length!r}")
     typer.echo(f"points      {len(found.points)}")
@@ -145,8 +149,8 @@ def paths(
     out: Annotated[
         Path,
         typer.Option(
-            help="Where the paths go: .obj (a polyline each) or .json.",
-            callback=writable(".obj", ".json"),
+            help="Where the paths go: .obj (a polyline each), .csv, .svg, .geojson or .json.",
+            callback=writable(*LINES),
         ),
     ],
     max_distance: MaxDistance = None,
@@ -179,7 +183,7 @@ def paths(
             except NoPath as error:
                 found.append(error)
         solved = perf_counter() - began
-    files.write_file(out, files.PATHS[out.suffix.lower()], found)
+    files.write_answer(out, answers.of_paths(found))
     _tell_size(mesh)
     for written, path in zip(target, found, strict=True):
         if isinstance(path, NoPath):
@@ -197,8 +201,8 @@ def isolines(
     out: Annotated[
         Path,
         typer.Option(
-            help="Where the lines go: .obj (polylines) or .json.",
-            callback=writable(".obj", ".json"),
+            help="Where the lines go: .obj (polylines), .csv, .svg, .geojson or .json.",
+            callback=writable(*LINES),
         ),
     ],
     level: Annotated[
@@ -238,7 +242,7 @@ def isolines(
         levels = level or field.levels(count or 0).tolist()
         found = field.isolines(levels, chord_error)
         solved = perf_counter() - began
-    files.write_file(out, files.ISOLINES[out.suffix.lower()], (field, levels, found))
+    files.write_answer(out, answers.of_isolines(field, levels, found))
     _tell_size(mesh)
     for distance, lines in zip(levels, found, strict=True):
         closed, length = sum(line.closed for line in lines), sum(line.length for line in lines)
@@ -294,7 +298,7 @@ def matrix(
         began = perf_counter()
         found = distance_matrix(mesh, starts, ends, max_distance, layout.value, **step._asdict())
         solved = perf_counter() - began
-    files.write_file(out, files.MATRIX[out.suffix.lower()], found)
+    files.write_answer(out, answers.of_matrix(found))
     values = found.data if is_sparse else found
     cells = len(source) if layout is Layout.PAIRS else len(source) * len(target)
     _tell_size(mesh)

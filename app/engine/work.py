@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+from app.encoding import Form
 from app.errors import Problem
 from app.queries import Estimate, Query
+from app.result_store import Written
 from app.schemas import Merge
 
 
@@ -37,7 +39,7 @@ class Answering:
     """Answer ``query`` into the result ``result_name``."""
 
     query: Query[Any]
-    media_type: str
+    form: Form
     result_name: str
 
     stops_when_asked: ClassVar[bool] = True
@@ -48,7 +50,7 @@ class Estimating:
     """Tell what the answer to ``query`` would take."""
 
     query: Query[Any]
-    media_type: str
+    form: Form
 
     stops_when_asked: ClassVar[bool] = True
 
@@ -79,13 +81,14 @@ class StoredMesh:
 
 @dataclass(frozen=True)
 class Done:
-    """What a worker reports: the seconds of each phase, and what the work was for, if it is small.
+    """What a worker reports: the seconds of each phase, and what the work was for.
 
-    Answers are files.
+    Answers are files; only small ones come along.
     """
 
     seconds: Mapping[str, float]
     mesh: StoredMesh | None = None
+    answer: Written | None = None
     estimate: Estimate | None = None
 
 

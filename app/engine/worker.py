@@ -96,18 +96,20 @@ class Worker:
             opened = self._open(work.query)
         with clock.phase("compute"):
             found = work.query.answer(opened, grant)
-        if work.media_type == JSON:
+        if work.form.media_type == JSON:
             refuse_large_json(found.values, settings.max_json_values, work.query.hint)
         with clock.phase("encode"):
-            encoded = encode(found, work.media_type)
-            write_result(self.config.results, work.result_name, encoded.parts, encoded.headers)
-        return Done(clock.seconds)
+            encoded = encode(found, work.form)
+            written = write_result(
+                self.config.results, work.result_name, encoded.parts, encoded.headers
+            )
+        return Done(clock.seconds, answer=written)
 
     def _estimate(self, work: Estimating, clock: "Clock", cancel: Callable[[], bool]) -> Done:
         with clock.phase("load"):
             opened = self._open(work.query)
         with clock.phase("compute"):
-            found = estimate(work.query, work.media_type, opened, cancel)
+            found = estimate(work.query, work.form, opened, cancel)
         return Done(clock.seconds, estimate=found)
 
     def _report(self, share: float) -> None:

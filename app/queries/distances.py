@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app import schemas
-from app.encoding import Answer
+from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices, Table
 from app.errors import Fault, refuse
 from app.mesh_store import OpenMesh
 from app.points import described
@@ -27,6 +27,7 @@ from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_more, refuse_places
 from app.queries.sources import described_sources, named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
+from app.queries.views import columns_of, surface_of
 from app.settings import Settings
 
 _VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3}
@@ -55,10 +56,16 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         """Refuse too many sources."""
         refuse_more("sources", point_count(*self.request.sources), settings, "max_sources")
 
+    @property
+    def offers(self) -> Sequence[str]:
+        """The media types: a mesh has distances at its vertices."""
+        return (JSON, NPY, OCTETS, CSV, *([PLY] if self.request.targets is None else []))
+
     def refuse_format(self, media_type: str) -> None:
         """Refuse a second array in binary."""
-        faults = [Fault("/include", f"{name} comes with JSON only") for name in self._included]
-        if faults:
+        message = "does not come with a bare array; ask for json, csv or ply"
+        faults = [Fault("/include", f"{name} {message}") for name in self._included]
+        if faults and media_type in (NPY, OCTETS):
             raise refuse("invalid_request", f"{media_type} holds one array", errors=tuple(faults))
 
     def value_count(self, size: MeshSize) -> int:
@@ -160,9 +167,15 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
             "warnings": opened.warnings,
         }
         for name, array in included.items():
-            is_index = name == "nearest_source"  # -1 for none
-            members[name] = [None if i < 0 else i for i in array.tolist()] if is_index else array
-        return Answer(members, ("distances",))
+            members[name] = Indices(array) if name == "nearest_source" else array
+        columns = columns_of(members)
+        return Answer(
+            members,
+            ("distances",),
+            ("distances", *included),
+            table=Table.of("vertex" if targets is None else "target", columns),
+            surface=surface_of(mesh, columns) if targets is None else None,
+        )
 
 
 def _straight_gradient(

@@ -1,10 +1,10 @@
 """What a query is likely to take, told without running it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
-from app.encoding import encode
+from app.encoding import Form, encode
 from app.mesh_store import OpenMesh
 from app.queries.costs import PER_FACE_BLOCKED
 from app.queries.places import resolved
@@ -21,13 +21,13 @@ class Estimate:
 
 
 def estimate(
-    query: Query[Any], media_type: str, opened: OpenMesh, cancel: Callable[[], bool]
+    query: Query[Any], form: Form, opened: OpenMesh, cancel: Callable[[], bool]
 ) -> Estimate:
     """Return what the answer to ``query`` would take, or refuse its points as the answer would."""
     places = resolved(query.points(), opened.mesh, cancel)
     likely = query.likely(opened, places)
-    parts = encode(likely.answer, media_type).parts
-    size = likely.times * sum(memoryview(part).nbytes for part in parts)
+    parts = encode(likely.answer, replace(form, coding=None)).parts
+    size = likely.times * sum(map(len, parts))
     cost = likely.cost
     seconds = cost.seconds
     if len(query.barriers):

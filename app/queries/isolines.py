@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app import schemas
-from app.encoding import JSON, Answer
+from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
 from app.mesh_store import OpenMesh
 from app.queries.accuracy import bound_of, likely_bound, method_of, solve_field, with_its_error
 from app.queries.costs import (
@@ -30,6 +30,7 @@ from app.queries.query import Grant, Likely, Query
 from app.queries.refusals import MeshSize, Named, refuse_large_json, refuse_more, refuse_places
 from app.queries.sources import described_sources, named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
+from app.queries.views import lines_of
 from app.settings import Settings
 from geodesic_core.isolines import as_chord_error, spaced_levels
 
@@ -42,7 +43,7 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
 
     kind = "isolines"
     model = schemas.IsolinesRequest
-    offers: Sequence[str] = (JSON,)
+    offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
     hint = "ask for fewer levels at once, or grant a larger chord_error"
 
     @classmethod
@@ -89,7 +90,7 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
             values += _VALUES_OF_LEVEL
             values += _VALUES_OF_POINT * sum(len(line.points) for line in lines)
             refuse_large_json(values, grant.max_values, self.hint)
-            found.append({"level": level, "lines": [_line(line) for line in lines]})
+            found.append(told_of(level, lines))
         bound, stats = bound_of(field.error_bound), stats_of(field.stats)
         return self._answer(opened, places, chord_error, found, bound, stats)
 
@@ -158,17 +159,19 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
                 "isolines": found,
                 "stats": stats,
                 "warnings": opened.warnings,
-            }
+            },
+            shown=("isolines",),
+            lines=lambda: lines_of(found),
         )
 
 
-def _line(line: gc.Isoline) -> dict[str, Any]:
-    return {
-        "closed": line.closed,
-        "length": line.length,
-        "points": line.points,
-        "faces": line.faces,
-    }
+def told_of(level: float, lines: Sequence[gc.Isoline]) -> dict[str, Any]:
+    """Return what answers say of a level."""
+    told = [
+        {"closed": each.closed, "length": each.length, "points": each.points, "faces": each.faces}
+        for each in lines
+    ]
+    return {"level": level, "lines": told}
 
 
 def _crossed_faces(

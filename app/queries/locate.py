@@ -7,7 +7,7 @@ import numpy as np
 
 import geodesic_core as gc
 from app import schemas
-from app.encoding import JSON, Answer
+from app.encoding import CSV, GEOJSON, JSON, Answer
 from app.errors import Fault
 from app.mesh_store import OpenMesh
 from app.points import described
@@ -15,6 +15,7 @@ from app.queries.costs import PER_POSITION, Cost
 from app.queries.places import Places, look_up
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query
 from app.queries.refusals import MeshSize, refuse_points
+from app.queries.views import places_of, table_of_places
 
 
 class LocateQuery(Query[schemas.LocateRequest]):
@@ -22,7 +23,7 @@ class LocateQuery(Query[schemas.LocateRequest]):
 
     kind = "locate"
     model = schemas.LocateRequest
-    offers: Sequence[str] = (JSON,)
+    offers: Sequence[str] = (JSON, CSV, GEOJSON)
     hint = "ask for fewer points at once"
 
     def value_count(self, size: MeshSize) -> int:
@@ -61,4 +62,9 @@ class LocateQuery(Query[schemas.LocateRequest]):
         return {**described(mesh, place), "distance": away}
 
     def _answer(self, opened: OpenMesh, found: Sequence[Mapping[str, Any] | None]) -> Answer:
-        return Answer({"mesh_id": self.mesh_id, "points": found, "warnings": opened.warnings})
+        return Answer(
+            {"mesh_id": self.mesh_id, "points": found, "warnings": opened.warnings},
+            shown=("points",),
+            table=table_of_places("point", found),
+            places=lambda: places_of("point", found),
+        )

@@ -12,7 +12,7 @@ from scipy.sparse import coo_array
 
 import geodesic_core as gc
 from app import schemas
-from app.encoding import JSON, NPY, NPZ, OCTETS, Answer
+from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer
 from app.mesh_store import OpenMesh
 from app.points import described
 from app.queries.accuracy import CERTAIN
@@ -29,6 +29,7 @@ from app.queries.costs import (
 from app.queries.places import Places, components_of
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_more, refuse_places
+from app.queries.views import table_of_matrix, table_of_sparse
 from app.settings import Settings
 from geodesic_core.matrix import SWEEP_FROM
 from geodesic_core.threads import available_cores
@@ -52,7 +53,7 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
     @property
     def offers(self) -> Sequence[str]:
         """The media types that hold the layout."""
-        return (JSON, NPZ) if self.request.layout == "sparse" else (JSON, NPY, OCTETS)
+        return (JSON, NPZ, CSV) if self.request.layout == "sparse" else (JSON, NPY, OCTETS, CSV)
 
     @property
     def hint(self) -> str:
@@ -140,6 +141,9 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
             arrays += ("rows", "columns")
             found = table.data
             members |= {"shape": table.shape, "rows": table.row, "columns": table.col}
+            table = table_of_sparse(table.row, table.col, found)
+        else:
+            table = table_of_matrix(found)
         if layout == "pairs":
             connected = int(np.count_nonzero(starts == ends))
         else:
@@ -153,7 +157,7 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
             "warnings": opened.warnings,
         }
         values = VALUES_OF_POINT * len(places) + sum(members[name].size for name in arrays)
-        return Answer(members, arrays, values)
+        return Answer(members, arrays, arrays, values, table)
 
 
 def _told(

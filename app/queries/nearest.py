@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app import schemas
-from app.encoding import JSON, Answer
+from app.encoding import CSV, GEOJSON, JSON, Answer
 from app.mesh_store import OpenMesh
 from app.points import described
 from app.queries.accuracy import CERTAIN
@@ -23,6 +23,7 @@ from app.queries.costs import (
 from app.queries.places import Places, components_of, unreachable
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_places
+from app.queries.views import places_of, table_of_places
 
 
 class NearestQuery(Query[schemas.NearestRequest]):
@@ -30,7 +31,7 @@ class NearestQuery(Query[schemas.NearestRequest]):
 
     kind = "nearest"
     model = schemas.NearestRequest
-    offers: Sequence[str] = (JSON,)
+    offers: Sequence[str] = (JSON, CSV, GEOJSON)
     hint = "ask for a smaller k"
 
     @classmethod
@@ -92,16 +93,17 @@ class NearestQuery(Query[schemas.NearestRequest]):
     ) -> Answer:
         mesh = opened.mesh
         source, *candidates = places
+        found = [
+            {"candidate": i, "distance": away, **described(mesh, candidates[i])}
+            for i, away in zip(indices.tolist(), distances.tolist(), strict=True)
+        ]
         members = {
             "mesh_id": self.mesh_id,
             "method": "exact",
             "exact": True,
             "error_bound": CERTAIN,
             "source": described(mesh, source),
-            "nearest": [
-                {"candidate": i, "distance": away, **described(mesh, candidates[i])}
-                for i, away in zip(indices.tolist(), distances.tolist(), strict=True)
-            ],
+            "nearest": found,
             "warnings": opened.warnings,
         }
         if len(indices) < self.request.k:
@@ -109,4 +111,9 @@ class NearestQuery(Query[schemas.NearestRequest]):
             missed[indices] = False
             connected = components_of(mesh, candidates) == components_of(mesh, [source])[0]
             members["unreachable"] = unreachable(missed, connected)
-        return Answer(members)
+        return Answer(
+            members,
+            shown=("nearest",),
+            table=table_of_places("candidate", found),
+            places=lambda: places_of("candidate", found),
+        )

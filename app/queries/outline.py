@@ -10,6 +10,9 @@ import geodesic_core as gc
 from app.queries.accuracy import CERTAIN, bound_of
 from app.queries.costs import CROSSINGS
 
+SHOWN = "points", "locations", "faces"
+"""What drawings and tables of a path are made of."""
+
 
 def outline_of(path: gc.GeodesicPath) -> dict[str, Any]:
     """Return what is said of a path."""

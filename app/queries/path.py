@@ -1,7 +1,7 @@
 """The shortest path between two points."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import chain, pairwise
@@ -11,13 +11,13 @@ import numpy as np
 
 import geodesic_core as gc
 from app import point_text, schemas
-from app.encoding import Answer
+from app.encoding import CSV, GEOJSON, JSON, NPY, OBJ, OCTETS, SVG, Answer
 from app.errors import Fault, ProblemError, pointer
 from app.mesh_store import OpenMesh
 from app.points import described
 from app.queries.accuracy import method_of, solve_field, with_its_error
 from app.queries.costs import PER_PATH, PER_POINT, Cost, search_cost, sweep_cost, typical_edge
-from app.queries.outline import likely_outline, no_outline, outline_of
+from app.queries.outline import SHOWN, likely_outline, no_outline, outline_of
 from app.queries.places import Places, components_of, positions_of
 from app.queries.query import Grant, Likely, Query, numbered
 from app.queries.refusals import (
@@ -28,6 +28,7 @@ from app.queries.refusals import (
     refuse_places,
     refuse_points,
 )
+from app.queries.views import line_of
 from app.settings import Settings
 
 
@@ -36,6 +37,7 @@ class PathQuery(Query[schemas.PathRequest]):
 
     kind = "path"
     model = schemas.PathRequest
+    offers: Sequence[str] = (JSON, NPY, OCTETS, OBJ, CSV, SVG, GEOJSON)
 
     @classmethod
     def normal(cls, request: schemas.PathRequest) -> schemas.PathRequest:
@@ -129,7 +131,7 @@ class PathQuery(Query[schemas.PathRequest]):
             "waypoints": waypoints,
             "warnings": opened.warnings,
         }
-        return Answer(members | found, ("points",))
+        return Answer(members | found, ("points",), SHOWN, lines=lambda: [line_of(found)])
 
 
 # As a GET

@@ -6,7 +6,7 @@ from typing import Any
 
 import geodesic_core as gc
 from app import schemas
-from app.encoding import JSON, Answer
+from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
 from app.mesh_store import OpenMesh
 from app.points import described
 from app.queries.accuracy import method_of, solve_field, with_its_error
@@ -26,6 +26,7 @@ from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_large_json, refuse_more
 from app.queries.sources import described_origin, named_origin, origin_of, point_count
 from app.queries.stats import likely_stats, stats_of
+from app.queries.views import line_of
 from app.settings import Settings
 
 _TRIED = 64
@@ -37,7 +38,7 @@ class PathsQuery(Query[schemas.PathsRequest]):
 
     kind = "paths"
     model = schemas.PathsRequest
-    offers: Sequence[str] = (JSON,)
+    offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
     hint = "ask for fewer targets at once"
 
     @classmethod
@@ -136,5 +137,7 @@ class PathsQuery(Query[schemas.PathsRequest]):
                 "paths": paths,
                 "stats": stats,
                 "warnings": opened.warnings,
-            }
+            },
+            shown=("paths",),
+            lines=lambda: [line_of(path, i) for i, path in enumerate(found)],
         )

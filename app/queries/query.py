@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app import __version__, schemas
-from app.encoding import JSON, NPY, OCTETS, Answer
+from app.encoding import JSON, NPY, OCTETS, Answer, Form
 from app.mesh_store import OpenMesh
 from app.queries.costs import PER_FACE_BLOCKED, Cost
 from app.queries.places import Places, resolved
@@ -203,17 +203,17 @@ def code_version() -> str:
     return f"{__version__}+{sources_digest()}"
 
 
-def result_key(query: Query[Any], media_type: str) -> str:
-    """Return the hash that names the answer to ``query`` in ``media_type``.
+def result_key(query: Query[Any], form: Form) -> str:
+    """Return the hash that names the answer to ``query`` in a form.
 
     It is the same in any run, unless the answer is not: that of each run has a name of its own.
     """
-    return fingerprint(query, media_type) if query.is_repeatable else uuid4().hex
+    return fingerprint(query, form) if query.is_repeatable else uuid4().hex
 
 
-def fingerprint(query: Query[Any], media_type: str) -> str:
-    """Return the hash that stands for ``query`` in ``media_type``, answered by this code."""
-    names = [type(query).__name__, query.mesh_id, media_type, code_version()]
+def fingerprint(query: Query[Any], form: Form) -> str:
+    """Return the hash that stands for ``query`` in a form, answered by this code."""
+    names = [type(query).__name__, query.mesh_id, form, code_version()]
     digest = hashlib.blake2b(orjson.dumps(names), digest_size=16)
     digest.update(_written(query.request))
     return digest.hexdigest()

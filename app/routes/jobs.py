@@ -12,11 +12,11 @@ from app.jobs import Job
 from app.responses import (
     REVALIDATED,
     UNSTORED,
-    ResultResponse,
     etag_of,
     job_document,
     not_modified,
     problems,
+    result_response,
 )
 from app.schemas import JobDocument, JobList, ListParameters
 from app.service import Answered
@@ -104,7 +104,7 @@ async def get_job_results(
         service.results.give_back(result)
         return unchanged
     answered = Answered(result, {})
-    return ResultResponse(answered, job.errand.media_type, service.results, REVALIDATED)
+    return result_response(request, answered, job.errand.media_type, service.results, REVALIDATED)
 
 
 @router.get(

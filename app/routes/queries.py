@@ -9,12 +9,13 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from app.dependencies import (
     AskerDep,
     ServiceDep,
-    media_type_of,
+    form_of,
     prefers_async,
     require_json,
     while_connected,
 )
-from app.encoding import NPY, NPZ, OCTETS
+from app.encoding import CSV, GEOJSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
+from app.encoding.form import TEXTS
 from app.queries import (
     DistancesQuery,
     IsolinesQuery,
@@ -31,12 +32,12 @@ from app.queries import Query as ValidQuery
 from app.responses import (
     CACHED,
     UNSTORED,
-    ResultResponse,
     accepted_response,
     estimate_response,
     etag_of,
     not_modified,
     problems,
+    result_response,
 )
 from app.schemas import (
     AnswerParameters,
@@ -82,17 +83,20 @@ _CODES = (
 _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
 
 
-def _answers(model: type, description: str, *binary: str) -> dict[int | str, dict[str, Any]]:
-    content = {name: {"schema": {"type": "string", "format": "binary"}} for name in binary}
+def _answers(model: type, description: str, *others: str) -> dict[int | str, dict[str, Any]]:
+    """Describe an answer in JSON, and in ``others``, which have no room for all of it."""
+    description += ". In formats other than JSON the rest comes as `Geodesic-…` headers"
+    content = {name: {"schema": _TEXT if name in TEXTS else _BINARY} for name in others}
     return {
         200: {"model": model | Estimate, "content": content, "description": description},
         202: {"model": JobDocument, "description": "With `Prefer: respond-async`: the job"},
     }
 
 
-def _in_binary(model: type, array: str) -> dict[int | str, dict[str, Any]]:
-    description = f"The answer; in binary the {array}, the rest as `Geodesic-…` headers"
-    return _answers(model, description, NPY, OCTETS)
+_TEXT = {"type": "string"}
+_BINARY = {"type": "string", "format": "binary"}
+_LINES = OBJ, CSV, SVG, GEOJSON
+_PATH = "The path; its points in binary"
 
 
 def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[str, Any]:
@@ -123,20 +127,20 @@ class Asked:
         """Answer the query of a kind that a body asks, or tell what that would take."""
         service, request, asker = self.service, self.request, self.asker
         query = kind.ask(self.mesh_id, service.size(self.mesh_id), body, service.settings)
-        media_type = media_type_of(request, parameters.format, query.offers)
+        form = form_of(request, parameters, query.offers)
         if parameters.estimate:
-            estimating = service.estimate(query, media_type, asker)
+            estimating = service.estimate(query, form, asker)
             estimate, seconds = await while_connected(request, estimating)
-            return estimate_response(self.mesh_id, estimate, media_type, seconds)
+            return estimate_response(self.mesh_id, estimate, form.media_type, seconds)
         if self.is_async:
-            return accepted_response(await service.submit(query, media_type, asker, self.key))
-        unchanged = not_modified(request, etag_of(result_key(query, media_type)), CACHED)
+            return accepted_response(await service.submit(query, form, asker, self.key))
+        unchanged = not_modified(request, etag_of(result_key(query, form)), CACHED)
         if unchanged is not None:
             return unchanged
-        answered = await while_connected(request, service.answer(query, media_type, asker))
+        answered = await while_connected(request, service.answer(query, form, asker))
         is_cacheable = request.method == "GET" and query.is_repeatable
         headers = CACHED if is_cacheable else UNSTORED
-        return ResultResponse(answered, media_type, service.results, headers)
+        return result_response(request, answered, form.media_type, service.results, headers)
 
 
 async def get_asked(
@@ -167,7 +171,14 @@ Parameters = Annotated[AnswerParameters, Query()]
     **_posted(
         "computeDistances",
         "Distances from sources to all vertices, exact or within a chosen error",
-        _in_binary(DistancesAnswer, "distances"),
+        _answers(
+            DistancesAnswer,
+            "The distances; as PLY the mesh with them at its vertices, for all vertices only",
+            NPY,
+            OCTETS,
+            CSV,
+            PLY,
+        ),
     ),
 )
 async def compute_distances(
@@ -182,7 +193,7 @@ async def compute_distances(
     **_posted(
         "computePath",
         "The shortest path between two points, exact or within a chosen error",
-        _in_binary(PathAnswer, "points"),
+        _answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES),
     ),
 )
 async def compute_path(
@@ -200,7 +211,7 @@ async def compute_path(
     operation_id="getPath",
     summary="The shortest path between two points, cacheable",
     response_class=Response,
-    responses={**_in_binary(PathAnswer, "points"), **problems(*_CODES)},
+    responses={**_answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES), **problems(*_CODES)},
 )
 async def get_path(parameters: Annotated[PathParameters, Query()], asked: AskedDep) -> Response:
     """Return the same as `POST`, for points written as `v12` or `f7:0.2,0.3,0.5`."""
@@ -213,7 +224,7 @@ async def get_path(parameters: Annotated[PathParameters, Query()], asked: AskedD
     **_posted(
         "computePaths",
         "Shortest paths from one point to many, from one solve",
-        _answers(PathsAnswer, "The paths, in the order of the targets"),
+        _answers(PathsAnswer, "The paths, in the order of the targets", *_LINES),
     ),
 )
 async def compute_paths(body: PathsRequest, parameters: Parameters, asked: AskedDep) -> Response:
@@ -226,7 +237,7 @@ async def compute_paths(body: PathsRequest, parameters: Parameters, asked: Asked
     **_posted(
         "computeIsolines",
         "Lines of equal distance from sources",
-        _answers(IsolinesAnswer, "The lines of each level, closed and open"),
+        _answers(IsolinesAnswer, "The lines of each level, closed and open", *_LINES),
     ),
 )
 async def compute_isolines(
@@ -243,18 +254,18 @@ async def compute_isolines(
         "Exact distances from many points to many others",
         _answers(
             MatrixAnswer,
-            "The answer; in binary the distances (a sparse matrix as `scipy.sparse.load_npz` reads "
-            "it), the rest as `Geodesic-…` headers",
+            "The distances; a sparse matrix in binary as `scipy.sparse.load_npz` reads it",
             NPY,
             NPZ,
             OCTETS,
+            CSV,
         ),
     ),
 )
 async def compute_matrix(body: MatrixRequest, parameters: Parameters, asked: AskedDep) -> Response:
     """Return a distance for each source and target, or for each pair.
 
-    A dense matrix and pairs come as JSON, npy and octets, a sparse matrix as JSON and npz.
+    In binary, a dense matrix and pairs come as npy and octets, a sparse matrix as npz.
     """
     return await asked.answer(MatrixQuery, body, parameters)
 
@@ -264,7 +275,7 @@ async def compute_matrix(body: MatrixRequest, parameters: Parameters, asked: Ask
     **_posted(
         "findNearest",
         "The candidates that are nearest to a point along the surface",
-        _answers(NearestAnswer, "The candidates, nearest first"),
+        _answers(NearestAnswer, "The candidates, nearest first", CSV, GEOJSON),
     ),
 )
 async def find_nearest(body: NearestRequest, parameters: Parameters, asked: AskedDep) -> Response:
@@ -277,7 +288,7 @@ async def find_nearest(body: NearestRequest, parameters: Parameters, asked: Aske
     **_posted(
         "locatePoints",
         "The points of the surface that are nearest to positions",
-        _answers(LocateAnswer, "The points, in the order of the positions"),
+        _answers(LocateAnswer, "The points, in the order of the positions", CSV, GEOJSON),
     ),
 )
 async def locate_points(body: LocateRequest, parameters: Parameters, asked: AskedDep) -> Response:

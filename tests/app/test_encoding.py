@@ -1,11 +1,30 @@
+import json
+import tracemalloc
+from dataclasses import replace
 from io import BytesIO
+from typing import Any
 
 import numpy as np
 import orjson
 import pytest
 from scipy.sparse import load_npz
 
-from app.encoding import JSON, NPY, NPZ, OCTETS, Answer, encode, negotiate
+from app.encoding import (
+    CSV,
+    GEOJSON,
+    JSON,
+    NPY,
+    NPZ,
+    OCTETS,
+    PLY,
+    Answer,
+    Form,
+    Indices,
+    Surface,
+    Table,
+    encode,
+    negotiate,
+)
 
 ANSWER = Answer(
     {"mesh_id": "abc", "values": np.array([0.5, np.inf]), "stats": {"n": 1}, "warnings": ["π"]},
@@ -14,7 +33,7 @@ ANSWER = Answer(
 
 
 def body(media_type: str) -> bytes:
-    return b"".join(encode(ANSWER, media_type).parts)
+    return b"".join(encode(ANSWER, Form(media_type)).parts)
 
 
 def test_json_has_all_members_and_null_for_infinity() -> None:
@@ -28,7 +47,7 @@ def test_json_has_all_members_and_null_for_infinity() -> None:
 
 def test_npy_has_the_array_and_headers_the_rest() -> None:
     np.testing.assert_array_equal(np.load(BytesIO(body(NPY))), [0.5, np.inf])
-    headers = encode(ANSWER, NPY).headers
+    headers = encode(ANSWER, Form(NPY)).headers
     assert headers["Geodesic-Dtype"] == "<f8"
     assert headers["Geodesic-Shape"] == "2"
     assert headers["Geodesic-Mesh-Id"] == "abc"
@@ -42,7 +61,7 @@ def test_octets_are_the_bare_array() -> None:
 
 def test_binary_is_little_endian_and_in_c_order() -> None:
     array = np.asfortranarray(np.arange(6.0).reshape(2, 3)).astype(">f8")
-    encoded = encode(Answer({"points": array}, ("points",)), OCTETS)
+    encoded = encode(Answer({"points": array}, ("points",)), Form(OCTETS))
 
     found = np.frombuffer(b"".join(encoded.parts), "<f8").reshape(2, 3)
     np.testing.assert_array_equal(found, array)
@@ -51,7 +70,7 @@ def test_binary_is_little_endian_and_in_c_order() -> None:
 
 @pytest.mark.parametrize("media_type", [JSON, NPY, OCTETS])
 def test_empty_arrays(media_type: str) -> None:
-    encoded = encode(Answer({"points": np.empty((0, 3))}, ("points",)), media_type)
+    encoded = encode(Answer({"points": np.empty((0, 3))}, ("points",)), Form(media_type))
 
     assert b"".join(encoded.parts) is not None
 
@@ -64,7 +83,7 @@ def test_npz_has_a_sparse_matrix_as_scipy_reads_it() -> None:
         "columns": np.array([2, 1, 0], np.int32),
         "distances": np.array([0.5, 0.0, 2.0]),
     }
-    encoded = encode(Answer(members, ("distances", "rows", "columns")), NPZ)
+    encoded = encode(Answer(members, ("distances", "rows", "columns")), Form(NPZ))
 
     table = load_npz(BytesIO(b"".join(encoded.parts)))
     assert table.shape == (2, 3)
@@ -77,10 +96,80 @@ def test_npz_has_a_sparse_matrix_as_scipy_reads_it() -> None:
     }
 
 
+def test_blocks_make_one_document() -> None:
+    """Above 2¹⁴ values JSON is made in blocks; whole, by `json`, it has to read the same."""
+    numbers = np.random.default_rng(0).random(100_000)
+    numbers[::1000] = np.inf
+    members: dict[str, Any] = {
+        "numbers": numbers,
+        "rows": numbers.reshape(-1, 4),
+        "wide": np.ones((2, 70_000)),
+        "bare": numbers[::2],
+        "indices": Indices(np.arange(-1, 70_000)),
+        "places": [{"face": i} for i in range(70_000)],
+        "none": [],
+        "empty": np.empty((0, 3)),
+        "text": "π",
+    }
+    found = json.loads(b"".join(encode(Answer(members), Form(JSON)).parts))
+
+    plain = [x if np.isfinite(x) else None for x in numbers.tolist()]
+    assert list(found) == list(members)
+    assert found["numbers"] == plain
+    assert found["rows"] == [plain[i : i + 4] for i in range(0, 100_000, 4)]
+    assert found["wide"] == [[1.0] * 70_000] * 2
+    assert found["bare"] == plain[::2]
+    assert found["indices"] == [None, *range(70_000)]
+    assert found["places"] == members["places"]
+    assert (found["none"], found["empty"], found["text"]) == ([], [], "π")
+
+
+MILLION = np.random.default_rng(1).random(1_000_000)
+LARGE = Answer(
+    {"distances": MILLION, "nearest_source": Indices(np.zeros(1_000_000, np.int32))},
+    ("distances",),
+    table=Table.of("vertex", {"distance": MILLION}),
+    surface=Surface(np.zeros((1_000_000, 3)), np.zeros((1, 3), np.int32), {"distance": MILLION}),
+)
+
+
+@pytest.mark.parametrize(
+    ("form", "most"),
+    [
+        (Form(JSON), 5e6),
+        (Form(JSON, coding="gzip"), 5e6),
+        (Form(CSV), 8e6),
+        (Form(NPY), 1e5),
+        (Form(OCTETS), 1e5),
+        (Form(OCTETS, "float32"), 4.1e6),
+        (Form(PLY), 8e6),
+    ],
+)
+def test_large_answers_are_never_there_as_a_whole(form: Form, most: float) -> None:
+    tracemalloc.start()
+    try:
+        size = sum(map(len, encode(LARGE, form).parts))
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert size >= 4e6
+    assert peak < most
+
+
+def test_members_are_headers_where_they_are_short() -> None:
+    answer = Answer({"points": [1] * 10**6, "status": "ok", "warnings": []}, shown=("points",))
+    answer = replace(answer, places=list)
+
+    assert encode(answer, Form(GEOJSON)).headers == {
+        "Geodesic-Status": "ok",
+        "Geodesic-Warnings": "[]",
+    }
+
+
 def test_long_members_are_left_out_of_headers() -> None:
     answer = Answer({"values": np.zeros(1), "sources": list(range(10_000))}, ("values",))
 
-    assert "Geodesic-Sources" not in encode(answer, NPY).headers
+    assert "Geodesic-Sources" not in encode(answer, Form(NPY)).headers
 
 
 @pytest.mark.parametrize(

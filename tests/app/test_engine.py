@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.encoding import Form
 from app.engine import Answering, MeshFromSample, Order, local, worker
 from app.engine.worker import Clock, Worker, WorkerConfig
 from app.errors import Problem
@@ -282,7 +283,9 @@ def test_clients_take_turns(two: TestClient, slow: str, medium: str) -> None:
 
     async def ask_as(client: str, mesh_id: str) -> None:
         vertex = next(_starts)
-        work = Answering(asked(mesh_id, vertex=vertex), "application/json", f"{mesh_id}/{vertex}")
+        work = Answering(
+            asked(mesh_id, vertex=vertex), Form("application/json"), f"{mesh_id}/{vertex}"
+        )
 
         def note(share: float) -> None:
             if share == 0.0:
@@ -443,7 +446,7 @@ def test_work_that_was_asked_to_stop_stops(
     monkeypatch.setattr(worker, "_worker", state)
     ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
     query = PathQuery(mesh_id, PathRequest(**ends, **accuracy))
-    work = Answering(query, "application/json", f"{mesh_id}/key")
+    work = Answering(query, Form("application/json"), f"{mesh_id}/key")
     (tmp_path / "results").mkdir()
 
     asked.value = 2

@@ -180,11 +180,6 @@ def test_sources_off_the_mesh_are_refused(client: TestClient, plane: str) -> Non
     assert [fault["pointer"] for fault in problem["errors"]] == ["/sources/1/vertex"]
 
 
-@pytest.mark.parametrize("name", ["npy", "npz", "octets"])
-def test_isolines_come_as_json_only(client: TestClient, plane: str, name: str) -> None:
-    check_problem(isolines(client, plane, f"?format={name}", count=1), 406, "not_acceptable")
-
-
 def test_limits(tmp_path: Path) -> None:
     with serving(tmp_path, max_json_values=1000, max_levels=5, max_sources=3) as client:
         mesh_id = upload_sample(client, "plane", 200)

@@ -118,11 +118,6 @@ def test_refused_paths(client: TestClient, knot: str, change: dict, place: str) 
         assert [fault["pointer"] for fault in problem["errors"]] == [place]
 
 
-@pytest.mark.parametrize("name", ["npy", "npz", "octets"])
-def test_paths_come_as_json_only(client: TestClient, knot: str, name: str) -> None:
-    check_problem(paths(client, knot, f"?format={name}"), 406, "not_acceptable")
-
-
 def test_paths_that_are_too_large(tmp_path: Path) -> None:
     with serving(tmp_path, max_json_values=300) as client:
         mesh_id = upload_sample(client, "plane", 1000)

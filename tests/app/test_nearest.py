@@ -100,9 +100,3 @@ def test_refused_questions(client: TestClient, knot: str, change: dict, place: s
     for query in ("", "?estimate=true"):
         problem = check_problem(nearest(client, knot, query, **change), 422, "invalid_request")
         assert [fault["pointer"] for fault in problem["errors"]] == [place]
-
-
-@pytest.mark.parametrize("name", ["npy", "npz", "octets"])
-def test_candidates_come_as_json_only(client: TestClient, knot: str, name: str) -> None:
-    check_problem(nearest(client, knot, f"?format={name}"), 406, "not_acceptable")
-    check_problem(nearest(client, knot, "?format=csv"), 422, "invalid_request")

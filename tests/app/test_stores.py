@@ -140,14 +140,14 @@ def test_a_failed_write_leaves_nothing(
 
 @pytest.fixture
 def results(tmp_path: Path) -> ResultStore:
-    store = ResultStore(tmp_path / "results", 100)
+    store = ResultStore(tmp_path / "results", 100, memory=0)
     store.prepare()
     return store
 
 
 def put(results: ResultStore, root: Path, name: str, size: int = 40) -> None:
-    write_result(root / "results", name, [b"x" * size], {"A": "b"})
-    results.give_back(results.take_new(name))
+    written = write_result(root / "results", name, [b"x" * size], {"A": "b"})
+    results.give_back(results.take_new(name, written))
 
 
 def find(results: ResultStore, name: str):
@@ -179,8 +179,8 @@ def test_the_least_recently_used_go_first(results: ResultStore, tmp_path: Path) 
 
 
 def test_what_is_being_sent_stays(results: ResultStore, tmp_path: Path) -> None:
-    write_result(tmp_path / "results", "m/a", [b"x" * 90], {})
-    sent = results.take_new("m/a")
+    written = write_result(tmp_path / "results", "m/a", [b"x" * 90], {})
+    sent = results.take_new("m/a", written)
     put(results, tmp_path, "m/b")
 
     assert sent.path.exists()
@@ -211,7 +211,7 @@ def test_results_survive_a_restart(results: ResultStore, tmp_path: Path) -> None
     (tmp_path / "results" / "m" / "unsealed.body").write_bytes(b"x")
     (tmp_path / "results" / "m" / "tmpabc").write_bytes(b"x")
 
-    restarted = ResultStore(tmp_path / "results", 50)
+    restarted = ResultStore(tmp_path / "results", 50, memory=0)
     restarted.prepare()
 
     assert find(restarted, "m/old") is None
@@ -228,6 +228,37 @@ def test_results_of_a_mesh_are_forgotten(results: ResultStore, tmp_path: Path) -
 
     assert find(results, "m/a") is None
     assert find(results, "n/a") is not None
+
+
+def test_small_results_are_in_memory_as_far_as_they_fit(tmp_path: Path) -> None:
+    results = ResultStore(tmp_path / "results", 10**6, memory=100)
+    results.prepare()
+    for key in "abc":
+        put(results, tmp_path, f"m/{key}")
+    put(results, tmp_path, "m/large", 2**17)
+
+    found = {key: find(results, f"m/{key}").body for key in ("c", "b", "large", "a")}
+    assert found == {"c": b"x" * 40, "b": b"x" * 40, "large": None, "a": b"x" * 40}
+    damage(tmp_path / "results" / "m" / "a.body")
+    assert find(results, "m/a").body == b"x" * 40, "read a moment ago"
+    results.forget_mesh("m")
+    assert find(results, "m/a") is None
+
+
+def test_what_is_held_stays_until_it_is_released(results: ResultStore, tmp_path: Path) -> None:
+    put(results, tmp_path, "m/a")
+    results.hold("m/a")
+    assert results.has_room_to_hold("m/a")
+    other = results.take_new("m/b", write_result(tmp_path / "results", "m/b", [b"x" * 61], {}))
+    assert not results.has_room_to_hold("m/b")
+    results.give_back(other)
+    results.forget_mesh("m")
+
+    assert find(results, "m/a") is not None
+    assert find(results, "m/b") is None
+    results.release("m/a")
+    put(results, tmp_path, "m/c", 61)
+    assert find(results, "m/a") is None
 
 
 @pytest.mark.usefixtures("results")

@@ -1,0 +1,56 @@
+"""Bare arrays: little-endian, in C order, unreachable as infinity; the rest as headers."""
+
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, save_npz
+
+from app.encoding.answer import Answer, Encoded
+from app.encoding.headers import headers_of
+from app.errors import refuse
+
+
+def to_npy(answer: Answer, dtype: str) -> Encoded:
+    """Encode the array in numpy's own format."""
+    array = _body(answer, dtype)
+    header = BytesIO()
+    np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(array))
+    return Encoded([header.getvalue(), _raw(array)], _headers(answer, array.dtype, array.shape))
+
+
+def to_octets(answer: Answer, dtype: str) -> Encoded:
+    """Encode the array without anything."""
+    array = _body(answer, dtype)
+    return Encoded([_raw(array)], _headers(answer, array.dtype, array.shape))
+
+
+def to_npz(answer: Answer, dtype: str) -> Encoded:
+    """Encode a sparse matrix as `scipy.sparse.load_npz` reads it."""
+    _, rows, columns = (answer.members[name] for name in answer.arrays)
+    distances = _body(answer, dtype)
+    table = coo_array((distances, (rows, columns)), shape=answer.members["shape"]).tocsr()
+    file = BytesIO()
+    save_npz(file, table, compressed=False)
+    return Encoded([file.getbuffer()], _headers(answer, distances.dtype, table.shape))
+
+
+def _body(answer: Answer, dtype: str) -> NDArray[Any]:
+    array: NDArray[Any] | None = answer.members[answer.arrays[0]]
+    if array is None:  # no path: the headers say why
+        array = np.empty(0)
+    try:
+        with np.errstate(over="raise"):
+            return np.ascontiguousarray(array, dtype=np.dtype(dtype).newbyteorder("<"))
+    except FloatingPointError:
+        raise refuse("invalid_request", f"{dtype} cannot hold numbers so large") from None
+
+
+def _raw(array: NDArray[Any]) -> memoryview | bytes:
+    return array.data.cast("B") if array.size else b""
+
+
+def _headers(answer: Answer, dtype: np.dtype[Any], shape: tuple[int, ...]) -> dict[str, str]:
+    own = {"Geodesic-Dtype": dtype.str, "Geodesic-Shape": ",".join(map(str, shape))}
+    return own | headers_of(answer, (*answer.arrays, "shape"))

@@ -1,0 +1,35 @@
+"""Colours in which equal steps look equal: viridis, which is legible without colour as well."""
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+from cmap import Colormap
+from numpy.typing import NDArray
+
+_GREY = 128, 128, 128
+_STEPS = 256
+
+
+def largest_of(values: NDArray[np.floating[Any]]) -> float:
+    """Return the largest finite value, or 0."""
+    return float(values.max(where=np.isfinite(values), initial=0.0))
+
+
+def colours_of(values: NDArray[np.floating[Any]], largest: float) -> NDArray[np.uint8]:
+    """Return the colours (N, 3) of values from 0 to the ``largest``; grey for what is infinite."""
+    is_finite = np.isfinite(values)
+    shades = np.where(is_finite, values, 0.0) / (largest or 1.0)
+    colours: NDArray[np.uint8] = _table()[np.rint(shades * (_STEPS - 1)).astype(np.intp)]
+    colours[~is_finite] = _GREY
+    return colours
+
+
+def hex_colour(shade: float) -> str:
+    """Return the colour of a shade from 0 to 1, as ``#rrggbb``."""
+    return f"#{_table()[round(shade * (_STEPS - 1))].tobytes().hex()}"
+
+
+@cache
+def _table() -> NDArray[np.uint8]:
+    return np.rint(255.0 * Colormap("viridis").lut(_STEPS)[:, :3]).astype(np.uint8)

@@ -1,0 +1,35 @@
+"""What formats have no room for, as headers of the response."""
+
+import json
+from collections.abc import Collection, Sized
+from typing import Any
+
+import orjson
+
+from app.encoding.answer import Answer
+from app.encoding.json_document import dumped
+
+_LONGEST = 4096
+"""Servers and proxies refuse longer header lines; what does not fit is in the JSON answer."""
+
+
+def headers_of(answer: Answer, left_out: Collection[str]) -> dict[str, str]:
+    """Return the small members of an answer, but for some, as headers ``Geodesic-…``."""
+    headers = {}
+    for name, value in answer.members.items():
+        if name in left_out:
+            continue
+        text = value if isinstance(value, str) else _ascii(value)
+        if text is not None and len(text) <= _LONGEST:
+            headers["Geodesic-" + name.replace("_", "-").title()] = text
+    return headers
+
+
+def _ascii(value: Any) -> str | None:
+    """Return JSON as headers have it, None where it is too long: json is slow, and adds escapes."""
+    if isinstance(value, Sized) and 2 * len(value) > _LONGEST:
+        return None  # each element has a character and a comma
+    text = dumped(value)
+    if len(text) > _LONGEST:
+        return None
+    return json.dumps(orjson.loads(text), separators=(",", ":"))  # headers are Latin-1

@@ -1,0 +1,55 @@
+"""JSON: all members, and ``null`` for what is not finite."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import orjson
+from numpy.typing import NDArray
+
+from app.encoding.answer import Answer, Buffer, Encoded
+from app.encoding.views import Indices
+
+_VALUES, _ELEMENTS = 2**14, 2**12
+"""How many values of arrays, and elements of lists, are encoded at a time: orjson reserves 40 bytes
+for the former, 256 for the latter."""
+
+
+def to_json(answer: Answer) -> Encoded:
+    """Encode all members."""
+    return Encoded(document(answer.members))
+
+
+def document(members: Mapping[str, Any]) -> Iterator[Buffer]:
+    """Yield the parts of an object, its long members in blocks."""
+    yield b"{"
+    for i, (name, value) in enumerate(members.items()):
+        yield b"%b%b:" % (b"," if i else b"", dumped(name))
+        yield from _value(value)
+    yield b"}"
+
+
+def dumped(value: Any) -> bytes:
+    """Return a value as JSON."""
+    # orjson reads contiguous arrays of the machine's own numbers by itself; others go as lists.
+    return orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY, default=_as_list)
+
+
+def _value(value: Any) -> Iterator[Buffer]:
+    if not isinstance(value, np.ndarray | Indices | list | tuple):
+        yield dumped(value)
+        return
+    rows = _ELEMENTS
+    if isinstance(value, np.ndarray) and value.size:
+        rows = max(1, _VALUES * len(value) // value.size)
+    if len(value) <= rows:
+        yield dumped(value)
+        return
+    for start in range(0, len(value), rows):
+        yield b"," if start else b"["
+        yield dumped(value[start : start + rows])[1:-1]
+    yield b"]"
+
+
+def _as_list(value: NDArray[Any] | Indices) -> list[Any]:
+    return value.tolist()

@@ -1,0 +1,52 @@
+"""What a client accepts, and what it gets of that."""
+
+from collections.abc import Sequence
+
+from app.encoding.codings import CODINGS
+from app.encoding.form import FORMATS
+
+
+def negotiate(
+    accept: str | None, name: str | None, offers: Sequence[str] = tuple(FORMATS.values())
+) -> str | None:
+    """Return the media type for ``Accept``, or for ``name`` of ``FORMATS``, which overrides it.
+
+    None where it is not one of the ``offers``.
+    """
+    if name is not None:
+        return FORMATS[name] if FORMATS[name] in offers else None
+    wanted = sorted(_accepted(accept or "*/*"), key=lambda item: -item[1])
+    refused = {media for media, quality in wanted if quality <= 0}
+    for media, quality in wanted:
+        for offered in offers:
+            if quality > 0 and offered not in refused and _matches(media, offered):
+                return offered
+    return None
+
+
+def negotiate_coding(accept_encoding: str | None) -> str | None:
+    """Return the content coding for ``Accept-Encoding``: of equally welcome ones the fastest."""
+    qualities = dict(_accepted(accept_encoding or ""))
+    others = qualities.get("*", 0.0)
+    wanted = {coding: qualities.get(coding, others) for coding in CODINGS}
+    best = max(wanted, key=lambda coding: wanted[coding])
+    is_welcome = wanted[best] > 0 and wanted[best] >= qualities.get("identity", 0.0)
+    return best if is_welcome else None
+
+
+def _accepted(header: str) -> list[tuple[str, float]]:
+    ranges = []
+    for item in header.split(","):
+        media, *parameters = (part.strip().lower() for part in item.split(";"))
+        quality = next((text[2:] for text in parameters if text.startswith("q=")), "1")
+        try:
+            ranges.append((media, float(quality)))
+        except ValueError:
+            ranges.append((media, 1.0))
+    return ranges
+
+
+def _matches(media: str, offered: str) -> bool:
+    kind, _, subtype = media.partition("/")
+    offered_kind, _, offered_subtype = offered.partition("/")
+    return kind in ("*", offered_kind) and subtype in ("*", offered_subtype)

@@ -1,0 +1,31 @@
+"""OBJ: polylines, as programs for modelling read them."""
+
+from collections.abc import Iterator, Sequence
+
+from app.encoding.answer import Answer, Buffer, Encoded
+from app.encoding.headers import headers_of
+from app.encoding.views import Line
+
+
+def to_obj(answer: Answer) -> Encoded:
+    """Encode the lines: ``l`` elements, ``p`` for one that is a point."""
+    assert answer.lines is not None, "what comes as OBJ has lines"  # noqa: S101
+    return Encoded(_written(answer.lines()), headers_of(answer, answer.shown))
+
+
+def _written(lines: Sequence[Line]) -> Iterator[Buffer]:
+    first, group = 1, ""
+    for line in lines:
+        if line.group != group:
+            group = line.group
+            yield b"g %b\n" % group.encode()
+        count = len(line.points)
+        if not count:
+            told = " ".join(f"{name}={value}" for name, value in line.told.items())
+            yield b"# no line: %b\n" % told.encode()
+            continue
+        yield ("v %r %r %r\n" * count % tuple(line.points.ravel().tolist())).encode()
+        indices = [*range(first, first + count), *([first] if line.is_closed else ())]
+        element = "l " if count > 1 else "p "
+        yield (element + " ".join(map(str, indices)) + "\n").encode()
+        first += count

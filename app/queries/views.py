@@ -1,0 +1,113 @@
+"""Answers as tables, lines, places and surfaces, for formats that know no more than these."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import repeat
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import geodesic_core as gc
+from app.encoding import Line, Place, Surface, Table
+from app.encoding.views import Column, cells
+
+
+def columns_of(members: Mapping[str, Any]) -> dict[str, Column]:
+    """Return the distances of an answer, and what is included, by name; a vector as three."""
+    columns: dict[str, Column] = {"distance": members["distances"]}
+    if "nearest_source" in members:
+        columns["nearest_source"] = members["nearest_source"]
+    if "gradient" in members:
+        columns |= {f"gradient_{x}": members["gradient"][:, i] for i, x in enumerate("xyz")}
+    return columns
+
+
+def surface_of(mesh: gc.TriangleMesh, columns: Mapping[str, Column]) -> Surface:
+    """Return a mesh with values at its vertices."""
+    return Surface(mesh.vertices, mesh.faces, columns)
+
+
+def line_of(outline: Mapping[str, Any], number: int | None = None) -> Line:
+    """Return a path, or the reason why there is none; its ``number`` where there are several."""
+    told: dict[str, Any] = {} if number is None else {"path": number}
+    told |= {"status": outline.get("reason", "ok"), "length": outline.get("length")}
+    locations = outline.get("locations", ())
+    columns: dict[str, list[Any]] = {"face": [each["face"] for each in locations]}
+    columns |= {x: [each["barycentric"][i] for each in locations] for i, x in enumerate("uvw")}
+    points = np.empty((0, 3)) if outline["points"] is None else outline["points"]
+    return Line(points, told, "" if number is None else f"path_{number}", at_points=columns)
+
+
+def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
+    """Return isolines, and for each level that has none a line without points."""
+    highest = max(level["level"] for level in levels)
+    none = {"closed": None, "length": None, "points": np.empty((0, 3))}
+    return [
+        Line(
+            line["points"],
+            {
+                "level": each["level"],
+                "line": i if each["lines"] else None,
+                "closed": line["closed"],
+                "length": line["length"],
+            },
+            f"level_{each['level']!r}",
+            is_closed=bool(line["closed"]),
+            shade=each["level"] / highest,
+        )
+        for each in levels
+        for i, line in enumerate(each["lines"] or [none])
+    ]
+
+
+def table_of_matrix(distances: NDArray[np.float64]) -> Table:
+    """Return a row for each cell of a matrix (N, M), or for each of N pairs."""
+
+    def rows() -> Iterator[Sequence[Any]]:
+        if distances.ndim == 1:
+            for i, value in enumerate(cells(distances)):
+                yield i, i, value
+            return
+        for i, row in enumerate(distances):
+            yield from zip(repeat(i), range(len(row)), cells(row))
+
+    return Table(_MATRIX, rows)
+
+
+def table_of_sparse(rows: Column, columns: Column, distances: Column) -> Table:
+    """Return a row for each cell that there is."""
+    return Table(_MATRIX, lambda: zip(cells(rows), cells(columns), cells(distances), strict=True))
+
+
+_MATRIX = "source", "target", "distance"
+
+
+def places_of(index: str, found: Sequence[Mapping[str, Any] | None]) -> list[Place]:
+    """Return points as answers describe them; numbered by ``index`` where they do not say it."""
+    return [
+        Place(each["position"], {index: i} | {k: v for k, v in each.items() if k != "position"})
+        if each is not None
+        else Place(None, {index: i})
+        for i, each in enumerate(found)
+    ]
+
+
+def table_of_places(index: str, found: Sequence[Mapping[str, Any] | None]) -> Table:
+    """Return a row for each of the same points."""
+
+    def rows() -> Iterator[Sequence[Any]]:
+        for i, described in enumerate(found):
+            each = described or {}
+            yield (
+                each.get(index, i),
+                each.get("distance"),
+                *each.get("position", _NOTHING),
+                each.get("vertex"),
+                each.get("face"),
+                *each.get("barycentric", _NOTHING),
+            )
+
+    return Table([index, "distance", *"xyz", "vertex", "face", *"uvw"], rows)
+
+
+_NOTHING = None, None, None
