@@ -8,7 +8,7 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-_ROWS = 2**14
+_ROWS = 2**11
 """Rows of arrays that become Python's numbers at a time."""
 
 
