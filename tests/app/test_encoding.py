@@ -25,6 +25,7 @@ from app.encoding import (
     encode,
     negotiate,
 )
+from app.queries.views import table_of_matrix, table_of_sparse
 
 ANSWER = Answer(
     {"mesh_id": "abc", "values": np.array([0.5, np.inf]), "stats": {"n": 1}, "warnings": ["π"]},
@@ -128,7 +129,7 @@ MILLION = np.random.default_rng(1).random(1_000_000)
 LARGE = Answer(
     {"distances": MILLION, "nearest_source": Indices(np.zeros(1_000_000, np.int32))},
     ("distances",),
-    table=Table.of("vertex", {"distance": MILLION}),
+    table=Table.of({"vertex": range(1_000_000), "distance": MILLION}),
     surface=Surface(np.zeros((1_000_000, 3)), np.zeros((1, 3), np.int32), {"distance": MILLION}),
 )
 
@@ -146,14 +147,34 @@ LARGE = Answer(
     ],
 )
 def test_large_answers_are_never_there_as_a_whole(form: Form, most: float) -> None:
-    tracemalloc.start()
-    try:
-        size = sum(map(len, encode(LARGE, form).parts))
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    size, peak = size_and_peak(LARGE, form)
     assert size >= 4e6
     assert peak < most
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        table_of_matrix(MILLION.reshape(1000, 1000)),
+        table_of_matrix(MILLION.reshape(2, 500_000)),
+        table_of_matrix(MILLION),
+        table_of_sparse(np.arange(10**6), np.arange(10**6), MILLION),
+    ],
+)
+def test_large_matrices_become_rows_one_after_the_other(table: Table) -> None:
+    size, peak = size_and_peak(Answer({}, table=table), Form(CSV))
+    assert size >= 2e7
+    assert peak < 3e6
+
+
+def size_and_peak(answer: Answer, form: Form) -> tuple[int, int]:
+    """Return how many bytes an answer has, and how many are in memory at most."""
+    tracemalloc.start()
+    try:
+        size = sum(map(len, encode(answer, form).parts))
+        return size, tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 def test_members_are_headers_where_they_are_short() -> None:
