@@ -213,9 +213,9 @@ class DistancesRequest(Accuracy, AmongBarriers):
     )
     include: list[Literal["nearest_source", "gradient"]] = Field(
         default=[],
-        description="What else to tell of each, but in bare arrays: `nearest_source`, its index in "
-        "`sources`; "
-        "`gradient`, the direction in which distance grows fastest, of all vertices only",
+        description="What else to tell of each, in JSON, CSV and PLY: `nearest_source`, its index "
+        "in `sources`; `gradient`, the direction in which distance grows fastest, of all vertices "
+        "only",
     )
 
 

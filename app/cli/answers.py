@@ -11,9 +11,9 @@ if TYPE_CHECKING:
 
 def of_distances(field: "DistanceField") -> "Answer":
     """Return the distances of all vertices."""
-    from app.encoding import Answer, Indices, Table
+    from app.encoding import Answer, Indices
     from app.points import described_source
-    from app.queries.views import columns_of, surface_of
+    from app.queries.views import columns_of, surface_of, table_of_distances
 
     members = {
         "sources": [described_source(field.mesh, source) for source in field.sources],
@@ -26,7 +26,7 @@ def of_distances(field: "DistanceField") -> "Answer":
     return Answer(
         members,
         ("distances",),
-        table=Table.of("vertex", columns),
+        table=table_of_distances("vertex", columns),
         surface=surface_of(field.mesh, columns),
     )
 

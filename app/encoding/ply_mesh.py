@@ -11,8 +11,8 @@ from app.encoding.colours import colours_of, largest_of
 from app.encoding.headers import headers_of
 from app.encoding.views import Indices, Surface
 
-_ROWS = 2**14
-"""How many rows are written at a time."""
+_ROWS = 2**11
+"""How many rows are written at a time: few enough for malloc to keep their memory."""
 _KINDS = {"f": ("double", "<f8"), "i": ("int", "<i4")}
 _RGB = "red", "green", "blue"
 

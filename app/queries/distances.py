@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app import schemas
-from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices, Table
+from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, refuse
 from app.mesh_store import OpenMesh
 from app.points import described
@@ -27,7 +27,7 @@ from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_more, refuse_places
 from app.queries.sources import described_sources, named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
-from app.queries.views import columns_of, surface_of
+from app.queries.views import columns_of, surface_of, table_of_distances
 from app.settings import Settings
 
 _VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3}
@@ -173,7 +173,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
             members,
             ("distances",),
             ("distances", *included),
-            table=Table.of("vertex" if targets is None else "target", columns),
+            table=table_of_distances("vertex" if targets is None else "target", columns),
             surface=surface_of(mesh, columns) if targets is None else None,
         )
 

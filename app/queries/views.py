@@ -1,7 +1,6 @@
 """Answers as tables, lines, places and surfaces, for formats that know no more than these."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -9,12 +8,12 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app.encoding import Line, Place, Surface, Table
-from app.encoding.views import Column, cells
+from app.encoding.views import Column, Values, rows_of
 
 
-def columns_of(members: Mapping[str, Any]) -> dict[str, Column]:
+def columns_of(members: Mapping[str, Any]) -> dict[str, Values]:
     """Return the distances of an answer, and what is included, by name; a vector as three."""
-    columns: dict[str, Column] = {"distance": members["distances"]}
+    columns: dict[str, Values] = {"distance": members["distances"]}
     if "nearest_source" in members:
         columns["nearest_source"] = members["nearest_source"]
     if "gradient" in members:
@@ -22,7 +21,12 @@ def columns_of(members: Mapping[str, Any]) -> dict[str, Column]:
     return columns
 
 
-def surface_of(mesh: gc.TriangleMesh, columns: Mapping[str, Column]) -> Surface:
+def table_of_distances(index: str, columns: Mapping[str, Values]) -> Table:
+    """Return a row for each vertex or target, numbered under the name ``index``."""
+    return Table.of({index: range(len(columns["distance"])), **columns})
+
+
+def surface_of(mesh: gc.TriangleMesh, columns: Mapping[str, Values]) -> Surface:
     """Return a mesh with values at its vertices."""
     return Surface(mesh.vertices, mesh.faces, columns)
 
@@ -62,21 +66,20 @@ def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
 
 def table_of_matrix(distances: NDArray[np.float64]) -> Table:
     """Return a row for each cell of a matrix (N, M), or for each of N pairs."""
+    if distances.ndim == 1:
+        pairs = range(len(distances))
+        return table_of_sparse(pairs, pairs, distances)
 
     def rows() -> Iterator[Sequence[Any]]:
-        if distances.ndim == 1:
-            for i, value in enumerate(cells(distances)):
-                yield i, i, value
-            return
         for i, row in enumerate(distances):
-            yield from zip(repeat(i), range(len(row)), cells(row))
+            yield from rows_of(np.broadcast_to(i, len(row)), range(len(row)), row)
 
     return Table(_MATRIX, rows)
 
 
 def table_of_sparse(rows: Column, columns: Column, distances: Column) -> Table:
     """Return a row for each cell that there is."""
-    return Table(_MATRIX, lambda: zip(cells(rows), cells(columns), cells(distances), strict=True))
+    return Table.of(dict(zip(_MATRIX, (rows, columns, distances), strict=True)))
 
 
 _MATRIX = "source", "target", "distance"

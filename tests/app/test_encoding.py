@@ -25,6 +25,7 @@ from app.encoding import (
     encode,
     negotiate,
 )
+from app.queries.views import table_of_matrix, table_of_sparse
 
 ANSWER = Answer(
     {"mesh_id": "abc", "values": np.array([0.5, np.inf]), "stats": {"n": 1}, "warnings": ["π"]},
@@ -97,7 +98,7 @@ def test_npz_has_a_sparse_matrix_as_scipy_reads_it() -> None:
 
 
 def test_blocks_make_one_document() -> None:
-    """Above 2¹⁴ values JSON is made in blocks; whole, by `json`, it has to read the same."""
+    """Above 2¹¹ values JSON is made in blocks; whole, by `json`, it has to read the same."""
     numbers = np.random.default_rng(0).random(100_000)
     numbers[::1000] = np.inf
     members: dict[str, Any] = {
@@ -128,7 +129,7 @@ MILLION = np.random.default_rng(1).random(1_000_000)
 LARGE = Answer(
     {"distances": MILLION, "nearest_source": Indices(np.zeros(1_000_000, np.int32))},
     ("distances",),
-    table=Table.of("vertex", {"distance": MILLION}),
+    table=Table.of({"vertex": range(1_000_000), "distance": MILLION}),
     surface=Surface(np.zeros((1_000_000, 3)), np.zeros((1, 3), np.int32), {"distance": MILLION}),
 )
 
@@ -136,24 +137,44 @@ LARGE = Answer(
 @pytest.mark.parametrize(
     ("form", "most"),
     [
-        (Form(JSON), 5e6),
-        (Form(JSON, coding="gzip"), 5e6),
-        (Form(CSV), 8e6),
+        (Form(JSON), 1e6),
+        (Form(JSON, coding="gzip"), 2e6),
+        (Form(CSV), 3e6),
         (Form(NPY), 1e5),
         (Form(OCTETS), 1e5),
         (Form(OCTETS, "float32"), 4.1e6),
-        (Form(PLY), 8e6),
+        (Form(PLY), 2e6),
     ],
 )
 def test_large_answers_are_never_there_as_a_whole(form: Form, most: float) -> None:
-    tracemalloc.start()
-    try:
-        size = sum(map(len, encode(LARGE, form).parts))
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    size, peak = size_and_peak(LARGE, form)
     assert size >= 4e6
     assert peak < most
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        table_of_matrix(MILLION.reshape(1000, 1000)),
+        table_of_matrix(MILLION.reshape(2, 500_000)),
+        table_of_matrix(MILLION),
+        table_of_sparse(np.arange(10**6), np.arange(10**6), MILLION),
+    ],
+)
+def test_large_matrices_become_rows_one_after_the_other(table: Table) -> None:
+    size, peak = size_and_peak(Answer({}, table=table), Form(CSV))
+    assert size >= 2e7
+    assert peak < 3e6
+
+
+def size_and_peak(answer: Answer, form: Form) -> tuple[int, int]:
+    """Return how many bytes an answer has, and how many are in memory at most."""
+    tracemalloc.start()
+    try:
+        size = sum(map(len, encode(answer, form).parts))
+        return size, tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
 
 
 def test_members_are_headers_where_they_are_short() -> None:
