@@ -120,7 +120,7 @@ def path(
             found = shortest_path(mesh, first, last, between, explain=explain, **step._asdict())
         else:
             field = approximate_distance(
-                mesh, first, *granted, targets=[last], keep_windows=True, **step._asdict()
+                mesh, first, *granted, targets=[last], keep_paths=True, **step._asdict()
             )
             found = field.path_to(last)
         solved = perf_counter() - start
@@ -171,7 +171,7 @@ def paths(
             field = exact_distance(mesh, start, max_distance, ends, **step._asdict())
         else:
             field = approximate_distance(
-                mesh, start, *granted, max_distance, ends, keep_windows=True, **step._asdict()
+                mesh, start, *granted, max_distance, ends, keep_paths=True, **step._asdict()
             )
         for end in ends:
             try:
@@ -228,16 +228,19 @@ def isolines(
     from geodesic_core import approximate_distance, exact_distance
 
     sources = [point_of(mesh, "--source", written) for written in source]
-    with showing("Drawing isolines") as step:
-        began = perf_counter()
-        options = {**step._asdict(), "keep_windows": True}
+    began = perf_counter()
+    with showing("Computing distances") as step:
+        options = step._asdict()
         if granted is None:
             field = exact_distance(mesh, sources, max_distance, **options)
         else:
-            field = approximate_distance(mesh, sources, *granted, max_distance, **options)
-        levels = level or field.levels(count or 0).tolist()
-        found = field.isolines(levels, chord_error)
-        solved = perf_counter() - began
+            field = approximate_distance(
+                mesh, sources, *granted, max_distance, keep_windows=True, **options
+            )
+    levels = level or field.levels(count or 0).tolist()
+    with showing("Drawing isolines") as step:
+        found = field.isolines(levels, chord_error, **step._asdict())
+    solved = perf_counter() - began
     files.write_file(out, files.ISOLINES[out.suffix.lower()], (field, levels, found))
     _tell_size(mesh)
     for distance, lines in zip(levels, found, strict=True):

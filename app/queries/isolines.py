@@ -24,7 +24,7 @@ from app.queries.costs import (
     sweep_cost,
     typical_edge,
 )
-from app.queries.places import Places, look_up
+from app.queries.places import Places
 from app.queries.query import Grant, Likely, Query
 from app.queries.refusals import Named, refuse_large_json, refuse_more, refuse_places
 from app.queries.sources import described_sources, named_sources, point_count, starts_of
@@ -62,7 +62,7 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         return named_sources(self.request.sources)
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
-        """Sweep once, and draw level after level, as long as they fit into the answer."""
+        """Sweep, and draw level after level, as long as they fit into the answer."""
         chord_error = self._chord_error(opened.mesh)
         field = solve_field(
             opened.solver,
@@ -74,9 +74,9 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         )
         found: list[dict[str, Any]] = []
         values = 0
-        for level in self._levels(field.distances):
-            look_up(grant.cancel)
-            (lines,) = field.isolines([level], chord_error)
+        levels = self._levels(field.distances)
+        drawn = field.each_isoline(levels, chord_error, **grant.options)
+        for level, lines in zip(levels, drawn, strict=True):
             values += _VALUES_OF_LEVEL
             values += _VALUES_OF_POINT * sum(len(line.points) for line in lines)
             refuse_large_json(values, grant.max_values, self.hint)
@@ -91,9 +91,6 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(places) * float(share_within(mesh, request.max_distance)))
-        sweep = sweep_cost(mesh, request, share, isolines=True)
-        lines = self._level_count * share * len(mesh.faces)
-        seconds = sweep.seconds + PER_POINT * len(places) + PER_FACE_AND_LEVEL * lines
         away, _ = straight_to_nearest(mesh, places, None, request.max_distance)
         levels = self._levels(away)
         crossed = [_crossed_faces(mesh, away, level) for level in levels]
@@ -102,6 +99,9 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
             for level, faces in zip(levels, crossed, strict=True)
         ]
         counts = np.array([len(faces) for faces in crossed])
+        sweep = sweep_cost(mesh, request, share, crossed=counts.sum() / len(mesh.faces))
+        lines = self._level_count * share * len(mesh.faces)
+        seconds = sweep.seconds + PER_POINT * len(places) + PER_FACE_AND_LEVEL * lines
         pieces = _pieces(mesh, request, np.array(levels), chord_error)
         times = float(counts @ pieces) / counts.sum() if counts.any() else 1.0
         bound, stats = likely_bound(request), likely_stats(mesh, share)
