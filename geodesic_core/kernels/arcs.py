@@ -276,6 +276,9 @@ def outer_arcs(topology: Any, face: int, regions: Floats, level: float, shortest
                 continue
             intervals[0, 0], intervals[0, 1] = lo, hi
             left = clip_to_region(intervals, arc, region, beyond)
+            if left == 1 and intervals[0, 0] <= lo and intervals[0, 1] >= hi:
+                lo = hi  # all of it: what others hide does not matter
+                break
             hidden = with_room(hidden, hidden_count + left)
             for k in range(left):  # kept in order
                 place = hidden_count
