@@ -36,8 +36,8 @@ PER_SEARCH, PER_FACE_SEARCHED = 0.5e-3, 0.08e-6
 """For a path between two points: each, and for each face of the mesh."""
 PER_WINDOW_KEPT = 50e-9
 """To keep the windows of an exact sweep, for the n√n of n faces: its memory is what takes long."""
-PER_FACE_AND_LEVEL = 1e-6
-"""For the isolines of a level, for each face of the mesh."""
+PER_FACE_CROSSED, PER_WINDOW_CROSSED = 8e-6, 0.2e-6
+"""For each face that an isoline crosses; for √n more, by the windows of an exact sweep."""
 PER_FACE_BLOCKED = 0.4e-6
 """To make a mesh with barriers: for each of its faces."""
 PER_PATH = 0.3e-3

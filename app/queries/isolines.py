@@ -14,8 +14,9 @@ from app.mesh_store import OpenMesh
 from app.queries.accuracy import bound_of, likely_bound, method_of, solve_field, with_its_error
 from app.queries.costs import (
     ARC_IN_FACE,
-    PER_FACE_AND_LEVEL,
+    PER_FACE_CROSSED,
     PER_POINT,
+    PER_WINDOW_CROSSED,
     PIECES_BY_WINDOWS,
     PIECES_IN_FACE,
     Cost,
@@ -100,8 +101,10 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         ]
         counts = np.array([len(faces) for faces in crossed])
         sweep = sweep_cost(mesh, request, share, crossed=counts.sum() / len(mesh.faces))
-        lines = self._level_count * share * len(mesh.faces)
-        seconds = sweep.seconds + PER_POINT * len(places) + PER_FACE_AND_LEVEL * lines
+        per_face = PER_FACE_CROSSED
+        if request.method == "exact":
+            per_face += PER_WINDOW_CROSSED * math.sqrt(share * len(mesh.faces))
+        seconds = sweep.seconds + PER_POINT * len(places) + per_face * float(counts.sum())
         pieces = _pieces(mesh, request, np.array(levels), chord_error)
         times = float(counts @ pieces) / counts.sum() if counts.any() else 1.0
         bound, stats = likely_bound(request), likely_stats(mesh, share)
