@@ -321,7 +321,7 @@ def warm_up() -> None:
     corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     mesh = TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     exact_distance(mesh, 0).path_to(3)
-    approximate_distance(mesh, 0, keep_windows=True).path_to(3)
+    approximate_distance(mesh, 0, keep_paths=True).path_to(3)
     shortest_path(mesh, 0, 3, explain=True)
     mesh.report  # noqa: B018 - computed on access
 
