@@ -98,8 +98,8 @@ def approximate_distance(
     targets: Sequence[Point] = (),
     barriers: Iterable[int] = (),
     *,
-    keep_paths: bool = False,
     keep_windows: bool = False,
+    keep_isolines: bool = False,
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
     deadline_s: float | None = None,
@@ -116,10 +116,10 @@ def approximate_distance(
         for no such bound, if there is an absolute one.
     absolute_error
         The same in mesh units. Where both are given, both hold.
-    keep_paths
+    keep_windows
         Keep what `DistanceField.path_to` and `DistanceField.gradient` need, at most about as much
         as the mesh's own arrays. Else the first of them runs the sweep again.
-    keep_windows
+    keep_isolines
         Keep the windows of all faces, 64 bytes each, and what paths need: then neither those nor
         `DistanceField.isolines` run the sweep again.
     progress, cancel, deadline_s, memory_limit
@@ -152,8 +152,8 @@ def approximate_distance(
         bounds,
         promise,
         control,
-        paths=keep_paths or keep_windows,
-        windows=keep_windows,
+        paths=keep_windows or keep_isolines,
+        windows=keep_isolines,
     )
 
 
@@ -321,7 +321,7 @@ def warm_up() -> None:
     corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     mesh = TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     exact_distance(mesh, 0).path_to(3)
-    approximate_distance(mesh, 0, keep_paths=True).path_to(3)
+    approximate_distance(mesh, 0, keep_windows=True).path_to(3)
     shortest_path(mesh, 0, 3, explain=True)
     mesh.report  # noqa: B018 - computed on access
 

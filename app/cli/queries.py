@@ -120,7 +120,7 @@ def path(
             found = shortest_path(mesh, first, last, between, explain=explain, **step._asdict())
         else:
             field = approximate_distance(
-                mesh, first, *granted, targets=[last], keep_paths=True, **step._asdict()
+                mesh, first, *granted, targets=[last], keep_windows=True, **step._asdict()
             )
             found = field.path_to(last)
         solved = perf_counter() - start
@@ -171,7 +171,7 @@ def paths(
             field = exact_distance(mesh, start, max_distance, ends, **step._asdict())
         else:
             field = approximate_distance(
-                mesh, start, *granted, max_distance, ends, keep_paths=True, **step._asdict()
+                mesh, start, *granted, max_distance, ends, keep_windows=True, **step._asdict()
             )
         for end in ends:
             try:
@@ -235,7 +235,7 @@ def isolines(
             field = exact_distance(mesh, sources, max_distance, **options)
         else:
             field = approximate_distance(
-                mesh, sources, *granted, max_distance, keep_windows=True, **options
+                mesh, sources, *granted, max_distance, keep_isolines=True, **options
             )
     levels = level or field.levels(count or 0).tolist()
     with showing("Drawing isolines") as step:

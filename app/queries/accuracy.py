@@ -50,7 +50,7 @@ def solve_field(
     """
     if request.method == "exact":
         return solver.exact_distance(sources, **options)
-    keep = {"keep_paths": paths, "keep_windows": isolines}
+    keep = {"keep_windows": paths, "keep_isolines": isolines}
     return solver.approximate_distance(sources, **errors_of(request), **keep, **options)
 
 

@@ -12,9 +12,9 @@ from tests.conftest import WITHOUT_JIT
 from tests.core.approximation import MERGING
 
 
-def answer(mesh, source, *, keep_paths=True):
+def answer(mesh, source, *, keep_windows=True):
     """A field, and a few of its paths, as bytes."""
-    field = gc.approximate_distance(mesh, [source, 0], 1e-2, keep_paths=keep_paths)
+    field = gc.approximate_distance(mesh, [source, 0], 1e-2, keep_windows=keep_windows)
     paths = [field.path_to(target).points for target in range(1, len(mesh.vertices), 50)]
     return [array.tobytes() for array in (field.distances, field.nearest_source, *paths)]
 
@@ -25,7 +25,7 @@ def test_two_runs_agree(name):
     meshes = [gc.TriangleMesh(case.vertices, case.faces) for _ in range(2)]
     first = answer(meshes[0], 7)
     assert answer(meshes[0], 7) == answer(meshes[1], 7) == first
-    assert answer(meshes[0], 7, keep_paths=False) == first
+    assert answer(meshes[0], 7, keep_windows=False) == first
 
 
 @pytest.mark.jit
@@ -44,7 +44,7 @@ def test_paths_asked_from_several_threads():
     case = MERGING["dented_ball"]
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     targets = list(range(1, len(case.vertices), 7))
-    kept = gc.approximate_distance(mesh, 0, 1e-2, keep_paths=True)
+    kept = gc.approximate_distance(mesh, 0, 1e-2, keep_windows=True)
     field = gc.approximate_distance(mesh, 0, 1e-2)
     with ThreadPoolExecutor(4) as pool:
         paths = list(pool.map(lambda target: field.path_to(target).points.tobytes(), targets))
@@ -55,7 +55,7 @@ def test_the_mesh_is_not_written_to():
     case = MERGING["islands"]
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     before = {name: array.tobytes() for name, array in mesh.arrays().items()}
-    answer(mesh, 0, keep_paths=False)
+    answer(mesh, 0, keep_windows=False)
     assert before == {name: array.tobytes() for name, array in mesh.arrays().items()}
 
 

@@ -235,7 +235,7 @@ def test_approximate_lines_keep_to_the_error(case):
     mesh, error = mesh_of(case), 0.02
     curve = random_curve(mesh, np.random.default_rng(53))
     for keep in (True, False):
-        field = gc.approximate_distance(mesh, curve, error, keep_windows=keep)
+        field = gc.approximate_distance(mesh, curve, error, keep_isolines=keep)
         levels = some_levels(field, 53, 2)
         for level, lines in zip(levels, field.isolines(levels), strict=True):
             points = [point for line in lines for point in line_points(mesh, line)]

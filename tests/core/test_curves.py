@@ -222,7 +222,7 @@ def test_distances_are_least_over_the_points_of_the_curve(case, error):
     if error is None:
         field = gc.exact_distance(mesh, curve, targets=targets)
     else:
-        field = gc.approximate_distance(mesh, curve, error, targets=targets, keep_paths=True)
+        field = gc.approximate_distance(mesh, curve, error, targets=targets, keep_windows=True)
     for target in targets:
         distance = field.distance_at(target)
         if math.isinf(distance):

@@ -24,7 +24,7 @@ FIELDS = {
     "exact": lambda mesh: gc.exact_distance(mesh, 0),
     "kept": lambda mesh: gc.exact_distance(mesh, 0, keep_windows=True),
     "approximate": lambda mesh: gc.approximate_distance(mesh, 0),
-    "kept approximate": lambda mesh: gc.approximate_distance(mesh, 0, keep_windows=True),
+    "kept approximate": lambda mesh: gc.approximate_distance(mesh, 0, keep_isolines=True),
     "curve": lambda mesh: gc.exact_distance(mesh, CURVE),
     "approximate curve": lambda mesh: gc.approximate_distance(mesh, CURVE),
 }

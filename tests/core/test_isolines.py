@@ -179,7 +179,7 @@ def test_approximate_lines_keep_to_the_error(case):
     (source,) = random_points(mesh, 1, seed=45)
     error = 0.02
     for keep in (True, False):
-        field = gc.approximate_distance(mesh, source, error, keep_windows=keep)
+        field = gc.approximate_distance(mesh, source, error, keep_isolines=keep)
         for level, lines in zip(
             levels := some_levels(field, 45, 2), field.isolines(levels), strict=True
         ):
