@@ -3,21 +3,24 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geodesic_core.arguments import is_index, is_number
 from geodesic_core.arrays import Flags, Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.kernels import isolines as kernels
-from geodesic_core.kernels.isolines import Field
+from geodesic_core.kernels.isolines import Chains, Cuts, Field
 from geodesic_core.kernels.kept import Kept
-from geodesic_core.kernels.topology import LENGTH
-from geodesic_core.kernels.wavefront import FACE
+from geodesic_core.kernels.topology import LENGTH, LENGTH_LEFT, TAIL
+from geodesic_core.kernels.wavefront import FACE, NODE
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nodes import Nodes
 from geodesic_core.path import length_of
-from geodesic_core.tolerances import PIECE
+from geodesic_core.run import Control, in_slices
+from geodesic_core.tolerances import LEVEL, PIECE
 
 CHORD_SHARE = 1e-3
 """Share of the mean edge length that chords may stray from their arcs if nothing else is said."""
@@ -95,42 +98,139 @@ def as_chord_error(mesh: TriangleMesh, chord_error: float | None) -> float:
     return float(chord_error)
 
 
-def find_isolines(
-    mesh: TriangleMesh,
-    kept: Kept,
-    distances: Floats,
-    nodes: Nodes,
-    levels: Sequence[float],
-    chord_error: float,
-) -> list[list[Isoline]]:
-    """Return the lines of each level; ``distances`` are by node.
+def crossed_faces(
+    mesh: TriangleMesh, distances: Floats, max_distance: float, levels: Sequence[float]
+) -> Flags:
+    """Tell which inner faces (F,) some levels may pass, by the exact distances of the vertices.
 
-    O(windows + F), and for each level O(F + n² log n) for n windows in each face that it passes.
+    Within a face no distance differs from that of a corner by more than the way there. Of vertices
+    beyond ``max_distance`` it is known that they are as far as that. O(F log n) for n levels.
     """
-    topology, sites = mesh.topology, nodes.sites
-    site_rows = np.argsort(sites.ints[: nodes.first_target, FACE], kind="stable")
-    piece_rows = np.argsort(sites.piece_ints[:, FACE], kind="stable")
-    field = Field(
-        kept=kept,
-        distance=distances,
-        site_ints=sites.ints[site_rows],
-        site_weights=sites.weights[site_rows],
-        piece_ints=sites.piece_ints[piece_rows],
-        piece_ends=sites.piece_ends[piece_rows],
-        first_piece=nodes.first_piece,
-    )
-    least, most = kernels.face_ranges(topology, field)
-    place = np.full(len(least), -1, np.int32)
-    found = []
-    for level in levels:
-        cuts = kernels.cut_faces(topology, field, least, most, level, place)
-        crossings = kernels.cross_edges(topology, distances, cuts, level, place)
-        place[cuts.faces[:, 0]] = -1
-        chains = kernels.chain_pieces(topology, distances, cuts, crossings, level, chord_error)
-        found.append(
-            _lines(mesh, *kernels.link_chains(topology.links, crossings, chains, PIECE * level))
+    topology = mesh.topology
+    corners = distances[topology.links[:, TAIL]]
+    ways = topology.geometry[:, [LENGTH, LENGTH_LEFT]].max(axis=1)
+    least = (np.minimum(corners, max_distance) - ways).reshape(-1, 3).max(axis=1)
+    most = (corners + ways).reshape(-1, 3).min(axis=1)
+    ordered = np.sort(levels)
+    below = np.searchsorted(ordered, least * (1.0 - PIECE), "left")  # rounding
+    crossed: Flags = np.searchsorted(ordered, most * (1.0 + PIECE), "right") > below
+    return crossed
+
+
+class Drawing:
+    """Draws the lines of a finished sweep, level by level."""
+
+    def __init__(
+        self, mesh: TriangleMesh, kept: Kept, distances: Floats, nodes: Nodes, control: Control
+    ) -> None:
+        """Look up between which distances each face lies: O(windows + F).
+
+        ``distances`` are by node. Raises as `lines` does.
+        """
+        sites = nodes.sites
+        site_rows = np.argsort(sites.ints[: nodes.first_target, FACE], kind="stable")
+        piece_rows = np.argsort(sites.piece_ints[:, FACE], kind="stable")
+        field = Field(
+            kept=kept,
+            distance=distances,
+            site_ints=sites.ints[site_rows],
+            site_weights=sites.weights[site_rows],
+            piece_ints=sites.piece_ints[piece_rows],
+            piece_ends=sites.piece_ends[piece_rows],
+            first_piece=nodes.first_piece,
         )
-    return found
+        count = len(mesh.topology.links) // 3
+        least, most = np.full(count, np.inf), np.full(count, np.inf)
+        self._mesh, self._field, self._least, self._most = mesh, field, least, most
+        self._nbytes = sum(array.nbytes for array in (*kept, least, most))
+        control.grant_memory(self._nbytes)
+
+        def bound(first: int, last: int) -> int:
+            kernels.bound_faces(mesh.topology, field, first, last, least, most)
+            return count
+
+        in_slices(count, bound, control)
+        for inside in (field.site_ints, field.piece_ints):
+            np.minimum.at(least, inside[:, FACE], distances[inside[:, NODE]])
+
+    def lines(self, level: float, chord_error: float, control: Control) -> list[Isoline]:
+        """Return the lines of a level: O(F + n² log n) for n windows in each face that it passes.
+
+        Raises
+        ------
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As the control says; what the lines are drawn from counts as memory of the call.
+        """
+        topology, distances = self._mesh.topology, self._field.distance
+        slack = LEVEL * level
+        passed = np.flatnonzero((self._least <= level + slack) & (self._most >= level - slack))
+        if len(passed) == 0:
+            return []
+        place = np.full(len(self._least), -1, np.int32)
+        control = control.holding(self._nbytes + place.nbytes)
+        cuts = self._cut(passed.astype(np.int32), level, place, control.for_part(0, 2))
+        crossings = kernels.cross_edges(topology, distances, cuts, level, place)
+        held = sum(array.nbytes for array in (*cuts, *crossings))
+        control = control.holding(held).for_part(1, 2)
+        parts: list[_Arrays] = []
+
+        def chain(first: int, last: int) -> int:
+            parts.append(
+                kernels.chain_pieces(
+                    topology, distances, cuts, crossings, level, chord_error, first, last
+                )
+            )
+            control.grant_memory(_bytes_of(parts))
+            return len(cuts.faces)
+
+        in_slices(len(cuts.faces), chain, control)
+        points, points_of, ends, faces = _joined(parts)
+        chains = Chains(points, _starts(points_of), ends, faces)
+        return _lines(
+            self._mesh, *kernels.link_chains(topology.links, crossings, chains, PIECE * level)
+        )
+
+    def _cut(self, passed: Ints, level: float, place: Ints, control: Control) -> Cuts:
+        """Cut the faces that a level may pass: by their bounds, and by what neighbours say.
+
+        ``place`` (F,) is -1 all over, and then tells where among the faces each one is.
+        """
+        place[passed] = np.arange(len(passed))
+        faces = passed[:, None]
+        parts: list[_Arrays] = []
+
+        def cut(first: int, last: int) -> int:
+            nonlocal faces
+            spans, spans_of, arcs, arcs_of, found = kernels.cut_faces(
+                self._mesh.topology, self._field, faces[first:last], len(faces), level, place
+            )
+            parts.append((spans, spans_of, arcs, arcs_of))
+            faces = np.concatenate([faces, found])
+            control.grant_memory(faces.nbytes + _bytes_of(parts))
+            return len(faces)
+
+        in_slices(len(faces), cut, control)
+        spans, spans_of, arcs, arcs_of = _joined(parts)
+        return Cuts(faces, spans, _starts(spans_of), arcs, _starts(arcs_of))
+
+
+_Arrays = Sequence[NDArray[Any]]
+
+
+def _bytes_of(parts: Sequence[_Arrays]) -> int:
+    return sum(array.nbytes for part in parts for array in part)
+
+
+def _joined(parts: Sequence[_Arrays]) -> list[NDArray[Any]]:
+    """Return the first arrays of all parts as one, then the second ones, and so on."""
+    return [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
+
+
+def _starts(counts: NDArray[Any]) -> NDArray[Any]:
+    """Return where each of some runs begins, and the last one ends, from their lengths (n, 1)."""
+    starts = np.zeros((len(counts) + 1, 1), counts.dtype)
+    np.cumsum(counts, axis=0, out=starts[1:])
+    return starts
 
 
 def _lines(

@@ -38,10 +38,16 @@ def find_nearest_source(
     known: Floats,
     bounds: Bounds,
     point: SurfacePoint,
+    control: Control,
 ) -> NearestSource:
     """Return the nearest source of a field with values ``known``, found within ``bounds``.
 
     ``known`` is by inner vertex, with more behind. O(faces in the strip), and O(V + F) for memory.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `run_sweep`.
     """
     nodes = nodes_of(mesh, [(point,)], sources)
     corners, reaches = corners_of(mesh, point)
@@ -54,15 +60,9 @@ def find_nearest_source(
     rest = np.minimum(least, bounds.max_distance)
     goal = goal_at(np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
     wave = wavefront.new_wavefront(mesh.topology, nodes.sites, pruned=True)
-    wave = sweep_nodes(
-        mesh,
-        wave,
-        nodes,
-        np.zeros(1),
-        wavefront.exact_bounds(math.inf, goal),
-        Control(),
-        lambda _: 0.0,
-    )
+    control.grant_memory(wavefront.bytes_of(wave))
+    backward = wavefront.exact_bounds(math.inf, goal)
+    wave = sweep_nodes(mesh, wave, nodes, np.zeros(1), backward, control, lambda _: 0.0)
     totals = wave.distance[nodes.targets] + start_distances
     distance = float(totals.min())
     if distance > bounds.max_distance:

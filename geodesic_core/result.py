@@ -1,28 +1,35 @@
 """What the solvers give back."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import Any
-
-import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.arrival import Arrival, arrival_at, with_target
 from geodesic_core.curve import Curve, Polyline
 from geodesic_core.errors import InternalError, NoPath
 from geodesic_core.gradient import gradient_at_vertices
-from geodesic_core.isolines import Isoline, as_chord_error, as_levels, find_isolines, spaced_levels
+from geodesic_core.isolines import (
+    Drawing,
+    Isoline,
+    as_chord_error,
+    as_levels,
+    crossed_faces,
+    spaced_levels,
+)
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept
-from geodesic_core.kernels.wavefront import Bounds, exact_bounds, with_strips
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest_source import NearestSource, find_nearest_source
 from geodesic_core.nodes import Nodes, component_of, disconnected
+from geodesic_core.once import Once
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, traced_path
+from geodesic_core.run import Control
 from geodesic_core.surface_point import Point, SurfacePoint
 from geodesic_core.tolerances import LEVEL, PATH_LENGTH
+from geodesic_core.whole_sweep import WholeSweep
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,73 +78,100 @@ class DistanceField:
     stats: SweepStats
     _places: tuple[Polyline, ...]
     """The sources' points, canonical"""
-    _bounds: Bounds
-    _nodes: Nodes
+    _sweep: WholeSweep
+    """Where the values come from"""
     _node_of: Mapping[SurfacePoint, int]
     """The nodes of the targets that the sweep was told of"""
     _node_distances: Floats
     """(N,) by node"""
     _node_nearest: Ints
     """(N,) the same of `nearest_source`"""
-    _winners: Winners | None
-    """For backtracing; None where the sweep kept nothing for it."""
+    _winners: Once[Winners]
+    """For backtracing; the sweep may not have kept what that needs."""
     _windows: Kept | None
     """None where they were not kept."""
-    _sweep_again: Callable[[Bounds], tuple[Winners, Kept]]
+    _ways: Once[tuple[Winners, Kept]] | None
+    """Those of an exact sweep, by which any point is found; None where it is searched from."""
 
-    @cached_property
-    def _swept_again(self) -> tuple[Winners, Kept]:
-        return self._sweep_again(self._bounds)
-
-    @property
-    def _known_winners(self) -> Winners:
-        return self._swept_again[0] if self._winners is None else self._winners
-
-    def distance_at(self, point: Point) -> float:
+    def distance_at(
+        self,
+        point: Point,
+        *,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> float:
         """Return the distance of any point of the surface, mesh units; infinite as in `distances`.
 
         At a vertex or a target of the sweep it is what the sweep found, O(1). Elsewhere it is
         exact, also where the field is approximate: by the windows of an exact field that kept them,
         O(windows of the face); else by an exact sweep from the point to the nearest source, in a
         thin strip that the field's own values leave. Where a source is a curve, the first such
-        point runs the sweep again, exactly, and keeps its windows.
+        point runs the sweep again, exactly, and keeps its windows. Sweeps are watched as those of
+        the solvers are: see `Control`.
 
         Raises
         ------
         InvalidPoint
             It is not a point of the mesh.
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As said in `Control`; the field is as good as before.
         """
+        control = Control(progress, cancel, deadline_s, memory_limit)
         place = self.mesh.point(point)
         node = self._node(place)
         if node is not None:
             return float(self._node_distances[node])
-        arrival = self._arrival_at(place)
-        return self._nearest_to(place).distance if arrival is None else arrival.distance
+        if self._ways is None:
+            return self._nearest_to(place, control).distance
+        return self._arrival_at(place, *self._ways.get(control)).distance
 
-    def nearest_source_at(self, point: Point) -> int:
+    def nearest_source_at(
+        self,
+        point: Point,
+        *,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> int:
         """Return the index of the source nearest to any point of the surface; -1 for none.
 
-        Found as `distance_at` finds the distance.
+        Found as `distance_at` finds the distance, and watched as that.
 
         Raises
         ------
         InvalidPoint
             It is not a point of the mesh.
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As said in `Control`; the field is as good as before.
         """
+        control = Control(progress, cancel, deadline_s, memory_limit)
         place = self.mesh.point(point)
         node = self._node(place)
         if node is not None:
             return int(self._node_nearest[node])
-        arrival = self._arrival_at(place)
-        return self._nearest_to(place).source if arrival is None else arrival.source
+        if self._ways is None:
+            return self._nearest_to(place, control).source
+        return self._arrival_at(place, *self._ways.get(control)).source
 
-    def path_to(self, target: Point) -> GeodesicPath:
+    def path_to(
+        self,
+        target: Point,
+        *,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> GeodesicPath:
         """Return a path from the nearest source to any point of the surface (sections 3.5 and 4.3).
 
         Of an exact field its length is the point's distance less the start distance of its source;
         of an approximate one at most the promised error more. O(faces crossed) to a vertex or a
-        target of the sweep. Where an approximate field was not told to keep its windows, the first
-        of those runs the sweep again. To other points as `distance_at` finds their distances.
+        target of the sweep. Where an approximate field was not told to keep what paths need, the
+        first of those runs the sweep again. To other points as `distance_at` finds their distances,
+        and watched as that.
 
         Raises
         ------
@@ -145,23 +179,28 @@ class DistanceField:
             The target is not a point of the mesh.
         NoPath
             It is not connected to a source, or lies beyond ``max_distance``.
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As said in `Control`; the field is as good as before.
         """
+        control = Control(progress, cancel, deadline_s, memory_limit)
         place = self.mesh.point(target, "target")
         node = self._node(place)
         if node is not None:
             if math.isinf(self._node_distances[node]):
                 raise self._no_path(place)
-            return self._traced(place, self._known_winners, self._nodes, node)
-        arrival = self._arrival_at(place)
-        if arrival is not None and self._exact_ways is not None:
-            if arrival.source < 0:
+            return self._traced(place, self._winners.get(control), self._sweep.nodes, node)
+        if self._ways is None:
+            path = self._nearest_to(place, control).path
+            if path is None:
                 raise self._no_path(place)
-            reached = with_target(self.mesh, self._exact_ways[0], self._nodes, place, arrival)
-            return self._traced(place, *reached)
-        path = self._nearest_to(place).path
-        if path is None:
+            return path
+        winners, windows = self._ways.get(control)
+        arrival = self._arrival_at(place, winners, windows)
+        if arrival.source < 0:
             raise self._no_path(place)
-        return path
+        return self._traced(
+            place, *with_target(self.mesh, winners, self._sweep.nodes, place, arrival)
+        )
 
     @cached_property
     def gradient(self) -> Floats:
@@ -169,10 +208,10 @@ class DistanceField:
 
         At each vertex the direction against that in which the shortest path to its nearest source
         sets out; of one of them where several are as short. NaN at sources, and where `distances`
-        is infinite. O(V); of an approximate field that did not keep its windows, after another
-        sweep.
+        is infinite. O(V); of an approximate field that did not keep what paths need, after another
+        sweep, which nobody watches: unless `path_to` has found a path before.
         """
-        return gradient_at_vertices(self.mesh, self._known_winners, self._nodes)
+        return gradient_at_vertices(self.mesh, self._winners.get(Control()), self._sweep.nodes)
 
     def levels(self, count: int) -> Floats:
         """Return levels for `isolines`: evenly spaced between 0 and the largest finite distance.
@@ -187,7 +226,14 @@ class DistanceField:
         return spaced_levels(self.distances, count)
 
     def isolines(
-        self, levels: Sequence[float], chord_error: float | None = None
+        self,
+        levels: Sequence[float],
+        chord_error: float | None = None,
+        *,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
     ) -> list[list[Isoline]]:
         """Return for each level, in their order, the lines of points at that distance.
 
@@ -211,21 +257,65 @@ class DistanceField:
         ------
         InvalidArgument
             A level or the chord error is out of its domain.
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As said in `Control`; the field is as good as before.
 
         Notes
         -----
-        Where the sweep did not keep its windows, the first call runs it again. O(windows), and for
-        each level O(n² log n) for n windows in each face that it passes.
+        Where the sweep did not keep its windows, each call runs it again: of an exact field for
+        the windows of those faces only that the levels may pass. That takes less memory by far than
+        to keep all, and mostly less time. O(windows), and for each level O(n² log n) for n windows
+        in each face that it passes.
         """
-        heights, error = as_levels(levels), as_chord_error(self.mesh, chord_error)
-        windows = self._swept_again[1] if self._windows is None else self._windows
+        control = Control(progress, cancel, deadline_s, memory_limit)
+        return list(
+            self._isolines(as_levels(levels), as_chord_error(self.mesh, chord_error), control)
+        )
+
+    def each_isoline(
+        self,
+        levels: Sequence[float],
+        chord_error: float | None = None,
+        *,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> Iterator[list[Isoline]]:
+        """Yield what `isolines` returns, level by level: each is drawn when it is asked for."""
+        control = Control(progress, cancel, deadline_s, memory_limit)
+        return self._isolines(as_levels(levels), as_chord_error(self.mesh, chord_error), control)
+
+    def _isolines(
+        self, levels: Sequence[float], chord_error: float, control: Control
+    ) -> Iterator[list[Isoline]]:
         # At its very limit the sweep is cut off by rounding: a line stays clear of that.
         highest = self.max_distance * (1.0 - 3.0 * LEVEL)
-        within = [min(level, highest) for level in heights if level <= self.max_distance]
-        lines = iter(
-            find_isolines(self.mesh, windows, self._node_distances, self._nodes, within, error)
+        within = [min(level, highest) for level in levels if level <= self.max_distance]
+        if not within:
+            yield from ([] for _ in levels)
+            return
+        windows = self._windows
+        if windows is None:
+            windows = self._windows_at(within, control.for_part(0, 2))
+            control = control.for_part(1, 2)
+        parts = 1 + len(levels)
+        drawing = Drawing(
+            self.mesh, windows, self._node_distances, self._sweep.nodes, control.for_part(0, parts)
         )
-        return [next(lines) if level <= self.max_distance else [] for level in heights]
+        for i, level in enumerate(levels):
+            part = control.for_part(1 + i, parts)
+            reached = level <= self.max_distance
+            yield drawing.lines(min(level, highest), chord_error, part) if reached else []
+        if control.progress is not None:
+            control.progress(1.0)
+
+    def _windows_at(self, levels: Sequence[float], control: Control) -> Kept:
+        """Return the windows of all faces that some levels may pass."""
+        if self._sweep.bounds.merging:
+            return self._sweep.find_windows(self._sweep.all_faces, control)
+        faces = crossed_faces(self.mesh, self._node_distances, self.max_distance, levels)
+        return self._sweep.find_windows(faces, control)
 
     def _traced(
         self, place: SurfacePoint, winners: Winners, nodes: Nodes, node: int
@@ -251,31 +341,21 @@ class DistanceField:
             return int(self.mesh.topology.inner_vertex[place.vertex_index])
         return self._node_of.get(place)
 
-    @cached_property
-    def _exact_ways(self) -> tuple[Winners, Kept] | None:
-        """The windows of an exact sweep; None where they were not kept, and need not be."""
-        if self._windows is not None and not self._bounds.merging:
-            return self._known_winners, self._windows
-        if self._bounds.strips:  # a sweep back from a point ends at points, not on curves
-            exact = exact_bounds(self.max_distance)
-            return self._sweep_again(with_strips(exact, self._bounds.first_piece))
-        return None
+    def _arrival_at(self, place: SurfacePoint, winners: Winners, windows: Kept) -> Arrival:
+        """Return how windows reach a point."""
+        nodes = self._sweep.nodes
+        return arrival_at(self.mesh, winners, windows, nodes, place, self.max_distance)
 
-    def _arrival_at(self, place: SurfacePoint) -> Arrival | None:
-        """How kept windows reach a point; None where there are none, or they are merged ones."""
-        if self._exact_ways is None:
-            return None
-        return arrival_at(self.mesh, *self._exact_ways, self._nodes, place, self.max_distance)
-
-    def _nearest_to(self, place: SurfacePoint) -> NearestSource:
-        starts = np.array([source.start_distance for source in self.sources])
+    def _nearest_to(self, place: SurfacePoint, control: Control) -> NearestSource:
+        sweep, starts = self._sweep, [line[0] for line in self._places]
         return find_nearest_source(
             self.mesh,
-            [line[0] for line in self._places],
             starts,
+            sweep.start_distances,
             self._node_distances,
-            self._bounds,
+            sweep.bounds,
             place,
+            control,
         )
 
     def _no_path(self, place: SurfacePoint) -> NoPath:

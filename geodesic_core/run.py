@@ -32,9 +32,11 @@ from geodesic_core.nodes import Nodes
 from geodesic_core.tolerances import RUNS
 
 SLICE_SECONDS = 0.05
-"""About how long the sweep runs before it looks up: what cancelling takes, at most."""
+"""About how long a call computes before it looks up: what cancelling takes, at most."""
 
 _FIRST_BUDGET = 1_000_000
+
+_FIRST_ITEMS = 256
 
 _FIRST_LIMITED_BUDGET = 10_000
 _LIMITED_GROWTH = 1.25
@@ -171,6 +173,27 @@ def run_sweep(
         wave = grown(wave)
         control.grant_memory(wavefront.bytes_of(wave))
     return wave
+
+
+def in_slices(count: int, work: Callable[[int, int], int], control: Control) -> None:
+    """Do ``work`` on all of some items, from a first up to a last of them at a time.
+
+    It returns how many there are by then: there may be more than at first.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded
+        As the control says, which is asked before each slice.
+    """
+    done, size, shown = 0, _FIRST_ITEMS, 0.0
+    while done < count:
+        shown = max(shown, done / count)
+        control.look_up(shown)
+        last = min(done + size, count)
+        began = time.perf_counter()
+        count = work(done, last)
+        took = time.perf_counter() - began
+        done, size = last, max(int(size * min(max(SLICE_SECONDS / took, 0.5), 2.0)), 1)
 
 
 def winners_of(wave: Wavefront, nearest: Ints) -> Winners:

@@ -4,7 +4,6 @@ import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -15,21 +14,23 @@ from geodesic_core.arguments import as_barriers, as_limit, is_number
 from geodesic_core.arrays import Floats
 from geodesic_core.curve import Curve, Polyline, polyline_of
 from geodesic_core.errors import InvalidArgument, InvalidPoint
-from geodesic_core.kernels import kept, sweep, wavefront
+from geodesic_core.kernels import kept, wavefront
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept
 from geodesic_core.kernels.wavefront import Bounds, Wavefront, with_strips
 from geodesic_core.matrix import Layout, find_matrix
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest import Nearest, find_nearest
-from geodesic_core.nodes import Nodes, component_of, disconnected, nodes_of
+from geodesic_core.nodes import component_of, disconnected, nodes_of
+from geodesic_core.once import Once
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, joined
 from geodesic_core.path_search import PathSearch
 from geodesic_core.result import DistanceField, Source, Sources, SweepStats
-from geodesic_core.run import Control, share_of_vertices, sweep_nodes, winners_of
+from geodesic_core.run import Control
 from geodesic_core.surface_point import Point, SurfacePoint
 from geodesic_core.sweeper import Sweeper
 from geodesic_core.tolerances import WIDEST_ERROR
+from geodesic_core.whole_sweep import WholeSweep, all_winners, peak_bytes
 
 
 def exact_distance(
@@ -65,7 +66,8 @@ def exact_distance(
     keep_windows
         Keep the windows of all faces, 64 bytes each: then `DistanceField.distance_at` and
         `DistanceField.path_to` find any point by those of its face, without a search, and
-        `DistanceField.isolines` does not run the sweep again.
+        `DistanceField.isolines` does not run the sweep again. On large meshes to keep them takes
+        longer than the sweep.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
@@ -97,6 +99,7 @@ def approximate_distance(
     barriers: Iterable[int] = (),
     *,
     keep_windows: bool = False,
+    keep_isolines: bool = False,
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
     deadline_s: float | None = None,
@@ -114,8 +117,11 @@ def approximate_distance(
     absolute_error
         The same in mesh units. Where both are given, both hold.
     keep_windows
-        Keep what `DistanceField.path_to` needs, at most about as much as the mesh's own arrays.
-        Else the first path runs the sweep again; so do the first isolines in any case.
+        Keep what `DistanceField.path_to` and `DistanceField.gradient` need, at most about as much
+        as the mesh's own arrays. Else the first of them runs the sweep again.
+    keep_isolines
+        Keep the windows of all faces, 64 bytes each, and what paths need: then neither those nor
+        `DistanceField.isolines` run the sweep again.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
@@ -146,8 +152,8 @@ def approximate_distance(
         bounds,
         promise,
         control,
-        paths=keep_windows,
-        windows=False,
+        paths=keep_windows or keep_isolines,
+        windows=keep_isolines,
     )
 
 
@@ -350,12 +356,10 @@ def _solve(
     distances = np.array([start.start_distance for start in starts])
     if nodes.pieces:
         bounds = with_strips(bounds, nodes.first_piece)
-    wave = _sweep(mesh, nodes, distances, bounds, control, paths=paths, windows=windows)
-    wave.distance[wave.distance > bounds.max_distance] = math.inf
-    winners = _winners_of(wave)
-    peak = wavefront.bytes_of(wave) + (kept.bytes_of(wave) if windows else 0)
-    control.grant_memory(peak)
-    inner = mesh.topology.inner_vertex
+    sweep = WholeSweep(mesh, nodes, distances, bounds)
+    wave = sweep.run(control, paths=paths, windows=sweep.all_faces if windows else None)
+    winners, inner = all_winners(wave), mesh.topology.inner_vertex
+    windows_kept = kept.kept_of(wave) if windows else None
     return DistanceField(
         mesh=mesh,
         sources=starts,
@@ -363,59 +367,32 @@ def _solve(
         distances=wave.distance[inner],
         nearest_source=winners.nearest[inner],
         error_bound=promise,
-        stats=_stats(mesh, wave, peak, time.perf_counter() - control.began),
+        stats=_stats(mesh, wave, time.perf_counter() - control.began),
         _places=places,
-        _bounds=bounds,
-        _nodes=nodes,
+        _sweep=sweep,
         _node_of=dict(zip(ends, nodes.targets.tolist(), strict=True)),
         _node_distances=wave.distance,
         _node_nearest=winners.nearest,
-        _winners=winners if paths else None,
-        _windows=kept.kept_of(wave) if windows else None,
-        _sweep_again=partial(_sweep_again, mesh, nodes, distances),
+        _winners=Once(sweep.find_winners, winners if paths else None),
+        _windows=windows_kept,
+        _ways=_ways_of(sweep, winners, windows_kept),
     )
 
 
-def _sweep_again(
-    mesh: TriangleMesh, nodes: Nodes, start_distances: Floats, bounds: Bounds
-) -> tuple[Winners, Kept]:
-    """Sweep again, and keep all that there is: sweeps are the same to the bit."""
-    wave = _sweep(mesh, nodes, start_distances, bounds, Control(), paths=True, windows=True)
-    wave.distance[wave.distance > bounds.max_distance] = math.inf
-    return _winners_of(wave), kept.kept_of(wave)
+def _ways_of(
+    sweep: WholeSweep, winners: Winners, windows: Kept | None
+) -> Once[tuple[Winners, Kept]] | None:
+    """Return by which windows any point is found exactly; None where they need not be kept."""
+    bounds = sweep.bounds
+    if windows is not None and not bounds.merging:
+        return Once(sweep.find_ways, (winners, windows))
+    if bounds.strips:  # a sweep back from a point ends at points, not on curves
+        exact = with_strips(wavefront.exact_bounds(bounds.max_distance), bounds.first_piece)
+        return Once(replace(sweep, bounds=exact).find_ways)
+    return None
 
 
-def _winners_of(wave: Wavefront) -> Winners:
-    nearest = sweep.nearest_sources(wave.distance, wave.winner_ints, wave.origin)
-    found = winners_of(wave, nearest)
-    # What was recorded of merges is kept, not the room for more.
-    return found._replace(merges=found.merges.copy(), merge_ints=found.merge_ints.copy())
-
-
-def _sweep(
-    mesh: TriangleMesh,
-    nodes: Nodes,
-    start_distances: Floats,
-    bounds: Bounds,
-    control: Control,
-    *,
-    paths: bool,
-    windows: bool,
-) -> Wavefront:
-    merges = bool(bounds.merging)
-    wave = wavefront.new_wavefront(
-        mesh.topology, nodes.sites, merges=merges, paths=merges and paths, windows=windows
-    )
-    control.grant_memory(wavefront.bytes_of(wave))
-    reachable = int(np.isin(mesh.components, nodes.components).sum())
-    share = share_of_vertices(reachable, bounds.max_distance)
-    wave = sweep_nodes(mesh, wave, nodes, start_distances, bounds, control, share)
-    if control.progress is not None:
-        control.progress(1.0)
-    return wave
-
-
-def _stats(mesh: TriangleMesh, wave: Wavefront, peak: int, seconds: float) -> SweepStats:
+def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
     created = int(wave.counters[wavefront.CREATED])
     kept = int(wave.counters[wavefront.KEPT])
     return SweepStats(
@@ -424,7 +401,7 @@ def _stats(mesh: TriangleMesh, wave: Wavefront, peak: int, seconds: float) -> Sw
         windows_peak=int(wave.counters[wavefront.PEAK]),
         windows_per_edge_created=created / mesh.edge_count,
         windows_per_edge_kept=kept / mesh.edge_count,
-        peak_bytes=peak,
+        peak_bytes=peak_bytes(wave),
         seconds=seconds,
     )
 

@@ -427,7 +427,7 @@ def test_approximate_paths_report_their_own_bounds(run: Run, knot: Path) -> None
     errors = ["--method", "approximate", "--relative-error", 0.05]
     targets = point_options("--target", 700, 20)
     ran = run("paths", knot, "--source", 3, *targets, *errors, "--out", "p.json")
-    field = gc.approximate_distance(gc.load_mesh(knot), 3, 0.05, keep_windows=True)
+    field = gc.approximate_distance(gc.load_mesh(knot), 3, 0.05, keep_isolines=True)
     assert ran.code == 0
     for found, target in zip(
         json.loads(Path("p.json").read_text())["paths"], (700, 20), strict=True
@@ -858,15 +858,28 @@ def test_help_needs_no_numbers() -> None:
 
 
 def test_serve_runs_the_application(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    called: dict[str, Any] = {}
-    monkeypatch.setattr(uvicorn, "run", lambda app, **options: called.update(app=app, **options))
+    monkeypatch.setenv("GEODESIC_DRAIN_S", "7.5")
+    served: list[uvicorn.Config] = []
+
+    def note(server: uvicorn.Server) -> None:
+        served.append(server.config)
+        server.started = True
+
+    monkeypatch.setattr(uvicorn.Server, "run", note)
     assert run("serve", "--host", "127.0.0.9", "--port", 8123).code == 0
-    assert isinstance(called["app"], FastAPI)
-    assert (called["host"], called["port"]) == ("127.0.0.9", 8123)
+    (config,) = served
+    assert isinstance(config.app, FastAPI)
+    assert (config.host, config.port) == ("127.0.0.9", 8123)
+    assert config.timeout_graceful_shutdown == 8
+
+
+def test_a_service_that_cannot_start_fails(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uvicorn.Server, "run", lambda _: None)
+    assert run("serve").code == 1
 
 
 def test_serve_refuses_wrong_settings(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(uvicorn, "run", lambda *_, **__: pytest.fail("must not start"))
+    monkeypatch.setattr(uvicorn.Server, "run", lambda _: pytest.fail("must not start"))
     monkeypatch.setenv("GEODESIC_WORKERS", "none")
     ran = run("serve")
     assert ran.code == 2

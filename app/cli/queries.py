@@ -232,16 +232,19 @@ def isolines(
     from geodesic_core import approximate_distance, exact_distance
 
     sources = [point_of(mesh, "--source", written) for written in source]
-    with showing("Drawing isolines") as step:
-        began = perf_counter()
-        options = {**step._asdict(), "keep_windows": True}
+    began = perf_counter()
+    with showing("Computing distances") as step:
+        options = step._asdict()
         if granted is None:
             field = exact_distance(mesh, sources, max_distance, **options)
         else:
-            field = approximate_distance(mesh, sources, *granted, max_distance, **options)
-        levels = level or field.levels(count or 0).tolist()
-        found = field.isolines(levels, chord_error)
-        solved = perf_counter() - began
+            field = approximate_distance(
+                mesh, sources, *granted, max_distance, keep_isolines=True, **options
+            )
+    levels = level or field.levels(count or 0).tolist()
+    with showing("Drawing isolines") as step:
+        found = field.isolines(levels, chord_error, **step._asdict())
+    solved = perf_counter() - began
     files.write_answer(out, answers.of_isolines(field, levels, found))
     _tell_size(mesh)
     for distance, lines in zip(levels, found, strict=True):

@@ -44,12 +44,14 @@ def solve_field(
 ) -> gc.DistanceField:
     """Return the field of distances from some sources, as exact as it has to be.
 
-    It keeps what ``paths`` or ``isolines`` need, where it can: exact fields keep what paths need
-    anyway, approximate ones run again for isolines.
+    Approximate ones keep what ``paths`` or ``isolines`` need. Exact ones keep the first anyway, and
+    sweep again for the second: their windows are so many that it takes less time and memory to find
+    those that the levels need.
     """
     if request.method == "exact":
-        return solver.exact_distance(sources, keep_windows=isolines, **options)
-    return solver.approximate_distance(sources, **errors_of(request), keep_windows=paths, **options)
+        return solver.exact_distance(sources, **options)
+    keep = {"keep_windows": paths, "keep_isolines": isolines}
+    return solver.approximate_distance(sources, **errors_of(request), **keep, **options)
 
 
 def method_of(request: schemas.Accuracy) -> dict[str, Any]:

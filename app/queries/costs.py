@@ -36,9 +36,9 @@ PER_FACE_UNSWEPT = 0.03e-6
 PER_SEARCH, PER_FACE_SEARCHED = 0.5e-3, 0.08e-6
 """For a path between two points: each, and for each face of the mesh."""
 PER_WINDOW_KEPT = 50e-9
-"""To keep the windows of an exact sweep, for the n√n of n faces."""
-PER_FACE_AND_LEVEL = 1e-6
-"""For the isolines of a level, for each face of the mesh."""
+"""To keep the windows of an exact sweep, for the n√n of n faces: its memory is what takes long."""
+PER_FACE_CROSSED, PER_WINDOW_CROSSED = 8e-6, 0.2e-6
+"""For each face that an isoline crosses; for √n more, by the windows of an exact sweep."""
 PER_FACE_BLOCKED = 0.4e-6
 """To make a mesh with barriers: for each of its faces."""
 PER_PATH = 0.3e-3
@@ -49,10 +49,16 @@ SWEEP_BYTES, SWEEP_BYTES_PER_FACE = 82_000, 100
 MERGING_BYTES_PER_FACE = 120
 TRACING_BYTES_PER_FACE, KEEPING_BYTES_PER_FACE = 170, 600
 """Of an approximate sweep, where it keeps what paths need, and where it keeps its windows."""
+KEEPING_BYTES = 260_000
+"""Room for the first windows that are kept."""
 BYTES_OF_WINDOWS_KEPT = 30
-"""Of an exact sweep that keeps its windows, for the n√n of n faces."""
+"""Of those of an exact sweep, for the n√n of n faces."""
+FACES_KEPT = 1.5
+"""Faces whose windows isolines need, for each that a level crosses."""
 SEARCH_BYTES, SEARCH_BYTES_PER_FACE = 230_000, 275
 
+FACES_ON_LEVEL = 4.0
+"""Faces that an isoline crosses, for the √n of n faces, about: as the longest circles of a ball do"""
 CROSSINGS = 2.3
 """Edges that a path crosses over the length of one."""
 ARC_IN_FACE = 0.45
@@ -75,21 +81,24 @@ def sweep_cost(
     share: float = 1.0,
     *,
     paths: bool = False,
-    isolines: bool = False,
+    crossed: float | None = None,
 ) -> Cost:
-    """Return the cost of one sweep over a share of so many faces, and of what it keeps."""
+    """Return the cost of a sweep over a share of so many faces, and of what it keeps.
+
+    ``crossed`` is the share of the faces that isolines cross; None where there are to be none.
+    """
     memory = SWEEP_BYTES
     if request.method == "exact":
         seconds = _sweep_seconds(share * faces)
         memory += SWEEP_BYTES_PER_FACE * faces
-        if isolines:
-            seconds += PER_WINDOW_KEPT * (share * faces) ** 1.5
-            memory += round(BYTES_OF_WINDOWS_KEPT * (share * faces) ** 1.5)
+        if crossed is not None:  # it runs a second time, and keeps the windows of those faces then
+            windows = min(FACES_KEPT * crossed, share) * faces * math.sqrt(share * faces)
+            seconds += seconds + PER_WINDOW_KEPT * windows
+            memory += KEEPING_BYTES + round(BYTES_OF_WINDOWS_KEPT * windows)
     else:
         seconds = PER_SWEEP + PER_FACE_MERGED * share * faces
-        if isolines:  # it runs a second time, and keeps its windows then
-            seconds *= 2.0
-            memory += KEEPING_BYTES_PER_FACE * faces
+        if crossed is not None:
+            memory += KEEPING_BYTES + KEEPING_BYTES_PER_FACE * faces
         else:
             memory += (TRACING_BYTES_PER_FACE if paths else MERGING_BYTES_PER_FACE) * faces
     return Cost(seconds + PER_FACE_UNSWEPT * faces, memory)

@@ -14,8 +14,10 @@ from app.mesh_store import OpenMesh
 from app.queries.accuracy import bound_of, likely_bound, method_of, solve_field, with_its_error
 from app.queries.costs import (
     ARC_IN_FACE,
-    PER_FACE_AND_LEVEL,
+    FACES_ON_LEVEL,
+    PER_FACE_CROSSED,
     PER_POINT,
+    PER_WINDOW_CROSSED,
     PIECES_BY_WINDOWS,
     PIECES_IN_FACE,
     Cost,
@@ -25,7 +27,7 @@ from app.queries.costs import (
     sweep_cost,
     typical_edge,
 )
-from app.queries.places import Places, look_up
+from app.queries.places import Places
 from app.queries.query import Grant, Likely, Query
 from app.queries.refusals import MeshSize, Named, refuse_large_json, refuse_more, refuse_places
 from app.queries.sources import described_sources, named_sources, point_count, starts_of
@@ -68,11 +70,12 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         """Return the cost of a sweep to the limit, and of the lines."""
         request = self.request
         share = rough_share(size, point_count(*request.sources), request.max_distance)
-        lines = PER_FACE_AND_LEVEL * self._level_count * share * size.faces
-        return sweep_cost(size.faces, request, share, isolines=True).seconds + lines
+        crossed = min(1.0, self._level_count * FACES_ON_LEVEL / math.sqrt(size.faces)) * share
+        sweep = sweep_cost(size.faces, request, share, crossed=crossed)
+        return sweep.seconds + PER_FACE_CROSSED * crossed * size.faces
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
-        """Sweep once, and draw level after level, as long as they fit into the answer."""
+        """Sweep, and draw level after level, as long as they fit into the answer."""
         chord_error = self._chord_error(opened.mesh)
         field = solve_field(
             opened.solver,
@@ -80,13 +83,13 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
             starts_of(opened.mesh, self.request.sources, places),
             isolines=True,
             max_distance=self.request.max_distance,
-            **grant.options,
+            **grant.part(0, 2).options,
         )
         found: list[dict[str, Any]] = []
         values = 0
-        for level in self._levels(field.distances):
-            look_up(grant.cancel)
-            (lines,) = field.isolines([level], chord_error)
+        levels = self._levels(field.distances)
+        drawn = field.each_isoline(levels, chord_error, **grant.part(1, 2).options)
+        for level, lines in zip(levels, drawn, strict=True):
             values += _VALUES_OF_LEVEL
             values += _VALUES_OF_POINT * sum(len(line.points) for line in lines)
             refuse_large_json(values, grant.max_values, self.hint)
@@ -101,9 +104,6 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(places) * float(share_within(mesh, request.max_distance)))
-        sweep = sweep_cost(len(mesh.faces), request, share, isolines=True)
-        lines = self._level_count * share * len(mesh.faces)
-        seconds = sweep.seconds + PER_POINT * len(places) + PER_FACE_AND_LEVEL * lines
         away, _ = straight_to_nearest(mesh, places, None, request.max_distance)
         levels = self._levels(away)
         crossed = [_crossed_faces(mesh, away, level) for level in levels]
@@ -112,6 +112,11 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
             for level, faces in zip(levels, crossed, strict=True)
         ]
         counts = np.array([len(faces) for faces in crossed])
+        sweep = sweep_cost(len(mesh.faces), request, share, crossed=counts.sum() / len(mesh.faces))
+        per_face = PER_FACE_CROSSED
+        if request.method == "exact":
+            per_face += PER_WINDOW_CROSSED * math.sqrt(share * len(mesh.faces))
+        seconds = sweep.seconds + PER_POINT * len(places) + per_face * float(counts.sum())
         pieces = _pieces(mesh, request, np.array(levels), chord_error)
         times = float(counts @ pieces) / counts.sum() if counts.any() else 1.0
         bound, stats = likely_bound(request), likely_stats(mesh, share)

@@ -3,7 +3,7 @@
 import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any, ClassVar, Generic, Self, TypeVar
 from uuid import uuid4
@@ -46,6 +46,10 @@ class Grant:
     memory_limit: int
     max_values: int
     """Most values of the answer, where it is written as JSON."""
+
+    def part(self, part: int, parts: int) -> "Grant":
+        """Return the grant of one of several calls, of about the same length, for one answer."""
+        return replace(self, progress=lambda share: self.progress((part + share) / parts))
 
     @property
     def options(self) -> dict[str, Any]:

@@ -268,12 +268,17 @@ def outer_arcs(topology: Any, face: int, regions: Floats, level: float, shortest
         arc, owner, hidden_count = arcs[a], owners[a, 0], 0
         lo, hi, chord = arc[FROM], arc[TO], chord_of(arc)
         for j in range(len(regions)):
+            if j == owner:
+                continue
             region = regions[j]
             beyond = slack if yields_to(arc, owner, region, j) else -slack
-            if j == owner or is_apart(chord, region, beyond):
+            if is_apart(chord, region, beyond):
                 continue
             intervals[0, 0], intervals[0, 1] = lo, hi
             left = clip_to_region(intervals, arc, region, beyond)
+            if left == 1 and intervals[0, 0] <= lo and intervals[0, 1] >= hi:
+                lo = hi  # all of it: what others hide does not matter
+                break
             hidden = with_room(hidden, hidden_count + left)
             for k in range(left):  # kept in order
                 place = hidden_count

@@ -27,7 +27,6 @@ from geodesic_core.kernels.topology import (
     half_edge_in_face,
     next_around,
 )
-from geodesic_core.kernels.wavefront import FACE, NODE
 from geodesic_core.kernels.window import B0, B1, ROOT, SIGMA, SX, SY, distance_at
 from geodesic_core.tolerances import CROSSING, LEVEL, PIECE
 
@@ -92,13 +91,16 @@ class Chains(NamedTuple):
 
 
 @kernel
-def face_ranges(topology: Any, field: Any) -> tuple[Floats, Floats]:
-    """Return a lower and an upper bound (F,) of the distances in each face; O(windows + F)."""
+def bound_faces(
+    topology: Any, field: Any, first: int, last: int, least: Floats, most: Floats
+) -> None:
+    """Lower bounds (F,) of the distances in some faces in a row to what windows and corners say.
+
+    ``most`` (F,) to upper ones. Points and pieces inside are left to the caller. O(their windows).
+    """
     geometry, kept = topology.geometry, field.kept
-    count = len(topology.links) // 3
-    least, most = np.full(count, np.inf), np.full(count, np.inf)
     ints = kept.windows.view(np.int32)
-    for face in range(count):
+    for face in range(first, last):
         for h in range(3 * face, 3 * face + 3):
             for i in range(kept.first[h], kept.first[h + 1]):
                 w = kept.windows[i]
@@ -110,35 +112,27 @@ def face_ranges(topology: Any, field: Any) -> tuple[Floats, Floats]:
             corner = field.distance[topology.links[h, TAIL]]
             farthest = max(geometry[h, LENGTH], geometry[h, LENGTH_LEFT])
             least[face], most[face] = min(least[face], corner), min(most[face], corner + farthest)
-    for inside in (field.site_ints, field.piece_ints):
-        for k in range(len(inside)):
-            face = inside[k, FACE]
-            least[face] = min(least[face], field.distance[inside[k, NODE]])
-    return least, most
 
 
 @kernel
 def cut_faces(
-    topology: Any, field: Any, least: Floats, most: Floats, level: float, place: Ints
-) -> Cuts:
-    """Cut all faces that a level may pass: by their bounds, or by what a neighbour says.
+    topology: Any, field: Any, faces: Ints, known: int, level: float, place: Ints
+) -> tuple[Floats, Ints, Floats, Ints, Ints]:
+    """Cut some (n, 1) of the faces that a level may pass.
 
-    ``place`` (F,) is -1 all over, and then tells where among the faces each one is.
+    Returns their spans and arcs, each as `Cuts` has them, followed by how many there are of each
+    half-edge and of each face; then the faces that the level may pass as well, as these say.
+    ``place`` (F,) tells where among all faces each one is, -1 for none; ``known`` is how many there
+    are, and those that are found come after them.
     """
     links, geometry = topology.links, topology.geometry
     slack, shortest = LEVEL * level, PIECE * level
-    faces, count = np.empty((64, 1), np.int32), 0
-    for f in range(len(least)):
-        if least[f] <= level + slack and most[f] >= level - slack:
-            faces = with_room(faces, count + 1)
-            faces[count, 0], place[f] = f, count
-            count += 1
     spans, span_count = np.empty((64, 2)), 0
     arcs, arc_count = np.empty((64, ARC)), 0
-    first_span = np.zeros((3 * count + 1, 1), np.int32)
-    first_arc = np.zeros((count + 1, 1), np.int32)
-    k = 0
-    while k < count:
+    spans_of = np.empty((3 * len(faces), 1), np.int32)
+    arcs_of = np.empty((len(faces), 1), np.int32)
+    found, count = np.empty((64, 1), np.int32), 0
+    for k in range(len(faces)):
         f = faces[k, 0]
         regions = regions_of_face(topology, field, f, level)
         outer = outer_arcs(topology, f, regions, level, shortest)
@@ -147,9 +141,7 @@ def cut_faces(
             for column in range(ARC):
                 arcs[arc_count, column] = outer[i, column]
             arc_count += 1
-        first_arc = with_room(first_arc, k + 2)
-        first_arc[k + 1, 0] = arc_count
-        first_span = with_room(first_span, 3 * k + 4)
+        arcs_of[k, 0] = len(outer)
         for h in range(3 * f, 3 * f + 3):
             ox, oy, ux, uy = half_edge_in_face(geometry, h)
             length, begin = geometry[h, LENGTH], span_count
@@ -162,23 +154,16 @@ def cut_faces(
                     spans[span_count, 0], spans[span_count, 1] = lo, hi
                     span_count += 1
             span_count = begin + united(spans[begin:span_count], CROSSING * length)
-            first_span[3 * k + 3 - (3 * f + 2 - h), 0] = span_count
+            spans_of[3 * (k - f) + h, 0] = span_count - begin
             whole = span_count == begin + 1 and spans[begin, 0] <= 0.0 and spans[begin, 1] >= length
             g = -1 if whole or span_count == begin else next_around(links, h)
             while g >= 0 and g != h:
                 if place[g // 3] < 0:
-                    faces = with_room(faces, count + 1)
-                    faces[count, 0], place[g // 3] = g // 3, count
+                    found = with_room(found, count + 1)
+                    found[count, 0], place[g // 3] = g // 3, known + count
                     count += 1
                 g = next_around(links, g)
-        k += 1
-    return Cuts(
-        faces[:count],
-        spans[:span_count],
-        first_span[: 3 * count + 1],
-        arcs[:arc_count],
-        first_arc[: count + 1],
-    )
+    return spans[:span_count], spans_of, arcs[:arc_count], arcs_of, found[:count]
 
 
 @kernel
@@ -390,13 +375,24 @@ def put_crossing(topology: Any, crossings: Any, c: int, points: Floats, count: i
 
 @kernel
 def chain_pieces(
-    topology: Any, distance: Floats, cuts: Any, crossings: Any, level: float, chord_error: float
-) -> Chains:
-    """Join the pieces of each face: O(n²) for n pieces in a face."""
+    topology: Any,
+    distance: Floats,
+    cuts: Any,
+    crossings: Any,
+    level: float,
+    chord_error: float,
+    first: int,
+    last: int,
+) -> tuple[Floats, Longs, Ints, Ints]:
+    """Join the pieces of each of the cut faces from the first up to the last.
+
+    Returns the chains, as `Chains` has them, with the number of points of each. O(n²) for n pieces
+    in a face.
+    """
     points, count = np.empty((256, 3)), 0
-    first, ends = np.zeros((64, 1), np.int64), np.empty((64, 2), np.int32)
+    points_of, ends = np.empty((64, 1), np.int64), np.empty((64, 2), np.int32)
     faces, chains = np.empty((64, 1), np.int32), 0
-    for k in range(len(cuts.faces)):
+    for k in range(first, last):
         face = cuts.faces[k, 0]
         end_places, end_ids, start_places, start_ids = ends_of_face(
             topology, distance, cuts, crossings, k, level
@@ -410,7 +406,7 @@ def chain_pieces(
             e = arcs + i if i < len(end_ids) - arcs else i - (len(end_ids) - arcs)
             if e < arcs and done[e]:
                 continue
-            first = with_room(first, chains + 2)
+            points_of = with_room(points_of, chains + 1)
             ends, faces = with_room(ends, chains + 1), with_room(faces, chains + 1)
             faces[chains, 0], ends[chains, 0], ends[chains, 1] = face, -1, -1
             begin, s = count, e
@@ -432,9 +428,9 @@ def chain_pieces(
                 for axis in range(3):
                     points[count, axis] = points[begin, axis]
                 count += 1
+            points_of[chains, 0] = count - begin
             chains += 1
-            first[chains, 0] = count
-    return Chains(points[:count], first[: chains + 1], ends[:chains], faces[:chains])
+    return points[:count], points_of[:chains], ends[:chains], faces[:chains]
 
 
 @kernel

@@ -18,7 +18,7 @@ from geodesic_core.kernels.jit import kernel, pointer
 from geodesic_core.kernels.pieces import distance_to_piece, is_piece
 from geodesic_core.kernels.sites import way_through
 from geodesic_core.kernels.topology import LENGTH, TAIL, point_in_frame
-from geodesic_core.kernels.wavefront import FACE, KEPT, NODE, Wavefront
+from geodesic_core.kernels.wavefront import FACE, KEPT_ROWS, NODE, Wavefront
 from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY, WIDTH
 from geodesic_core.tolerances import GAP
 
@@ -50,7 +50,7 @@ def sort_by_half_edge(rows: Floats, first: Longs, windows: Floats) -> None:
 
 def kept_of(wave: Wavefront) -> Kept:
     """Return the windows that a sweep kept, in memory of their own."""
-    rows = wave.kept[: wave.counters[KEPT]]
+    rows = wave.kept[: wave.counters[KEPT_ROWS]]
     kept = Kept(
         first=np.empty(len(wave.lists) + 1, np.int64),
         windows=aligned_rows(len(rows), WIDTH, np.float64),
@@ -61,7 +61,7 @@ def kept_of(wave: Wavefront) -> Kept:
 
 def bytes_of(wave: Wavefront) -> int:
     """Memory that `kept_of` takes."""
-    return 8 * (len(wave.lists) + 1 + WIDTH * int(wave.counters[KEPT]))
+    return 8 * (len(wave.lists) + 1 + WIDTH * int(wave.counters[KEPT_ROWS]))
 
 
 class Reach(NamedTuple):

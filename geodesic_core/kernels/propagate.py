@@ -41,7 +41,9 @@ from geodesic_core.kernels.wavefront import (
     FIRST,
     FREE_SIZE,
     FRESH,
+    KEEPS,
     KEPT,
+    KEPT_ROWS,
     LAST,
     LEFT,
     LEFT_REFERENCE,
@@ -223,11 +225,12 @@ def record_merge(
 @kernel
 def keep_windows(wave: Any, h: int, count: int) -> None:
     """Keep the windows of scratch, which are those that cross the face of h."""
-    first = wave.counters[KEPT]
+    first = wave.counters[KEPT_ROWS]
     for i in range(WIDTH * count):
         wave.kept[WIDTH * first + i] = wave.scratch[i]
     for i in range(first, first + count):
         wave.kept_ints[INTS * i + NEXT] = h
+    wave.counters[KEPT_ROWS] = first + count
 
 
 @inlined
@@ -464,7 +467,8 @@ def propagate_list(wave: Any, h: int) -> int:
     if size > wave.scratch_size:
         return SCRATCH_FULL
     # Asked per list, while the sweep runs: free, where a compiled switch would double the kernels.
-    if wave.keep_capacity > 0 and wave.counters[KEPT] + size > wave.keep_capacity:
+    keeps = wave.lists[LIST * h + MARKS] & KEEPS
+    if keeps and wave.counters[KEPT_ROWS] + size > wave.keep_capacity:
         return KEPT_FULL
     if merging(wave):
         if wave.merge_capacity > 0 and wave.counters[MERGES] + size > wave.merge_capacity:
@@ -474,7 +478,7 @@ def propagate_list(wave: Any, h: int) -> int:
         wave.runs[h] += 1
     count = collect(wave, h)
     release_list(wave, h)
-    if wave.keep_capacity > 0:
+    if keeps:
         keep_windows(wave, h, count)
     wave.counters[KEPT] += count
     wave.counters[WORK] += 4 * size + 20

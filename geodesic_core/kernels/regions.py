@@ -97,6 +97,8 @@ def runs_along(
 @kernel
 def rows_in_face(ints: Ints, face: int) -> tuple[int, int]:
     """Return the rows, sorted by face, that are of one face: from, to."""
+    if len(ints) == 0:
+        return 0, 0
     faces = ints[:, FACE]
     return int(np.searchsorted(faces, face)), int(np.searchsorted(faces, face + 1))
 

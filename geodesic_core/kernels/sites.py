@@ -106,7 +106,8 @@ def watch_sites(topology: Any, wavefront: Any, bounds: Any, first: int) -> None:
         marks = wave.lists[LIST * 3 * face + MARKS]
         wave.site_ints[SITE * k + NEXT_SITE] = (marks >> SITE_SHIFT) - 1
         for h in range(3 * face, 3 * face + 3):
-            wave.lists[LIST * h + MARKS] = (k + 1) << SITE_SHIFT
+            others = wave.lists[LIST * h + MARKS] & ((1 << SITE_SHIFT) - 1)
+            wave.lists[LIST * h + MARKS] = others | (k + 1) << SITE_SHIFT
 
 
 @kernel

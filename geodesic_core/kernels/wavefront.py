@@ -19,11 +19,12 @@ from geodesic_core.kernels.window import WIDTH
 SIZE = 0  # number of windows
 FIRST = 1  # slot of the first window; without meaning in an empty list
 LAST = 2
-MARKS = 3  # IN_RING, and from SITE_SHIFT on 1 + the row of the first site to reach in its face
+MARKS = 3  # below, and from SITE_SHIFT on 1 + the row of the first site to reach in its face
 LIST = 4
 
 IN_RING = 1  # the mark of a half-edge that is in the ring
-SITE_SHIFT = 1
+KEEPS = 2  # of one whose windows are kept as they are propagated
+SITE_SHIFT = 2
 
 # Columns of Wavefront.site_ints, a row per site and face that it belongs to
 NODE = 0  # its number among vertices and sites
@@ -73,11 +74,12 @@ FREE_SIZE = 4
 FRESH = 5  # rows of the pool from here on were never used
 DONE_VERTICES = 6
 CREATED = 7  # windows, in all
-KEPT = 8  # windows that survived trimming and were propagated; rows of `kept`, where it is used
+KEPT = 8  # windows that survived trimming and were propagated
 PEAK = 9  # windows alive at once, at most
 WORK = 10  # done in this slice, about 10 ns each
 MERGES = 11  # recorded for backtracing
 TOUCHED = 12  # vertices
+KEPT_ROWS = 13  # of `kept`
 COUNTERS = 16
 
 
@@ -228,7 +230,8 @@ class Wavefront(NamedTuple):
     toward: Floats
     """(V,): lower bound of the rest of a path from a touched vertex on; empty unless pruned"""
     kept: Floats
-    """(K, 8): windows that were propagated, as in the pool, NEXT their half-edge; or empty"""
+    """(K, 8): windows that crossed a half-edge that KEEPS them, as in the pool, NEXT the half-edge;
+    or empty"""
     passed: Ints
     """(3F,): slot of what last passed an irregular edge, by its lowest half-edge; -1 at the end;
     empty where there are none"""
@@ -397,13 +400,13 @@ def new_wavefront(
     *,
     merges: bool = False,
     paths: bool = False,
-    windows: bool = False,
+    windows: Flags | None = None,
     pruned: bool = False,
 ) -> Wavefront:
     """Allocate the state of one sweep: O(V + F), nothing reached yet.
 
-    With ``paths``, a sweep that merges records what it merges, for backtracing; with ``windows``
-    any sweep keeps those that it propagates.
+    With ``paths``, a sweep that merges records what it merges, for backtracing. ``windows`` (F,)
+    are the faces for which the sweep keeps the windows that it propagates into them.
     """
     vertices, half_edges = len(topology.total_angle), len(topology.links)
     nodes = vertices + sites.nodes
@@ -411,6 +414,9 @@ def new_wavefront(
     merged_vertices, merged_nodes = (vertices, nodes) if merges else (0, 0)
     counters = np.zeros(COUNTERS, np.int64)
     counters[FREE_FIRST] = -1
+    lists = np.zeros((half_edges, LIST), np.int32)
+    if windows is not None:
+        lists[:, MARKS] = np.repeat(np.where(windows, KEEPS, 0), 3)
     return Wavefront(
         distance=np.full(nodes, np.inf),
         winner=np.empty((nodes, 2)),
@@ -421,7 +427,7 @@ def new_wavefront(
         heap_keys=np.empty(vertices),
         heap_place=np.full(vertices, -1, np.int32),
         ring=np.empty(half_edges, np.int32),
-        lists=np.zeros((half_edges, LIST), np.int32),
+        lists=lists,
         windows=aligned_rows(1024 + sites.windows, WIDTH, np.float64),
         scratch=aligned_rows(256, WIDTH, np.float64),
         counters=counters,
@@ -431,7 +437,7 @@ def new_wavefront(
         piece_ends=sites.piece_ends,
         touched=np.empty(vertices, np.int32),
         toward=np.empty(vertices if pruned else 0),
-        kept=aligned_rows(4096 if windows else 0, WIDTH, np.float64),
+        kept=aligned_rows(0 if windows is None else 4096, WIDTH, np.float64),
         passed=np.full(half_edges if irregular else 0, -1, np.int32),
         upper=np.full(merged_vertices, np.inf),
         light=np.tile([1.0, -1.0, 1.0, -1.0, np.inf], (merged_vertices, 1)),

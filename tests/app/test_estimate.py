@@ -140,7 +140,6 @@ def test_what_is_out_of_reach_is_not_counted(
 
 # Positions are looked for without any state; what is said of paths comes on top of it.
 STATEFUL = [name for name, (operation, *_) in QUERIES.items() if operation != "locate"]
-LIMITED = [name for name in STATEFUL if name != "rough lines"]  # its second sweep has no limit
 ALLOCATED = [name for name in STATEFUL if QUERIES[name][0] != "paths"]
 
 
@@ -160,7 +159,7 @@ def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mes
     assert 1 / 3 <= told.memory_bytes / peak <= 3
 
 
-@pytest.mark.parametrize("name", LIMITED)
+@pytest.mark.parametrize("name", STATEFUL)
 def test_memory_that_suffices(
     client: TestClient, ids: dict[str, str], name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,6 +8,9 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
+from app.mesh_store import OpenMesh
+from app.queries import Grant, IsolinesQuery
+from geodesic_core.whole_sweep import WholeSweep
 
 from .conftest import check_problem, mesh_of, serving, upload_sample
 
@@ -41,7 +44,7 @@ def test_lines_are_the_library_s(client: TestClient, knot: str, method: dict) ->
     mesh = mesh_of(client, knot)
     sources = [gc.Source(gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), 0.25), gc.Source(700)]
     if method:
-        field = gc.approximate_distance(mesh, sources, 0.05, keep_windows=True)
+        field = gc.approximate_distance(mesh, sources, 0.05, keep_isolines=True)
     else:
         field = gc.exact_distance(mesh, sources, keep_windows=True)
     asked = [INSIDE | {"start_distance": 0.25}, {"vertex": 700}]
@@ -121,6 +124,39 @@ def test_lines_end_at_max_distance(client: TestClient, plane: str) -> None:
     assert far["lines"] == []
     levels = isolines(client, plane, count=4, max_distance=0.5).json()["isolines"]
     np.testing.assert_allclose([each["level"] for each in levels], [0.1, 0.2, 0.3, 0.4])
+
+
+@pytest.mark.parametrize(("method", "sweeps"), list(zip(METHODS, (2, 1), strict=True)))
+def test_the_grant_is_in_force_throughout(
+    method: dict, sweeps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = OpenMesh(gc.Solver(gc.TriangleMesh(*gc.samples.knot(3000))), [])
+    request = IsolinesQuery.model.model_validate({"sources": [INSIDE], "count": 4, **method})
+    query = IsolinesQuery("m", IsolinesQuery.normal(request))
+    watched: list[dict[str, Any]] = []
+    run, asked = WholeSweep.run, 0
+
+    def watch(sweep: WholeSweep, control: Any, **keep: Any) -> Any:
+        watched.append({"cancel": control.cancel, "memory_limit": control.memory_limit})
+        return run(sweep, control, **keep)
+
+    def cancel() -> bool:
+        nonlocal asked
+        asked += 1
+        return asked == stop_at
+
+    monkeypatch.setattr(WholeSweep, "run", watch)
+    grant = Grant(cancel, 2**30, 10**7)
+    stop_at = -1
+    query.answer(opened, grant)
+
+    assert watched == [grant.options] * sweeps
+    assert asked >= sweeps + 1 + 2 * 4, "each sweep, all faces, and cutting and joining each level"
+    for stop_at in range(1, asked + 1):
+        asked = 0
+        with pytest.raises(gc.errors.Cancelled):
+            query.answer(opened, grant)
+        assert asked == stop_at
 
 
 def test_components_without_a_source_have_no_lines(client: TestClient, apart: str) -> None:

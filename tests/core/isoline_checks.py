@@ -98,3 +98,32 @@ def check_crossings(mesh, sources, level, lines, samples=40):
         gaps = np.clip(np.floor(places[on_edge] * samples + 0.5), 0, samples).astype(int).tolist()
         for gap in range(samples + 1):
             assert gaps.count(gap) % 2 == (gap in passed), (u, v, gap)
+
+
+def some_levels(field, seed, count):
+    finite = field.distances[np.isfinite(field.distances)]
+    return (np.random.default_rng(seed).uniform(0.05, 1.1, count) * finite.max()).tolist()
+
+
+def check_found_again(mesh, sources, seed):
+    """Kept or found again by a second sweep, the windows where levels pass are the same."""
+    field = gc.exact_distance(mesh, sources)
+    finite = np.sort(field.distances[np.isfinite(field.distances) & (field.distances > 0.0)])
+    levels = [*some_levels(field, seed, 4), *finite[:: len(finite) // 3 + 1].tolist()]
+    for limit in (None, float(finite[len(finite) // 2])):
+        kept, found = (
+            gc.exact_distance(mesh, sources, limit, keep_windows=keep) for keep in (True, False)
+        )
+        drawn = zip(levels, kept.isolines(levels), found.isolines(levels), strict=True)
+        for level, expected, lines in drawn:
+            check_same(lines, expected)
+            check_same(found.isolines([level])[0], expected)
+
+
+def check_same(lines, expected):
+    """To the bit."""
+    assert len(lines) == len(expected)
+    for line, other in zip(lines, expected, strict=True):
+        assert line.closed == other.closed
+        np.testing.assert_array_equal(line.points, other.points)
+        np.testing.assert_array_equal(line.faces, other.faces)

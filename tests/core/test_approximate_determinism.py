@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels import wavefront
+from geodesic_core.kernels import sweep, wavefront
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
 from tests.core.approximation import MERGING
@@ -95,12 +95,12 @@ def test_slices_change_nothing(name, monkeypatch):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     whole = answer(mesh, 3)
     slices = []
-    advance = gc.solvers.sweep.advance
+    advance = sweep.advance
 
     def slowly(topology, wave, bounds, _):
         slices.append(1)
         return advance(topology, wave, bounds, 200 if WITHOUT_JIT else 1)
 
-    monkeypatch.setattr(gc.solvers.sweep, "advance", slowly)
+    monkeypatch.setattr(sweep, "advance", slowly)
     assert answer(mesh, 3) == whole
     assert len(slices) > 20

@@ -9,9 +9,16 @@ import pytest
 import geodesic_core as gc
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
-from tests.core.isoline_checks import check_ends, check_pieces, check_points, line_points
+from tests.core.isoline_checks import (
+    check_ends,
+    check_found_again,
+    check_pieces,
+    check_points,
+    line_points,
+    some_levels,
+)
 from tests.core.test_curves import random_curve
-from tests.core.test_isolines import FINE, check_all, some_levels, total_length
+from tests.core.test_isolines import FINE, check_all, total_length
 from tests.core.test_points import mesh_of
 from tests.oracles import closed_forms
 
@@ -214,12 +221,21 @@ def test_limits_and_what_is_kept_change_no_line_within(case):
 
 
 @pytest.mark.jit
+@zoo.each(zoo.SMALL)
+def test_windows_kept_or_found_again_draw_the_same_lines(case):
+    mesh = mesh_of(case)
+    curve = random_curve(mesh, np.random.default_rng(54))
+    if curve is not None:
+        check_found_again(mesh, curve, seed=54)
+
+
+@pytest.mark.jit
 @zoo.each({name: zoo.SMALL[name] for name in ("hills", "annulus", "crumpled_torus", "box_1x2x3")})
 def test_approximate_lines_keep_to_the_error(case):
     mesh, error = mesh_of(case), 0.02
     curve = random_curve(mesh, np.random.default_rng(53))
     for keep in (True, False):
-        field = gc.approximate_distance(mesh, curve, error, keep_windows=keep)
+        field = gc.approximate_distance(mesh, curve, error, keep_isolines=keep)
         levels = some_levels(field, 53, 2)
         for level, lines in zip(levels, field.isolines(levels), strict=True):
             points = [point for line in lines for point in line_points(mesh, line)]

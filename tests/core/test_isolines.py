@@ -9,7 +9,14 @@ import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
-from tests.core.isoline_checks import check_crossings, check_ends, check_pieces, check_points
+from tests.core.isoline_checks import (
+    check_crossings,
+    check_ends,
+    check_found_again,
+    check_pieces,
+    check_points,
+    some_levels,
+)
 from tests.core.test_points import mesh_of, random_points
 from tests.expected import real_mesh
 
@@ -30,11 +37,6 @@ def check_all(mesh, sources, field, levels, *, crossings=True):
             check_points(mesh, sources, level, lines)
         if crossings:
             check_crossings(mesh, sources, level, lines)
-
-
-def some_levels(field, seed, count):
-    finite = field.distances[np.isfinite(field.distances)]
-    return (np.random.default_rng(seed).uniform(0.05, 1.1, count) * finite.max()).tolist()
 
 
 @pytest.mark.jit
@@ -162,13 +164,22 @@ def test_max_distance_and_what_is_kept_change_no_line_within(case):
 
 
 @pytest.mark.jit
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
+def test_windows_kept_or_found_again_draw_the_same_lines(case):
+    mesh = mesh_of(case)
+    point, other = random_points(mesh, 2, seed=46)
+    for sources in (point, [gc.Source(point, 0.1 * mesh.diagonal), other]):
+        check_found_again(mesh, sources, seed=46)
+
+
+@pytest.mark.jit
 @zoo.each(zoo.SMALL)
 def test_approximate_lines_keep_to_the_error(case):
     mesh = mesh_of(case)
     (source,) = random_points(mesh, 1, seed=45)
     error = 0.02
     for keep in (True, False):
-        field = gc.approximate_distance(mesh, source, error, keep_windows=keep)
+        field = gc.approximate_distance(mesh, source, error, keep_isolines=keep)
         for level, lines in zip(
             levels := some_levels(field, 45, 2), field.isolines(levels), strict=True
         ):

@@ -108,7 +108,7 @@ def test_points_of_an_approximate_field_mean_the_same_whether_it_kept_windows_or
     mesh = gc.TriangleMesh(*gc.samples.knot(500))
     source, *targets = random_points(mesh, 8, seed=25)
     fields = [
-        gc.approximate_distance(mesh, source, 0.05, keep_windows=keep) for keep in (True, False)
+        gc.approximate_distance(mesh, source, 0.05, keep_isolines=keep) for keep in (True, False)
     ]
     exact = gc.exact_distance(mesh, source, targets=targets)
     for field, target in itertools.product(fields, targets):

@@ -8,6 +8,7 @@ from geodesic_core.kernels.backtrace import LOST, NO_ROOM, TRACED, Winners, trac
 from geodesic_core.kernels.sweep import nearest_sources
 from geodesic_core.kernels.topology import APEX, OPPOSITE
 from geodesic_core.kernels.wavefront import FROM, VIA
+from geodesic_core.run import Control
 from tests import zoo
 from tests.core.kernels.stepping import finished, started, topology_of
 
@@ -73,7 +74,7 @@ def test_a_lost_line_is_an_internal_error():
     field = gc.exact_distance(mesh, 0)
     _, wave, v = broken("jittered_grid")
     for name in ("winner", "winner_ints", "distance"):
-        getattr(field._winners, name)[:] = getattr(wave, name)
+        getattr(field._winners.get(Control()), name)[:] = getattr(wave, name)
     with pytest.raises(gc.errors.InternalError, match="left the surface"):
         field.path_to(int(mesh.topology.outer_vertex[v]))
 
