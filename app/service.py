@@ -8,6 +8,7 @@ from typing import Any
 
 from anyio import to_thread
 
+from app.callers import Caller
 from app.engine import (
     Answering,
     Done,
@@ -95,8 +96,10 @@ class Service:
                 described.append(self.describe(mesh_id))
         return described, ids[-1] if more else None
 
-    async def delete_mesh(self, mesh_id: str) -> None:
+    async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
         """Remove a mesh and its results."""
+        if not caller.may_delete(self.meshes.owner(mesh_id)):
+            raise refuse("forbidden", f"mesh {mesh_id} was stored with another API key")
         await to_thread.run_sync(self.meshes.delete, mesh_id)
         self.results.forget_mesh(mesh_id)
 
@@ -121,9 +124,15 @@ class Service:
         return done.estimate, done.seconds
 
     async def _run(self, work: Work, deadline_s: float, mesh_id: str = "") -> Done:
+        async with self.within(deadline_s):
+            return await self.engine.run(work, mesh_id or None)
+
+    @asynccontextmanager
+    async def within(self, deadline_s: float) -> AsyncIterator[None]:
+        """Stop what runs inside after ``deadline_s``, with ``deadline_exceeded``."""
         try:
             async with asyncio.timeout(deadline_s):
-                return await self.engine.run(work, mesh_id or None)
+                yield
         except TimeoutError:
             own = deadline_s >= self.settings.deadline_s
             setting = variable_of("deadline_s") if own else None

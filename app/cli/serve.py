@@ -1,5 +1,6 @@
 """``geodesic serve``."""
 
+from ipaddress import ip_address
 from typing import Annotated
 
 import typer
@@ -25,6 +26,19 @@ def serve(
         faults = [
             f"{variable_of(str(fault['loc'][0]))}: {fault['msg']}" if fault["loc"] else fault["msg"]
             for fault in error.errors()
+            if fault["type"] != "default_factory_not_called"  # for another fault's sake
         ]
         raise typer.BadParameter("; ".join(faults)) from error
+    if not _is_loopback(host) and not settings.api_keys and settings.auth == "on":
+        raise typer.BadParameter(
+            f"whoever reaches {host} could use the service: set GEODESIC_API_KEYS, or "
+            f"GEODESIC_AUTH=off where something before it asks for keys"
+        )
     uvicorn.run(create_app(settings), host=host, port=port, timeout_graceful_shutdown=_DRAIN_S)
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

@@ -16,6 +16,8 @@ class MeshFromFile:
     path: Path
     file_type: str
     merge: Merge
+    owner: str | None = None
+    """Who may delete it; None is everybody."""
 
     stops_when_asked: ClassVar[bool] = False
 
@@ -27,6 +29,7 @@ class MeshFromSample:
     name: str
     faces: int
     merge: Merge
+    owner: str | None = None
 
     stops_when_asked: ClassVar[bool] = False
 

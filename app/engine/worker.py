@@ -82,7 +82,7 @@ class Worker:
         if faces > limit:
             raise over_limit("limit_exceeded", "faces", faces, limit, "max_faces")
         with clock.phase("store"):
-            mesh_id, is_new = self.store.add(mesh)
+            mesh_id, is_new = self.store.add(mesh, work.owner)
         return Done(clock.seconds, StoredMesh(mesh_id, is_new))
 
     def _answer(self, work: Answering, clock: "Clock", cancel: Callable[[], bool]) -> Done:
@@ -143,12 +143,12 @@ class Clock:
 
 def _make_mesh(work: MeshFromFile | MeshFromSample) -> gc.TriangleMesh:
     match work:
-        case MeshFromSample(name, faces, merge):
-            return gc.TriangleMesh(*SAMPLES[name](faces), merge=merge)
-        case MeshFromFile(path, "json", merge):
-            return gc.TriangleMesh(*read_json_mesh(path.read_bytes()), merge=merge)
-        case MeshFromFile(path, file_type, merge):
-            return gc.load_mesh(path, file_type=file_type, merge=merge)
+        case MeshFromSample():
+            return gc.TriangleMesh(*SAMPLES[work.name](work.faces), merge=work.merge)
+        case MeshFromFile(file_type="json"):
+            return gc.TriangleMesh(*read_json_mesh(work.path.read_bytes()), merge=work.merge)
+        case MeshFromFile():
+            return gc.load_mesh(work.path, file_type=work.file_type, merge=work.merge)
 
 
 SAMPLES = {"knot": gc.samples.knot, "sphere": gc.samples.sphere, "plane": gc.samples.plane}

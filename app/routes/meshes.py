@@ -4,7 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from app.dependencies import Deadline, ServiceDep, while_connected
+from app.callers import Caller
+from app.dependencies import CallerDep, Deadline, ServiceDep, while_connected
 from app.encoding import NPY
 from app.engine import MeshFromFile, MeshFromSample, StoredMesh
 from app.errors import Fault, over_limit, refuse
@@ -101,6 +102,7 @@ async def create_mesh(
     request: Request,
     response: Response,
     service: ServiceDep,
+    caller: CallerDep,
     deadline: Deadline,
 ) -> dict[str, object]:
     """Read, check and store a mesh; the id is a hash of its content.
@@ -110,9 +112,9 @@ async def create_mesh(
     triangles in their place, and `face_map` leads back to them.
     """
     if parameters.sample is None:
-        stored, seconds = await _add_upload(service, parameters, request, deadline)
+        stored, seconds = await _add_upload(service, parameters, request, caller, deadline)
     else:
-        making = service.add_mesh(_sample(service, parameters), deadline)
+        making = service.add_mesh(_sample(service, parameters, caller), deadline)
         stored, seconds = await while_connected(request, making)
     response.status_code = 201 if stored.is_new else 200
     response.headers.update(server_timing(seconds))
@@ -157,11 +159,14 @@ async def get_mesh(
     operation_id="deleteMesh",
     summary="Remove a mesh and its results",
     status_code=204,
-    responses=problems("mesh_not_found"),
+    responses=problems("forbidden", "mesh_not_found"),
 )
-async def delete_mesh(mesh_id: str, service: ServiceDep) -> None:
-    """Remove a mesh; queries that run on it end as if it were there."""
-    await service.delete_mesh(mesh_id)
+async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> None:
+    """Remove a mesh; queries that run on it end as if it were there.
+
+    Where keys are asked for, it needs the one that stored the mesh first.
+    """
+    await service.delete_mesh(mesh_id, caller)
 
 
 @router.get(
@@ -187,20 +192,25 @@ async def get_mesh_array(
 
 
 async def _add_upload(
-    service: Service, parameters: UploadParameters, request: Request, deadline: float
+    service: Service,
+    parameters: UploadParameters,
+    request: Request,
+    caller: Caller,
+    deadline: float,
 ) -> tuple[StoredMesh, Seconds]:
     if parameters.faces is not None:
         fault = Fault("/query/faces", "only a sample can be asked for with so many faces")
         raise refuse("invalid_request", fault.message, errors=(fault,))
     with service.meshes.scratch_file() as path:
-        file_format = await spool(request, path, parameters.format)
-        work = MeshFromFile(path, file_format, parameters.merge)
-        return await while_connected(request, service.add_mesh(work, deadline))
+        async with service.within(deadline):  # both together
+            file_format = await spool(request, path, parameters.format)
+            work = MeshFromFile(path, file_format, parameters.merge, caller.owner)
+            return await while_connected(request, service.add_mesh(work, deadline))
 
 
-def _sample(service: Service, parameters: UploadParameters) -> MeshFromSample:
+def _sample(service: Service, parameters: UploadParameters, caller: Caller) -> MeshFromSample:
     faces = parameters.faces or _DEFAULT_SAMPLE_FACES
     if faces > service.settings.max_faces:
         limit = service.settings.max_faces
         raise over_limit("limit_exceeded", "faces", faces, limit, "max_faces")
-    return MeshFromSample(str(parameters.sample), faces, parameters.merge)
+    return MeshFromSample(str(parameters.sample), faces, parameters.merge, caller.owner)
