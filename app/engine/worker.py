@@ -13,6 +13,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from setproctitle import setproctitle
 
 import geodesic_core as gc
@@ -26,7 +28,7 @@ from app.engine.work import (
     StoredMesh,
     Work,
 )
-from app.errors import Problem, over_limit, problem_of
+from app.errors import Problem, problem_of
 from app.json_mesh import read_json_mesh
 from app.mesh_store import MeshStore, OpenMesh
 from app.queries import Grant, Query, estimate
@@ -77,10 +79,7 @@ class Worker:
 
     def _add_mesh(self, work: MeshFromFile | MeshFromSample, clock: "Clock") -> Done:
         with clock.phase("load"):
-            mesh = _make_mesh(work)
-        faces, limit = mesh.report.faces, self.settings.max_faces
-        if faces > limit:
-            raise over_limit("limit_exceeded", "faces", faces, limit, "max_faces")
+            mesh = _make_mesh(work, self.settings.max_faces)
         with clock.phase("store"):
             mesh_id, is_new = self.store.add(mesh, work.owner)
         return Done(clock.seconds, StoredMesh(mesh_id, is_new))
@@ -141,14 +140,18 @@ class Clock:
         self.seconds[name] = perf_counter() - start
 
 
-def _make_mesh(work: MeshFromFile | MeshFromSample) -> gc.TriangleMesh:
+def _make_mesh(work: MeshFromFile | MeshFromSample, max_faces: int) -> gc.TriangleMesh:
+    faces: NDArray[np.int32] | NDArray[np.int64]
     match work:
         case MeshFromSample():
-            return gc.TriangleMesh(*SAMPLES[work.name](work.faces), merge=work.merge)
+            vertices, faces = SAMPLES[work.name](work.faces)
         case MeshFromFile(file_type="json"):
-            return gc.TriangleMesh(*read_json_mesh(work.path.read_bytes()), merge=work.merge)
+            vertices, faces = read_json_mesh(work.path.read_bytes())
         case MeshFromFile():
-            return gc.load_mesh(work.path, file_type=work.file_type, merge=work.merge)
+            return gc.load_mesh(work.path, work.file_type, work.merge, max_faces=max_faces)
+    if len(faces) > max_faces:
+        raise gc.errors.TooManyFaces(len(faces), max_faces)
+    return gc.TriangleMesh(vertices, faces, merge=work.merge)
 
 
 SAMPLES = {"knot": gc.samples.knot, "sphere": gc.samples.sphere, "plane": gc.samples.plane}
