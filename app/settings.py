@@ -19,6 +19,8 @@ from app.api_keys import ApiKey, parse_keys
 PREFIX = "GEODESIC_"
 MIB = 2**20
 GIB = 2**30
+LEAST_WORKER_MEMORY = 512 * MIB
+"""What compiling a kernel takes."""
 
 
 def _cores() -> int:
@@ -80,8 +82,8 @@ class Settings(BaseSettings):
     """Folder of the meshes and results; created where it is not there."""
     workers: PositiveInt = Field(default_factory=_cores)
     """Worker processes; one for each core, unless set."""
-    worker_memory_bytes: PositiveInt = Field(default_factory=_worker_memory)
-    """Memory of a worker, whatever it does; its share of four fifths of all, unless set."""
+    worker_memory_bytes: int = Field(ge=LEAST_WORKER_MEMORY, default_factory=_worker_memory)
+    """Memory of a worker for its work, whatever that is; what it maps (meshes) does not count."""
     worker_mesh_bytes: PositiveInt = 2 * GIB
     """Size of the meshes that a worker keeps open, and of what it keeps for paths on them."""
     results_bytes: PositiveInt = 4 * GIB

@@ -77,7 +77,12 @@ class DeadlineExceeded(GeodesicError):  # noqa: N818
 
 
 class MemoryLimitExceeded(GeodesicError):  # noqa: N818
-    """The sweep needs more than ``memory_limit`` bytes."""
+    """The call needs more than ``memory_limit`` bytes: ``needed``, or more."""
+
+    def __init__(self, needed: int, memory_limit: int) -> None:
+        super().__init__(f"the call needs {needed} bytes or more; memory_limit is {memory_limit}")
+        self.needed = needed
+        self.memory_limit = memory_limit
 
 
 class NotConverged(GeodesicError):  # noqa: N818

@@ -7,7 +7,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from ctypes import c_longlong
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing import connection, parent_process
 from pathlib import Path
 from time import perf_counter
@@ -19,6 +19,7 @@ from setproctitle import setproctitle
 
 import geodesic_core as gc
 from app.encoding import JSON, encode
+from app.engine.memory import limit_memory
 from app.engine.work import (
     Answering,
     Done,
@@ -34,7 +35,7 @@ from app.mesh_store import MeshStore, OpenMesh
 from app.queries import Grant, Query, estimate
 from app.queries.refusals import refuse_large_json
 from app.result_store import write_result
-from app.settings import Settings
+from app.settings import Settings, variable_of
 
 logger = logging.getLogger(__name__)
 
@@ -170,22 +171,32 @@ def initialize(config: WorkerConfig, stop_number: c_longlong, pid: c_longlong) -
 
 
 def warm_up() -> None:
-    """Compile the kernels, or load them."""
+    """Compile the kernels, or load them; from then on memory is limited."""
     gc.warm_up()
+    limit_memory(_this_worker().settings.worker_memory_bytes)
 
 
 def do(number: int, work: Work) -> Done | Problem:
     """Do ``work``; what goes wrong is a value, since not every exception survives a pipe."""
-    assert _worker is not None, "the pool calls initialize first"  # noqa: S101
+    worker = _this_worker()
     try:
-        return _worker.do(number, work)
+        return worker.do(number, work)
     except gc.errors.Cancelled:
         return Done({})  # who asked for it has gone
+    except MemoryError as error:
+        worker.meshes.clear()  # what they keep counts as well
+        limit, setting = worker.settings.worker_memory_bytes, variable_of("worker_memory_bytes")
+        return replace(problem_of(error), limit=limit, setting=setting)
     except Exception as error:
         problem = problem_of(error)
         if problem.code == "internal_error":
             logger.exception("a worker failed at %s", work)
         return problem
+
+
+def _this_worker() -> Worker:
+    assert _worker is not None, "the pool calls initialize first"  # noqa: S101
+    return _worker
 
 
 def _die_with_parent() -> None:

@@ -122,6 +122,7 @@ def test_unknown_variable_stops_the_start(monkeypatch: pytest.MonkeyPatch, name:
         ("workers", "many"),
         ("max_faces", "5e6"),
         ("max_upload_bytes", "512 MiB"),
+        ("worker_memory_bytes", "1000"),
         ("deadline_s", "0"),
         ("deadline_s", "inf"),
         ("deadline_s", "nan"),
@@ -157,8 +158,8 @@ def test_senseless_value_stops_the_start(
             "GEODESIC_MAX_QUERY_BYTES is 2000, which is more than GEODESIC_MAX_UPLOAD_BYTES, 1000",
         ),
         (
-            {"query_memory_bytes": "2000", "worker_memory_bytes": "1000"},
-            "GEODESIC_QUERY_MEMORY_BYTES is 2000, which is more than GEODESIC_WORKER_MEMORY_BYTES",
+            {"query_memory_bytes": "2000000000", "worker_memory_bytes": "1000000000"},
+            "GEODESIC_QUERY_MEMORY_BYTES is 2000000000, which is more than GEODESIC_WORKER_MEMORY",
         ),
     ],
 )
@@ -176,4 +177,4 @@ def test_contradictions_stop_the_start(
 
 def test_what_is_not_set_follows_what_is() -> None:
     assert Settings(max_upload_bytes=1000).max_query_bytes == 1000
-    assert Settings(worker_memory_bytes=1000).query_memory_bytes == 500
+    assert Settings(worker_memory_bytes=GIB).query_memory_bytes == GIB // 2
