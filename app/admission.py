@@ -44,9 +44,10 @@ class AdmissionMiddleware:
         if not self.keys:
             return caller_at(scope["client"][0] if scope["client"] else None)
         given = [value for name, value in scope["headers"] if name == b"authorization"]
+        # Some servers leave blanks at the end of a header.
         if not given:
             raise _unauthorized("the request has no API key", "Bearer")
-        credentials = _BEARER.fullmatch(given[0]) if len(given) == 1 else None
+        credentials = _BEARER.fullmatch(given[0].strip(b" \t")) if len(given) == 1 else None
         name = name_of_secret(self.keys, credentials[1]) if credentials else None
         if name is None:
             raise _unauthorized("the API key is wrong", 'Bearer error="invalid_token"')

@@ -31,7 +31,11 @@ class BodyDeadlineMiddleware:
                 detail = f"the body was not complete within {self.limit_s:g} s"
                 setting = variable_of("deadline_s")
                 raise refuse(
-                    "deadline_exceeded", detail, limit=self.limit_s, setting=setting
+                    "deadline_exceeded",
+                    detail,
+                    limit=self.limit_s,
+                    setting=setting,
+                    headers={"Connection": "close"},  # or it goes on to drip
                 ) from None
             is_complete = not message.get("more_body", False)
             return message

@@ -816,6 +816,7 @@ def test_serve_refuses_wrong_settings(run: Run, monkeypatch: pytest.MonkeyPatch)
     ran = run("serve")
     assert ran.code == 2
     assert "GEODESIC_WORKERS" in error_line(ran)
+    assert "GEODESIC_WORKER_MEMORY" not in error_line(ran)
     monkeypatch.delenv("GEODESIC_WORKERS")
     monkeypatch.setenv("GEODESIC_WORKER", "2")
     ran = run("serve")

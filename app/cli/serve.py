@@ -24,11 +24,11 @@ def serve(
         settings = Settings()
     except ValidationError as error:
         faults = [
-            f"{variable_of(str(fault['loc'][0]))}: {fault['msg']}" if fault["loc"] else fault["msg"]
+            ": ".join([*(variable_of(str(name)) for name in fault["loc"][:1]), fault["msg"]])
             for fault in error.errors()
             if fault["type"] != "default_factory_not_called"  # for another fault's sake
         ]
-        raise typer.BadParameter("; ".join(faults)) from error
+        raise typer.BadParameter("; ".join(faults).replace("Value error, ", "")) from error
     if not _is_loopback(host) and not settings.api_keys and settings.auth == "on":
         raise typer.BadParameter(
             f"whoever reaches {host} could use the service: set GEODESIC_API_KEYS, or "

@@ -79,6 +79,7 @@ def test_a_body_has_to_be_there_in_time(
 
     assert (status, problem["code"]) == (504, "deadline_exceeded")
     assert (problem["limit"], problem["setting"]) == (0.3, "GEODESIC_DEADLINE_S")
+    assert (b"connection", b"close") in client.sent[0]["headers"]
     assert 0.25 < seconds < 5
     assert 0 < client.taken < 20
     assert not any((tmp_path / "tmp").iterdir())
