@@ -30,10 +30,7 @@ class AdmissionMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        if is_open(scope["path"]):
+        if scope["type"] != "http" or is_open(scope["path"]):
             await self.app(scope, receive, send)
             return
         scope["state"]["caller"] = caller = self._caller(scope)
@@ -44,9 +41,9 @@ class AdmissionMiddleware:
         if not self.keys:
             return caller_at(scope["client"][0] if scope["client"] else None)
         given = [value for name, value in scope["headers"] if name == b"authorization"]
-        # Some servers leave blanks at the end of a header.
         if not given:
             raise _unauthorized("the request has no API key", "Bearer")
+        # uvicorn leaves blanks at the end of a header.
         credentials = _BEARER.fullmatch(given[0].strip(b" \t")) if len(given) == 1 else None
         name = name_of_secret(self.keys, credentials[1]) if credentials else None
         if name is None:

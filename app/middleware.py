@@ -52,12 +52,9 @@ class RequestMiddleware:
 
         try:
             await self.app(scope, receive, send_checked)
-        except ProblemError as error:
-            if has_started:
-                raise
-            await answer(error.problem)
         except Exception as error:
-            logger.exception("request %s failed", request_id)
+            if not isinstance(error, ProblemError):
+                logger.exception("request %s failed", request_id)
             if has_started:
                 raise  # too late for a problem: the server cuts the connection
             await answer(problem_of(error))

@@ -1,11 +1,16 @@
 """What becomes of work that takes more memory than its worker has."""
 
+import resource
+import subprocess
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
+from app.engine import memory
 from app.settings import LEAST_WORKER_MEMORY
 
 from .conftest import TWO_TRIANGLES, check_problem, distances, serving, upload_sample
@@ -20,6 +25,43 @@ element face 1
 property list uchar char vertex_indices
 end_header
 """
+
+
+LIMITED = """
+import sys
+import numpy as np
+from app.engine.memory import limit_memory
+
+limit_memory(200_000_000)
+limit_memory(300_000_000)  # a limit is never raised
+mapped = np.memmap(sys.argv[1], "u1", "w+", shape=1_000_000_000)
+for size, fits in ((100_000_000, True), (250_000_000, False), (100_000_000, True)):
+    try:
+        np.ones(size, "u1")
+    except MemoryError:
+        assert not fits
+    else:
+        assert fits
+print(mapped.sum())
+"""
+
+
+def test_allocating_fails_beyond_the_limit_and_mapping_does_not(tmp_path: Path) -> None:
+    ran = subprocess.run(  # noqa: S603 - this Python, and the text above
+        [sys.executable, "-c", LIMITED, str(tmp_path / "mapped")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+    assert (ran.stdout, ran.stderr) == ("0\n", "")
+
+
+def test_elsewhere_there_is_no_limit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(memory, "_STATUS", tmp_path / "nowhere")
+    monkeypatch.setattr(resource, "setrlimit", lambda *_: pytest.fail("must not be set"))
+
+    memory.limit_memory(1)
 
 
 @pytest.fixture(scope="module")
