@@ -30,7 +30,7 @@ end_header
 LIMITED = """
 import sys
 import numpy as np
-from app.engine.memory import limit_memory
+from app.engine.memory import limit_memory, refuse_beyond_limit
 
 limit_memory(200_000_000)
 limit_memory(300_000_000)  # a limit is never raised
@@ -42,6 +42,11 @@ for size, fits in ((100_000_000, True), (250_000_000, False), (100_000_000, True
         assert not fits
     else:
         assert fits
+for size in (100_000_000, 250_000_000):
+    try:
+        refuse_beyond_limit(size)
+    except MemoryError:
+        assert size == 250_000_000
 print(mapped.sum())
 """
 
@@ -62,6 +67,7 @@ def test_elsewhere_there_is_no_limit(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     monkeypatch.setattr(resource, "setrlimit", lambda *_: pytest.fail("must not be set"))
 
     memory.limit_memory(1)
+    memory.refuse_beyond_limit(2**60)
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +95,20 @@ def test_an_upload_that_takes_too_much_is_refused_and_the_worker_lives(tight: Te
         assert problem["setting"] == "GEODESIC_WORKER_MEMORY_BYTES"
 
     assert tight.post("/v1/meshes", json=TWO_TRIANGLES).status_code in (200, 201)
+    assert pid_of_worker(tight) == pid
+
+
+def test_json_that_takes_too_much_is_refused_and_the_worker_lives(tight: TestClient) -> None:
+    pid = pid_of_worker(tight)
+    vertices = b",".join([b"[0,0,0]"] * 2_000_000)
+    response = tight.post(
+        "/v1/meshes",
+        content=b'{"vertices":[%s],"faces":[[0,1,2]]}' % vertices,
+        headers={"Content-Type": "application/json"},
+    )
+
+    problem = check_problem(response, 422, "memory_limit")
+    assert problem["setting"] == "GEODESIC_WORKER_MEMORY_BYTES"
     assert pid_of_worker(tight) == pid
 
 
