@@ -157,7 +157,7 @@ def _make_mesh(work: MeshFromFile | MeshFromSample, max_faces: int) -> gc.Triang
 
 
 _JSON_GROWS = 40
-"""Bytes that orjson takes for one of JSON; 37 were measured at most. It crashes for lack of them."""
+"""Bytes that orjson takes for one of JSON; 37 were the most measured. Lacking them, it crashes."""
 
 SAMPLES = {"knot": gc.samples.knot, "sphere": gc.samples.sphere, "plane": gc.samples.plane}
 
