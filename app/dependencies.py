@@ -12,6 +12,7 @@ from typing import Annotated, Any, TypeVar
 from fastapi import Depends, Header, Request
 from starlette.requests import ClientDisconnect
 
+from app.callers import Caller
 from app.encoding import Form, negotiate, negotiate_coding
 from app.encoding.form import ARRAYS, TEXTS
 from app.errors import Fault, refuse
@@ -30,6 +31,15 @@ async def get_service(request: Request) -> Service:
 ServiceDep = Annotated[Service, Depends(get_service)]
 
 
+async def get_caller(request: Request) -> Caller:
+    """Return who asks."""
+    caller: Caller = request.state.caller
+    return caller
+
+
+CallerDep = Annotated[Caller, Depends(get_caller)]
+
+
 async def get_deadline(
     service: ServiceDep,
     x_timeout_ms: Annotated[
@@ -44,27 +54,9 @@ async def get_deadline(
 Deadline = Annotated[float, Depends(get_deadline)]
 
 
-async def get_client(request: Request) -> str:
-    """Return who asks, as far as turns are concerned: an address."""
-    return request.client.host if request.client else ""
-
-
-async def get_owner() -> str:
-    """Return whose jobs are asked for: those of all, since there are no keys."""
-    return ""
-
-
-OwnerDep = Annotated[str, Depends(get_owner)]
-
-
-async def get_asker(
-    request: Request,
-    deadline_s: Deadline,
-    client: Annotated[str, Depends(get_client)],
-    owner: OwnerDep,
-) -> Asker:
-    """Return who asks and how long they would wait."""
-    return Asker(client, owner, deadline_s, request.state.request_id)
+async def get_asker(request: Request, deadline_s: Deadline, caller: CallerDep) -> Asker:
+    """Return who asks, and how long they would wait."""
+    return Asker(caller, deadline_s, request.state.request_id)
 
 
 AskerDep = Annotated[Asker, Depends(get_asker)]

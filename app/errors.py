@@ -178,6 +178,15 @@ def _invalid_mesh(error: core.InvalidMesh) -> Problem:
     return Problem("invalid_mesh", str(error), errors=tuple(_mesh_faults(error)))
 
 
+def _too_many_faces(error: core.TooManyFaces) -> Problem:
+    return over_limit("limit_exceeded", "faces", error.faces, error.max_faces, "max_faces").problem
+
+
+def _over_memory(error: core.MemoryLimitExceeded) -> Problem:
+    what, limit = "bytes or more are needed", error.memory_limit
+    return over_limit("memory_limit", what, error.needed, limit, "query_memory_bytes").problem
+
+
 def _not_converged(error: core.NotConverged) -> Problem:
     hint = "ask for a smaller relative_error or absolute_error, or for method exact"
     return Problem("limit_exceeded", str(error), hint=hint)
@@ -196,11 +205,12 @@ def _internal_error(error: BaseException) -> Problem:
 # The first row whose type fits is taken.
 EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (ProblemError, lambda error: error.problem),
+    (core.TooManyFaces, _too_many_faces),
     (core.InvalidMesh, _invalid_mesh),
     (core.InvalidPoint, lambda error: Problem("invalid_point", str(error))),
     (core.InvalidArgument, lambda error: Problem("invalid_request", str(error))),
     (core.DeadlineExceeded, lambda error: Problem("deadline_exceeded", str(error))),
-    (core.MemoryLimitExceeded, lambda error: Problem("memory_limit", str(error))),
+    (core.MemoryLimitExceeded, _over_memory),
     (core.NotConverged, _not_converged),
     (MemoryError, lambda _: Problem("memory_limit", "the worker ran out of memory")),
     (OSError, _system_error),

@@ -29,6 +29,8 @@ def install(app: FastAPI, settings: Settings) -> None:
     async def on_framework(request: Request, error: HTTPException) -> Response:
         if error.status_code == 413:
             return _respond(request, body_too_large(request.scope, settings))
+        if isinstance(error.__cause__, ProblemError):  # FastAPI's 400 for whatever stops a body
+            return _respond(request, error.__cause__.problem)
         detail = f"{request.method} {request.url.path}: {error.detail}"
         headers = error.headers
         if error.status_code == 405:

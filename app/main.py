@@ -5,10 +5,14 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 from fastapi import FastAPI
+from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__, handlers
+from app.admission import AdmissionMiddleware, is_open
+from app.body_deadline import BodyDeadlineMiddleware
 from app.errors import PROBLEM_JSON
 from app.middleware import RequestMiddleware
+from app.responses import problems
 from app.routes import about, jobs, meshes, queries
 from app.service import Service
 from app.settings import Settings
@@ -32,7 +36,18 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     app.state.service = service
+    # The last is the outermost.
+    app.add_middleware(BodyDeadlineMiddleware, settings=settings)
+    app.add_middleware(AdmissionMiddleware, settings=settings)
     app.add_middleware(RequestMiddleware, settings=settings)
+    if settings.cors_origins:
+        app.add_middleware(
+            CORSMiddleware,
+            allow_origins=settings.cors_origins,
+            allow_methods=["GET", "HEAD", "POST", "DELETE"],
+            allow_headers=["*"],
+            expose_headers=["*"],
+        )
     handlers.install(app, settings)
     app.include_router(about.router, max_body_size=settings.max_query_bytes)
     app.include_router(meshes.router, prefix="/v1", max_body_size=settings.max_upload_bytes)
@@ -45,8 +60,11 @@ class _Application(FastAPI):
     def openapi(self) -> dict[str, Any]:
         """Return FastAPI's document, with errors as they are here."""
         schema = super().openapi()
-        for path in schema["paths"].values():
+        for template, path in schema["paths"].items():
             for operation in path.values():
+                if not is_open(template):
+                    operation["security"] = [{"apiKey": []}, {}]
+                    operation["responses"].update(_REFUSALS)
                 operation["responses"] = {
                     status: _as_problem(response) if status >= "400" else response
                     for status, response in operation["responses"].items()
@@ -54,9 +72,20 @@ class _Application(FastAPI):
                 }
         for name in ("HTTPValidationError", "ValidationError"):
             schema["components"]["schemas"].pop(name, None)
+        schema["components"]["securitySchemes"] = {"apiKey": _SECURITY_SCHEME}
         return schema
 
 
+_SECURITY_SCHEME = {
+    "type": "http",
+    "scheme": "bearer",
+    "description": "A key of this service, where it asks for one.",
+}
+_PROBLEM = {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}
+_REFUSALS = {
+    str(status): {"description": refusal["description"], "content": {PROBLEM_JSON: _PROBLEM}}
+    for status, refusal in problems("unauthorized", "rate_limited").items()
+}
 _FASTAPI_S_OWN = "Validation Error"  # what it supposes of each operation with parameters
 
 

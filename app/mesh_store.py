@@ -3,7 +3,7 @@
 ::
 
     store/
-        meshes/{id}/manifest.json      report, warnings, and the checksum of each array
+        meshes/{id}/manifest.json      report, warnings, owner, and the checksum of each array
         meshes/{id}/{array}.npy        one file per array of ``TriangleMesh.arrays()``
         results/                       see ``result_store``
         tmp/                           what is being written; swept when the service starts
@@ -89,8 +89,11 @@ class MeshStore:
         with tempfile.TemporaryDirectory(dir=self._temporary) as folder:
             yield Path(folder) / "upload"
 
-    def add(self, mesh: TriangleMesh) -> tuple[str, bool]:
-        """Store ``mesh``; return its id, and whether it was not there before."""
+    def add(self, mesh: TriangleMesh, owner: str | None = None) -> tuple[str, bool]:
+        """Store ``mesh``; return its id, and whether it was not there before.
+
+        A mesh that was there stays ``owner``'s who stored it first.
+        """
         arrays = mesh.arrays()
         mesh_id = _content_hash(arrays)
         target = self._meshes / mesh_id
@@ -103,6 +106,7 @@ class MeshStore:
             manifest = {
                 "version": VERSION,
                 "id": mesh_id,
+                "owner": owner,
                 "created": datetime.now(UTC).isoformat(timespec="seconds"),
                 "report": mesh.report.as_dict(),
                 "warnings": mesh.warnings,
@@ -122,6 +126,16 @@ class MeshStore:
         if version != VERSION:
             raise _damaged(mesh_id, f"it has layout {version}, and this service reads {VERSION}")
         return manifest
+
+    def owner(self, mesh_id: str) -> str | None:
+        """Return who stored a mesh, where that was with a key and its manifest can be read."""
+        try:
+            owner: str | None = self.manifest(mesh_id).get("owner")
+        except ProblemError as error:
+            if error.problem.code != "mesh_damaged":
+                raise
+            return None
+        return owner
 
     def open(self, mesh_id: str) -> OpenMesh:
         """Return the mesh over memory-mapped arrays, once their checksums are found right."""

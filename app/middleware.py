@@ -8,7 +8,7 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.middleware.body_limit import MAX_BODY_SIZE_SCOPE_KEY
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.errors import PROBLEM_JSON, Problem, problem_of, problem_of_status
+from app.errors import PROBLEM_JSON, Problem, ProblemError, problem_of, problem_of_status
 from app.responses import problem_response
 from app.settings import Settings, variable_of
 
@@ -53,7 +53,8 @@ class RequestMiddleware:
         try:
             await self.app(scope, receive, send_checked)
         except Exception as error:
-            logger.exception("request %s failed", request_id)
+            if not isinstance(error, ProblemError):
+                logger.exception("request %s failed", request_id)
             if has_started:
                 raise  # too late for a problem: the server cuts the connection
             await answer(problem_of(error))

@@ -9,6 +9,7 @@ from typing import Any
 
 from anyio import to_thread
 
+from app.callers import Caller
 from app.encoding import Form
 from app.engine import (
     Answering,
@@ -36,10 +37,7 @@ Seconds = Mapping[str, float]
 class Asker:
     """Who asks, and how long they would wait."""
 
-    client: str
-    """Clients take turns at the workers"""
-    owner: str
-    """Whose jobs are whose"""
+    caller: Caller
     deadline_s: float
     request_id: str
 
@@ -85,8 +83,8 @@ class Service:
         self, work: MeshFromFile | MeshFromSample, asker: Asker
     ) -> tuple[StoredMesh, Seconds]:
         """Have a worker read or make a mesh and store it."""
-        async with self._deadline(asker.deadline_s, "deadline_s"):
-            done = await self.engine.run(Order(work, asker.client), _nobody)
+        async with self.within(asker.deadline_s):
+            done = await self.engine.run(Order(work, asker.caller.name), _nobody)
         assert done.mesh is not None, "this kind of work stores a mesh"  # noqa: S101
         return done.mesh, done.seconds
 
@@ -120,23 +118,25 @@ class Service:
                 described.append(self.describe(mesh_id))
         return described, ids[-1] if more else None
 
-    async def delete_mesh(self, mesh_id: str) -> None:
+    async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
         """Remove a mesh and its results."""
+        if not caller.may_delete(self.meshes.owner(mesh_id)):
+            raise refuse("forbidden", f"mesh {mesh_id} was stored with another API key")
         await to_thread.run_sync(self.meshes.delete, mesh_id)
         self.results.forget_mesh(mesh_id)
 
     async def answer(self, query: Query[Any], form: Form, asker: Asker) -> Answered:
         """Answer ``query``: from a kept result, or by a worker."""
-        async with self._deadline(asker.deadline_s, "deadline_s"):
-            return await self._answer(query, form, asker.client, _nobody)
+        async with self.within(asker.deadline_s):
+            return await self._answer(query, form, asker.caller.name, _nobody)
 
     async def estimate(
         self, query: Query[Any], form: Form, asker: Asker
     ) -> tuple[Estimate, Seconds]:
         """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
         query.refuse_answer(form.media_type, self.size(query.mesh_id), self.settings)
-        order = Order(Estimating(query, form), asker.client, query.mesh_id, is_small=True)
-        async with self._deadline(asker.deadline_s, "deadline_s"):
+        order = Order(Estimating(query, form), asker.caller.name, query.mesh_id, is_small=True)
+        async with self.within(asker.deadline_s):
             done = await self.engine.run(order, _nobody)
         assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
         return done.estimate, done.seconds
@@ -144,14 +144,14 @@ class Service:
     async def submit(self, query: Query[Any], form: Form, asker: Asker, key: str | None) -> Job:
         """Accept a job that answers ``query``; one for all with the same idempotency ``key``."""
         query.refuse_answer(form.media_type, self.size(query.mesh_id), self.settings)
-        self.engine.refuse_when_full(asker.client)
+        self.engine.refuse_when_full(asker.caller.name)
 
         async def solve(told: Told) -> Result:
-            async with self._deadline(self.settings.job_deadline_s, "job_deadline_s"):
-                return (await self._answer(query, form, asker.client, told)).result
+            async with self.within(self.settings.job_deadline_s, "job_deadline_s"):
+                return (await self._answer(query, form, asker.caller.name, told)).result
 
         errand = Errand(
-            owner=asker.owner,
+            owner=asker.caller.owner,
             kind=query.kind,
             mesh_id=query.mesh_id,
             media_type=form.media_type,
@@ -176,8 +176,8 @@ class Service:
         return Answered(result, done.seconds)
 
     @asynccontextmanager
-    async def _deadline(self, seconds: float, setting: str) -> AsyncIterator[None]:
-        """Stop what is inside after so many seconds, which ``setting`` bounds."""
+    async def within(self, seconds: float, setting: str = "deadline_s") -> AsyncIterator[None]:
+        """Stop what runs inside after so many seconds, which ``setting`` bounds."""
         try:
             async with asyncio.timeout(seconds):
                 yield

@@ -4,6 +4,7 @@ Every refusal and every early stop of the library is one of these::
 
     GeodesicError
     ├── InvalidMesh             the vertices, the faces or the file cannot be used
+    │   └── TooManyFaces        more than the caller allows
     ├── InvalidPoint            a source or target that is not on the mesh
     ├── InvalidArgument         any other argument out of its domain
     ├── NoPath                  the two points are not connected (``reason``)
@@ -42,6 +43,15 @@ class InvalidMesh(GeodesicError):  # noqa: N818 - the contract's names read as t
         self.elements = tuple(elements)
 
 
+class TooManyFaces(InvalidMesh):
+    """A file holds, or claims to hold, more than ``max_faces`` faces."""
+
+    def __init__(self, faces: int, max_faces: int) -> None:
+        super().__init__(f"{faces} faces, where at most {max_faces} are allowed", kind="face")
+        self.faces = faces
+        self.max_faces = max_faces
+
+
 class InvalidPoint(GeodesicError):  # noqa: N818
     """A source or a target that is not a point of the mesh."""
 
@@ -67,7 +77,12 @@ class DeadlineExceeded(GeodesicError):  # noqa: N818
 
 
 class MemoryLimitExceeded(GeodesicError):  # noqa: N818
-    """The sweep needs more than ``memory_limit`` bytes."""
+    """The call needs more than ``memory_limit`` bytes: ``needed``, or more."""
+
+    def __init__(self, needed: int, memory_limit: int) -> None:
+        super().__init__(f"the call needs {needed} bytes or more; memory_limit is {memory_limit}")
+        self.needed = needed
+        self.memory_limit = memory_limit
 
 
 class NotConverged(GeodesicError):  # noqa: N818

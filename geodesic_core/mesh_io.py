@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from trimesh.exchange.stl import load_stl
 
 from geodesic_core.arrays import Floats, Longs
+from geodesic_core.claims import claim_of, glb_faces, refuse_claim, refuse_more_faces
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.mesh import Merge, TriangleMesh
 
@@ -44,6 +45,8 @@ def load_mesh(
     source: str | Path | bytes | bytearray | memoryview,
     file_type: str | None = None,
     merge: Merge = "none",
+    *,
+    max_faces: int | None = None,
 ) -> TriangleMesh:
     """Read a mesh file: OBJ, OFF, PLY, STL or GLB.
 
@@ -62,9 +65,14 @@ def load_mesh(
         ``"obj"``, ``"off"``, ``"ply"``, ``"stl"`` or ``"glb"``; by default the suffix of the path.
     merge
         ``"exact"`` merges vertices at equal positions, as `TriangleMesh` does.
+    max_faces
+        More triangles than that are refused: by what the header declares, else by counting, and in
+        any case before they are looked into.
 
     Raises
     ------
+    TooManyFaces
+        There are more than ``max_faces``; an `InvalidMesh` as well.
     InvalidMesh
         The file cannot be read, is no such file, is damaged, claims more than it holds, or holds a
         mesh that `TriangleMesh` refuses.
@@ -78,14 +86,17 @@ def load_mesh(
     if not data:
         raise InvalidMesh(f"the {kind.upper()} file is empty")
     try:
-        read = _READERS[kind](data.removeprefix(codecs.BOM_UTF8))
+        read = _READERS[kind](data.removeprefix(codecs.BOM_UTF8), max_faces)
     except InvalidMesh:
+        raise
+    except MemoryError:
         raise
     except Exception as error:  # whatever parsing stumbles over
         what = " ".join(str(error).split())[:200] or type(error).__name__
         raise InvalidMesh(f"the {kind.upper()} file is damaged: {what}") from error
     if len(read.sizes) == 0:
         raise InvalidMesh(f"the {kind.upper()} file holds no faces", kind="face")
+    refuse_more_faces(int(np.maximum(read.sizes - 2, 1).sum()), max_faces)
     return TriangleMesh.from_polygons(
         read.vertices, read.corners, read.sizes, "exact" if kind == "stl" else merge, read.notes
     )
@@ -113,6 +124,7 @@ def _bytes_of(path: Path) -> bytes:
 _COMMENT = re.compile(rb"#.*")
 _CONTINUATION = re.compile(rb"\\[ \t]*\r?\n")
 _OBJ_ROW = re.compile(rb"^[ \t]*(v|f|l|p|curv2?|surf)[ \t]+([^#\r\n]*)", re.MULTILINE)
+_OBJ_FACE_ROW = re.compile(rb"^[ \t]*f[ \t]", re.MULTILINE)
 _NUMBER = rb"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|(?i:nan|inf(?:inity)?))"
 _CORNER = rb"-?0*[1-9]\d{0,17}(?:/-?\d*){0,2}"
 _VERTEX_ROW = re.compile(rb"[ \t]*" + _NUMBER + rb"(?:[ \t]+" + _NUMBER + rb"){2,}[ \t\r]*")
@@ -122,11 +134,12 @@ _NOT_POSITION = re.compile(rb"/\S*")
 _OBJ_IGNORED = {b"l": "lines", b"p": "points", b"surf": "surfaces"}
 
 
-def _read_obj(data: bytes) -> Read:
+def _read_obj(data: bytes, max_faces: int | None) -> Read:
     if b"\n" not in data:
         data = data.replace(b"\r", b"\n")
     if b"\\" in data:  # a comment may end in one
         data = _CONTINUATION.sub(b" ", _COMMENT.sub(b"", data))
+    _refuse_counted(_OBJ_FACE_ROW, data, max_faces)
     rows = _OBJ_ROW.findall(data)
     vertex_rows = [row for keyword, row in rows if keyword == b"v"]
     face_rows = [row for keyword, row in rows if keyword == b"f"]
@@ -150,6 +163,11 @@ def _read_obj(data: bytes) -> Read:
         )
     ignored = Counter(_OBJ_IGNORED.get(k, "curves") for k, _ in rows if k not in (b"v", b"f"))
     return Read(_table(vertex_rows, 3), corners, sizes, _notes("OBJ", ignored))
+
+
+def _refuse_counted(face: re.Pattern[bytes], data: bytes, max_faces: int | None) -> None:
+    if max_faces is not None:
+        refuse_more_faces(sum(1 for _ in face.finditer(data)), max_faces)
 
 
 def _refuse_row(rows: list[bytes], pattern: re.Pattern[bytes], kind: str, rule: str) -> None:
@@ -192,14 +210,20 @@ def _notes(kind: str, ignored: Mapping[str, int]) -> tuple[str, ...]:
 _OFF_HEADER = re.compile(rb"\s*(?:ST)?C?N?OFF\b\s*(-?\d+)[ \t]+(-?\d+)(?:[ \t]+-?\d+)?[ \t\r]*\n")
 
 
-def _read_off(data: bytes) -> Read:
+_OFF_LEAST_BYTES = {"vertex": len("0 0 0\n"), "face": len("1 0\n")}
+
+
+def _read_off(data: bytes, max_faces: int | None) -> Read:
     text = _COMMENT.sub(b"", data) if b"#" in data else data
     header = _OFF_HEADER.match(text)
     if header is None:
         raise InvalidMesh("the OFF file does not begin with OFF and its counts as ASCII numbers")
     vertex_count, face_count = int(header[1]), int(header[2])
+    counts = {"vertex": vertex_count, "face": face_count}
+    refuse_claim(counts, _OFF_LEAST_BYTES, len(text) - header.end())
+    refuse_more_faces(face_count, max_faces)
     rows = [row for row in text[header.end() :].splitlines() if row.strip()]
-    _refuse_missing_rows({"vertex": vertex_count, "face": face_count}, len(rows))
+    _refuse_missing_rows(counts, len(rows))
     if face_count == 0:
         raise InvalidMesh("the OFF file holds no faces", kind="face")
     vertex_rows = rows[:vertex_count]
@@ -223,12 +247,8 @@ def _polygons(rows: list[bytes], skipped: int = 0) -> list[bytes]:
 
 
 def _refuse_missing_rows(counts: dict[str, int], rows: int) -> None:
-    if sum(counts.values()) != rows or min(counts.values()) < 0:
-        raise InvalidMesh(f"the header declares {_claim(counts)}, but {rows} rows follow")
-
-
-def _claim(counts: dict[str, int]) -> str:
-    return " and ".join(f"{count} {name} elements" for name, count in counts.items())
+    if sum(counts.values()) != rows:
+        raise InvalidMesh(f"the header declares {claim_of(counts)}, but {rows} rows follow")
 
 
 # PLY ---------------------------------------------------------------------------------------------
@@ -250,6 +270,8 @@ _PLY_TYPES = {
     for name in names.split()
 }
 """The types by name, as `struct` and numpy both write them."""
+_MOST_PLY_LINES = 1000
+"""Elements and properties of a PLY file: more than any has, and few enough to go through."""
 _CORNER_NAMES = (b"vertex_indices", b"vertex_index")
 
 
@@ -269,8 +291,14 @@ class _Element(NamedTuple):
     def has_lists(self) -> bool:
         return any(part.count_type for part in self.properties)
 
+    def least_bytes(self, order: str) -> int:
+        """Return how many bytes one takes, its lists empty; in text, where ``order`` is empty."""
+        if not order:
+            return 2 * len(self.properties)  # a digit, and what parts it from the next
+        return sum(np.dtype(part.count_type or part.type).itemsize for part in self.properties)
 
-def _read_ply(data: bytes) -> Read:
+
+def _read_ply(data: bytes, max_faces: int | None) -> Read:
     header = _PLY_HEADER.match(data)
     if header is None:
         raise InvalidMesh("the PLY file has no header from 'ply' to 'end_header'")
@@ -281,6 +309,8 @@ def _read_ply(data: bytes) -> Read:
             raise InvalidMesh(f"the PLY file holds no {name} elements", kind="face")
     _refuse_odd_properties(elements)
     body = data[header.end() :]
+    refuse_claim(counts, {each.name: each.least_bytes(order) for each in elements}, len(body))
+    refuse_more_faces(counts["face"], max_faces)
     read = _ply_binary(elements, body, order) if order else _ply_ascii(elements, body)
     others = {name: n for name, n in counts.items() if n and name not in ("vertex", "face")}
     return read._replace(notes=_notes("PLY", others))
@@ -290,7 +320,13 @@ def _ply_elements(header: bytes) -> tuple[str, list[_Element]]:
     """Return the byte order, empty for text, and the elements."""
     order: str | None = None
     elements: list[_Element] = []
-    for line in header.splitlines():
+    lines = header.splitlines()
+    declared = sum(line.lstrip()[:7] in (b"element", b"propert") for line in lines)
+    if declared > _MOST_PLY_LINES:
+        raise InvalidMesh(
+            f"the PLY header has {declared} elements and properties; {_MOST_PLY_LINES} are read"
+        )
+    for line in lines:
         match line.split():
             case [b"format", form, _] if form in _PLY_ORDERS:
                 order = _PLY_ORDERS[form]
@@ -371,9 +407,7 @@ def _ply_positions(element: _Element, rows: list[bytes]) -> Floats:
 
 def _ply_binary(elements: list[_Element], body: bytes, order: str) -> Read:
     counts = {element.name: element.size for element in elements}
-    short = InvalidMesh(f"the header declares {_claim(counts)}, but {len(body)} bytes follow")
-    if sum(counts.values()) > len(body):
-        raise short
+    short = InvalidMesh(f"the header declares {claim_of(counts)}, but {len(body)} bytes follow")
     at = 0
     for element in elements:
         table = _even_records(element, body, at, order)
@@ -443,20 +477,23 @@ def _walked(element: _Element, body: bytes, at: int, order: str) -> tuple[Longs,
 # STL ---------------------------------------------------------------------------------------------
 
 _STL_HEADER, _STL_TRIANGLE = 84, 50
-_STL_FACET = re.compile(rb"^\s*facet\b", re.MULTILINE | re.IGNORECASE)
+_STL_FACET = re.compile(rb"^[ \t]*facet\b", re.MULTILINE | re.IGNORECASE)
 _STL_VERTEX = re.compile(rb"^[ \t]*vertex\b[ \t]*([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
 
 
-def _read_stl(data: bytes) -> Read:
+def _read_stl(data: bytes, max_faces: int | None) -> Read:
     triangles = int.from_bytes(data[_STL_HEADER - 4 : _STL_HEADER], "little")
     expected = _STL_HEADER + triangles * _STL_TRIANGLE
-    if len(data) != expected:
-        facets = len(_STL_FACET.findall(data))
+    if len(data) == expected:
+        refuse_more_faces(triangles, max_faces)
+    else:
+        facets = sum(1 for _ in _STL_FACET.finditer(data))
         if not facets or data.lstrip()[:5].lower() != b"solid":
             raise InvalidMesh(
                 f"the STL file is neither ASCII nor binary: its header declares {triangles} "
                 f"triangles, which take {expected} bytes, but it has {len(data)}"
             )
+        refuse_more_faces(facets, max_faces)
         corners = _STL_VERTEX.findall(data)
         _refuse_row(corners, _VERTEX_ROW, "vertex", _VERTEX_RULE)
         if len(corners) != 3 * facets:
@@ -479,8 +516,8 @@ _GLB_HEADER, _CHUNK_HEADER = 12, 8
 _FLOAT, _TRIANGLE_FAN = 5126, 6
 
 
-def _read_glb(data: bytes) -> Read:
-    _refuse_bad_glb(data)
+def _read_glb(data: bytes, max_faces: int | None) -> Read:
+    refuse_more_faces(glb_faces(_checked_glb(data)), max_faces)
     scene = trimesh.load_scene(
         io.BytesIO(data), file_type="glb", process=False, skip_materials=True
     )
@@ -508,8 +545,8 @@ def _read_glb(data: bytes) -> Read:
     return Read(np.concatenate(vertices), corners, sizes, _notes("GLB", ignored))
 
 
-def _refuse_bad_glb(data: bytes) -> None:
-    """Refuse lengths and counts that the bytes do not bear out, and what trimesh would misread."""
+def _checked_glb(data: bytes) -> dict[str, Any]:
+    """Return the document, whose lengths and counts the bytes bear out, and trimesh reads right."""
     if data[:4] != b"glTF" or len(data) < _GLB_HEADER + _CHUNK_HEADER:
         raise InvalidMesh("the GLB file does not begin with a glTF header")
     length = int.from_bytes(data[8:12], "little")
@@ -522,7 +559,7 @@ def _refuse_bad_glb(data: bytes) -> None:
             f"the GLB file's first chunk declares {json_length} bytes, but {len(data) - start} "
             f"follow"
         )
-    tree = json.loads(data[start : start + json_length])
+    tree: dict[str, Any] = json.loads(data[start : start + json_length])
     for number, buffer in enumerate(tree.get("buffers", [])):
         if not buffer.get("uri", "data:").startswith("data:"):
             raise InvalidMesh(
@@ -536,6 +573,7 @@ def _refuse_bad_glb(data: bytes) -> None:
         children += node.get("children", [])
     if len(set(children)) < len(children):
         raise InvalidMesh("the GLB file's nodes form no tree: one has two parents")
+    return tree
 
 
 def _refuse_bad_accessors(tree: dict[str, Any], file_bytes: int) -> None:
@@ -567,7 +605,7 @@ def _refuse_bad_accessors(tree: dict[str, Any], file_bytes: int) -> None:
                     )
 
 
-_Reader = Callable[[bytes], Read]
+_Reader = Callable[[bytes, int | None], Read]
 _READERS: dict[str, _Reader] = {
     "obj": _read_obj,
     "off": _read_off,

@@ -91,9 +91,7 @@ class Control:
         """Raise if the call needs more memory than it may take."""
         needed += self.bytes_beside
         if self.memory_limit is not None and needed > self.memory_limit:
-            raise MemoryLimitExceeded(
-                f"the call needs {needed} bytes or more; memory_limit is {self.memory_limit}"
-            )
+            raise MemoryLimitExceeded(needed, self.memory_limit)
 
 
 def sweep_nodes(

@@ -884,11 +884,53 @@ def test_serve_refuses_wrong_settings(run: Run, monkeypatch: pytest.MonkeyPatch)
     ran = run("serve")
     assert ran.code == 2
     assert "GEODESIC_WORKERS" in error_line(ran)
+    assert "GEODESIC_WORKER_MEMORY" not in error_line(ran)
     monkeypatch.delenv("GEODESIC_WORKERS")
     monkeypatch.setenv("GEODESIC_WORKER", "2")
     ran = run("serve")
     assert ran.code == 2
     assert "GEODESIC_WORKER" in error_line(ran)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "10.0.0.7", "example.org", "", "127.0.0.1.x"])  # noqa: S104
+def test_serve_on_other_addresses_asks_for_keys(
+    run: Run, monkeypatch: pytest.MonkeyPatch, host: str
+) -> None:
+    started: list[str] = []
+    monkeypatch.setattr(uvicorn, "run", lambda _app, host, **_: started.append(host))
+    ran = run("serve", "--host", host)
+    assert ran.code == 2
+    assert "GEODESIC_API_KEYS" in error_line(ran)
+    assert "GEODESIC_AUTH=off" in error_line(ran)
+    assert not started
+
+    monkeypatch.setenv("GEODESIC_API_KEYS", "alice:0123456789abcdef")
+    assert run("serve", "--host", host).code == 0
+    monkeypatch.setenv("GEODESIC_AUTH", "off")
+    ran = run("serve", "--host", host)
+    assert ran.code == 2
+    assert "GEODESIC_AUTH is off, but GEODESIC_API_KEYS has keys" in error_line(ran)
+    monkeypatch.delenv("GEODESIC_API_KEYS")
+    assert run("serve", "--host", host).code == 0
+    assert started == [host, host]
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.10", "::1", "localhost"])
+def test_serve_on_this_machine_needs_none(
+    run: Run, monkeypatch: pytest.MonkeyPatch, host: str
+) -> None:
+    started: list[str] = []
+    monkeypatch.setattr(uvicorn, "run", lambda _app, host, **_: started.append(host))
+    assert run("serve", "--host", host).code == 0
+    assert started == [host]
+
+
+def test_serve_shows_no_key_that_it_refuses(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEODESIC_API_KEYS", "alice:0123456789abcdef,0123456789abcdef")
+    ran = run("serve")
+    assert ran.code == 2
+    assert "GEODESIC_API_KEYS" in error_line(ran)
+    assert "0123456789" not in ran.err + ran.out
 
 
 def test_the_manual_names_every_setting_and_no_other() -> None:

@@ -1,6 +1,7 @@
 """``geodesic serve``."""
 
 import math
+from ipaddress import ip_address
 from types import FrameType
 from typing import Annotated
 
@@ -22,10 +23,16 @@ def serve(
         settings = Settings()
     except ValidationError as error:
         faults = [
-            f"{variable_of(str(fault['loc'][0]))}: {fault['msg']}" if fault["loc"] else fault["msg"]
+            ": ".join([*(variable_of(str(name)) for name in fault["loc"][:1]), fault["msg"]])
             for fault in error.errors()
+            if fault["type"] != "default_factory_not_called"  # for another fault's sake
         ]
-        raise typer.BadParameter("; ".join(faults)) from error
+        raise typer.BadParameter("; ".join(faults).replace("Value error, ", "")) from error
+    if not _is_loopback(host) and not settings.api_keys and settings.auth == "on":
+        raise typer.BadParameter(
+            f"whoever reaches {host} could use the service: set GEODESIC_API_KEYS, or "
+            f"GEODESIC_AUTH=off where something before it asks for keys"
+        )
     app = create_app(settings)
 
     class Server(uvicorn.Server):
@@ -41,3 +48,10 @@ def serve(
     server.run()
     if not server.started:
         raise typer.Exit(1)
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

@@ -19,6 +19,8 @@ class MeshFromFile:
     path: Path
     file_type: str
     merge: Merge
+    owner: str | None = None
+    """Who may delete it; None is everybody."""
 
     stops_when_asked: ClassVar[bool] = False
 
@@ -30,6 +32,7 @@ class MeshFromSample:
     name: str
     faces: int
     merge: Merge
+    owner: str | None = None
 
     stops_when_asked: ClassVar[bool] = False
 

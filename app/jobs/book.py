@@ -73,24 +73,24 @@ class JobBook:
         """Remove the record of a job."""
         await self._run("DELETE FROM jobs WHERE id = ?", job_id)
 
-    async def find(self, owner: str, job_id: str) -> Job | None:
+    async def find(self, owner: str | None, job_id: str) -> Job | None:
         """Return the job of an owner with this id, if there is one."""
-        found = await self._jobs("WHERE owner = ? AND id = ?", owner, job_id)
+        found = await self._jobs("WHERE owner IS ? AND id = ?", owner, job_id)
         return found[0] if found else None
 
-    async def find_by_key(self, owner: str, key: str) -> Job | None:
+    async def find_by_key(self, owner: str | None, key: str) -> Job | None:
         """Return the newest job of an owner with this idempotency key, if there is one."""
         found = await self._jobs(
-            "WHERE owner = ? AND idempotency_key = ? ORDER BY number DESC LIMIT 1", owner, key
+            "WHERE owner IS ? AND idempotency_key = ? ORDER BY number DESC LIMIT 1", owner, key
         )
         return found[0] if found else None
 
     async def page(
-        self, owner: str, limit: int, before: int | None
+        self, owner: str | None, limit: int, before: int | None
     ) -> tuple[list[Job], int | None]:
         """Return ``limit`` jobs of an owner, and the number before which to go on, if any."""
         rows = await self._rows(
-            "SELECT number, record FROM jobs WHERE owner = ? AND number < ? "
+            "SELECT number, record FROM jobs WHERE owner IS ? AND number < ? "
             "ORDER BY number DESC LIMIT ?",
             owner,
             2**62 if before is None else before,

@@ -114,7 +114,7 @@ class Jobs:
             live.task = asyncio.create_task(self._run(live, solve), name=f"job {live.job.id}")
             return live.job
 
-    async def find(self, owner: str, job_id: str) -> Job:
+    async def find(self, owner: str | None, job_id: str) -> Job:
         """Return a job as it is now; raises ``ProblemError`` where the owner has none such."""
         live = self._live.get(job_id)
         if live is not None and live.job.errand.owner == owner:
@@ -125,13 +125,13 @@ class Jobs:
         return job
 
     async def page(
-        self, owner: str, limit: int, before: int | None
+        self, owner: str | None, limit: int, before: int | None
     ) -> tuple[list[Job], int | None]:
         """Return ``limit`` jobs of an owner, the newest first, and where to go on, if anywhere."""
         jobs, after = await self._book.page(owner, limit, before)
         return [self._live[job.id].job if job.id in self._live else job for job in jobs], after
 
-    async def dismiss(self, owner: str, job_id: str) -> Job:
+    async def dismiss(self, owner: str | None, job_id: str) -> Job:
         """Stop a job, or forget it where it has finished; return it as it was left."""
         job = await self.find(owner, job_id)
         live = self._live.get(job_id)
@@ -141,7 +141,7 @@ class Jobs:
         await self._forget(job)
         return job
 
-    async def result(self, owner: str, job_id: str) -> tuple[Job, Result]:
+    async def result(self, owner: str | None, job_id: str) -> tuple[Job, Result]:
         """Take the answer of a job.
 
         Raises

@@ -16,8 +16,8 @@ class Errand(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    owner: str
-    """Whose it is: nobody else sees it"""
+    owner: str | None
+    """Whose it is: nobody else sees it; None without keys"""
     kind: str
     """Of question, such as ``distances``"""
     mesh_id: str

@@ -58,7 +58,7 @@ FACES_KEPT = 1.5
 SEARCH_BYTES, SEARCH_BYTES_PER_FACE = 230_000, 275
 
 FACES_ON_LEVEL = 4.0
-"""Faces that an isoline crosses, for the √n of n faces, about: as the longest circles of a ball do"""
+"""Faces that an isoline crosses, for the √n of n faces: about those of a great circle"""
 CROSSINGS = 2.3
 """Edges that a path crosses over the length of one."""
 ARC_IN_FACE = 0.45

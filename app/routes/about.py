@@ -25,10 +25,13 @@ _LIMITS = (
     "max_levels",
     "max_json_values",
     "query_memory_bytes",
+    "worker_memory_bytes",
     "queue_size",
     "deadline_s",
     "job_deadline_s",
     "job_ttl",
+    "rate_limit",
+    "max_concurrent",
 )
 
 
@@ -65,13 +68,14 @@ async def get_readiness(service: ServiceDep) -> Health:
 @router.get("/v1", operation_id="getAbout", summary="Version, formats and limits in force")
 async def get_about(service: ServiceDep) -> About:
     """Return what this service can do, and how much of it."""
+    limits = {variable_of(name): getattr(service.settings, name) for name in _LIMITS}
     return About(
         version=__version__,
         methods=list(get_args(Method)),
         mesh_formats=[*MESH_FORMATS, "json"],
         answer_formats=dict(FORMATS),
         samples=["knot", "sphere", "plane"],
-        limits={variable_of(name): getattr(service.settings, name) for name in _LIMITS},
+        limits={name: limit for name, limit in limits.items() if limit is not None},
     )
 
 

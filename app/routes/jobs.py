@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
-from app.dependencies import OwnerDep, ServiceDep
+from app.dependencies import CallerDep, ServiceDep
 from app.errors import refuse
 from app.jobs import Job
 from app.responses import (
@@ -24,9 +24,9 @@ from app.service import Answered
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
 
-async def get_job_asked_for(job_id: str, service: ServiceDep, owner: OwnerDep) -> Job:
+async def get_job_asked_for(job_id: str, service: ServiceDep, caller: CallerDep) -> Job:
     """Return the job that the address names."""
-    return await service.jobs.find(owner, job_id)
+    return await service.jobs.find(caller.owner, job_id)
 
 
 JobDep = Annotated[Job, Depends(get_job_asked_for)]
@@ -44,12 +44,12 @@ async def list_jobs(
     parameters: Annotated[ListParameters, Query()],
     response: Response,
     service: ServiceDep,
-    owner: OwnerDep,
+    caller: CallerDep,
 ) -> dict[str, Any]:
     """List jobs, the newest first, `limit` at a time."""
     response.headers.update(UNSTORED)
     before = _number(parameters.cursor)
-    jobs, after = await service.jobs.page(owner, parameters.limit, before)
+    jobs, after = await service.jobs.page(caller.owner, parameters.limit, before)
     cursor = None if after is None else str(after)
     return {"jobs": [job_document(job) for job in jobs], "next_cursor": cursor}
 
@@ -76,12 +76,12 @@ async def get_job(job: JobDep, response: Response) -> dict[str, Any]:
     response_model_exclude_unset=True,
     responses=problems("job_not_found"),
 )
-async def dismiss_job(job: JobDep, service: ServiceDep, owner: OwnerDep) -> dict[str, Any]:
+async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> dict[str, Any]:
     """Stop a job that is waiting or running: it is `dismissed` then.
 
     One that has finished, also a dismissed one, is removed with its answer.
     """
-    return job_document(await service.jobs.dismiss(owner, job.id))
+    return job_document(await service.jobs.dismiss(caller.owner, job.id))
 
 
 @router.get(
@@ -95,10 +95,10 @@ async def dismiss_job(job: JobDep, service: ServiceDep, owner: OwnerDep) -> dict
     },
 )
 async def get_job_results(
-    job_id: str, request: Request, service: ServiceDep, owner: OwnerDep
+    job_id: str, request: Request, service: ServiceDep, caller: CallerDep
 ) -> Response:
     """Return the answer, in the format that the query asked for; or the problem that it met."""
-    job, result = await service.jobs.result(owner, job_id)
+    job, result = await service.jobs.result(caller.owner, job_id)
     unchanged = not_modified(request, etag_of(result.key), REVALIDATED)
     if unchanged is not None:
         service.results.give_back(result)

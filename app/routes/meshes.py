@@ -4,7 +4,8 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from app.dependencies import AskerDep, ServiceDep, while_connected
+from app.callers import Caller
+from app.dependencies import AskerDep, CallerDep, ServiceDep, while_connected
 from app.encoding import NPY
 from app.engine import MeshFromFile, MeshFromSample, StoredMesh
 from app.errors import Fault, over_limit, refuse
@@ -112,7 +113,7 @@ async def create_mesh(
     if parameters.sample is None:
         stored, seconds = await _add_upload(service, parameters, request, asker)
     else:
-        making = service.add_mesh(_sample(service, parameters), asker)
+        making = service.add_mesh(_sample(service, parameters, asker.caller), asker)
         stored, seconds = await while_connected(request, making)
     response.status_code = 201 if stored.is_new else 200
     response.headers.update(server_timing(seconds))
@@ -157,11 +158,14 @@ async def get_mesh(
     operation_id="deleteMesh",
     summary="Remove a mesh and its results",
     status_code=204,
-    responses=problems("mesh_not_found"),
+    responses=problems("forbidden", "mesh_not_found"),
 )
-async def delete_mesh(mesh_id: str, service: ServiceDep) -> None:
-    """Remove a mesh; queries that run on it end as if it were there."""
-    await service.delete_mesh(mesh_id)
+async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> None:
+    """Remove a mesh; queries that run on it end as if it were there.
+
+    Where keys are asked for, it needs the one that stored the mesh first.
+    """
+    await service.delete_mesh(mesh_id, caller)
 
 
 @router.get(
@@ -193,14 +197,15 @@ async def _add_upload(
         fault = Fault("/query/faces", "only a sample can be asked for with so many faces")
         raise refuse("invalid_request", fault.message, errors=(fault,))
     with service.meshes.scratch_file() as path:
-        file_format = await spool(request, path, parameters.format)
-        work = MeshFromFile(path, file_format, parameters.merge)
-        return await while_connected(request, service.add_mesh(work, asker))
+        async with service.within(asker.deadline_s):  # both together
+            file_format = await spool(request, path, parameters.format)
+            work = MeshFromFile(path, file_format, parameters.merge, asker.caller.owner)
+            return await while_connected(request, service.add_mesh(work, asker))
 
 
-def _sample(service: Service, parameters: UploadParameters) -> MeshFromSample:
+def _sample(service: Service, parameters: UploadParameters, caller: Caller) -> MeshFromSample:
     faces = parameters.faces or _DEFAULT_SAMPLE_FACES
     if faces > service.settings.max_faces:
         limit = service.settings.max_faces
         raise over_limit("limit_exceeded", "faces", faces, limit, "max_faces")
-    return MeshFromSample(str(parameters.sample), faces, parameters.merge)
+    return MeshFromSample(str(parameters.sample), faces, parameters.merge, caller.owner)

@@ -23,6 +23,8 @@ def test_about_tells_the_limits_in_force(client: TestClient) -> None:
     about = client.get("/v1").json()
 
     assert about["limits"]["GEODESIC_MAX_FACES"] == 5_000_000
+    assert about["limits"]["GEODESIC_WORKER_MEMORY_BYTES"] >= 2**30
+    assert "GEODESIC_RATE_LIMIT" not in about["limits"]
     assert about["answer_formats"]["npy"] == "application/x-npy"
     assert "ply" in about["mesh_formats"]
     assert about["methods"] == ["exact", "approximate"]

@@ -426,7 +426,7 @@ def test_a_defect_in_a_worker_is_logged_there_and_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(worker, "_worker", Worker(config(tmp_path), c_longlong(0), c_double(0.0)))
-    monkeypatch.setattr(worker, "_make_mesh", lambda _: 1 / 0)
+    monkeypatch.setattr(worker, "_make_mesh", lambda *_: 1 / 0)
 
     outcome = worker.do(1, MeshFromSample("plane", 10, "none"))
 

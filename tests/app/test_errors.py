@@ -56,10 +56,11 @@ def test_unknown_code(client: TestClient) -> None:
     ("error", "code"),
     [
         (core.InvalidMesh("bad"), "invalid_mesh"),
+        (core.TooManyFaces(9, 7), "limit_exceeded"),
         (core.InvalidPoint("bad"), "invalid_point"),
         (core.InvalidArgument("bad"), "invalid_request"),
         (core.DeadlineExceeded("late"), "deadline_exceeded"),
-        (core.MemoryLimitExceeded("much"), "memory_limit"),
+        (core.MemoryLimitExceeded(9, 7), "memory_limit"),
         (core.NotConverged("in circles"), "limit_exceeded"),
         (MemoryError(), "memory_limit"),
         (OSError(errno.ENOSPC, "full"), "storage_full"),
@@ -83,6 +84,19 @@ def test_invalid_mesh_names_its_elements() -> None:
 
     assert [fault.pointer for fault in faces.errors] == ["/faces/3", "/faces/5"]
     assert [fault.message for fault in edge.errors] == ["edge 3-5 is at fault"]
+
+
+@pytest.mark.parametrize(
+    ("error", "setting"),
+    [
+        (core.TooManyFaces(9, 7), "GEODESIC_MAX_FACES"),
+        (core.MemoryLimitExceeded(9, 7), "GEODESIC_QUERY_MEMORY_BYTES"),
+    ],
+)
+def test_limits_are_named(error: Exception, setting: str) -> None:
+    problem = problem_of(error)
+
+    assert (problem.limit, problem.actual, problem.setting) == (7, 9, setting)
 
 
 def test_what_does_not_converge_says_what_to_do_about_it() -> None:

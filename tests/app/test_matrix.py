@@ -253,5 +253,7 @@ def test_memory_of_matrices(tmp_path: Path) -> None:
             ("paths", {"source": {"vertex": 0}, "targets": [{"vertex": 1}]}),
         ):
             link = f"/v1/meshes/{mesh_id}/{operation}"
-            check_problem(client.post(link, json=body), 422, "memory_limit")
+            problem = check_problem(client.post(link, json=body), 422, "memory_limit")
+            assert problem["actual"] > problem["limit"] == 1000
+            assert problem["setting"] == "GEODESIC_QUERY_MEMORY_BYTES"
             assert client.post(f"{link}?estimate=true", json=body).json()["memory_bytes"] > 1000

@@ -1,43 +1,180 @@
+import ast
 import os
+from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
 
-from app.settings import Settings, variable_of
+from app import settings as settings_module
+from app.settings import GIB, MIB, Settings, variable_of
+
+from .conftest import distances, serving, upload_sample
+
+TESTS = Path(__file__).parents[1]
+
+TEXTS = {
+    "store": ("/somewhere", Path("/somewhere")),
+    "worker_memory_bytes": ("3000000000", 3_000_000_000),
+    "deadline_s": ("0.5", 0.5),
+    "cancel_grace_s": ("0.25", 0.25),
+    "auth": ("on", "on"),
+    "api_keys": ("", ()),
+    "cors_origins": ("https://a.org, http://b:80", ("https://a.org", "http://b:80")),
+}
+"""What a variable says, and what is understood; all others are whole numbers."""
 
 
 def test_every_setting_is_an_environment_variable(monkeypatch: pytest.MonkeyPatch) -> None:
-    given = dict.fromkeys(Settings.model_fields, "7")
-    for name, value in given.items():
-        monkeypatch.setenv(variable_of(name), value)
+    given = {name: TEXTS.get(name, ("7", 7)) for name in Settings.model_fields}
+    for name, (text, _) in given.items():
+        monkeypatch.setenv(variable_of(name), text)
 
     settings = Settings()
 
-    assert {name: str(getattr(settings, name)).removesuffix(".0") for name in given} == given
+    assert settings.model_dump() == {name: value for name, (_, value) in given.items()}
+
+
+def test_every_setting_is_put_to_use_in_a_test() -> None:
+    used: set[str | None] = set()
+    for path in TESTS.rglob("*.py"):
+        if path == Path(__file__):
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.keyword):
+                used.add(node.arg)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                used.add(node.value)
+
+    missing = {
+        name for name in Settings.model_fields if not used & {name, variable_of(name)}
+    } - USED_BELOW
+    assert not missing
+
+
+USED_BELOW = {"results_bytes"}
+
+
+def test_results_bytes(tmp_path: Path) -> None:
+    with serving(tmp_path, results_bytes=5000) as client:
+        mesh_id = upload_sample(client, "plane", 50)
+        timings = []
+        for vertex in (0, 0, 1, 2, 3, 4, 5, 6, 0):
+            answer = distances(client, mesh_id, sources=[{"vertex": vertex}])
+            timings.append(answer.headers["server-timing"])
+
+    assert [timing == "kept" for timing in timings] == [False, True] + 7 * [False]
 
 
 def test_defaults_are_those_of_the_contract() -> None:
     settings = Settings()
 
-    assert settings.max_upload_bytes == 512 * 2**20
+    assert settings.max_upload_bytes == 512 * MIB
+    assert settings.max_query_bytes == 4 * MIB
     assert settings.max_faces == 5_000_000
     assert settings.max_json_values == 2_000_000
     assert settings.max_sources == 10_000
+    assert settings.max_matrix_cells == 10_000_000
     assert settings.queue_size == 64
     assert settings.deadline_s == 120
     assert settings.workers == len(os.sched_getaffinity(0))
+    assert (settings.rate_limit, settings.max_concurrent) == (None, None)
+    assert (settings.api_keys, settings.cors_origins) == ((), ())
 
 
-def test_unknown_variable_stops_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("GEODESIC_WORKER", "2")
+@pytest.mark.parametrize(
+    ("memory", "workers", "worker", "query"),
+    [
+        (80 * GIB, 4, 16 * GIB, 8 * GIB),
+        (20 * GIB, 2, 8 * GIB, 4 * GIB),
+        (2 * GIB, 8, GIB, GIB // 2),
+    ],
+)
+def test_memory_is_shared_among_workers(
+    monkeypatch: pytest.MonkeyPatch, memory: int, workers: int, worker: int, query: int
+) -> None:
+    monkeypatch.setattr(settings_module, "_memory", lambda: memory)
 
-    with pytest.raises(ValidationError, match=r"unknown setting GEODESIC_WORKER; there are"):
+    settings = Settings(workers=workers)
+
+    assert settings.worker_memory_bytes == worker
+    assert settings.query_memory_bytes == query
+
+
+def test_memory_is_that_of_the_machine_at_most() -> None:
+    total = int(Path("/proc/meminfo").read_text().split()[1]) * 1024
+
+    assert GIB <= settings_module._memory() <= total
+
+
+@pytest.mark.parametrize("name", ["WORKER", "API_KEY", "MAX_FACE"])
+def test_unknown_variable_stops_the_start(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    monkeypatch.setenv(f"GEODESIC_{name}", "2")
+
+    with pytest.raises(ValidationError, match=rf"unknown setting GEODESIC_{name}; there are"):
         Settings()
 
 
-@pytest.mark.parametrize("value", ["0", "-1", "many"])
-def test_senseless_value_stops_the_start(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
-    monkeypatch.setenv("GEODESIC_WORKERS", value)
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("workers", "0"),
+        ("workers", "-1"),
+        ("workers", "many"),
+        ("max_faces", "5e6"),
+        ("max_upload_bytes", "512 MiB"),
+        ("worker_memory_bytes", "1000"),
+        ("deadline_s", "0"),
+        ("deadline_s", "inf"),
+        ("deadline_s", "nan"),
+        ("rate_limit", "0"),
+        ("max_concurrent", "-3"),
+        ("auth", "no"),
+        ("api_keys", "secret"),
+        ("cors_origins", "example.org"),
+        ("cors_origins", "https://example.org/"),
+        ("cors_origins", "https://Example.org"),
+        ("cors_origins", "https://a.org https://b.org"),
+        ("cors_origins", "https://a.org,"),
+    ],
+)
+def test_senseless_value_stops_the_start(
+    monkeypatch: pytest.MonkeyPatch, name: str, value: str
+) -> None:
+    monkeypatch.setenv(variable_of(name), value)
 
-    with pytest.raises(ValidationError, match="workers"):
+    with pytest.raises(ValidationError, match=name):
         Settings()
+
+
+@pytest.mark.parametrize(
+    ("given", "why"),
+    [
+        (
+            {"auth": "off", "api_keys": "alice:0123456789abcdef"},
+            "GEODESIC_AUTH is off, but GEODESIC_API_KEYS has keys",
+        ),
+        (
+            {"max_query_bytes": "2000", "max_upload_bytes": "1000"},
+            "GEODESIC_MAX_QUERY_BYTES is 2000, which is more than GEODESIC_MAX_UPLOAD_BYTES, 1000",
+        ),
+        (
+            {"query_memory_bytes": "2000000000", "worker_memory_bytes": "1000000000"},
+            "GEODESIC_QUERY_MEMORY_BYTES is 2000000000, which is more than GEODESIC_WORKER_MEMORY",
+        ),
+    ],
+)
+def test_contradictions_stop_the_start(
+    monkeypatch: pytest.MonkeyPatch, given: dict[str, str], why: str
+) -> None:
+    for name, value in given.items():
+        monkeypatch.setenv(variable_of(name), value)
+
+    with pytest.raises(ValidationError, match=why) as refusal:
+        Settings()
+
+    assert "0123456789" not in str(refusal.value)
+
+
+def test_what_is_not_set_follows_what_is() -> None:
+    assert Settings(max_upload_bytes=1000).max_query_bytes == 1000
+    assert Settings(worker_memory_bytes=GIB).query_memory_bytes == GIB // 2

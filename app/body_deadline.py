@@ -1,0 +1,43 @@
+"""A limit of time for bodies: who sends one drop by drop is not waited for for ever."""
+
+import asyncio
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.errors import refuse
+from app.settings import Settings, variable_of
+
+
+class BodyDeadlineMiddleware:
+    """Refuses requests whose body is not there within the time that a request may take."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self.app = app
+        self.limit_s = settings.deadline_s
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        end = asyncio.get_running_loop().time() + self.limit_s
+        is_complete = False
+
+        async def receive_in_time() -> Message:
+            nonlocal is_complete
+            if is_complete:
+                return await receive()  # until the client hangs up
+            try:
+                async with asyncio.timeout_at(end):
+                    message = await receive()
+            except TimeoutError:
+                detail = f"the body was not complete within {self.limit_s:g} s"
+                setting = variable_of("deadline_s")
+                raise refuse(
+                    "deadline_exceeded",
+                    detail,
+                    limit=self.limit_s,
+                    setting=setting,
+                    headers={"Connection": "close"},  # or it goes on to drip
+                ) from None
+            is_complete = not message.get("more_body", False)
+            return message
+
+        await self.app(scope, receive_in_time if scope["type"] == "http" else receive, send)

@@ -1,0 +1,149 @@
+import threading
+import tracemalloc
+from typing import Any
+
+import pytest
+
+from app import allowances
+from app.allowances import Allowances
+from app.callers import Caller, caller_at
+from app.errors import Problem, ProblemError
+
+
+class Clock:
+    """Seconds that pass when they are told to."""
+
+    def __init__(self) -> None:
+        self.now = 1e6
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    clock = Clock()
+    monkeypatch.setattr(allowances, "monotonic", clock)
+    return clock
+
+
+ALICE, BOB = Caller("alice", has_key=True), Caller("bob", has_key=True)
+
+
+def refusal_of(given: Allowances, caller: Caller) -> Problem | None:
+    try:
+        with given.one_of(caller):
+            return None
+    except ProblemError as error:
+        return error.problem
+
+
+def test_as_many_as_the_rate_at_once_then_one_by_one(clock: Clock) -> None:
+    given = Allowances(a_minute=3, at_once=None)
+
+    assert [refusal_of(given, ALICE) for _ in range(3)] == [None] * 3
+    refused: Any = refusal_of(given, ALICE)
+    assert (refused.code, refused.limit, refused.actual) == ("rate_limited", 3, 4)
+    assert refused.setting == "GEODESIC_RATE_LIMIT"
+    assert refused.headers == {"Retry-After": "20"}
+    assert refusal_of(given, BOB) is None
+
+    clock.now += 19.5
+    assert refusal_of(given, ALICE).headers == {"Retry-After": "1"}  # type: ignore[union-attr]
+    clock.now += 0.5
+    assert refusal_of(given, ALICE) is None
+    assert refusal_of(given, ALICE) is not None
+    clock.now += 3600
+    assert [refusal_of(given, ALICE) is None for _ in range(4)] == [True, True, True, False]
+
+
+@pytest.mark.parametrize("a_minute", [1, 7, 60, 1000, 100_000])
+def test_over_a_while_the_rate_is_kept(clock: Clock, a_minute: int) -> None:
+    given = Allowances(a_minute, at_once=None)
+    asked = 2 * a_minute + 10
+    let_in = 0
+    for _ in range(asked):
+        let_in += refusal_of(given, ALICE) is None
+        clock.now += 60 / asked
+
+    assert a_minute <= let_in <= 2 * a_minute
+
+
+def test_requests_at_the_same_time() -> None:
+    given = Allowances(a_minute=None, at_once=2)
+
+    with given.one_of(ALICE):
+        with given.one_of(ALICE):
+            refused: Any = refusal_of(given, ALICE)
+            assert (refused.code, refused.limit, refused.actual) == ("rate_limited", 2, 3)
+            assert refused.setting == "GEODESIC_MAX_CONCURRENT"
+            assert refused.headers == {"Retry-After": "1"}
+            assert refusal_of(given, BOB) is None
+        assert refusal_of(given, ALICE) is None
+    assert not given._running
+
+
+def test_what_fails_has_ended_too() -> None:
+    given = Allowances(a_minute=None, at_once=1)
+
+    with pytest.raises(KeyError), given.one_of(ALICE):
+        raise KeyError
+
+    assert refusal_of(given, ALICE) is None
+
+
+def test_a_request_too_many_at_once_costs_no_rate() -> None:
+    given = Allowances(a_minute=2, at_once=1)
+
+    with given.one_of(ALICE):
+        assert refusal_of(given, ALICE).setting == "GEODESIC_MAX_CONCURRENT"  # type: ignore[union-attr]
+    assert refusal_of(given, ALICE) is None
+
+
+def test_without_limits_nothing_is_kept() -> None:
+    given = Allowances(None, None)
+
+    assert all(refusal_of(given, ALICE) is None for _ in range(1000))
+    assert not given._known
+
+
+def test_a_hundred_thousand_addresses_take_bounded_memory_and_no_thread() -> None:
+    threads = threading.active_count()
+    given = Allowances(a_minute=1, at_once=1)
+    tracemalloc.start()
+    for n in range(100_000):
+        refusal_of(given, Caller(f"10.{n >> 16}.{n >> 8 & 255}.{n & 255}", has_key=False))
+    size, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+
+    assert len(given._known) == 10_000
+    assert not given._running
+    assert size < 4_000_000
+    assert threading.active_count() == threads
+
+
+@pytest.mark.parametrize(
+    ("host", "name"),
+    [
+        ("10.0.0.7", "10.0.0.7"),
+        ("::ffff:10.0.0.7", "10.0.0.7"),
+        ("2001:db8:1:2:3::4", "2001:db8:1:2::"),
+        ("2001:db8:1:2:ffff::", "2001:db8:1:2::"),
+        ("fe80::1%eth0", "fe80::"),
+        ("not an address\r\nX: y", "unknown"),
+        ("", "unknown"),
+        (None, "unknown"),
+    ],
+)
+def test_callers_without_a_key_are_their_address(host: str | None, name: str) -> None:
+    assert caller_at(host) == Caller(name, has_key=False)
+
+
+def test_what_belongs_to_whom() -> None:
+    anyone = caller_at("10.0.0.7")
+
+    assert (ALICE.owner, anyone.owner) == ("alice", None)
+    assert ALICE.may_delete("alice")
+    assert ALICE.may_delete(None)
+    assert not BOB.may_delete("alice")
+    assert anyone.may_delete("alice")  # no keys are asked for
