@@ -293,7 +293,7 @@ def test_jobs_are_forgotten_after_a_while(tmp_path: Path) -> None:
 
 
 def test_answers_of_jobs_outlive_those_that_are_only_kept(tmp_path: Path) -> None:
-    with serving(tmp_path, results_bytes=20_000) as client:
+    with serving(tmp_path, results_bytes=20_000, results_memory_bytes=1) as client:
         mesh_id = upload_sample(client, "plane", 200)
         job = job_of(submit(client, mesh_id))
         wait_for(client, job, "successful")
