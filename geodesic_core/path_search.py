@@ -97,9 +97,9 @@ class PathSearch:
         try:
             log = _Log(self, explain)
             return self._search(_Leg(*ends, SEARCH_SLACK, control, log))
-        except (_LostError, NotConverged):
+        except (InternalError, NotConverged):
             # Rounding on slivers can exceed any slack; without bounds there is nothing to lose.
-            # Where many faces lie near each other, merging may go in circles.
+            # Where many faces lie near each other, merging may go in circles, or its path be lost.
             log = _Log(self, explain)
             return self._search(_Leg(*ends, math.inf, control, log))
 
@@ -230,16 +230,12 @@ class _Leg(NamedTuple):
     control: Control
     log: "_Log"
 
-    def lost(self, how: str) -> "_LostError":
+    def lost(self, how: str) -> InternalError:
         """Return the error of not having reached the end."""
-        return _LostError(
+        return InternalError(
             f"{self.end.point} was not reached {how} from {self.start.point}, though the two are "
             f"connected; please report this mesh"
         )
-
-
-class _LostError(InternalError):
-    """A search did not reach its target."""
 
 
 class _Log:

@@ -24,6 +24,20 @@ FLAT = 1e-14
 On the line itself it would send no rays into the face beyond. Directions are off by this much.
 """
 
+SHARP = 1e-2
+"""Radians of the total angle below which an inner vertex is a tip that windows wind about for long.
+
+A window whose rays meet the tip goes around it until it has turned by π: π / SHARP times here. At
+such a tip what passed an edge is kept, which ends that after a turn or two.
+"""
+
+NO_AREA = 1e-8
+"""Sine of an angle of a face up to which it counts as one of no area.
+
+All ways around such faces are as long, so that windows could go in a circle where there is no tip,
+between several of them. Ends of one whose angle is larger differ by more than rounding.
+"""
+
 OVERLAP = 1e-6
 """Share of an edge's length up to which two windows may overlap untrimmed.
 

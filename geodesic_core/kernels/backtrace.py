@@ -50,7 +50,7 @@ from geodesic_core.kernels.wavefront import (
     SPLIT,
     VIA,
 )
-from geodesic_core.tolerances import GAP, ON_PATH, SAME_PLACE
+from geodesic_core.tolerances import GAP, ON_PATH, SAME_PLACE, WIDEST_ERROR
 
 
 class Winners(NamedTuple):
@@ -74,6 +74,12 @@ class Winners(NamedTuple):
 TRACED = 0
 NO_ROOM = 1  # the path has more points than the arrays hold: grow, and call again
 LOST = 2  # the line left the surface: a defect
+
+TRIES = 64
+"""How many edges a straight piece is tried over, per point of the longest path, before it is lost.
+
+Sheets upon each other, around a sharp tip, can be gone through in more ways than time allows.
+"""
 
 FORKS = 64
 """Irregular edges on a straight piece where other faces are still to be tried, at most."""
@@ -230,6 +236,7 @@ def trace_line(
 
     Across an irregular edge it is not known from which face the path came: the faces are tried in
     turn. Of several that lead to the pseudosource, straight and at the right distance, any will do.
+    A wrong one is given up where a vertex is farther than the way to it would be.
     """
     links, geometry, distance = topology.links, topology.geometry, winners.distance
     m, root = winners.winner_ints[v, VIA], winners.winner_ints[v, FROM]
@@ -258,7 +265,8 @@ def trace_line(
     # Where other faces may be tried: what was known there, and which one was the last
     forks, fork_ints = np.empty((FORKS, 4)), np.empty((FORKS, 4), np.int32)
     fork_count, after = 0, -1
-    while True:
+    slack = (WIDEST_ERROR if len(winners.reference) > 0 else SAME_PLACE) * distance[v]
+    for _ in range(TRIES * len(nodes)):
         # At (x, 0) on m, whose face lies ahead; the pseudosource is behind
         if reference >= 0:
             reference, sx, sy, sigma = unmerge(winners, reference, m, x, sx, sy, sigma)
@@ -303,8 +311,10 @@ def trace_line(
             ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
             ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
             reach = math.sqrt((ax - x) * (ax - x) + ay * ay)
+            is_lost = fork_count > 0 and distance[apex] > sigma + rest + reach + slack
             is_root = apex == root and reach <= most * (1.0 + SAME_PLACE) + GAP * length
-            if is_root or is_on_path(winners, apex, reach, sigma + rest, v):
+            is_end = is_root or is_on_path(winners, apex, reach, sigma + rest, v)
+            if is_end and not is_lost:
                 return TRACED, count, apex
             if (ax - x) * sy - ay * (sx - sw * x) >= 0.0:  # s is left of the apex
                 m, side = previous(h), geometry[h, LENGTH_LEFT]
@@ -327,7 +337,7 @@ def trace_line(
             is_due = reference >= 0 and winners.merge_ints[reference, MERGED_ON] == m
             close = SAME_PLACE * side
             ends = left < -close or (sw > 0.0 and left <= close and rest <= close)
-            is_lost = fork_count > 0 and not is_due and ends
+            is_lost = is_lost or (fork_count > 0 and not is_due and ends)
             sy, after = -sy, -1
         if is_lost:
             if fork_count == 0:
@@ -338,3 +348,4 @@ def trace_line(
             m, after = fork_ints[fork_count, 0], fork_ints[fork_count, 1]
             reference, count = fork_ints[fork_count, 2], fork_ints[fork_count, 3]
             root = -1 - reference if reference < 0 else -1
+    return LOST, count, -1

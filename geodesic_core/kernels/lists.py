@@ -5,7 +5,17 @@ from typing import Any
 from geodesic_core.kernels.jit import kernel, prefetch
 from geodesic_core.kernels.passed import keep_passed, mirror, passes
 from geodesic_core.kernels.queue import ring_push
-from geodesic_core.kernels.topology import AROUND, HEAD, LENGTH, ROW, TAIL
+from geodesic_core.kernels.topology import (
+    AROUND,
+    HEAD,
+    IRREGULAR,
+    LENGTH,
+    OPPOSITE,
+    OUT_LEFT,
+    ROW,
+    TAIL,
+    following,
+)
 from geodesic_core.kernels.wavefront import (
     CREATED,
     DONE,
@@ -107,6 +117,16 @@ def queue_if_due(wave: Any, h: int, u: int, v: int) -> None:
     """Queue the list of h if an end of its edge (u, v) is done; else it waits for more windows."""
     if wave.status[u] == DONE or wave.status[v] == DONE:
         queue_list(wave, h)
+
+
+@kernel
+def send_out(wave: Any, h: int, slot: int) -> None:
+    """Move a window of a source in the face of h over the edge of h, which is no boundary."""
+    wave.counters[CREATED] += 1
+    if wave.links[ROW * following(h) + OUT_LEFT] == IRREGULAR:
+        send_across(wave, h, slot)
+    else:
+        insert_sorted(wave, wave.links[ROW * h + OPPOSITE], slot)
 
 
 @kernel

@@ -16,7 +16,7 @@ What passed is kept in the frame that runs from the lower vertex of the edge to 
 from typing import Any
 
 from geodesic_core.kernels.jit import kernel
-from geodesic_core.kernels.overlap import trim
+from geodesic_core.kernels.overlap import trim, wins_throughout, without
 from geodesic_core.kernels.topology import AROUND, HEAD, LENGTH, ROW, TAIL
 from geodesic_core.kernels.wavefront import merging, source_weight
 from geodesic_core.kernels.window import (
@@ -110,12 +110,43 @@ def cut_by(
     sx, sy, sigma = wave.windows[w + SX], wave.windows[w + SY], wave.windows[w + SIGMA]
     own_root = wave.window_ints[INTS * slot + ROOT]
     pw, sw = source_weight(wave, root), source_weight(wave, own_root)
-    slack = SLACK * distance_at(b0, sx, sy, sigma, sw)
-    if wave.origin[own_root] < wave.origin[root]:
-        slack = -slack
-    p_sigma -= slack
-    p0, p1, b0, b1 = trim(p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, 0.0, 0.0, pw, sw)
+    slack = -SLACK if wave.origin[own_root] < wave.origin[root] else SLACK
+    lo, hi = max(p0, b0), min(p1, b1)
+    if lo < hi and is_no_nearer(lo, hi, sx, sy, sigma, sw, px, py, p_sigma, pw, slack):
+        b0, b1 = without(b0, b1, lo, hi)
+    else:
+        p_sigma -= slack * distance_at(b0, sx, sy, sigma, sw)
+        p0, p1, b0, b1 = trim(p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, 0.0, 0.0, pw, sw)
     wave.windows[w + B0], wave.windows[w + B1] = b0, b1
+
+
+@kernel
+def is_no_nearer(
+    lo: float,
+    hi: float,
+    sx: float,
+    sy: float,
+    sigma: float,
+    sw: float,
+    px: float,
+    py: float,
+    p_sigma: float,
+    pw: float,
+    slack: float,
+) -> bool:
+    """Whether a window is nowhere in [lo, hi] nearer than p, by a share of its own distance there.
+
+    By what rounding adds from turn to turn, a window that lies along the edge seems nearer at its
+    far end than before; seen from the near end, where the source may be, that is not little.
+    """
+    x = 0.5 * (lo + hi)
+    if pw * sw == 1.0 and py != sy:  # where the lead is stationary: see `wins_throughout`
+        x = min(max((px * sy - sx * py) / (sy - py), lo), hi)
+    for place in (lo, x, hi):
+        own = distance_at(place, sx, sy, sigma, sw)
+        if distance_at(place, px, py, p_sigma, pw) > own + slack * own:
+            return False
+    return pw * sw == 1.0 or wins_throughout(lo, hi, px, py, p_sigma, sx, sy, sigma, pw, sw)
 
 
 @kernel

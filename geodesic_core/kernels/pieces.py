@@ -10,11 +10,10 @@ from typing import Any
 
 from geodesic_core.kernels.arrival import bound_vertex, improve_vertex, light_vertex
 from geodesic_core.kernels.jit import kernel
-from geodesic_core.kernels.lists import insert_sorted, put_window, send_across
+from geodesic_core.kernels.lists import put_window, send_out
 from geodesic_core.kernels.topology import (
     APEX,
     COS_LEFT,
-    IRREGULAR,
     LENGTH,
     LENGTH_LEFT,
     NO_FACE,
@@ -23,7 +22,6 @@ from geodesic_core.kernels.topology import (
     SIN_LEFT,
 )
 from geodesic_core.kernels.wavefront import (
-    CREATED,
     FACE,
     NODE,
     PIECE,
@@ -87,18 +85,14 @@ def emit_strip(
 ) -> None:
     """Send the strip that leaves pq over the edge of h; (dx, dy) is its direction, dx > 0."""
     row = ROW * h
-    length, across = wave.geometry[row + LENGTH], wave.links[row + OPPOSITE]
+    length = wave.geometry[row + LENGTH]
     b0, b1 = max(px + py * dy / dx, 0.0), min(qx + qy * dy / dx, length)
-    if across == NO_FACE or b1 <= b0:
+    if wave.links[row + OPPOSITE] == NO_FACE or b1 <= b0:
         return
     # The rays run along (dy, -dx). The frame across begins at the other end, and looks that way.
     sigma = wave.distance[node] + (length - px) * dy + py * dx
     slot = put_window(wave, length - b1, length - b0, dy, -dx, sigma, node, 0.0, -1 - node)
-    wave.counters[CREATED] += 1
-    if across == IRREGULAR:
-        send_across(wave, h, slot)
-    else:
-        insert_sorted(wave, across, slot)
+    send_out(wave, h, slot)
 
 
 @kernel

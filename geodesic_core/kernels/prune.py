@@ -12,7 +12,7 @@ from typing import Any
 
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.topology import SEAM, TAIL
+from geodesic_core.kernels.topology import PINCHED, SEAM, TAIL
 from geodesic_core.kernels.wavefront import (
     COUNTERS,
     FACE,
@@ -138,7 +138,7 @@ def forget(topology: Any, wavefront: Any, bounds: Any) -> None:
             for h in range(3 * face, 3 * face + 3):
                 wave.lists[LIST * h + SIZE] = 0
                 wave.lists[LIST * h + MARKS] = 0
-                if wave.flags[v] & SEAM:
+                if wave.flags[v] & (SEAM | PINCHED):
                     wave.passed[h] = -1
                 if merging(wave):
                     wave.runs[h] = 0

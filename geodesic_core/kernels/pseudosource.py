@@ -25,6 +25,7 @@ from geodesic_core.kernels.topology import (
     NO_FACE,
     OUT_LEFT,
     OUT_RIGHT,
+    PINCHED,
     ROW,
     SIN_RIGHT,
     following,
@@ -60,10 +61,10 @@ def emit_pseudosource(wave: Any, v: int) -> None:
 
     At a saddle the shadow is what no straight path through a neighbourhood of v reaches: directions
     that make an angle of π or more with the incoming one on both sides. At a boundary either side
-    will do. Where several fans meet, v emits all around.
+    will do. Where several fans meet, or faces are pinched, v emits all around.
     """
     total = wave.total_angle[v]
-    if wave.winner_ints[WINNER * v + VIA] < 0 or (wave.flags[v] & FANS) != 0:
+    if wave.winner_ints[WINNER * v + VIA] < 0 or wave.flags[v] & (FANS | PINCHED) != 0:
         emit_around(wave, v)
     elif merging(wave):
         emit_shadows(wave, v)

@@ -11,12 +11,11 @@ from typing import Any
 
 from geodesic_core.kernels.arrival import bound_vertex, improve_vertex, light_vertex, precedence
 from geodesic_core.kernels.jit import kernel, pointer
-from geodesic_core.kernels.lists import insert_sorted, put_window, send_across
+from geodesic_core.kernels.lists import put_window, send_out
 from geodesic_core.kernels.pieces import distance_to_piece
 from geodesic_core.kernels.topology import (
     APEX,
     COS_LEFT,
-    IRREGULAR,
     LENGTH,
     LENGTH_LEFT,
     NO_FACE,
@@ -26,7 +25,6 @@ from geodesic_core.kernels.topology import (
     TAIL,
 )
 from geodesic_core.kernels.wavefront import (
-    CREATED,
     FACE,
     FROM,
     LIST,
@@ -78,14 +76,9 @@ def emit_site(wave: Any, k: int) -> None:
         x, y = site_in_frame(wave, k, h)
         row = ROW * h
         length = wave.geometry[row + LENGTH]
-        across = wave.links[row + OPPOSITE]
-        if across != NO_FACE and y > 0.0:
+        if wave.links[row + OPPOSITE] != NO_FACE and y > 0.0:
             slot = put_window(wave, 0.0, length, length - x, -y, sigma, node, 0.0, -1 - node)
-            wave.counters[CREATED] += 1
-            if across == IRREGULAR:
-                send_across(wave, h, slot)
-            else:
-                insert_sorted(wave, across, slot)
+            send_out(wave, h, slot)
         ax = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
         ay = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
         distance = sigma + math.hypot(ax - x, ay - y)

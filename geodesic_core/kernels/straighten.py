@@ -21,8 +21,6 @@ from geodesic_core.kernels.topology import (
     LENGTH,
     LENGTH_LEFT,
     OPPOSITE,
-    OUT_LEFT,
-    OUT_RIGHT,
     SEAM,
     SIN_LEFT,
     TAIL,
@@ -125,7 +123,7 @@ def angle_on_right(topology: Any, before: int, v: int, after: int) -> float:
         angle += math.atan2(topology.geometry[h, SIN_LEFT], topology.geometry[h, COS_LEFT])
         if topology.links[h, APEX] == after:
             return angle
-        h = topology.links[h, OUT_LEFT]
+        h = topology.links[previous(h), OPPOSITE]
     return math.inf
 
 
@@ -146,7 +144,7 @@ def strip_along(topology: Any, path: Ints, sides: Any) -> tuple[Ints, int]:
                 strip[size] = h
                 size += 1
             while links[h, APEX] != after:
-                h = links[h, OUT_LEFT]
+                h = links[previous(h), OPPOSITE]
                 strip[size] = h
                 size += 1
         else:
@@ -180,7 +178,7 @@ def unfold_strip(topology: Any, strip: Ints, size: int, ends: Floats) -> None:
         along = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
         ahead = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
         ax, ay = lx + along * ex - ahead * ey, ly + along * ey + ahead * ex
-        if i + 1 < size and strip[i + 1] == topology.links[h, OUT_LEFT]:
+        if i + 1 < size and strip[i + 1] == topology.links[previous(h), OPPOSITE]:
             rx, ry = ax, ay
         else:
             lx, ly = ax, ay
@@ -345,5 +343,5 @@ def pass_beyond(
         if h == goal:
             return place
         is_end = False
-        h = links[h, OUT_RIGHT if side == LEFT else OUT_LEFT]
+        h = links[following(h) if side == LEFT else previous(h), OPPOSITE]
     return -1

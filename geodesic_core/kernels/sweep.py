@@ -22,6 +22,7 @@ from geodesic_core.kernels.topology import (
     IRREGULAR,
     OUT_LEFT,
     OUT_RIGHT,
+    PINCHED,
     ROW,
     SEAM,
     following,
@@ -148,7 +149,7 @@ def room_to_emit(wave: Any, v: int) -> int:
     """How many windows v may emit, at most."""
     first, last = wave.first_corner[v], wave.first_corner[v + 1]
     room = 6 * (last - first)
-    if wave.flags[v] & SEAM:
+    if wave.flags[v] & (SEAM | PINCHED):
         for c in range(first, last):
             h = wave.corners[c]
             if wave.links[ROW * h + OUT_RIGHT] == IRREGULAR:

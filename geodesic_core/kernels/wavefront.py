@@ -12,7 +12,7 @@ import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs, Singles, aligned_rows
 from geodesic_core.kernels.jit import inlined, kernel, pointer
-from geodesic_core.kernels.topology import SEAM, Topology
+from geodesic_core.kernels.topology import PINCHED, SEAM, Topology
 from geodesic_core.kernels.window import WIDTH
 
 # Columns of Wavefront.lists, a row per half-edge
@@ -410,7 +410,7 @@ def new_wavefront(
     """
     vertices, half_edges = len(topology.total_angle), len(topology.links)
     nodes = vertices + sites.nodes
-    irregular = bool((topology.flags & SEAM).any())
+    irregular = bool((topology.flags & (SEAM | PINCHED)).any())
     merged_vertices, merged_nodes = (vertices, nodes) if merges else (0, 0)
     counters = np.zeros(COUNTERS, np.int64)
     counters[FREE_FIRST] = -1

@@ -7,6 +7,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument
+from geodesic_core.tolerances import CROSSING, LEVEL
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
 from tests.core.isoline_checks import (
@@ -65,6 +66,56 @@ def test_levels_of_vertices(case):
     vertices = np.flatnonzero(np.isfinite(field.distances) & (field.distances > 0.0))[:6]
     levels = field.distances[vertices].tolist()
     check_all(mesh, 0, field, levels, crossings=False)
+
+
+LEVELS = pytest.mark.parametrize("share", [-3.0, -0.5, 0.0, 0.5, 3.0])
+"""By how much of LEVEL a level is off the distance of a vertex or an edge: as rounding may be."""
+
+
+@LEVELS
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_lines_along_edges_are_one_and_whole(share, scale):
+    """Of a curve along a column of edges, lines run along others, or a hair beside them."""
+    points, faces = zoo.grid(6, 3)
+    turned = scale * points @ zoo.rotation(8).T
+    mesh = gc.TriangleMesh(turned, faces)
+    column = [int(v) for v in np.flatnonzero(points[:, 0] == 2.0)]
+    field = gc.exact_distance(mesh, gc.Curve(column), keep_windows=True)
+    for away, sides in ((1.0, 2), (2.0, 2), (3.0, 1)):
+        level = scale * away * (1.0 + share * LEVEL)
+        (lines,) = field.isolines([level])
+        if away == 2.0:  # the rim itself is within, or a line lies just before it
+            lines = [line for line in lines if (line.points @ zoo.rotation(8))[0, 0] > scale]
+        assert len(lines) == (1 if away == 2.0 else sides)
+        for line in lines:
+            assert not line.closed
+            assert line.length == pytest.approx(3.0 * scale, rel=1e-11)
+            places = line.points @ zoo.rotation(8) / scale
+            np.testing.assert_allclose(np.abs(places[:, 0] - 2.0), away, rtol=2 * CROSSING)
+            check_pieces(mesh, line)
+
+
+@LEVELS
+def test_lines_through_vertices_are_one_and_whole(share):
+    """On a grid, circles through vertices, and along none of their edges."""
+    points, faces = zoo.grid(8, 8)
+    mesh = gc.TriangleMesh(points @ zoo.rotation(9).T, faces)
+    centre = int(np.flatnonzero((points == (4, 4, 0)).all(axis=1))[0])
+    field = gc.exact_distance(mesh, centre)
+    for distance in (1.0, math.sqrt(2.0), 3.0):
+        level = distance * (1.0 + share * LEVEL)
+        (line,) = field.isolines([level], FINE)[0]
+        assert line.closed
+        assert line.length == pytest.approx(2 * math.pi * level, rel=4 * FINE / level)
+        check_pieces(mesh, line)
+
+
+@pytest.mark.parametrize(("share", "lines"), [(-1e4, 1), (-0.5, 0), (0.0, 0), (0.5, 0), (1e4, 0)])
+def test_the_farthest_vertex_is_within_its_own_level(share, lines):
+    points, faces = zoo.grid(5, 4)
+    mesh = gc.TriangleMesh(points @ zoo.rotation(10).T, faces)
+    level = math.hypot(5.0, 4.0) * (1.0 + share * LEVEL)
+    assert len(gc.exact_distance(mesh, 0).isolines([level])[0]) == lines
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -231,6 +231,37 @@ def test_three_needles_upon_each_other(source):
         assert path.length == pytest.approx(expected[target], rel=1e-12)
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-16, 1e-14, 1e-12, 1e-8, 1e-5, 1e-3])
+@pytest.mark.parametrize(
+    "faces", [[(0, 1, 2), (2, 1, 0)], [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)]]
+)
+def test_a_pillow_of_faces_of_no_area(faces, noise):
+    """Windows would wind about its tips, whose angle is none, for ever."""
+    count = np.max(faces) + 1
+    places = np.array([1.0, 0.3, 3.7, 4.4])[:count]
+    line = np.stack([places, 0 * places, 0 * places], axis=1) @ zoo.rotation(3)
+    moved = line + noise * np.random.default_rng(5).normal(size=line.shape)
+    mesh = gc.TriangleMesh(moved, faces)
+    for source in range(count):
+        expected = np.abs(places - places[source])
+        found = gc.exact_distance(mesh, source, deadline_s=20)
+        assert found.stats.windows_created < 60
+        np.testing.assert_allclose(found.distances, expected, rtol=1e-14, atol=20 * noise)
+        near = gc.approximate_distance(mesh, source, 1e-3, deadline_s=20).distances
+        np.testing.assert_allclose(near, found.distances, rtol=1e-3)
+
+
+def test_what_is_pinched_is_no_other_mesh_to_the_report():
+    """Edges that windows cross as irregular ones are plain edges to all others."""
+    vertices = [(0, 0, 0), (1, 0, 0), (3, 0, 0), (1, 2, 0)]
+    mesh = gc.TriangleMesh(vertices, [(0, 1, 3), (1, 2, 3), (0, 2, 1)])
+    assert mesh.report.degenerate_faces == gc.Sample(1, (2,))
+    assert mesh.report.bow_tie_vertices.count == mesh.report.non_manifold_edges.count == 0
+    assert mesh.report.boundary_loops == 1
+    lines = gc.exact_distance(mesh, 3).isolines([2.1])[0]
+    assert [line.closed for line in lines] == [False, False]
+
+
 def test_points_inside_three_sheets_upon_each_other():
     """The way from inside one sheet into another is over the nearest edge, in its mirror image."""
     corners = np.array([(0, 0, 0), (4, 0, 0), (1, 3, 0)])

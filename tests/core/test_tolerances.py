@@ -28,6 +28,7 @@ from geodesic_core.kernels.topology import (
     LENGTH,
     LENGTH_LEFT,
     OPPOSITE,
+    PINCHED,
     ROW,
     SADDLE,
     SIN_LEFT,
@@ -60,6 +61,7 @@ from geodesic_core.tolerances import (
     LOCAL_SHARE,
     LOOSE_OVERLAP,
     LOWER_BOUND,
+    NO_AREA,
     ON_PATH,
     OVERLAP,
     PATH_LENGTH,
@@ -67,6 +69,7 @@ from geodesic_core.tolerances import (
     SADDLE_EXCESS,
     SEARCH_SLACK,
     SECTOR_MARGIN,
+    SHARP,
     SLACK,
     SLANT,
     SNAP,
@@ -92,6 +95,34 @@ def test_each_tolerance_is_tested():
     tested = [name.removeprefix("test_") for name in globals() if name.startswith("test_")]
     for name in names:
         assert any(test.startswith(name.lower()) for test in tested), name
+
+
+# Pinched faces -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("share", "is_pinched"), [(0.99, True), (1.01, False)])
+@SCALES
+def test_no_area_is_an_angle_of_so_much(share, is_pinched, scale):
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, share * NO_AREA, 0), (0, -1, 0)]) * scale
+    topology = topology_of(zoo.Case("needle", corners, np.array([(0, 1, 2), (0, 3, 1)])))
+    flagged = topology.flags[topology.inner_vertex] & PINCHED != 0
+    assert flagged.tolist() == [is_pinched] * 3 + [False]
+
+
+@pytest.mark.parametrize("share", [0.99, 1.01])
+@SCALES
+def test_sharp_tips_end_what_winds_about_them(share, scale):
+    """A square, as seen from the tip of a cone; just above the bound windows wind as said."""
+    sides = 4
+    tilt = math.acos(share * SHARP / sides / math.sqrt(2.0))
+    vertices, faces, _, total = zoo.cone(sides, tilt)
+    assert total == pytest.approx(share * SHARP, rel=1e-4)
+    mesh = gc.TriangleMesh(vertices * scale, faces)
+    assert ((mesh.topology.flags & PINCHED) != 0).all() == (share < 1)
+    found = gc.exact_distance(mesh, 1)
+    created = found.stats.windows_created
+    assert created < 50 if share < 1 else created < 8 * sides * math.pi / SHARP
+    np.testing.assert_allclose(found.distances[0], scale, rtol=1e-14)
 
 
 # Polygons ---------------------------------------------------------------------------------------

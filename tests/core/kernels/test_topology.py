@@ -224,10 +224,10 @@ def topology_as_given(case) -> Topology:
     topology = empty_topology(len(case.vertices), len(case.faces))
     faces = np.ascontiguousarray(case.faces, np.int32)
     opposite, around = link_opposites(faces, len(case.vertices))
-    angles = np.empty(faces.size)
-    assert fill_geometry(case.vertices, faces, topology.geometry, angles) == -1
-    fill_links(faces, opposite, around, topology.links)
-    unfold_fans(faces, opposite, angles, topology)
+    angles, pinched = np.empty(faces.size), np.zeros(len(faces), np.uint8)
+    assert fill_geometry(case.vertices, faces, topology.geometry, angles, pinched) == -1
+    unfold_fans(faces, opposite, angles, pinched, topology)
+    fill_links(faces, opposite, opposite, around, topology.links)
     for array in (topology.inner_vertex, topology.outer_vertex, topology.outer_face):
         array[:] = np.arange(len(array))
     for array in topology:
