@@ -52,6 +52,8 @@ _DEFINING_ARRAYS = ("vertices", "faces", "vertex_map", "face_map")
 class OpenMesh:
     """A mesh over memory-mapped arrays, its solver, and what its reader said of the file."""
 
+    name: tuple[str, bytes]
+    """Its id, and its barriers"""
     solver: Solver
     warnings: Sequence[str]
 
@@ -62,7 +64,8 @@ class OpenMesh:
 
     def with_barriers(self, faces: NDArray[np.int64]) -> "OpenMesh":
         """Return the same with some faces blocked; see `TriangleMesh.with_barriers`."""
-        return OpenMesh(Solver(self.mesh.with_barriers(faces)), self.warnings)
+        name = self.name[0], faces.tobytes()
+        return OpenMesh(name, Solver(self.mesh.with_barriers(faces)), self.warnings)
 
     @property
     def nbytes(self) -> int:
@@ -148,7 +151,8 @@ class MeshStore:
                 raise _damaged(mesh_id, f"its array {name} cannot be read") from error
             if _checksum(arrays[name]) != checksum:
                 raise _damaged(mesh_id, f"its array {name} is not what was written")
-        return OpenMesh(Solver(TriangleMesh.from_arrays(arrays)), manifest["warnings"])
+        solver = Solver(TriangleMesh.from_arrays(arrays))
+        return OpenMesh((mesh_id, b""), solver, manifest["warnings"])
 
     def array_file(self, mesh_id: str, name: str) -> Path:
         """Return the file of an array that clients may read."""

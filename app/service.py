@@ -135,7 +135,7 @@ class Service:
     ) -> tuple[Estimate, Seconds]:
         """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
         query.refuse_answer(form.media_type, self.size(query.mesh_id), self.settings)
-        order = Order(Estimating(query, form), asker.caller.name, query.mesh_id, is_small=True)
+        order = Order(Estimating(query, form), asker.caller.name, query.topics, is_small=True)
         async with self.within(asker.deadline_s):
             done = await self.engine.run(order, _nobody)
         assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
@@ -169,7 +169,7 @@ class Service:
         if kept is not None:
             return Answered(kept, {})
         work = Answering(query, form, name)
-        order = Order(work, client, query.mesh_id, query.is_small(size))
+        order = Order(work, client, query.topics, query.is_small(size))
         done = await self._flights.join(name, partial(self.engine.run, order), told)
         assert done.answer is not None, "this kind of work answers"  # noqa: S101
         result = self.results.take_new(name, done.answer, is_kept=query.is_repeatable)

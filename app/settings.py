@@ -86,6 +86,8 @@ class Settings(BaseSettings):
     """Memory of a worker for its work, whatever that is; what it maps (meshes) does not count."""
     worker_mesh_bytes: PositiveInt = 2 * GIB
     """Size of the meshes that a worker keeps open, and of what it keeps for paths on them."""
+    worker_field_bytes: PositiveInt = 512 * MIB
+    """Size of the distance fields that a worker keeps, so that what is asked next is there."""
     results_bytes: PositiveInt = 4 * GIB
     """Size of the finished results that the store keeps."""
     results_memory_bytes: PositiveInt = 256 * MIB

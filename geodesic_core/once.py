@@ -15,6 +15,11 @@ class Once(Generic[T]):
         self._find = find
         self._found = found
 
+    @property
+    def found(self) -> T | None:
+        """The value, if it is there."""
+        return self._found
+
     def get(self, control: Control) -> T:
         """Return the value.
 

@@ -93,6 +93,16 @@ class DistanceField:
     _ways: Once[tuple[Winners, Kept]] | None
     """Those of an exact sweep, by which any point is found; None where it is searched from."""
 
+    @property
+    def nbytes(self) -> int:
+        """Memory kept, bytes, the mesh not counted; it grows by what is found only when asked."""
+        kept: list[Any] = [self._node_distances, self.distances, self.nearest_source]
+        kept += self._winners.found or ()
+        ways = self._ways.found if self._ways is not None else None
+        for windows in (self._windows, ways[1] if ways is not None else None):
+            kept += windows or ()
+        return sum(array.nbytes for array in kept)
+
     def distance_at(
         self,
         point: Point,

@@ -163,17 +163,15 @@ class LocalEngine:
             await slot.close()
 
     async def _take(self, order: Order) -> Slot:
-        """Wait for a free slot, best one that has the mesh open."""
-        mesh_id = order.mesh_id
+        """Wait for a free slot, best one that knows what the order is about."""
         self._idle = [slot for slot in self._idle if slot.is_alive]
         fit = [slot for slot in self._idle if self._takes(slot, order.is_small)]
         if fit:
-            slot = max(fit, key=lambda s: (mesh_id in s.known_meshes, -len(s.known_meshes)))
+            slot = max(fit, key=lambda slot: _fitness(slot, order))
             self._idle.remove(slot)
         else:
             slot = await self._wait(order)
-        if mesh_id is not None and mesh_id not in slot.known_meshes:
-            slot.known_meshes.append(mesh_id)
+        slot.topics.extend(topic for topic in order.topics if topic not in slot.topics)
         return slot
 
     def _takes(self, slot: Slot, is_small: bool) -> bool:
@@ -230,6 +228,11 @@ class LocalEngine:
         task = asyncio.create_task(coroutine)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
+
+
+def _fitness(slot: Slot, order: Order) -> tuple[Any, ...]:
+    """Return what a slot has to do with an order; where nothing, the least it has with others."""
+    return *(topic in slot.topics for topic in order.topics), -len(slot.topics)
 
 
 def _unavailable() -> ProblemError:

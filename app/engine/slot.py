@@ -19,7 +19,7 @@ logger = logging.getLogger(__name__)
 
 _SPAWN = multiprocessing.get_context("spawn")  # fork would copy threads' locks, held or not
 _LOOK_S = 0.1  # how often an idle worker is looked after; pebble looks as often
-_KNOWN_MESHES = 32
+_TOPICS = 64  # that are remembered
 
 
 class WorkerLostError(Exception):
@@ -52,12 +52,12 @@ class Slot:
         self._stop_number = _SPAWN.RawValue("q", 0)
         self._pid = _SPAWN.RawValue("q", 0)
         self._progress = _SPAWN.RawValue("d", 0.0)
-        self.known_meshes: deque[str] = deque(maxlen=_KNOWN_MESHES)
+        self.topics: deque[str] = deque(maxlen=_TOPICS)
 
     async def open(self) -> None:
         """Start a worker and warm its kernels; raises ``WorkerLostError`` when it cannot."""
         self._given_up.clear()
-        self.known_meshes.clear()
+        self.topics.clear()
         self._stop_number.value = self._pid.value = 0
         self._pool = ProcessPool(
             max_workers=1,

@@ -68,8 +68,8 @@ class Order:
     work: Work
     client: str
     """On whose behalf: clients take turns"""
-    mesh_id: str | None = None
-    """The mesh that it is about: best done where that is open"""
+    topics: tuple[str, ...] = ()
+    """What it is about, the most telling first: best done where that came up before"""
     is_small: bool = False
     """Whether it is likely to be done at once, so that it need not wait behind long work"""
 

@@ -33,7 +33,7 @@ from app.engine.work import (
 from app.errors import problem_of
 from app.json_mesh import read_json_mesh
 from app.mesh_store import MeshStore, OpenMesh
-from app.queries import Grant, Query, estimate
+from app.queries import Fields, Grant, Query, estimate
 from app.queries.refusals import refuse_large_json
 from app.result_store import write_result
 from app.settings import Settings, variable_of
@@ -66,6 +66,7 @@ class Worker:
     def __post_init__(self) -> None:
         self.settings = self.config.settings
         self.store = MeshStore(self.settings.store)
+        self.fields = Fields(self.settings.worker_field_bytes)
 
     def do(self, number: int, work: Work) -> Done:
         """Do ``work``, unless the number of the work to stop reaches ``number``."""
@@ -91,7 +92,13 @@ class Worker:
 
     def _answer(self, work: Answering, clock: "Clock", cancel: Callable[[], bool]) -> Done:
         settings = self.settings
-        grant = Grant(cancel, self._report, settings.query_memory_bytes, settings.max_json_values)
+        grant = Grant(
+            cancel,
+            self._report,
+            self.fields,
+            settings.query_memory_bytes,
+            settings.max_json_values,
+        )
         with clock.phase("load"):
             opened = self._open(work.query)
         with clock.phase("compute"):
@@ -129,8 +136,15 @@ class Worker:
             self.meshes[name] = open_mesh()
         self.meshes.move_to_end(name)
         while len(self.meshes) > 1 and self._open_bytes() > self.settings.worker_mesh_bytes:
-            self.meshes.popitem(last=False)
+            unused, _ = self.meshes.popitem(last=False)
+            self.fields.forget(unused)
         return self.meshes[name]
+
+    def forget_all(self) -> None:
+        """Give back all memory that is only kept."""
+        for name in self.meshes:
+            self.fields.forget(name)
+        self.meshes.clear()
 
     def _open_bytes(self) -> int:
         return sum(opened.nbytes for opened in self.meshes.values())
@@ -200,7 +214,7 @@ def do(number: int, work: Work) -> Outcome:
     except gc.errors.Cancelled:
         return None
     except MemoryError as error:
-        worker.meshes.clear()  # what they keep counts as well
+        worker.forget_all()  # what is kept counts as well
         limit, setting = worker.settings.worker_memory_bytes, variable_of("worker_memory_bytes")
         return replace(problem_of(error), limit=limit, setting=setting)
     except Exception as error:

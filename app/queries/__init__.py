@@ -7,6 +7,7 @@ is likely to cost.
 
 from app.queries.distances import DistancesQuery
 from app.queries.estimate import Estimate, estimate
+from app.queries.fields import Fields
 from app.queries.isolines import IsolinesQuery
 from app.queries.locate import LocateQuery
 from app.queries.matrix import MatrixQuery
@@ -19,6 +20,7 @@ from app.queries.refusals import MeshSize
 __all__ = [
     "DistancesQuery",
     "Estimate",
+    "Fields",
     "Grant",
     "IsolinesQuery",
     "LocateQuery",

@@ -1,14 +1,21 @@
 """Exact or approximate: what queries grant, and what their answers promise."""
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
+
+import orjson
 
 import geodesic_core as gc
 from app import schemas
 from app.errors import pointer
+from app.mesh_store import OpenMesh
+from app.queries.query import Grant, Query
 from app.queries.refusals import refuse_places
 
 A = TypeVar("A", bound=schemas.Accuracy)
+
+_ERRORS = ("relative_error", "absolute_error")
 
 _USUAL_ERROR = 1e-3
 """The relative error of approximate answers where none is named."""
@@ -30,28 +37,54 @@ def with_its_error(request: A) -> A:
 
 def errors_of(request: schemas.Accuracy) -> dict[str, float | None]:
     """Return the errors that are granted."""
-    return {"relative_error": request.relative_error, "absolute_error": request.absolute_error}
+    return {name: getattr(request, name) for name in _ERRORS}
 
 
 def solve_field(
-    solver: gc.Solver,
+    opened: OpenMesh,
     request: schemas.Accuracy,
-    sources: Any,
+    sources: Sequence[gc.Source],
+    grant: Grant,
     *,
-    paths: bool = False,
+    max_distance: float | None = None,
+    targets: Sequence[gc.SurfacePoint] = (),
     isolines: bool = False,
-    **options: Any,
 ) -> gc.DistanceField:
-    """Return the field of distances from some sources, as exact as it has to be.
+    """Return the field of distances from some sources, as exact as it has to be; maybe a kept one.
 
-    Approximate ones keep what ``paths`` or ``isolines`` need. Exact ones keep the first anyway, and
-    sweep again for the second: their windows are so many that it takes less time and memory to find
-    those that the levels need.
+    It keeps what paths need. For ``isolines`` approximate ones keep all windows. Exact ones sweep
+    again for them: their windows are so many that it takes less time and memory to find those that
+    the levels need.
     """
-    if request.method == "exact":
-        return solver.exact_distance(sources, **options)
-    keep = {"keep_windows": paths, "keep_isolines": isolines}
-    return solver.approximate_distance(sources, **errors_of(request), **keep, **options)
+    solver, errors = opened.solver, errors_of(request)
+    # Vertices are reached in any case.
+    beside = tuple(target for target in targets if target.vertex_index is None)
+    options = {"max_distance": max_distance, "targets": beside, **grant.options}
+
+    def solve() -> gc.DistanceField:
+        if request.method == "exact":
+            return solver.exact_distance(sources, **options)
+        keep = {"keep_windows": True, "keep_isolines": isolines}
+        return solver.approximate_distance(sources, **errors, **keep, **options)
+
+    more = isolines and request.method != "exact"
+    question = tuple(sources), max_distance, beside, request.method, *errors.values(), more
+    return grant.fields.find(opened.name, question, solve)
+
+
+def topics_of(
+    query: Query[Any], sources: Sequence[schemas.Source | schemas.Origin]
+) -> tuple[str, ...]:
+    """Return what is known of the field that a query needs before its mesh is open."""
+    request = query.request
+    rest = request.model_dump(include={"method", "max_distance", "barriers", *_ERRORS})
+    written = orjson.dumps([query.mesh_id, rest, *sources], _as_source, orjson.OPT_SORT_KEYS)
+    return hashlib.blake2b(written, digest_size=8).hexdigest(), query.mesh_id
+
+
+def _as_source(point: schemas.Wire) -> dict[str, Any]:
+    # Some queries have sources without start distances; as JSON they are to look the same.
+    return {"start_distance": 0.0, **vars(point)}
 
 
 def method_of(request: schemas.Accuracy) -> dict[str, Any]:

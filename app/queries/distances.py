@@ -13,7 +13,14 @@ from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, refuse
 from app.mesh_store import OpenMesh
 from app.points import described
-from app.queries.accuracy import bound_of, likely_bound, method_of, solve_field, with_its_error
+from app.queries.accuracy import (
+    bound_of,
+    likely_bound,
+    method_of,
+    solve_field,
+    topics_of,
+    with_its_error,
+)
 from app.queries.costs import (
     PER_POINT,
     Cost,
@@ -75,6 +82,11 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
             return columns * size.vertices
         return (columns + VALUES_OF_POINT) * len(self.request.targets)
 
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The field of these sources, and the mesh."""
+        return topics_of(self, self.request.sources)
+
     def points(self) -> Named:
         """Yield the sources, then the targets."""
         request = self.request
@@ -93,13 +105,12 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         request = self.request
         sources, targets = self._parted(places)
         field = solve_field(
-            opened.solver,
+            opened,
             request,
             starts_of(opened.mesh, request.sources, sources),
-            paths="gradient" in self._included,
+            grant,
             max_distance=request.max_distance,
-            targets=[place for place in targets or () if place.vertex_index is None],
-            **grant.options,
+            targets=targets or (),
         )
         distances = _at(targets, field.distances, field.distance_at)
         included: dict[str, NDArray[Any]] = {}

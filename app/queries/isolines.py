@@ -11,7 +11,14 @@ import geodesic_core as gc
 from app import schemas
 from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
 from app.mesh_store import OpenMesh
-from app.queries.accuracy import bound_of, likely_bound, method_of, solve_field, with_its_error
+from app.queries.accuracy import (
+    bound_of,
+    likely_bound,
+    method_of,
+    solve_field,
+    topics_of,
+    with_its_error,
+)
 from app.queries.costs import (
     ARC_IN_FACE,
     FACES_ON_LEVEL,
@@ -62,6 +69,11 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         refuse_more("sources", point_count(*self.request.sources), settings, "max_sources")
         refuse_more("levels", self._level_count, settings, "max_levels")
 
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The field of these sources, and the mesh."""
+        return topics_of(self, self.request.sources)
+
     def points(self) -> Named:
         """Yield the sources."""
         return named_sources(self.request.sources)
@@ -78,12 +90,12 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         """Sweep, and draw level after level, as long as they fit into the answer."""
         chord_error = self._chord_error(opened.mesh)
         field = solve_field(
-            opened.solver,
+            opened,
             self.request,
             starts_of(opened.mesh, self.request.sources, places),
-            isolines=True,
+            grant.part(0, 2),
             max_distance=self.request.max_distance,
-            **grant.part(0, 2).options,
+            isolines=True,
         )
         found: list[dict[str, Any]] = []
         values = 0

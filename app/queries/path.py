@@ -88,14 +88,9 @@ class PathQuery(Query[schemas.PathRequest]):
                     source, target, waypoints, explain=request.explain, **grant.options
                 )
             else:
-                path = solve_field(
-                    opened.solver,
-                    request,
-                    source,
-                    targets=[target],
-                    paths=True,
-                    **grant.options,
-                ).path_to(target)
+                start = [gc.Source(source)]
+                field = solve_field(opened, request, start, grant, targets=[target])
+                path = field.path_to(target, **grant.options)
         except gc.errors.NoPath as error:
             return self._answer(opened, places, no_outline(error.reason))
         found = outline_of(path)

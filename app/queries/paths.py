@@ -9,7 +9,7 @@ from app import schemas
 from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
 from app.mesh_store import OpenMesh
 from app.points import described
-from app.queries.accuracy import method_of, solve_field, with_its_error
+from app.queries.accuracy import method_of, solve_field, topics_of, with_its_error
 from app.queries.costs import (
     PER_PATH,
     PER_POINT,
@@ -50,6 +50,11 @@ class PathsQuery(Query[schemas.PathsRequest]):
         """Return the least number of values: the ends of the paths."""
         return VALUES_OF_POINT * len(self.request.targets)
 
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """The field of these sources, and the mesh."""
+        return topics_of(self, [self.request.source])
+
     def points(self) -> Named:
         """Yield the source, then the targets."""
         request = self.request
@@ -70,13 +75,12 @@ class PathsQuery(Query[schemas.PathsRequest]):
         """Sweep once, and trace path after path, as long as they fit into the answer."""
         starts, targets = self._parted(places)
         field = solve_field(
-            opened.solver,
+            opened,
             self.request,
-            origin_of(opened.mesh, "/source", self.request.source, starts),
+            [gc.Source(origin_of(opened.mesh, "/source", self.request.source, starts))],
+            grant,
             max_distance=self.request.max_distance,
             targets=targets,
-            paths=True,
-            **grant.options,
         )
         found: list[dict[str, Any]] = []
         values = 0

@@ -17,6 +17,7 @@ from app import __version__, schemas
 from app.encoding import JSON, NPY, OCTETS, Answer, Form
 from app.mesh_store import OpenMesh
 from app.queries.costs import PER_FACE_BLOCKED, Cost
+from app.queries.fields import Fields
 from app.queries.places import Places, resolved
 from app.queries.refusals import (
     MeshSize,
@@ -43,6 +44,7 @@ class Grant:
 
     cancel: Callable[[], bool]
     progress: Callable[[float], None]
+    fields: Fields
     memory_limit: int
     max_values: int
     """Most values of the answer, where it is written as JSON."""
@@ -107,6 +109,11 @@ class Query(ABC, Generic[R]):
         took 0.2 and 0.5 s.
         """
         return _revived, (type(self), self.mesh_id, _written(self.request))
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """What a worker that was asked before may have kept: a field, and the mesh."""
+        return (self.mesh_id,)
 
     @property
     def barriers(self) -> NDArray[np.int64]:

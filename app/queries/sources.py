@@ -52,7 +52,7 @@ def origin_of(
     shown = tuple(islice(faults, FAULTS_SHOWN))
     if shown:
         raise refuse_points(shown)
-    return gc.Curve(places)
+    return gc.Curve(tuple(places))
 
 
 def starts_of(

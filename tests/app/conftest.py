@@ -13,6 +13,7 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.main import create_app
+from app.queries import Fields, Grant
 from app.settings import Settings
 
 MESHES = Path(__file__).parents[3] / "shared" / "meshes"
@@ -88,6 +89,13 @@ def distances(client: TestClient, mesh_id: str, headers: Any = None, **body: Any
     """Ask for distances, from vertex 0 where ``body`` names no sources."""
     body.setdefault("sources", [{"vertex": 0}])
     return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
+
+
+def granted(
+    cancel: Callable[[], bool] = lambda: False, memory: int = 2**40, values: int = 10**7
+) -> Grant:
+    """Return a grant that nobody reads the progress of, with no field known."""
+    return Grant(cancel, lambda _: None, Fields(10**9), memory, values)
 
 
 def mesh_of(client: TestClient, mesh_id: str) -> gc.TriangleMesh:

@@ -215,7 +215,7 @@ def test_blocked_meshes_are_kept_while_they_fit(tmp_path: Path) -> None:
 
 
 def test_an_open_mesh_with_barriers_keeps_its_warnings() -> None:
-    opened = OpenMesh(gc.Solver(gc.TriangleMesh(*gc.samples.plane(200))), ["look out"])
+    opened = OpenMesh(("", b""), gc.Solver(gc.TriangleMesh(*gc.samples.plane(200))), ["look out"])
 
     blocked = opened.with_barriers(np.array(WALL))
 

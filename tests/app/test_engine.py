@@ -239,7 +239,7 @@ def test_a_query_goes_where_its_mesh_is_open(two: TestClient, small: str) -> Non
     for mesh_id in (small, other):
         for _ in range(3):
             assert ask(two, mesh_id).status_code == 200
-    known = [slot.known_meshes for slot in engine_of(two)._slots]
+    known = [slot.topics for slot in engine_of(two)._slots]
 
     assert all(sum(mesh_id in slot for slot in known) >= 1 for mesh_id in (small, other))
     for _ in range(4):
@@ -268,7 +268,7 @@ def test_what_proves_not_to_be_small_begins_anew_elsewhere(
     engine = engine_of(two)
     engine._idle.sort(key=lambda slot: slot is not engine._small)
     for slot in engine._slots:
-        slot.known_meshes.clear()
+        slot.topics.clear()
 
     response = ask(two, slow)
 
@@ -291,7 +291,7 @@ def test_clients_take_turns(two: TestClient, slow: str, medium: str) -> None:
             if share == 0.0:
                 begun.append(client)
 
-        await engine_of(two).run(Order(work, client, mesh_id), note)
+        await engine_of(two).run(Order(work, client, (mesh_id,)), note)
 
     async def ask_all() -> None:
         running = [asyncio.create_task(ask_as("greedy", slow)) for _ in range(2)]

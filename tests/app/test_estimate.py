@@ -14,7 +14,6 @@ from app.encoding import JSON, Form
 from app.mesh_store import OpenMesh
 from app.queries import (
     DistancesQuery,
-    Grant,
     IsolinesQuery,
     LocateQuery,
     MatrixQuery,
@@ -26,7 +25,7 @@ from app.queries import (
 )
 from app.schemas import Wire
 
-from .conftest import check_problem, mesh_of, upload_sample
+from .conftest import check_problem, granted, mesh_of, upload_sample
 
 MESHES = {"knot": 8000, "sphere": 5000, "plane": 10_000}
 _RNG = np.random.default_rng(8)
@@ -146,12 +145,12 @@ ALLOCATED = [name for name in STATEFUL if QUERIES[name][0] != "paths"]
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("name", ALLOCATED)
 def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mesh: str) -> None:
-    opened = OpenMesh(gc.Solver(mesh_of(client, ids[mesh])), [])
+    opened = OpenMesh(("", b""), gc.Solver(mesh_of(client, ids[mesh])), [])
     query = query_of(name)
     told = estimate(query, Form(JSON), opened, lambda: False)
     tracemalloc.start()
     try:
-        query.answer(opened, Grant(lambda: False, print, 2**40, 10**7))
+        query.answer(opened, granted())
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
@@ -166,13 +165,13 @@ def test_memory_that_suffices(
     """Three times the estimate does, a third does not."""
     for module in ("app.queries.matrix", "geodesic_core.matrix"):
         monkeypatch.setattr(f"{module}.available_cores", lambda: 1)
-    opened = OpenMesh(gc.Solver(mesh_of(client, ids["sphere"])), [])
+    opened = OpenMesh(("", b""), gc.Solver(mesh_of(client, ids["sphere"])), [])
     query = query_of(name)
     told = estimate(query, Form(JSON), opened, lambda: False)
 
     with pytest.raises(gc.errors.MemoryLimitExceeded):
-        query.answer(opened, Grant(lambda: False, print, told.memory_bytes // 3, 10**7))
-    query.answer(opened, Grant(lambda: False, print, 3 * told.memory_bytes, 10**7))
+        query.answer(opened, granted(memory=told.memory_bytes // 3))
+    query.answer(opened, granted(memory=3 * told.memory_bytes))
 
 
 def test_seconds_grow_with_the_work(client: TestClient, ids: dict[str, str]) -> None:

@@ -9,10 +9,10 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.mesh_store import OpenMesh
-from app.queries import Grant, IsolinesQuery
+from app.queries import IsolinesQuery
 from geodesic_core.whole_sweep import WholeSweep
 
-from .conftest import check_problem, mesh_of, serving, upload_sample
+from .conftest import check_problem, granted, mesh_of, serving, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 METHODS = ({}, {"method": "approximate", "relative_error": 0.05})
@@ -130,7 +130,7 @@ def test_lines_end_at_max_distance(client: TestClient, plane: str) -> None:
 def test_the_grant_is_in_force_throughout(
     method: dict, sweeps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened = OpenMesh(gc.Solver(gc.TriangleMesh(*gc.samples.knot(3000))), [])
+    opened = OpenMesh(("", b""), gc.Solver(gc.TriangleMesh(*gc.samples.knot(3000))), [])
     request = IsolinesQuery.model.model_validate({"sources": [INSIDE], "count": 4, **method})
     query = IsolinesQuery("m", IsolinesQuery.normal(request))
     watched: list[dict[str, Any]] = []
@@ -146,7 +146,7 @@ def test_the_grant_is_in_force_throughout(
         return asked == stop_at
 
     monkeypatch.setattr(WholeSweep, "run", watch)
-    grant = Grant(cancel, 2**30, 10**7)
+    grant = granted(cancel)
     stop_at = -1
     query.answer(opened, grant)
 

@@ -11,7 +11,6 @@ import geodesic_core as gc
 from app.mesh_store import OpenMesh
 from app.queries import (
     DistancesQuery,
-    Grant,
     LocateQuery,
     MatrixQuery,
     NearestQuery,
@@ -32,7 +31,7 @@ from app.schemas import (
     VertexSource,
 )
 
-from .conftest import check_problem, distances, mesh_of, upload_sample
+from .conftest import check_problem, distances, granted, mesh_of, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 ENDS = {"source": {"vertex": 3}, "target": INSIDE}
@@ -315,7 +314,10 @@ def test_looking_for_points_can_be_stopped() -> None:
     ]
     for query in queries:
         with pytest.raises(gc.errors.Cancelled, match="looked for"):
-            query.answer(OpenMesh(gc.Solver(mesh), []), Grant(lambda: True, print, 2**30, 100))
+            query.answer(
+                OpenMesh(("", b""), gc.Solver(mesh), []),
+                granted(lambda: True),
+            )
 
 
 # Refusals
