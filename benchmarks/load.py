@@ -14,7 +14,7 @@ from statistics import median, quantiles
 
 import geodesic_core as gc
 from benchmarks.inputs import Inputs
-from benchmarks.serving import Client, serving
+from benchmarks.serving import Client, phases_of, serving
 from benchmarks.tables import Section, rated
 from benchmarks.timing import timed
 
@@ -44,6 +44,7 @@ def run(_inputs: Inputs, _runs: int) -> Section:
                 with _kept_busy(port, long, busy):
                     rows.append(_row(f"while {busy} long", clients, asked(), solve_s, alone))
         rows.append(_cached_path(Client(port), small))
+        stopping = _stopping(Client(port), long)
         heavy = _many_heavy(port, long)
     return Section(
         "Load",
@@ -51,7 +52,7 @@ def run(_inputs: Inputs, _runs: int) -> Section:
         f"{SECONDS:g} s by clients that each wait for their answer, in processes of their own; "
         f"long questions are exact distances on a sphere of {LONG_FACES:,} faces. "
         f"{WORKERS} workers and the one for small work. The solve alone takes "
-        f"{1e3 * solve_s:.2f} ms, and a request so much more at the median. {heavy}",
+        f"{1e3 * solve_s:.2f} ms, and a request so much more at the median. {stopping} {heavy}",
         ["paths", "clients", "a second", "p50, ms", "p99, ms", "over the solve, ms", "p99 : p50"],
         rows,
     )
@@ -146,6 +147,28 @@ def _cached_path(client: Client, mesh: str) -> list[str]:
     p50, p99 = median(times), quantiles(times, n=100)[98]
     cells = ["of a field that is known", "1", "", rated(1e3 * p50, 3.0, at_least=False)]
     return [*cells, f"{1e3 * p99:.2f}", "", ""]
+
+
+def _stopping(client: Client, mesh: str) -> str:
+    """Dismiss jobs that keep all workers busy; return how long other work waits for one then."""
+    times = []
+    medium = client.upload_sample("sphere", 100_000)
+    for _ in range(10):
+        jobs = []
+        for _ in range(WORKERS):
+            wish = {"Prefer": "respond-async"}
+            response, _ = client.ask(f"{mesh}/distances", _long_question(), wish)
+            jobs.append(response.headers["location"])
+        time.sleep(0.5)
+        for job in jobs:
+            client.ask(job, method="DELETE")
+        response, _ = client.ask(f"{medium}/distances", _long_question())
+        times.append(phases_of(response)["queue"])
+    slowest = rated(1e3 * max(times), 200.0, at_least=False, digits=0)
+    return (
+        f"After long jobs were dismissed on all workers, the next question waited {slowest} ms for "
+        f"one at most, in {len(times)} trials."
+    )
 
 
 def _many_heavy(port: int, mesh: str) -> str:

@@ -3,6 +3,7 @@
 import http.client
 import json
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -43,12 +44,12 @@ class Client:
         self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=300)
 
     def ask(
-        self, path: str, body: Any = None, headers: Mapping[str, str] = {}
+        self, path: str, body: Any = None, headers: Mapping[str, str] = {}, method: str = ""
     ) -> tuple[http.client.HTTPResponse, bytes]:
-        """Send a request, a POST where there is a body, and read the answer."""
+        """Send a request, by default a POST where there is a body, and read the answer."""
         sent = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
         kind = "application/octet-stream" if isinstance(body, bytes) else "application/json"
-        method = "GET" if body is None else "POST"
+        method = method or ("GET" if body is None else "POST")
         self._connection.request(method, path, sent, {"Content-Type": kind, **headers})
         response = self._connection.getresponse()
         return response, response.read()
@@ -68,6 +69,12 @@ class Client:
     def close(self) -> None:
         """Close the connection."""
         self._connection.close()
+
+
+def phases_of(response: http.client.HTTPResponse) -> dict[str, float]:
+    """Return the seconds of each phase that an answer tells of."""
+    phases = re.findall(r"(\w+);dur=([\d.]+)", response.headers.get("server-timing", ""))
+    return {name: float(milliseconds) / 1e3 for name, milliseconds in phases}
 
 
 def _wait_until_ready(port: int, server: subprocess.Popen[bytes]) -> None:

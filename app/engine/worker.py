@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from ctypes import c_double, c_longlong
 from dataclasses import dataclass, field, replace
+from gc import freeze
 from multiprocessing import connection, parent_process
 from pathlib import Path
 from time import perf_counter
@@ -203,6 +204,7 @@ def initialize(
 def warm_up() -> None:
     """Compile the kernels, or load them; from then on memory is limited."""
     gc.warm_up()
+    freeze()  # what is loaded now stays: a collection that looks through it takes 90 ms
     limit_memory(_this_worker().settings.worker_memory_bytes)
 
 
