@@ -86,6 +86,10 @@ class Settings(BaseSettings):
     """Memory of a worker for its work, whatever that is; what it maps (meshes) does not count."""
     worker_mesh_bytes: PositiveInt = 2 * GIB
     """Size of the meshes that a worker keeps open, and of what it keeps for paths on them."""
+    store_bytes: PositiveInt = 64 * GIB
+    """Size of the meshes that the store keeps; what finds no room is refused."""
+    store_evict: Literal["off", "lru"] = "off"
+    """`lru` lets the least recently used meshes go instead."""
     results_bytes: PositiveInt = 4 * GIB
     """Size of the finished results that the store keeps."""
     results_memory_bytes: PositiveInt = 256 * MIB
