@@ -49,8 +49,7 @@ class MeshBooks:
         """Sweep what a former service left half-written, and count what is there."""
         self._store.folder.mkdir(exist_ok=True)
         self._temporary.mkdir(exist_ok=True)
-        for entry in self._temporary.iterdir():
-            _remove(entry)
+        _remove(*self._temporary.iterdir())
         self._sizes = OrderedDict(self._store.sizes())
 
     @property
@@ -67,7 +66,10 @@ class MeshBooks:
         finally:
             # Renamed first: a worker that is about to be killed has no place to write to any more.
             gone = self._new_name()
-            folder.rename(gone)
+            try:
+                folder.rename(gone)
+            except OSError:  # no room for another name
+                gone = folder
             await to_thread.run_sync(_remove, gone)
 
     async def keep(self, written: WrittenMesh) -> Kept:
@@ -83,17 +85,26 @@ class MeshBooks:
             self.use(mesh_id)
             return Kept(is_new=False)
         evicted = self._chosen_to_go(written.size)
-        gone = [self._move_out(old) for old in evicted]
-        written.folder.rename(self._store.folder / mesh_id)
-        self._sizes[mesh_id] = written.size
-        await to_thread.run_sync(self._settle, gone)
+        gone: list[Path] = []
+        try:
+            gone.extend(self._move_out(old) for old in evicted)
+            written.folder.rename(self._store.folder / mesh_id)
+            self._sizes[mesh_id] = written.size
+            await to_thread.run_sync(sync, self._store.folder)
+        except OSError:
+            if mesh_id in self._sizes:
+                gone.append(self._move_out(mesh_id))  # a power cut might take it: better told now
+            raise
+        finally:
+            await to_thread.run_sync(_remove, *gone)
         return Kept(is_new=True, evicted=evicted)
 
     async def delete(self, mesh_id: str) -> None:
         """Remove a mesh at once; processes that have it open keep what they mapped."""
         if mesh_id not in self._sizes:
             raise unknown(mesh_id)
-        await to_thread.run_sync(self._settle, [self._move_out(mesh_id)])
+        gone = self._move_out(mesh_id)
+        await to_thread.run_sync(_remove, gone)
 
     def use(self, mesh_id: str) -> None:
         """Note that a mesh is used now, if it is there."""
@@ -133,17 +144,13 @@ class MeshBooks:
         del self._sizes[mesh_id]
         return gone
 
-    def _settle(self, gone: Sequence[Path]) -> None:
-        sync(self._store.folder)
-        for folder in gone:
-            _remove(folder)
-
     def _new_name(self) -> Path:
         return self._temporary / f"{uuid4().hex}.gone"
 
 
-def _remove(entry: Path) -> None:
-    if entry.is_dir():
-        shutil.rmtree(entry, ignore_errors=True)
-    else:
-        entry.unlink(missing_ok=True)
+def _remove(*entries: Path) -> None:
+    for entry in entries:
+        if entry.is_dir():
+            shutil.rmtree(entry, ignore_errors=True)
+        else:
+            entry.unlink(missing_ok=True)

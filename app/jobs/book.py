@@ -144,4 +144,5 @@ def _read(path: Path, statement: str) -> list[Any]:
 
 
 def _damaged(path: Path, reason: object) -> StoreError:
-    return StoreError(f"{path} is damaged ({reason}): move it away, and jobs begin anew")
+    in_a_line = " ".join(str(reason).split())
+    return StoreError(f"{path} is damaged ({in_a_line}): move it away, and jobs begin anew")
