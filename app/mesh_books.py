@@ -5,6 +5,7 @@ a crash leaves a mesh either there or not, and the next start counts anew. Worke
 aside, in a folder that is lent to them; what they leave there, killed or not, is removed with it.
 """
 
+import asyncio
 import shutil
 import tempfile
 from collections import Counter, OrderedDict
@@ -14,11 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from uuid import uuid4
 
-from anyio import to_thread
-
 from app.errors import over_limit
 from app.mesh_store import MeshStore, WrittenMesh, unknown
-from app.store import TEMPORARY, sync
+from app.store import TEMPORARY, sync, sync_all
 
 
 @dataclass(frozen=True)
@@ -70,10 +69,10 @@ class MeshBooks:
                 folder.rename(gone)
             except OSError:  # no room for another name
                 gone = folder
-            await to_thread.run_sync(_remove, gone)
+            await asyncio.to_thread(_remove, gone)
 
     async def keep(self, written: WrittenMesh) -> Kept:
-        """Move in what has been written aside; a mesh that is there already is used.
+        """Move in what has been written aside, for good; a mesh that is there already is used.
 
         Raises
         ------
@@ -84,19 +83,22 @@ class MeshBooks:
         if written.folder is None or mesh_id in self._sizes:
             self.use(mesh_id)
             return Kept(is_new=False)
+        await asyncio.to_thread(sync_all, written.folder)
+        if mesh_id in self._sizes:  # another was faster
+            return Kept(is_new=False)
         evicted = self._chosen_to_go(written.size)
         gone: list[Path] = []
         try:
             gone.extend(self._move_out(old) for old in evicted)
             written.folder.rename(self._store.folder / mesh_id)
             self._sizes[mesh_id] = written.size
-            await to_thread.run_sync(sync, self._store.folder)
+            await asyncio.to_thread(sync, self._store.folder)
         except OSError:
             if mesh_id in self._sizes:
                 gone.append(self._move_out(mesh_id))  # a power cut might take it: better told now
             raise
         finally:
-            await to_thread.run_sync(_remove, *gone)
+            await asyncio.to_thread(_remove, *gone)
         return Kept(is_new=True, evicted=evicted)
 
     async def delete(self, mesh_id: str) -> None:
@@ -104,7 +106,7 @@ class MeshBooks:
         if mesh_id not in self._sizes:
             raise unknown(mesh_id)
         gone = self._move_out(mesh_id)
-        await to_thread.run_sync(_remove, gone)
+        await asyncio.to_thread(_remove, gone)
 
     def use(self, mesh_id: str) -> None:
         """Note that a mesh is used now, if it is there."""

@@ -27,7 +27,7 @@ import orjson
 from numpy.typing import NDArray
 
 from app.errors import ProblemError, refuse
-from app.store import MESHES, sync
+from app.store import MESHES
 from geodesic_core import Solver, TriangleMesh
 
 PUBLIC_ARRAYS = {
@@ -88,7 +88,7 @@ class MeshStore:
         self.folder = root / MESHES
 
     def write_aside(self, mesh: TriangleMesh, folder: Path, owner: str | None) -> WrittenMesh:
-        """Write ``mesh`` into a new ``folder``, to survive a power cut, unless it is stored.
+        """Write ``mesh`` into a new ``folder``, unless it is stored.
 
         A mesh that is stored stays ``owner``'s who stored it first.
         """
@@ -108,9 +108,6 @@ class MeshStore:
         for name, array in arrays.items():
             _write_array(folder / f"{name}.npy", array)
         (folder / "manifest.json").write_bytes(orjson.dumps(manifest))
-        # Written first, then synced, so that the disk has it all to order.
-        for path in (*folder.iterdir(), folder):
-            sync(path)
         return WrittenMesh(manifest, folder, _bytes_in(folder))
 
     def manifest(self, mesh_id: str) -> Mapping[str, Any]:

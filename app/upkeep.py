@@ -123,3 +123,6 @@ def remove(leftover: Leftover) -> None:
             shutil.rmtree(path)
         else:
             path.unlink()
+    folder = leftover.paths[0].parent
+    if folder.parent.name == RESULTS and not any(folder.iterdir()):
+        folder.rmdir()

@@ -897,7 +897,12 @@ def test_serve_on_other_addresses_asks_for_keys(
     run: Run, monkeypatch: pytest.MonkeyPatch, host: str
 ) -> None:
     started: list[str] = []
-    monkeypatch.setattr(uvicorn, "run", lambda _app, host, **_: started.append(host))
+
+    def note(server: uvicorn.Server) -> None:
+        started.append(server.config.host)
+        server.started = True
+
+    monkeypatch.setattr(uvicorn.Server, "run", note)
     ran = run("serve", "--host", host)
     assert ran.code == 2
     assert "GEODESIC_API_KEYS" in error_line(ran)
@@ -920,7 +925,12 @@ def test_serve_on_this_machine_needs_none(
     run: Run, monkeypatch: pytest.MonkeyPatch, host: str
 ) -> None:
     started: list[str] = []
-    monkeypatch.setattr(uvicorn, "run", lambda _app, host, **_: started.append(host))
+
+    def note(server: uvicorn.Server) -> None:
+        started.append(server.config.host)
+        server.started = True
+
+    monkeypatch.setattr(uvicorn.Server, "run", note)
     assert run("serve", "--host", host).code == 0
     assert started == [host]
 
