@@ -189,20 +189,19 @@ class Service:
         return await self.jobs.submit(errand, solve)
 
     async def _answer(self, query: Query[Any], form: Form, client: str, told: Told) -> Answered:
-        size = self.size(query.mesh_id)
-        query.refuse_answer(form.media_type, size, self.settings)
-        name = result_name(query.mesh_id, result_key(query, form))
-        kept = await self.results.find(name)
-        if kept is not None:
-            self.mesh_books.use(query.mesh_id)
-            return Answered(kept, {})
-        work = Answering(query, form, name)
-        order = Order(work, client, query.mesh_id, query.is_small(size))
         with self.mesh_books.held(query.mesh_id):
+            size = self.size(query.mesh_id)
+            query.refuse_answer(form.media_type, size, self.settings)
+            name = result_name(query.mesh_id, result_key(query, form))
+            kept = await self.results.find(name)
+            if kept is not None:
+                return Answered(kept, {})
+            work = Answering(query, form, name)
+            order = Order(work, client, query.mesh_id, query.is_small(size))
             done = await self._flights.join(name, partial(self.engine.run, order), told)
-        assert done.answer is not None, "this kind of work answers"  # noqa: S101
-        result = self.results.take_new(name, done.answer, is_kept=query.is_repeatable)
-        return Answered(result, done.seconds)
+            assert done.answer is not None, "this kind of work answers"  # noqa: S101
+            result = self.results.take_new(name, done.answer, is_kept=query.is_repeatable)
+            return Answered(result, done.seconds)
 
     @asynccontextmanager
     async def within(self, seconds: float, setting: str = "deadline_s") -> AsyncIterator[None]:

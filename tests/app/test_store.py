@@ -8,7 +8,9 @@ import socket
 import sqlite3
 import subprocess
 import sys
+import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -20,6 +22,7 @@ import pytest
 
 import geodesic_core as gc
 from app import mesh_books, mesh_store
+from app.engine import Answering, Order
 from app.errors import ProblemError
 from app.jobs import require_whole
 from app.mesh_books import Kept, MeshBooks
@@ -299,6 +302,34 @@ def test_over_http(tmp_path: Path) -> None:
         assert len(list((store / "results" / first).glob("*.body"))) == 1
         total = client.app.state.service.mesh_books.total
         assert total == sum(MeshStore(store).sizes().values()) <= room
+
+
+def test_a_mesh_stays_while_a_query_waits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    room = sum(sizes(tmp_path, 50, 72))
+    with (
+        serving(tmp_path / "store", store_bytes=room, store_evict="lru") as client,
+        ThreadPoolExecutor() as threads,
+    ):
+        asked, other = (upload_sample(client, "plane", faces) for faces in (50, 72))
+        service = client.app.state.service
+        run, goes_on = service.engine.run, threading.Event()
+
+        async def run_later(order: Order, told: Any) -> Any:
+            while isinstance(order.work, Answering) and not goes_on.is_set():
+                await asyncio.sleep(0.01)
+            return await run(order, told)
+
+        monkeypatch.setattr(service.engine, "run", run_later)
+        waiting = threads.submit(distances, client, asked)
+        wait_until(lambda: asked in service.mesh_books._held)
+        client.get(f"/v1/meshes/{other}")
+        third = upload_sample(client, "plane", 32)
+        stored = {mesh["id"] for mesh in client.get("/v1/meshes").json()["meshes"]}
+        goes_on.set()
+
+        assert stored == {asked, third}
+        assert waiting.result().status_code == 200
+        assert not service.mesh_books._held
 
 
 # Crashes
