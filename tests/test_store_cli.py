@@ -237,3 +237,9 @@ def test_serve_refuses_a_store_that_it_cannot_have(
     ran = run("serve")
     assert ran.code == 1
     assert "has layout '4.5'" in error_line(ran)
+
+
+def test_the_command_has_to_be_named(run: Run) -> None:  # noqa: F811
+    ran = run("store")
+    assert ran.code == 2
+    assert "Missing command" in error_line(ran)

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 store = typer.Typer(
     help="Look after the store of a service. To be run where the store is.",
-    no_args_is_help=True,
     rich_markup_mode=None,
 )
 
