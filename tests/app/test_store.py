@@ -271,6 +271,27 @@ def test_two_that_write_one_mesh(tmp_path: Path) -> None:
         assert files_in(tmp_path / "tmp") == set()
 
 
+def test_uploads_at_the_same_time_do_not_exceed_the_bound(tmp_path: Path) -> None:
+    kinds = (50, 72, 98, 128)
+    room = sum(sizes(tmp_path, *kinds)[:2])
+    with opened(tmp_path / "store", room) as store:
+        meshes, books = store
+
+        async def run() -> list[Any]:
+            async with books.scratch_folder() as folder:
+                written = [
+                    meshes.write_aside(plane(faces), folder / str(faces), None) for faces in kinds
+                ]
+                return await asyncio.gather(*map(books.keep, written), return_exceptions=True)
+
+        kept = anyio.run(run)
+        refused = [each for each in kept if isinstance(each, ProblemError)]
+        assert len(refused) >= 2
+        assert len(meshes.sizes()) == len(kinds) - len(refused) >= 1
+        assert books.total == sum(meshes.sizes().values()) <= room
+        assert files_in(tmp_path / "store" / "tmp") == set()
+
+
 def test_over_http(tmp_path: Path) -> None:
     room = sum(sizes(tmp_path, 50, 72))
     store = tmp_path / "store"
