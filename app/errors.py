@@ -1,6 +1,7 @@
 """Every error the service answers with, and the one table from exceptions to them."""
 
 import errno
+import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -193,9 +194,15 @@ def _not_converged(error: core.NotConverged) -> Problem:
 
 
 def _system_error(error: OSError) -> Problem:
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return Problem("storage_full", "the store has no room left on its disk")
-    return _internal_error(error)
+    return _DISK_FULL if error.errno in (errno.ENOSPC, errno.EDQUOT) else _internal_error(error)
+
+
+def _database_error(error: sqlite3.OperationalError) -> Problem:
+    is_full = error.sqlite_errorcode == sqlite3.SQLITE_FULL
+    return _DISK_FULL if is_full else _internal_error(error)
+
+
+_DISK_FULL = Problem("storage_full", "the store has no room left on its disk")
 
 
 def _internal_error(error: BaseException) -> Problem:
@@ -214,6 +221,7 @@ EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (core.NotConverged, _not_converged),
     (MemoryError, lambda _: Problem("memory_limit", "the worker ran out of memory")),
     (OSError, _system_error),
+    (sqlite3.OperationalError, _database_error),
     (BaseException, _internal_error),
 )
 

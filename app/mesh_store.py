@@ -2,11 +2,8 @@
 
 ::
 
-    store/
-        meshes/{id}/manifest.json      report, warnings, owner, and the checksum of each array
-        meshes/{id}/{array}.npy        one file per array of ``TriangleMesh.arrays()``
-        results/                       see ``result_store``
-        tmp/                           what is being written; swept when the service starts
+    meshes/{id}/manifest.json      report, warnings, owner, and the checksum of each array
+    meshes/{id}/{array}.npy        one file per array of ``TriangleMesh.arrays()``
 
 The id is a hash over the canonical arrays (vertices, faces, both maps), not over the bytes of the
 upload: the same mesh as PLY, as JSON or as a sample is one entry with one set of results; and a
@@ -15,12 +12,10 @@ result can be taken for one of another mesh.
 """
 
 import hashlib
-import shutil
-import tempfile
+import os
 import zlib
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
@@ -32,9 +27,9 @@ import orjson
 from numpy.typing import NDArray
 
 from app.errors import ProblemError, refuse
+from app.store import MESHES
 from geodesic_core import Solver, TriangleMesh
 
-VERSION = 4
 PUBLIC_ARRAYS = {
     "vertices": "vertices",
     "faces": "faces",
@@ -73,61 +68,61 @@ class OpenMesh:
         return self.mesh.nbytes + self.solver.nbytes
 
 
+@dataclass(frozen=True)
+class WrittenMesh:
+    """A mesh that has been written aside, or was found to be in the store already."""
+
+    manifest: Mapping[str, Any]
+    folder: Path | None
+    """Where it waits to be moved in; None where it was in the store"""
+    size: int = 0
+    """In bytes, on disk"""
+
+    @property
+    def mesh_id(self) -> str:
+        """The hash of its content."""
+        return str(self.manifest["id"])
+
+
 class MeshStore:
-    """The meshes in the folder ``root``; any number of processes may read and add."""
+    """The meshes under ``root``; any number of processes may read, and write aside."""
 
     def __init__(self, root: Path) -> None:
-        self._meshes = root / "meshes"
-        self._temporary = root / "tmp"
+        self.folder = root / MESHES
 
-    def prepare(self) -> None:
-        """Create the folders, and sweep what a former service left half-written."""
-        shutil.rmtree(self._temporary, ignore_errors=True)
-        self._meshes.mkdir(parents=True, exist_ok=True)
-        self._temporary.mkdir(parents=True)
+    def write_aside(self, mesh: TriangleMesh, folder: Path, owner: str | None) -> WrittenMesh:
+        """Write ``mesh`` into a new ``folder``, unless it is stored.
 
-    @contextmanager
-    def scratch_file(self) -> Iterator[Path]:
-        """Lend a path on the store's disk, for an upload; the file is gone afterwards."""
-        with tempfile.TemporaryDirectory(dir=self._temporary) as folder:
-            yield Path(folder) / "upload"
-
-    def add(self, mesh: TriangleMesh, owner: str | None = None) -> tuple[str, bool]:
-        """Store ``mesh``; return its id, and whether it was not there before.
-
-        A mesh that was there stays ``owner``'s who stored it first.
+        A mesh that is stored stays ``owner``'s who stored it first.
         """
         arrays = mesh.arrays()
         mesh_id = _content_hash(arrays)
-        target = self._meshes / mesh_id
-        if target.exists():
-            return mesh_id, False
-        with tempfile.TemporaryDirectory(dir=self._temporary) as folder:
-            written = Path(folder) / mesh_id
-            written.mkdir()
-            checksums = {name: _write_array(written, name, arrays[name]) for name in arrays}
-            manifest = {
-                "version": VERSION,
-                "id": mesh_id,
-                "owner": owner,
-                "created": datetime.now(UTC).isoformat(timespec="seconds"),
-                "report": mesh.report.as_dict(),
-                "warnings": mesh.warnings,
-                "crc32": checksums,
-            }
-            (written / "manifest.json").write_bytes(orjson.dumps(manifest))
-            return mesh_id, _rename_unless_there(written, target)
+        if (self.folder / mesh_id).is_dir():
+            return WrittenMesh(self.manifest(mesh_id), folder=None)
+        manifest = {
+            "id": mesh_id,
+            "owner": owner,
+            "created": datetime.now(UTC).isoformat(timespec="seconds"),
+            "report": mesh.report.as_dict(),
+            "warnings": list(mesh.warnings),
+            "crc32": {name: _checksum(array) for name, array in arrays.items()},
+        }
+        folder.mkdir()
+        for name, array in arrays.items():
+            _write_array(folder / f"{name}.npy", array)
+        (folder / "manifest.json").write_bytes(orjson.dumps(manifest))
+        return WrittenMesh(manifest, folder, _bytes_in(folder))
 
     def manifest(self, mesh_id: str) -> Mapping[str, Any]:
         """Return what is known of a mesh without opening its arrays."""
         path = self._folder(mesh_id) / "manifest.json"
         try:
             manifest = _read_manifest(path, path.stat().st_mtime_ns)
-            version = manifest["version"]
+            is_its_own = manifest["id"] == mesh_id
         except (OSError, ValueError, TypeError, KeyError) as error:
             raise _damaged(mesh_id, "its manifest cannot be read") from error
-        if version != VERSION:
-            raise _damaged(mesh_id, f"it has layout {version}, and this service reads {VERSION}")
+        if not is_its_own:
+            raise _damaged(mesh_id, "its manifest is that of another mesh")
         return manifest
 
     def owner(self, mesh_id: str) -> str | None:
@@ -142,17 +137,37 @@ class MeshStore:
 
     def open(self, mesh_id: str) -> OpenMesh:
         """Return the mesh over memory-mapped arrays, once their checksums are found right."""
-        manifest, folder = self.manifest(mesh_id), self._folder(mesh_id)
-        arrays = {}
-        for name, checksum in manifest["crc32"].items():
-            try:
-                arrays[name] = _open_array(folder / f"{name}.npy")
-            except (OSError, ValueError) as error:
-                raise _damaged(mesh_id, f"its array {name} cannot be read") from error
-            if _checksum(arrays[name]) != checksum:
-                raise _damaged(mesh_id, f"its array {name} is not what was written")
+        manifest = self.manifest(mesh_id)
+        arrays = {name: self._array(mesh_id, name) for name in manifest["crc32"]}
         solver = Solver(TriangleMesh.from_arrays(arrays))
         return OpenMesh((mesh_id, b""), solver, manifest["warnings"])
+
+    def damage(self, mesh_id: str) -> Iterator[ProblemError]:
+        """Yield all that is damaged of a mesh; raises ``ProblemError`` where there is none such."""
+        try:
+            names = self.manifest(mesh_id)["crc32"]
+        except ProblemError as error:
+            if error.problem.code != "mesh_damaged":
+                raise
+            yield error
+            return
+        arrays = {}
+        for name in names:
+            try:
+                arrays[name] = self._array(mesh_id, name)
+            except ProblemError as error:
+                yield error
+        if len(arrays) == len(names) and _content_hash(arrays) != mesh_id:
+            yield _damaged(mesh_id, "its name is not that of its content")
+
+    def _array(self, mesh_id: str, name: str) -> NDArray[Any]:
+        try:
+            array = _open_array(self._folder(mesh_id) / f"{name}.npy")
+        except (OSError, ValueError) as error:
+            raise _damaged(mesh_id, f"its array {name} cannot be read") from error
+        if _checksum(array) != self.manifest(mesh_id)["crc32"][name]:
+            raise _damaged(mesh_id, f"its array {name} is not what was written")
+        return array
 
     def array_file(self, mesh_id: str, name: str) -> Path:
         """Return the file of an array that clients may read."""
@@ -168,24 +183,29 @@ class MeshStore:
 
     def page(self, after: str, limit: int) -> tuple[list[str], bool]:
         """Return the ``limit`` ids that follow ``after``, in order, and whether there are more."""
-        ids = sorted(entry.name for entry in self._meshes.iterdir())
+        ids = sorted(entry.name for entry in self.folder.iterdir())
         first = bisect_right(ids, after)
         return ids[first : first + limit], len(ids) > first + limit
 
-    def delete(self, mesh_id: str) -> None:
-        """Remove a mesh at once; processes that have it open keep what they mapped."""
-        folder = self._folder(mesh_id)
-        with tempfile.TemporaryDirectory(dir=self._temporary) as trash:
-            try:
-                folder.rename(Path(trash) / mesh_id)
-            except FileNotFoundError as error:
-                raise _unknown(mesh_id) from error
+    def sizes(self) -> dict[str, int]:
+        """Return the bytes of each mesh on disk, those that were used least recently first."""
+        folders = [entry for entry in self.folder.glob("*") if entry.is_dir()]
+        folders.sort(key=lambda folder: folder.stat().st_mtime_ns)
+        return {folder.name: _bytes_in(folder) for folder in folders}
+
+    def last_used(self, mesh_id: str) -> datetime:
+        """Return when a mesh was used last."""
+        return datetime.fromtimestamp(self._folder(mesh_id).stat().st_mtime, UTC)
+
+    def note_use(self, mesh_id: str) -> None:
+        """Note that a mesh is used now, where a restart finds it: the time of its folder."""
+        os.utime(self._folder(mesh_id))
 
     def _folder(self, mesh_id: str) -> Path:
         is_id = len(mesh_id) == 2 * _ID_BYTES and set(mesh_id) <= set("0123456789abcdef")
-        folder = self._meshes / mesh_id
+        folder = self.folder / mesh_id
         if not is_id or not folder.is_dir():
-            raise _unknown(mesh_id)
+            raise unknown(mesh_id)
         return folder
 
 
@@ -209,9 +229,16 @@ def _checksum(array: NDArray[Any]) -> int:
     return zlib.crc32(np.ascontiguousarray(array).data) if array.size else 0
 
 
-def _write_array(folder: Path, name: str, array: NDArray[Any]) -> int:
-    np.save(folder / f"{name}.npy", array, allow_pickle=False)
-    return _checksum(array)
+def _write_array(path: Path, array: NDArray[Any]) -> None:
+    # As np.save does, which on a full disk raises an OSError that does not tell why.
+    array = np.ascontiguousarray(array)
+    with path.open("wb") as file:
+        np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(array))
+        file.write(array.data)
+
+
+def _bytes_in(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.iterdir())
 
 
 def _open_array(path: Path) -> NDArray[Any]:
@@ -219,17 +246,8 @@ def _open_array(path: Path) -> NDArray[Any]:
     return mapped.view(np.ndarray)
 
 
-def _rename_unless_there(written: Path, target: Path) -> bool:
-    try:
-        written.rename(target)
-    except OSError:
-        if not target.is_dir():
-            raise
-        return False  # another process stored the same mesh meanwhile
-    return True
-
-
-def _unknown(mesh_id: str) -> ProblemError:
+def unknown(mesh_id: str) -> ProblemError:
+    """Return the refusal of a mesh that is not there."""
     return refuse("mesh_not_found", f"there is no mesh {mesh_id!r}")
 
 

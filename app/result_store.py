@@ -30,6 +30,8 @@ class Seal(BaseModel):
     headers: dict[str, str]
     size: int
     crc32: int
+    code: str = ""
+    """Which version of the code found it"""
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class Result:
 
 
 def write_result(
-    root: Path, name: str, parts: Iterable[Buffer], headers: Mapping[str, str]
+    root: Path, name: str, parts: Iterable[Buffer], headers: Mapping[str, str], code: str
 ) -> Written:
     """Write the result ``name`` under ``root``, body first and seal last, each atomically.
 
@@ -79,7 +81,7 @@ def write_result(
             yield part
 
     _write_atomically(_body(root, name), noted())
-    seal = Seal(headers=dict(headers), size=size, crc32=checksum)
+    seal = Seal(headers=dict(headers), size=size, crc32=checksum, code=code)
     _write_atomically(_seal(root, name), [seal.model_dump_json().encode()])
     return Written(seal, b"".join(small) if size <= _SMALL else None)
 
@@ -216,6 +218,21 @@ class ResultStore:
 def result_name(mesh_id: str, key: str) -> str:
     """Return the name under which the result ``key`` of a mesh is stored."""
     return f"{mesh_id}/{key}"
+
+
+def sealed_results(root: Path) -> dict[str, tuple[Path, Path]]:
+    """Return the files of each result that is complete on disk, by name."""
+    seals = sorted(root.glob("*/*.json"))
+    names = [seal.relative_to(root).with_suffix("").as_posix() for seal in seals]
+    return {
+        name: (_seal(root, name), _body(root, name)) for name in names if _body(root, name).exists()
+    }
+
+
+def read_seal(root: Path, name: str) -> Seal | None:
+    """Return the seal of the result ``name``, where it is what was written."""
+    written = _read(root, name)
+    return None if written is None else written.seal
 
 
 def _body(root: Path, name: str) -> Path:

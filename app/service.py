@@ -1,11 +1,12 @@
 """What the routes ask for: meshes in the store, and answers to queries, computed or kept."""
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Iterator, Mapping
+from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from gc import freeze
+from pathlib import Path
 from typing import Any
 
 from anyio import to_thread
@@ -18,18 +19,19 @@ from app.engine import (
     Engine,
     Estimating,
     LocalEngine,
-    MeshFromFile,
-    MeshFromSample,
+    MeshOrigin,
     Order,
-    StoredMesh,
+    Storing,
 )
 from app.errors import ProblemError, refuse
 from app.flights import Flights, Told
-from app.jobs import Errand, Job, JobBook, Jobs
+from app.jobs import Errand, Job, JobBook, Jobs, require_whole
+from app.mesh_books import MeshBooks
 from app.mesh_store import PUBLIC_ARRAYS, MeshStore
 from app.queries import Estimate, MeshSize, Query, fingerprint, result_key
 from app.result_store import Result, ResultStore, result_name
 from app.settings import Settings, variable_of
+from app.store import JOB_BOOK, RESULTS, owned
 
 Seconds = Mapping[str, float]
 
@@ -51,56 +53,80 @@ class Answered:
     seconds: Seconds
 
 
+@dataclass(frozen=True)
+class Added:
+    """A mesh that is in the store, as clients see it, and what it took."""
+
+    mesh: Mapping[str, Any]
+    is_new: bool
+    seconds: Seconds
+
+
 class Service:
     """The parts of a running service, and what they do together."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        results = settings.store / "results"
+        results = settings.store / RESULTS
         self.meshes = MeshStore(settings.store)
+        self.mesh_books = MeshBooks(
+            settings.store,
+            self.meshes,
+            settings.store_bytes,
+            evicts=settings.store_evict == "lru",
+        )
         self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
         self.engine: Engine = LocalEngine(settings, results)
-        self.jobs = Jobs(JobBook(settings.store / "jobs.sqlite3"), self.results, settings.job_ttl)
+        self._job_book = settings.store / JOB_BOOK
+        self.jobs = Jobs(JobBook(self._job_book), self.results, settings.job_ttl)
         self._flights: Flights[Done] = Flights()
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        """Sweep the store, keep workers, and run jobs while inside."""
-        self.meshes.prepare()
-        self.results.prepare()
-        await self.engine.start()
-        freeze()  # what is imported now stays: a collection that looks through it takes 90 ms
-        try:
-            async with self.jobs.running():
-                yield
-        finally:
-            await self.engine.stop()
+        """Own the store, keep workers, and run jobs while inside."""
+        with self.owning_store():
+            self.mesh_books.prepare()
+            self.results.prepare()
+            await self.engine.start()
+            freeze()  # what is imported now stays: a collection that looks through it takes 90 ms
+            try:
+                async with self.jobs.running():
+                    yield
+            finally:
+                await self.engine.stop()
+
+    @contextmanager
+    def owning_store(self) -> Iterator[None]:
+        """Own the store while inside; raises ``StoreError`` where it cannot be used as it is."""
+        with owned(self.settings.store):
+            require_whole(self._job_book)
+            yield
 
     def drain(self) -> None:
         """Finish what runs, and refuse all else: the service is about to stop."""
         self.engine.drain()
         self.jobs.end_events()
 
-    async def add_mesh(
-        self, work: MeshFromFile | MeshFromSample, asker: Asker
-    ) -> tuple[StoredMesh, Seconds]:
-        """Have a worker read or make a mesh and store it."""
-        async with self.within(asker.deadline_s):
-            done = await self.engine.run(Order(work, asker.caller.name), _nobody)
-        assert done.mesh is not None, "this kind of work stores a mesh"  # noqa: S101
-        return done.mesh, done.seconds
+    async def add_mesh(self, origin: MeshOrigin, asker: Asker) -> Added:
+        """Have a worker read or make a mesh, and store it."""
+        async with self.mesh_books.scratch_folder() as scratch, self.within(asker.deadline_s):
+            order = Order(Storing(origin, scratch / "mesh"), asker.caller.name)
+            done = await self.engine.run(order, _nobody)
+            assert done.mesh is not None, "this kind of work writes a mesh"  # noqa: S101
+            kept = await self.mesh_books.keep(done.mesh)
+        for mesh_id in kept.evicted:
+            self.results.forget_mesh(mesh_id)
+        return Added(_described(done.mesh.manifest), kept.is_new, done.seconds)
 
     def describe(self, mesh_id: str) -> dict[str, Any]:
         """Return the report of a mesh, as clients see it."""
-        manifest = self.meshes.manifest(mesh_id)
-        names = [name for name, kept in PUBLIC_ARRAYS.items() if kept in manifest["crc32"]]
-        return {
-            "id": mesh_id,
-            **manifest["report"],
-            "warnings": manifest["warnings"],
-            "created": manifest["created"],
-            "arrays": {name: f"/v1/meshes/{mesh_id}/arrays/{name}" for name in names},
-        }
+        self.mesh_books.use(mesh_id)
+        return _described(self.meshes.manifest(mesh_id))
+
+    def array_file(self, mesh_id: str, name: str) -> Path:
+        """Return the file of an array that clients may read."""
+        self.mesh_books.use(mesh_id)
+        return self.meshes.array_file(mesh_id, name)
 
     def size(self, mesh_id: str) -> MeshSize:
         """Return how large a mesh is."""
@@ -117,14 +143,14 @@ class Service:
         for mesh_id in ids:
             # Left out: what is deleted just now, or damaged, which it says when asked itself.
             with suppress(ProblemError):
-                described.append(self.describe(mesh_id))
+                described.append(_described(self.meshes.manifest(mesh_id)))
         return described, ids[-1] if more else None
 
     async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
         """Remove a mesh and its results."""
         if not caller.may_delete(self.meshes.owner(mesh_id)):
             raise refuse("forbidden", f"mesh {mesh_id} was stored with another API key")
-        await to_thread.run_sync(self.meshes.delete, mesh_id)
+        await self.mesh_books.delete(mesh_id)
         self.results.forget_mesh(mesh_id)
 
     async def answer(self, query: Query[Any], form: Form, asker: Asker) -> Answered:
@@ -139,7 +165,8 @@ class Service:
         query.refuse_answer(form.media_type, self.size(query.mesh_id), self.settings)
         order = Order(Estimating(query, form), asker.caller.name, query.topics, is_small=True)
         async with self.within(asker.deadline_s):
-            done = await self.engine.run(order, _nobody)
+            with self.mesh_books.held(query.mesh_id):
+                done = await self.engine.run(order, _nobody)
         assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
         return done.estimate, done.seconds
 
@@ -164,18 +191,19 @@ class Service:
         return await self.jobs.submit(errand, solve)
 
     async def _answer(self, query: Query[Any], form: Form, client: str, told: Told) -> Answered:
-        size = self.size(query.mesh_id)
-        query.refuse_answer(form.media_type, size, self.settings)
-        name = result_name(query.mesh_id, result_key(query, form))
-        kept = await self.results.find(name)
-        if kept is not None:
-            return Answered(kept, {})
-        work = Answering(query, form, name)
-        order = Order(work, client, query.topics, query.is_small(size))
-        done = await self._flights.join(name, partial(self.engine.run, order), told)
-        assert done.answer is not None, "this kind of work answers"  # noqa: S101
-        result = self.results.take_new(name, done.answer, is_kept=query.is_repeatable)
-        return Answered(result, done.seconds)
+        with self.mesh_books.held(query.mesh_id):
+            size = self.size(query.mesh_id)
+            query.refuse_answer(form.media_type, size, self.settings)
+            name = result_name(query.mesh_id, result_key(query, form))
+            kept = await self.results.find(name)
+            if kept is not None:
+                return Answered(kept, {})
+            work = Answering(query, form, name)
+            order = Order(work, client, query.topics, query.is_small(size))
+            done = await self._flights.join(name, partial(self.engine.run, order), told)
+            assert done.answer is not None, "this kind of work answers"  # noqa: S101
+            result = self.results.take_new(name, done.answer, is_kept=query.is_repeatable)
+            return Answered(result, done.seconds)
 
     @asynccontextmanager
     async def within(self, seconds: float, setting: str = "deadline_s") -> AsyncIterator[None]:
@@ -192,6 +220,18 @@ class Service:
                 limit=seconds,
                 setting=variable_of(setting) if own else None,
             ) from None
+
+
+def _described(manifest: Mapping[str, Any]) -> dict[str, Any]:
+    mesh_id = manifest["id"]
+    names = [name for name, kept in PUBLIC_ARRAYS.items() if kept in manifest["crc32"]]
+    return {
+        "id": mesh_id,
+        **manifest["report"],
+        "warnings": manifest["warnings"],
+        "created": manifest["created"],
+        "arrays": {name: f"/v1/meshes/{mesh_id}/arrays/{name}" for name in names},
+    }
 
 
 def _nobody(_share: float) -> None:

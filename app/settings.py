@@ -88,6 +88,10 @@ class Settings(BaseSettings):
     """Size of the meshes that a worker keeps open, and of what it keeps for paths on them."""
     worker_field_bytes: PositiveInt = 512 * MIB
     """Size of the distance fields that a worker keeps, so that what is asked next is there."""
+    store_bytes: PositiveInt = 64 * GIB
+    """Size of the meshes that the store keeps; what finds no room is refused."""
+    store_evict: Literal["off", "lru"] = "off"
+    """`lru` lets the least recently used meshes go instead."""
     results_bytes: PositiveInt = 4 * GIB
     """Size of the finished results that the store keeps."""
     results_memory_bytes: PositiveInt = 256 * MIB

@@ -9,6 +9,7 @@ from typer.exceptions import TyperException
 from app import __version__
 from app.cli import meshes, queries, serve
 from app.cli.steps import Failure
+from app.cli.store import store
 
 FAILED, INTERRUPTED = 1, 130
 """Exit codes: the work failed, Ctrl-C; typer's own for a wrong command line is 2."""
@@ -74,3 +75,5 @@ for command in (
     meshes.sample,
 ):
     cli.command()(command)
+
+cli.add_typer(store, name="store")

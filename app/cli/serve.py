@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from app.cli.steps import Failure
+
 
 def serve(
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
@@ -18,6 +20,7 @@ def serve(
 
     from app.main import create_app
     from app.settings import Settings, variable_of
+    from app.store import StoreError
 
     try:
         settings = Settings()
@@ -34,6 +37,11 @@ def serve(
             f"GEODESIC_AUTH=off where something before it asks for keys"
         )
     app = create_app(settings)
+    try:
+        with app.state.service.owning_store():
+            pass  # tried before the server does so for good, and shows a refusal as a traceback
+    except StoreError as error:
+        raise Failure(str(error)) from error
 
     class Server(uvicorn.Server):
         """Tells the service at once that it is to stop: uvicorn itself does so last of all."""

@@ -11,8 +11,9 @@ from app.engine.work import (
     Estimating,
     MeshFromFile,
     MeshFromSample,
+    MeshOrigin,
     Order,
-    StoredMesh,
+    Storing,
     Work,
 )
 
@@ -24,7 +25,8 @@ __all__ = [
     "LocalEngine",
     "MeshFromFile",
     "MeshFromSample",
+    "MeshOrigin",
     "Order",
-    "StoredMesh",
+    "Storing",
     "Work",
 ]

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 
 from app.encoding import Form
 from app.errors import Problem
+from app.mesh_store import WrittenMesh
 from app.queries import Estimate, Query
 from app.result_store import Written
 from app.schemas import Merge
@@ -14,7 +15,7 @@ from app.schemas import Merge
 
 @dataclass(frozen=True)
 class MeshFromFile:
-    """Read, check and store the mesh of an upload."""
+    """The mesh of an upload."""
 
     path: Path
     file_type: str
@@ -22,17 +23,26 @@ class MeshFromFile:
     owner: str | None = None
     """Who may delete it; None is everybody."""
 
-    stops_when_asked: ClassVar[bool] = False
-
 
 @dataclass(frozen=True)
 class MeshFromSample:
-    """Make, check and store a sample."""
+    """A sample."""
 
     name: str
     faces: int
     merge: Merge
     owner: str | None = None
+
+
+MeshOrigin = MeshFromFile | MeshFromSample
+
+
+@dataclass(frozen=True)
+class Storing:
+    """Read or make a mesh, check it, and write it into a new folder."""
+
+    origin: MeshOrigin
+    folder: Path
 
     stops_when_asked: ClassVar[bool] = False
 
@@ -58,7 +68,7 @@ class Estimating:
     stops_when_asked: ClassVar[bool] = True
 
 
-Work = MeshFromFile | MeshFromSample | Answering | Estimating
+Work = Storing | Answering | Estimating
 
 
 @dataclass(frozen=True)
@@ -75,14 +85,6 @@ class Order:
 
 
 @dataclass(frozen=True)
-class StoredMesh:
-    """A mesh that is in the store, and whether it is new there."""
-
-    mesh_id: str
-    is_new: bool
-
-
-@dataclass(frozen=True)
 class Done:
     """What a worker reports: the seconds of each phase, and what the work was for.
 
@@ -90,7 +92,7 @@ class Done:
     """
 
     seconds: Mapping[str, float]
-    mesh: StoredMesh | None = None
+    mesh: WrittenMesh | None = None
     answer: Written | None = None
     estimate: Estimate | None = None
 

@@ -27,14 +27,15 @@ from app.engine.work import (
     Estimating,
     MeshFromFile,
     MeshFromSample,
+    MeshOrigin,
     Outcome,
-    StoredMesh,
+    Storing,
     Work,
 )
 from app.errors import problem_of
 from app.json_mesh import read_json_mesh
 from app.mesh_store import MeshStore, OpenMesh
-from app.queries import Fields, Grant, Query, estimate
+from app.queries import Fields, Grant, Query, code_version, estimate
 from app.queries.refusals import refuse_large_json
 from app.result_store import write_result
 from app.settings import Settings, variable_of
@@ -77,19 +78,19 @@ class Worker:
             return self.stop_number.value >= number
 
         match work:
-            case MeshFromFile() | MeshFromSample():
-                return self._add_mesh(work, clock)
+            case Storing():
+                return self._store(work, clock)
             case Answering():
                 return self._answer(work, clock, is_to_stop)
             case Estimating():
                 return self._estimate(work, clock, is_to_stop)
 
-    def _add_mesh(self, work: MeshFromFile | MeshFromSample, clock: "Clock") -> Done:
+    def _store(self, work: Storing, clock: "Clock") -> Done:
         with clock.phase("load"):
-            mesh = _make_mesh(work, self.settings.max_faces)
+            mesh = _make_mesh(work.origin, self.settings.max_faces)
         with clock.phase("store"):
-            mesh_id, is_new = self.store.add(mesh, work.owner)
-        return Done(clock.seconds, StoredMesh(mesh_id, is_new))
+            written = self.store.write_aside(mesh, work.folder, work.origin.owner)
+        return Done(clock.seconds, mesh=written)
 
     def _answer(self, work: Answering, clock: "Clock", cancel: Callable[[], bool]) -> Done:
         settings = self.settings
@@ -109,7 +110,11 @@ class Worker:
         with clock.phase("encode"):
             encoded = encode(found, work.form)
             written = write_result(
-                self.config.results, work.result_name, encoded.parts, encoded.headers
+                self.config.results,
+                work.result_name,
+                encoded.parts,
+                encoded.headers,
+                code_version(),
             )
         return Done(clock.seconds, answer=written)
 
@@ -165,19 +170,19 @@ class Clock:
         self.seconds[name] = perf_counter() - start
 
 
-def _make_mesh(work: MeshFromFile | MeshFromSample, max_faces: int) -> gc.TriangleMesh:
+def _make_mesh(origin: MeshOrigin, max_faces: int) -> gc.TriangleMesh:
     faces: NDArray[np.int32] | NDArray[np.int64]
-    match work:
+    match origin:
         case MeshFromSample():
-            vertices, faces = SAMPLES[work.name](work.faces)
+            vertices, faces = SAMPLES[origin.name](origin.faces)
         case MeshFromFile(file_type="json"):
-            refuse_beyond_limit(_JSON_GROWS * work.path.stat().st_size)
-            vertices, faces = read_json_mesh(work.path.read_bytes())
+            refuse_beyond_limit(_JSON_GROWS * origin.path.stat().st_size)
+            vertices, faces = read_json_mesh(origin.path.read_bytes())
         case MeshFromFile():
-            return gc.load_mesh(work.path, work.file_type, work.merge, max_faces=max_faces)
+            return gc.load_mesh(origin.path, origin.file_type, origin.merge, max_faces=max_faces)
     if len(faces) > max_faces:
         raise gc.errors.TooManyFaces(len(faces), max_faces)
-    return gc.TriangleMesh(vertices, faces, merge=work.merge)
+    return gc.TriangleMesh(vertices, faces, merge=origin.merge)
 
 
 _JSON_GROWS = 40

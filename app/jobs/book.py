@@ -1,6 +1,8 @@
 """The records of jobs, in SQLite: they outlive the process that wrote them."""
 
+import sqlite3
 from collections.abc import Sequence
+from contextlib import closing
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -8,10 +10,10 @@ from typing import Any
 import aiosqlite
 
 from app.jobs.record import Job
+from app.store import StoreError
 
-VERSION = 1
-_SCHEMA = f"""
-CREATE TABLE jobs (
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS jobs (
     number INTEGER PRIMARY KEY AUTOINCREMENT,
     record TEXT NOT NULL,
     id TEXT UNIQUE AS (record ->> '$.id'),
@@ -20,10 +22,10 @@ CREATE TABLE jobs (
     status TEXT AS (record ->> '$.status'),
     finished TEXT AS (record ->> '$.finished')
 );
-CREATE INDEX jobs_by_owner ON jobs (owner, number);
-CREATE INDEX jobs_by_key ON jobs (owner, idempotency_key) WHERE idempotency_key IS NOT NULL;
-CREATE INDEX jobs_by_end ON jobs (finished);
-PRAGMA user_version = {VERSION};
+CREATE INDEX IF NOT EXISTS jobs_by_owner ON jobs (owner, number);
+CREATE INDEX IF NOT EXISTS jobs_by_key ON jobs (owner, idempotency_key)
+    WHERE idempotency_key IS NOT NULL;
+CREATE INDEX IF NOT EXISTS jobs_by_end ON jobs (finished);
 """
 
 
@@ -35,25 +37,11 @@ class JobBook:
         self._database: aiosqlite.Connection | None = None
 
     async def open(self) -> None:
-        """Open the file, which is made where it is not there.
-
-        Raises
-        ------
-        RuntimeError
-            It was written by another version of the service.
-        """
+        """Open the file, which is made where it is not there."""
         self._database = await aiosqlite.connect(self._path, isolation_level=None)
         await self._database.execute("PRAGMA journal_mode = WAL")
         await self._database.execute("PRAGMA synchronous = NORMAL")
-        ((version,),) = await self._rows("PRAGMA user_version")
-        if version == 0:
-            await self._database.executescript(_SCHEMA)
-        elif version != VERSION:
-            await self.close()
-            raise RuntimeError(
-                f"{self._path} has layout {version}, and this service reads {VERSION}: "
-                f"move it away, and jobs begin anew"
-            )
+        await self._database.executescript(_SCHEMA)
 
     async def close(self) -> None:
         """Close the file."""
@@ -130,3 +118,31 @@ class JobBook:
     def _connection(self) -> aiosqlite.Connection:
         assert self._database is not None, "the book is open while the service runs"  # noqa: S101
         return self._database
+
+
+def read_book(path: Path) -> list[Job]:
+    """Return the jobs in the book at ``path``, the oldest first; none where there is no book."""
+    rows = _read(path, "SELECT record FROM jobs ORDER BY number")
+    return [Job.model_validate_json(record) for (record,) in rows]
+
+
+def require_whole(path: Path) -> None:
+    """Raise ``StoreError`` where the book at ``path`` is damaged."""
+    found = _read(path, "PRAGMA quick_check(1)")
+    if found not in ([], [("ok",)]):
+        raise _damaged(path, found[0][0])
+
+
+def _read(path: Path, statement: str) -> list[Any]:
+    if not path.is_file():
+        return []
+    try:
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+            return database.execute(statement).fetchall()
+    except sqlite3.DatabaseError as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, reason: object) -> StoreError:
+    in_a_line = " ".join(str(reason).split())
+    return StoreError(f"{path} is damaged ({in_a_line}): move it away, and jobs begin anew")

@@ -14,7 +14,7 @@ from app.queries.matrix import MatrixQuery
 from app.queries.nearest import NearestQuery
 from app.queries.path import PathQuery, naming_parameters, written_request
 from app.queries.paths import PathsQuery
-from app.queries.query import Grant, Query, fingerprint, result_key
+from app.queries.query import Grant, Query, code_version, fingerprint, result_key
 from app.queries.refusals import MeshSize
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "PathQuery",
     "PathsQuery",
     "Query",
+    "code_version",
     "estimate",
     "fingerprint",
     "naming_parameters",

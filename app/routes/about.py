@@ -16,6 +16,7 @@ from app.uploads import FORMATS as MESH_FORMATS
 router = APIRouter(tags=["service"])
 
 _LIMITS = (
+    "store_bytes",
     "max_upload_bytes",
     "max_query_bytes",
     "max_faces",

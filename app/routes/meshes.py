@@ -1,5 +1,6 @@
 """Meshes: upload, list, describe, read arrays, delete."""
 
+from collections.abc import Mapping
 from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
@@ -7,7 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from app.callers import Caller
 from app.dependencies import AskerDep, CallerDep, ServiceDep, while_connected
 from app.encoding import NPY
-from app.engine import MeshFromFile, MeshFromSample, StoredMesh
+from app.engine import MeshFromFile, MeshFromSample
 from app.errors import Fault, over_limit, refuse
 from app.responses import (
     IMMUTABLE,
@@ -19,7 +20,7 @@ from app.responses import (
     server_timing,
 )
 from app.schemas import ListParameters, MeshDocument, MeshList, UploadParameters
-from app.service import Asker, Seconds, Service
+from app.service import Added, Asker, Service
 from app.uploads import spool
 
 router = APIRouter(prefix="/meshes", tags=["meshes"])
@@ -103,7 +104,7 @@ async def create_mesh(
     response: Response,
     service: ServiceDep,
     asker: AskerDep,
-) -> dict[str, object]:
+) -> Mapping[str, object]:
     """Read, check and store a mesh; the id is a hash of its content.
 
     The body is the file itself (with its format in `Content-Type` or `?format=`), a form with one
@@ -111,14 +112,14 @@ async def create_mesh(
     triangles in their place, and `face_map` leads back to them.
     """
     if parameters.sample is None:
-        stored, seconds = await _add_upload(service, parameters, request, asker)
+        added = await _add_upload(service, parameters, request, asker)
     else:
         making = service.add_mesh(_sample(service, parameters, asker.caller), asker)
-        stored, seconds = await while_connected(request, making)
-    response.status_code = 201 if stored.is_new else 200
-    response.headers.update(server_timing(seconds))
-    response.headers["Location"] = f"/v1/meshes/{stored.mesh_id}"
-    return service.describe(stored.mesh_id)
+        added = await while_connected(request, making)
+    response.status_code = 201 if added.is_new else 200
+    response.headers.update(server_timing(added.seconds))
+    response.headers["Location"] = f"/v1/meshes/{added.mesh['id']}"
+    return added.mesh
 
 
 @router.get(
@@ -183,7 +184,7 @@ async def get_mesh_array(
     mesh_id: str, name: str, request: Request, service: ServiceDep
 ) -> Response:
     """Send `vertices`, `faces`, `vertex_map`, `face_map` or `components`; ranges are served."""
-    path = service.meshes.array_file(mesh_id, name)
+    path = service.array_file(mesh_id, name)
     etag = etag_of(f"{mesh_id}-{name}")
     return not_modified(request, etag, IMMUTABLE) or StoredFileResponse(
         path, headers={"ETag": etag, **IMMUTABLE}, media_type=NPY
@@ -192,15 +193,15 @@ async def get_mesh_array(
 
 async def _add_upload(
     service: Service, parameters: UploadParameters, request: Request, asker: Asker
-) -> tuple[StoredMesh, Seconds]:
+) -> Added:
     if parameters.faces is not None:
         fault = Fault("/query/faces", "only a sample can be asked for with so many faces")
         raise refuse("invalid_request", fault.message, errors=(fault,))
-    with service.meshes.scratch_file() as path:
-        async with service.within(asker.deadline_s):  # both together
-            file_format = await spool(request, path, parameters.format)
-            work = MeshFromFile(path, file_format, parameters.merge, asker.caller.owner)
-            return await while_connected(request, service.add_mesh(work, asker))
+    async with service.mesh_books.scratch_folder() as folder, service.within(asker.deadline_s):
+        path = folder / "upload"
+        file_format = await spool(request, path, parameters.format)
+        origin = MeshFromFile(path, file_format, parameters.merge, asker.caller.owner)
+        return await while_connected(request, service.add_mesh(origin, asker))
 
 
 def _sample(service: Service, parameters: UploadParameters, caller: Caller) -> MeshFromSample:

@@ -7,14 +7,18 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import anyio
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.main import create_app
+from app.mesh_books import MeshBooks
+from app.mesh_store import MeshStore
 from app.queries import Fields, Grant
 from app.settings import Settings
+from app.store import owned
 
 MESHES = Path(__file__).parents[3] / "shared" / "meshes"
 
@@ -77,6 +81,22 @@ def plane(client: TestClient) -> str:
 def apart(client: TestClient) -> str:
     """The id of a mesh of two components."""
     return str(client.post("/v1/meshes", json=TWO_TRIANGLES).json()["id"])
+
+
+def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> str:
+    """Put a mesh into a store on which no service runs."""
+    store = MeshStore(root)
+    books = MeshBooks(root, store, 2**60, evicts=False)
+
+    async def keep() -> str:
+        async with books.scratch_folder() as folder:
+            written = store.write_aside(mesh, folder / "mesh", owner)
+            await books.keep(written)
+            return written.mesh_id
+
+    with owned(root):
+        books.prepare()
+        return anyio.run(keep)
 
 
 def upload_sample(client: TestClient, name: str, faces: int) -> str:

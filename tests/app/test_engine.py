@@ -15,17 +15,16 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.encoding import Form
-from app.engine import Answering, MeshFromSample, Order, local, worker
+from app.engine import Answering, MeshFromSample, Order, Storing, local, worker
 from app.engine.worker import Clock, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
-from app.mesh_store import MeshStore
 from app.queries import DistancesQuery, PathQuery
 from app.schemas import DistancesRequest, PathRequest, VertexPoint
 from app.settings import Settings
 from geodesic_core import TriangleMesh, samples
 
-from .conftest import check_problem, is_ready, serving, upload_sample, wait_until
+from .conftest import check_problem, is_ready, serving, store_mesh, upload_sample, wait_until
 
 SLOW_FACES = 300_000
 """Distances on a sphere of so many faces take seconds."""
@@ -366,10 +365,8 @@ def asked(mesh_id: str, *barriers: int, vertex: int = 0) -> DistancesQuery:
 
 
 def test_a_worker_closes_meshes_that_do_not_fit(tmp_path: Path) -> None:
-    store = MeshStore(tmp_path)
-    store.prepare()
     meshes = [TriangleMesh(*samples.plane(faces)) for faces in (100, 200, 300)]
-    ids = [store.add(mesh)[0] for mesh in meshes]
+    ids = [store_mesh(tmp_path, mesh) for mesh in meshes]
     room = meshes[1].nbytes + meshes[2].nbytes
     state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0), c_double(0.0))
 
@@ -380,10 +377,8 @@ def test_a_worker_closes_meshes_that_do_not_fit(tmp_path: Path) -> None:
 
 
 def test_a_worker_keeps_meshes_with_barriers_as_it_keeps_others(tmp_path: Path) -> None:
-    store = MeshStore(tmp_path)
-    store.prepare()
     mesh = TriangleMesh(*samples.plane(200))
-    mesh_id, _ = store.add(mesh)
+    mesh_id = store_mesh(tmp_path, mesh)
     state = Worker(
         config(tmp_path, worker_mesh_bytes=2 * mesh.nbytes), c_longlong(0), c_double(0.0)
     )
@@ -398,10 +393,8 @@ def test_a_worker_keeps_meshes_with_barriers_as_it_keeps_others(tmp_path: Path) 
 
 
 def test_what_paths_need_counts_as_part_of_an_open_mesh(tmp_path: Path) -> None:
-    store = MeshStore(tmp_path)
-    store.prepare()
     meshes = [TriangleMesh(*samples.plane(faces)) for faces in (200, 300)]
-    ids = [store.add(mesh)[0] for mesh in meshes]
+    ids = [store_mesh(tmp_path, mesh) for mesh in meshes]
     room = sum(mesh.nbytes for mesh in meshes) + 100
     state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0), c_double(0.0))
 
@@ -428,7 +421,7 @@ def test_a_defect_in_a_worker_is_logged_there_and_told(
     monkeypatch.setattr(worker, "_worker", Worker(config(tmp_path), c_longlong(0), c_double(0.0)))
     monkeypatch.setattr(worker, "_make_mesh", lambda *_: 1 / 0)
 
-    outcome = worker.do(1, MeshFromSample("plane", 10, "none"))
+    outcome = worker.do(1, Storing(MeshFromSample("plane", 10, "none"), tmp_path / "mesh"))
 
     assert isinstance(outcome, Problem)
     assert outcome.code == "internal_error"
@@ -441,8 +434,7 @@ def test_work_that_was_asked_to_stop_stops(
 ) -> None:
     asked = c_longlong(0)
     state = Worker(config(tmp_path), asked, c_double(0.0))
-    state.store.prepare()
-    mesh_id, _ = state.store.add(TriangleMesh(*samples.sphere(100_000)))
+    mesh_id = store_mesh(tmp_path, TriangleMesh(*samples.sphere(100_000)))
     monkeypatch.setattr(worker, "_worker", state)
     ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
     query = PathQuery(mesh_id, PathRequest(**ends, **accuracy))

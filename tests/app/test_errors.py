@@ -1,5 +1,6 @@
 import errno
 import pickle
+import sqlite3
 
 import pytest
 from starlette.testclient import TestClient
@@ -52,6 +53,12 @@ def test_unknown_code(client: TestClient) -> None:
     assert "malformed_body" in problem["detail"]
 
 
+def database_error(code: int) -> sqlite3.OperationalError:
+    error = sqlite3.OperationalError("so it goes")
+    error.sqlite_errorcode = code
+    return error
+
+
 @pytest.mark.parametrize(
     ("error", "code"),
     [
@@ -65,6 +72,8 @@ def test_unknown_code(client: TestClient) -> None:
         (MemoryError(), "memory_limit"),
         (OSError(errno.ENOSPC, "full"), "storage_full"),
         (OSError(errno.EIO, "broken"), "internal_error"),
+        (database_error(sqlite3.SQLITE_FULL), "storage_full"),
+        (database_error(sqlite3.SQLITE_BUSY), "internal_error"),
         (core.InternalError("defect"), "internal_error"),
         (KeyError("defect"), "internal_error"),
         (ProblemError(Problem("draining", "bye")), "draining"),

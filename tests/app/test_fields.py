@@ -15,6 +15,7 @@ from app.mesh_store import OpenMesh
 from app.queries import DistancesQuery, Fields, Grant, IsolinesQuery, PathsQuery
 from geodesic_core import whole_sweep
 
+from .conftest import store_mesh
 from .test_engine import asked, config
 
 APPROXIMATE = {"method": "approximate", "relative_error": 0.01}
@@ -169,10 +170,9 @@ def test_questions_about_one_field_go_to_one_worker() -> None:
 
 def test_a_worker_drops_fields_with_their_mesh(tmp_path: Path) -> None:
     meshes = [gc.TriangleMesh(*gc.samples.plane(faces)) for faces in (200, 300)]
-    settings = config(tmp_path, worker_mesh_bytes=meshes[1].nbytes + 1)
+    settings = config(tmp_path, worker_mesh_bytes=meshes[1].nbytes + 1, worker_field_bytes=10**6)
     state = Worker(settings, c_longlong(0), c_double(0.0))
-    state.store.prepare()
-    ids = [state.store.add(mesh, None)[0] for mesh in meshes]
+    ids = [store_mesh(tmp_path, mesh) for mesh in meshes]
     for mesh_id in ids:
         query = asked(mesh_id)
         opened = state._open(query)

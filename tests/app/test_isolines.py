@@ -146,16 +146,15 @@ def test_the_grant_is_in_force_throughout(
         return asked == stop_at
 
     monkeypatch.setattr(WholeSweep, "run", watch)
-    grant = granted(cancel)
     stop_at = -1
-    query.answer(opened, grant)
+    query.answer(opened, granted(cancel, memory=10**9))
 
-    assert watched == [grant.options] * sweeps
+    assert watched == [{"cancel": cancel, "memory_limit": 10**9}] * sweeps
     assert asked >= sweeps + 1 + 2 * 4, "each sweep, all faces, and cutting and joining each level"
     for stop_at in range(1, asked + 1):
         asked = 0
         with pytest.raises(gc.errors.Cancelled):
-            query.answer(opened, grant)
+            query.answer(opened, granted(cancel))
         assert asked == stop_at
 
 

@@ -1,8 +1,6 @@
 """Queries that are answered whether their client waits or not."""
 
-import asyncio
 import json
-import sqlite3
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -12,8 +10,6 @@ from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
-
-from app.jobs import JobBook
 
 from .conftest import check_problem, serving, upload_sample, wait_until
 
@@ -306,12 +302,3 @@ def test_answers_of_jobs_outlive_those_that_are_only_kept(tmp_path: Path) -> Non
         (found,) = (tmp_path / "results").rglob("*.body")
         found.write_bytes(b"other")
         check_problem(client.get(f"{job}/results"), 500, "mesh_damaged")
-
-
-def test_a_book_of_another_layout_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "jobs.sqlite3"
-    with sqlite3.connect(path) as database:
-        database.execute("PRAGMA user_version = 99")
-
-    with pytest.raises(RuntimeError, match="layout 99"):
-        asyncio.run(JobBook(path).open())

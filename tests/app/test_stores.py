@@ -10,6 +10,8 @@ from app.errors import ProblemError
 from app.mesh_store import MeshStore
 from app.result_store import ResultStore, write_result
 
+from .conftest import store_mesh
+
 SQUARE = (
     np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float),
     np.array([[0, 1, 2], [0, 2, 3]]),
@@ -18,9 +20,7 @@ SQUARE = (
 
 @pytest.fixture
 def meshes(tmp_path: Path) -> MeshStore:
-    store = MeshStore(tmp_path)
-    store.prepare()
-    return store
+    return MeshStore(tmp_path)
 
 
 def damage(path: Path) -> None:
@@ -35,104 +35,93 @@ def code_of(call) -> str:
     return caught.value.problem.code
 
 
-def test_a_mesh_comes_back_as_it_was(meshes: MeshStore) -> None:
+def test_a_mesh_comes_back_as_it_was(meshes: MeshStore, tmp_path: Path) -> None:
     mesh = gc.TriangleMesh(*SQUARE)
 
-    mesh_id, is_new = meshes.add(mesh)
-    opened = meshes.open(mesh_id)
+    opened = meshes.open(store_mesh(tmp_path, mesh))
 
-    assert is_new
     assert opened.warnings == list(mesh.warnings)
+    assert opened.mesh.arrays().keys() == mesh.arrays().keys()
     for name, array in mesh.arrays().items():
         np.testing.assert_array_equal(opened.mesh.arrays()[name], array)
+        assert opened.mesh.arrays()[name].dtype == array.dtype
         assert not opened.mesh.arrays()[name].flags.writeable
 
 
-def test_the_id_is_of_the_content(meshes: MeshStore) -> None:
+def test_the_id_is_of_the_content(tmp_path: Path) -> None:
     vertices, faces = SQUARE
-    mesh_id, _ = meshes.add(gc.TriangleMesh(vertices, faces))
+    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(vertices, faces))
 
-    assert meshes.add(gc.TriangleMesh(vertices.tolist(), faces.tolist())) == (mesh_id, False)
-    assert meshes.add(gc.TriangleMesh(vertices * 2, faces))[0] != mesh_id
-    assert meshes.add(gc.TriangleMesh(vertices, faces[::-1]))[0] != mesh_id
+    assert store_mesh(tmp_path, gc.TriangleMesh(vertices.tolist(), faces.tolist())) == mesh_id
+    assert store_mesh(tmp_path, gc.TriangleMesh(vertices * 2, faces)) != mesh_id
+    assert store_mesh(tmp_path, gc.TriangleMesh(vertices, faces[::-1])) != mesh_id
 
 
-def test_a_vertex_map_is_part_of_the_content(meshes: MeshStore) -> None:
+def test_a_vertex_map_is_part_of_the_content(tmp_path: Path) -> None:
     vertices, faces = SQUARE
     doubled = np.concatenate([vertices, vertices])
 
     merged = gc.TriangleMesh(doubled, faces, merge="exact")
 
-    assert meshes.add(merged)[0] != meshes.add(gc.TriangleMesh(vertices, faces))[0]
+    assert store_mesh(tmp_path, merged) != store_mesh(tmp_path, gc.TriangleMesh(vertices, faces))
 
 
-def test_two_writers_of_one_mesh(meshes: MeshStore, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mesh_that_is_stored_is_not_written_again(meshes: MeshStore, tmp_path: Path) -> None:
     mesh = gc.TriangleMesh(*SQUARE)
-    rename = Path.rename
+    mesh_id = store_mesh(tmp_path, mesh, "alice")
 
-    def overtaken(path: Path, target: Path) -> Path:
-        monkeypatch.undo()
-        meshes.add(mesh)
-        return rename(path, target)
+    written = meshes.write_aside(mesh, tmp_path / "aside", "bob")
 
-    monkeypatch.setattr(Path, "rename", overtaken)
-
-    assert meshes.add(mesh)[1] is False
-    assert len(meshes.page("", 10)[0]) == 1
+    assert (written.mesh_id, written.folder) == (mesh_id, None)
+    assert written.manifest["owner"] == "alice"
+    assert not (tmp_path / "aside").exists()
 
 
 @pytest.mark.parametrize("file", ["vertices.npy", "faces.npy", "component.npy"])
 def test_a_changed_array_is_noticed(meshes: MeshStore, tmp_path: Path, file: str) -> None:
-    mesh_id, _ = meshes.add(gc.TriangleMesh(*SQUARE))
+    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(*SQUARE))
     damage(tmp_path / "meshes" / mesh_id / file)
 
     assert code_of(lambda: meshes.open(mesh_id)) == "mesh_damaged"
+    (found,) = meshes.damage(mesh_id)
+    assert f"its array {file.removesuffix('.npy')} is not what was written" in str(found)
 
 
-@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b'{"version": 99}'])
+@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b'{"id": "of another"}'])
 def test_a_broken_manifest_is_noticed(meshes: MeshStore, tmp_path: Path, content: bytes) -> None:
-    mesh_id, _ = meshes.add(gc.TriangleMesh(*SQUARE))
+    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(*SQUARE))
     (tmp_path / "meshes" / mesh_id / "manifest.json").write_bytes(content)
 
     assert code_of(lambda: meshes.manifest(mesh_id)) == "mesh_damaged"
+    (found,) = meshes.damage(mesh_id)
+    assert "its manifest" in str(found)
 
 
 def test_a_missing_array_is_noticed(meshes: MeshStore, tmp_path: Path) -> None:
-    mesh_id, _ = meshes.add(gc.TriangleMesh(*SQUARE))
+    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(*SQUARE))
     (tmp_path / "meshes" / mesh_id / "faces.npy").unlink()
 
     assert code_of(lambda: meshes.open(mesh_id)) == "mesh_damaged"
 
 
+def test_a_mesh_under_the_name_of_another_is_noticed(meshes: MeshStore, tmp_path: Path) -> None:
+    """Checksums are right, but what results are named by is not."""
+    vertices, faces = SQUARE
+    ids = [store_mesh(tmp_path, gc.TriangleMesh(vertices * scale, faces)) for scale in (1, 2)]
+    assert [list(meshes.damage(mesh_id)) for mesh_id in ids] == [[], []]
+    manifests = [tmp_path / "meshes" / mesh_id / "manifest.json" for mesh_id in ids]
+    manifests[0].write_bytes(manifests[1].read_bytes().replace(ids[1].encode(), ids[0].encode()))
+    for array in manifests[0].parent.glob("*.npy"):
+        array.write_bytes((manifests[1].parent / array.name).read_bytes())
+
+    (found,) = meshes.damage(ids[0])
+    assert "its name is not that of its content" in str(found)
+
+
 @pytest.mark.parametrize("mesh_id", ["", "..", "0" * 32, "../meshes", "G" * 32])
 def test_unknown_ids(meshes: MeshStore, mesh_id: str) -> None:
     assert code_of(lambda: meshes.manifest(mesh_id)) == "mesh_not_found"
-    assert code_of(lambda: meshes.delete(mesh_id)) == "mesh_not_found"
-
-
-def test_half_written_entries_are_swept(meshes: MeshStore, tmp_path: Path) -> None:
-    mesh_id, _ = meshes.add(gc.TriangleMesh(*SQUARE))
-    (tmp_path / "tmp" / "half").mkdir()
-    (tmp_path / "tmp" / "half" / "vertices.npy").write_bytes(b"x")
-
-    MeshStore(tmp_path).prepare()
-
-    assert list((tmp_path / "tmp").iterdir()) == []
-    assert meshes.open(mesh_id)
-
-
-def test_a_failed_write_leaves_nothing(
-    meshes: MeshStore, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def full(*_args: object, **_kwargs: object) -> None:
-        raise OSError(28, "no space left on device")
-
-    monkeypatch.setattr(np, "save", full)
-
-    with pytest.raises(OSError, match="no space"):
-        meshes.add(gc.TriangleMesh(*SQUARE))
-    assert list((tmp_path / "tmp").iterdir()) == []
-    assert list((tmp_path / "meshes").iterdir()) == []
+    assert code_of(lambda: meshes.array_file(mesh_id, "faces")) == "mesh_not_found"
 
 
 # Results
@@ -146,7 +135,7 @@ def results(tmp_path: Path) -> ResultStore:
 
 
 def put(results: ResultStore, root: Path, name: str, size: int = 40) -> None:
-    written = write_result(root / "results", name, [b"x" * size], {"A": "b"})
+    written = write_result(root / "results", name, [b"x" * size], {"A": "b"}, "code")
     results.give_back(results.take_new(name, written))
 
 
@@ -179,7 +168,7 @@ def test_the_least_recently_used_go_first(results: ResultStore, tmp_path: Path) 
 
 
 def test_what_is_being_sent_stays(results: ResultStore, tmp_path: Path) -> None:
-    written = write_result(tmp_path / "results", "m/a", [b"x" * 90], {})
+    written = write_result(tmp_path / "results", "m/a", [b"x" * 90], {}, "code")
     sent = results.take_new("m/a", written)
     put(results, tmp_path, "m/b")
 
@@ -249,7 +238,9 @@ def test_what_is_held_stays_until_it_is_released(results: ResultStore, tmp_path:
     put(results, tmp_path, "m/a")
     results.hold("m/a")
     assert results.has_room_to_hold("m/a")
-    other = results.take_new("m/b", write_result(tmp_path / "results", "m/b", [b"x" * 61], {}))
+    other = results.take_new(
+        "m/b", write_result(tmp_path / "results", "m/b", [b"x" * 61], {}, "code")
+    )
     assert not results.has_room_to_hold("m/b")
     results.give_back(other)
     results.forget_mesh("m")
@@ -264,5 +255,5 @@ def test_what_is_held_stays_until_it_is_released(results: ResultStore, tmp_path:
 @pytest.mark.usefixtures("results")
 def test_a_failed_result_leaves_nothing(tmp_path: Path) -> None:
     with pytest.raises(TypeError):
-        write_result(tmp_path / "results", "m/a", [b"x", None], {})  # type: ignore[list-item]
+        write_result(tmp_path / "results", "m/a", [b"x", None], {}, "code")  # type: ignore[list-item]
     assert not list((tmp_path / "results").glob("m/*"))

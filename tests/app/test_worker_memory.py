@@ -79,7 +79,7 @@ def tight(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
 
 
 def pid_of_worker(client: Any) -> int:
-    [slot] = client.app.state.service.engine._slots
+    _, slot = client.app.state.service.engine._slots
     return int(slot._pid.value)
 
 

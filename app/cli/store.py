@@ -1,0 +1,144 @@
+"""``geodesic store``: what is in a store, whether it is whole, and what may go."""
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.cli.steps import Failure, showing
+
+if TYPE_CHECKING:
+    from app.upkeep import Contents
+
+store = typer.Typer(
+    help="Look after the store of a service. To be run where the store is.",
+    rich_markup_mode=None,
+)
+
+Root = Annotated[
+    Path,
+    typer.Argument(metavar="STORE", envvar="GEODESIC_STORE", help="Folder of the store."),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
+
+_DEFAULT = Path("geodesic-store")
+
+
+@store.command()
+def ls(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
+    """List the meshes, and sum up results and jobs."""
+    from app.upkeep import contents
+
+    with _store_at(root):
+        found = contents(root)
+    if as_json:
+        _print_json(_document(found))
+        return
+    if found.meshes:
+        typer.echo(_ROW.format("id", "faces", "bytes", "created", "last used", "owner"))
+    for mesh in found.meshes:
+        faces = "damaged" if mesh.faces is None else mesh.faces
+        used = mesh.last_used.isoformat(timespec="seconds")
+        row = mesh.id, faces, mesh.bytes, mesh.created or "", used, mesh.owner or ""
+        typer.echo(_ROW.format(*row).rstrip())
+    total = sum(mesh.bytes for mesh in found.meshes)
+    typer.echo(f"meshes      {len(found.meshes)}, {total} bytes")
+    typer.echo(f"results     {found.results}, {found.result_bytes} bytes")
+    states = Counter(job.status for job in found.jobs)
+    told = "".join(f", {count} {status}" for status, count in sorted(states.items()))
+    typer.echo(f"jobs        {len(found.jobs)}{told}")
+
+
+@store.command()
+def check(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
+    """Read all there is and hold it against its checksums; the exit code is 1 if any is damaged."""
+    from app.upkeep import damage
+
+    with _store_at(root), showing("Reading"):
+        found = list(damage(root))
+    if as_json:
+        _print_json({"damaged": found})
+    else:
+        for fault in found:
+            typer.echo(fault)
+        typer.echo(f"damaged     {len(found)}")
+    if found:
+        raise typer.Exit(1)
+
+
+@store.command()
+def prune(
+    root: Root = _DEFAULT,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Only tell what would be removed.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Remove what is half-written, and results that are damaged, outdated or of no mesh any more.
+
+    No service may run on the store. Meshes stay, and so do the answers of jobs.
+    """
+    from app.queries import code_version
+    from app.store import owned
+    from app.upkeep import leftovers, remove
+
+    with _store_at(root), owned(root), showing("Reading"):
+        going = [(leftover, leftover.bytes) for leftover in leftovers(root, code_version())]
+        for leftover, _ in going:
+            if not dry_run:
+                remove(leftover)
+    if as_json:
+        removed = [
+            {"reason": leftover.reason, "paths": list(map(str, leftover.paths)), "bytes": size}
+            for leftover, size in going
+        ]
+        _print_json({"dry_run": dry_run, "removed": removed})
+        return
+    for leftover, size in going:
+        typer.echo(f"{leftover.reason}: {leftover.paths[0].relative_to(root)}, {size} bytes")
+    verb = "to remove" if dry_run else "removed"
+    typer.echo(f"{verb:12}{len(going)}, {sum(size for _, size in going)} bytes")
+
+
+_ROW = "{:32}  {:>9}  {:>13}  {:25}  {:25}  {}"
+
+
+@contextmanager
+def _store_at(root: Path) -> Iterator[None]:
+    """Refuse what is no store that can be read, and say what goes wrong in a line."""
+    from app.store import StoreError, is_store, require_layout
+
+    if not is_store(root):
+        raise Failure(f"there is no store in {root}")
+    try:
+        require_layout(root)
+        yield
+    except (StoreError, OSError) as error:
+        raise Failure(str(error)) from error
+
+
+def _document(found: "Contents") -> dict[str, Any]:
+    return {
+        "meshes": [asdict(mesh) for mesh in found.meshes],
+        "results": {"count": found.results, "bytes": found.result_bytes},
+        "jobs": [
+            {
+                "id": job.id,
+                "status": job.status,
+                "mesh_id": job.errand.mesh_id,
+                "owner": job.errand.owner,
+                "created": job.created,
+            }
+            for job in found.jobs
+        ],
+    }
+
+
+def _print_json(document: dict[str, Any]) -> None:
+    import orjson
+
+    typer.echo(orjson.dumps(document, option=orjson.OPT_INDENT_2))
