@@ -154,7 +154,7 @@ def _make_mesh(work: MeshFromFile | MeshFromSample, max_faces: int) -> gc.Triang
     faces: NDArray[np.int32] | NDArray[np.int64]
     match work:
         case MeshFromSample():
-            vertices, faces = SAMPLES[work.name](work.faces)
+            vertices, faces = gc.samples.SAMPLES[work.name](work.faces)
         case MeshFromFile(file_type="json"):
             refuse_beyond_limit(_JSON_GROWS * work.path.stat().st_size)
             vertices, faces = read_json_mesh(work.path.read_bytes())
@@ -167,8 +167,6 @@ def _make_mesh(work: MeshFromFile | MeshFromSample, max_faces: int) -> gc.Triang
 
 _JSON_GROWS = 40
 """Bytes that orjson takes for one of JSON; 37 were the most measured. Lacking them, it crashes."""
-
-SAMPLES = {"knot": gc.samples.knot, "sphere": gc.samples.sphere, "plane": gc.samples.plane}
 
 # pebble calls module functions: the state of the process has to live beside them.
 _worker: Worker | None = None

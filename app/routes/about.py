@@ -9,7 +9,7 @@ from app.dependencies import ServiceDep
 from app.encoding import FORMATS
 from app.errors import CODES, refuse
 from app.responses import problems
-from app.schemas import About, Health, Index, Method, ProblemCode
+from app.schemas import About, Health, Index, Method, ProblemCode, SampleName
 from app.settings import variable_of
 from app.uploads import FORMATS as MESH_FORMATS
 
@@ -74,7 +74,7 @@ async def get_about(service: ServiceDep) -> About:
         methods=list(get_args(Method)),
         mesh_formats=[*MESH_FORMATS, "json"],
         answer_formats=dict(FORMATS),
-        samples=["knot", "sphere", "plane"],
+        samples=list(get_args(SampleName)),
         limits={name: limit for name, limit in limits.items() if limit is not None},
     )
 
