@@ -11,6 +11,7 @@ from app import __version__, handlers
 from app.admission import AdmissionMiddleware, is_open
 from app.body_deadline import BodyDeadlineMiddleware
 from app.errors import PROBLEM_JSON
+from app.metrics import MeasuringMiddleware, Metrics
 from app.middleware import RequestMiddleware
 from app.responses import problems
 from app.routes import about, jobs, meshes, queries
@@ -36,10 +37,12 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     app.state.service = service
+    app.state.metrics = metrics = Metrics(service)
     # The last is the outermost.
     app.add_middleware(BodyDeadlineMiddleware, settings=settings)
     app.add_middleware(AdmissionMiddleware, settings=settings)
     app.add_middleware(RequestMiddleware, settings=settings)
+    app.add_middleware(MeasuringMiddleware, metrics=metrics)
     if settings.cors_origins:
         app.add_middleware(
             CORSMiddleware,

@@ -168,6 +168,11 @@ class MeshStore:
         first = bisect_right(ids, after)
         return ids[first : first + limit], len(ids) > first + limit
 
+    def usage(self) -> tuple[int, int]:
+        """Return how many meshes there are, and their size in bytes."""
+        sizes = [file.stat().st_size for file in self._meshes.glob("*/*")]
+        return len(list(self._meshes.iterdir())), sum(sizes)
+
     def delete(self, mesh_id: str) -> None:
         """Remove a mesh at once; processes that have it open keep what they mapped."""
         folder = self._folder(mesh_id)

@@ -2,13 +2,15 @@
 
 from typing import get_args
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
+from starlette.responses import PlainTextResponse
 
 from app import __version__
 from app.dependencies import ServiceDep
 from app.encoding import FORMATS
 from app.errors import CODES, refuse
-from app.responses import problems
+from app.metrics import Metrics
+from app.responses import UNSTORED, problems
 from app.schemas import About, Health, Index, Method, ProblemCode, SampleName
 from app.settings import variable_of
 from app.uploads import FORMATS as MESH_FORMATS
@@ -77,6 +79,20 @@ async def get_about(service: ServiceDep) -> About:
         samples=list(get_args(SampleName)),
         limits={name: limit for name, limit in limits.items() if limit is not None},
     )
+
+
+@router.get(
+    "/metrics",
+    operation_id="getMetrics",
+    summary="Metrics, as Prometheus reads them",
+    response_class=PlainTextResponse,
+    responses={200: {"description": "Metrics named `geodesic_…`, in Prometheus's text format"}},
+)
+async def get_metrics(request: Request) -> Response:
+    """Return what an operator watches: requests, workers, queue, results, jobs."""
+    metrics: Metrics = request.app.state.metrics
+    text, media_type = await metrics.written(request.headers.get("accept", ""))
+    return Response(text, headers={**UNSTORED, "Content-Type": media_type})
 
 
 @router.get(
