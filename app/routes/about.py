@@ -10,7 +10,7 @@ from app.dependencies import ServiceDep
 from app.encoding import FORMATS
 from app.errors import CODES, refuse
 from app.metrics import Metrics
-from app.responses import UNSTORED, problems
+from app.responses import UNSTORED, documented, problems
 from app.schemas import About, Health, Index, Method, ProblemCode, SampleName
 from app.settings import variable_of
 from app.uploads import FORMATS as MESH_FORMATS
@@ -86,7 +86,12 @@ async def get_about(service: ServiceDep) -> About:
     operation_id="getMetrics",
     summary="Metrics, as Prometheus reads them",
     response_class=PlainTextResponse,
-    responses={200: {"description": "Metrics named `geodesic_…`, in Prometheus's text format"}},
+    responses={
+        200: {
+            "description": "Metrics named `geodesic_…`, in Prometheus's text format",
+            "headers": documented("Cache-Control"),
+        }
+    },
 )
 async def get_metrics(request: Request) -> Response:
     """Return what an operator watches: requests, workers, queue, results, jobs."""
@@ -100,7 +105,10 @@ async def get_metrics(request: Request) -> Response:
     operation_id="getProblem",
     summary="What an error code means",
     response_model=ProblemCode,
-    responses=problems("not_found"),
+    responses={
+        200: {"description": "The meaning", "headers": documented("Cache-Control")},
+        **problems("not_found"),
+    },
 )
 async def get_problem(code: str, response: Response) -> ProblemCode:
     """Return the row of the error table; the `type` of a problem leads here."""
