@@ -85,6 +85,7 @@ def test_a_size_out_of_the_domain_is_refused(name: str, faces: int) -> None:
         samples.SAMPLES[name](faces)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("name", ["terrain", "obstacles"])
 def test_any_size_from_the_fewest_on_is_a_sound_mesh(name: str) -> None:
     fewest = FEWEST[name]
@@ -137,6 +138,7 @@ def test_the_terrain_s_faces_have_the_shorter_diagonals_of_their_cells() -> None
         assert here <= there
 
 
+@pytest.mark.jit
 def test_the_obstacles_are_seen_from_above_and_have_holes_to_walk_around() -> None:
     vertices, faces = samples.obstacles(20_000)
     assert (_normals(vertices, faces)[:, 2] > 0).all()
