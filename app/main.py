@@ -8,11 +8,11 @@ from fastapi import FastAPI
 from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__, handlers
-from app.admission import AdmissionMiddleware, is_open
+from app.admission import AdmissionMiddleware
 from app.body_deadline import BodyDeadlineMiddleware
-from app.errors import PROBLEM_JSON
+from app.documentation import complete
+from app.metrics import MeasuringMiddleware, Metrics
 from app.middleware import RequestMiddleware
-from app.responses import problems
 from app.routes import about, jobs, meshes, queries
 from app.service import Service
 from app.settings import Settings
@@ -36,10 +36,12 @@ def create_app(settings: Settings) -> FastAPI:
         redoc_url=None,
     )
     app.state.service = service
+    app.state.metrics = metrics = Metrics(service)
     # The last is the outermost.
     app.add_middleware(BodyDeadlineMiddleware, settings=settings)
     app.add_middleware(AdmissionMiddleware, settings=settings)
     app.add_middleware(RequestMiddleware, settings=settings)
+    app.add_middleware(MeasuringMiddleware, metrics=metrics)
     if settings.cors_origins:
         app.add_middleware(
             CORSMiddleware,
@@ -58,38 +60,7 @@ def create_app(settings: Settings) -> FastAPI:
 
 class _Application(FastAPI):
     def openapi(self) -> dict[str, Any]:
-        """Return FastAPI's document, with errors as they are here."""
-        schema = super().openapi()
-        for template, path in schema["paths"].items():
-            for operation in path.values():
-                if not is_open(template):
-                    operation["security"] = [{"apiKey": []}, {}]
-                    operation["responses"].update(_REFUSALS)
-                operation["responses"] = {
-                    status: _as_problem(response) if status >= "400" else response
-                    for status, response in operation["responses"].items()
-                    if response["description"] != _FASTAPI_S_OWN
-                }
-        for name in ("HTTPValidationError", "ValidationError"):
-            schema["components"]["schemas"].pop(name, None)
-        schema["components"]["securitySchemes"] = {"apiKey": _SECURITY_SCHEME}
-        return schema
-
-
-_SECURITY_SCHEME = {
-    "type": "http",
-    "scheme": "bearer",
-    "description": "A key of this service, where it asks for one.",
-}
-_PROBLEM = {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}
-_REFUSALS = {
-    str(status): {"description": refusal["description"], "content": {PROBLEM_JSON: _PROBLEM}}
-    for status, refusal in problems("unauthorized", "rate_limited").items()
-}
-_FASTAPI_S_OWN = "Validation Error"  # what it supposes of each operation with parameters
-
-
-def _as_problem(response: dict[str, Any]) -> dict[str, Any]:
-    # FastAPI writes the media type of the answer to the errors as well.
-    (model,) = response["content"].values()
-    return {**response, "content": {PROBLEM_JSON: model}}
+        """Return the interface document, made when it is first asked for."""
+        if self.openapi_schema is None:
+            self.openapi_schema = complete(super().openapi())
+        return self.openapi_schema

@@ -52,6 +52,11 @@ class MeshBooks:
         self._sizes = OrderedDict(self._store.sizes())
 
     @property
+    def count(self) -> int:
+        """How many meshes there are."""
+        return len(self._sizes)
+
+    @property
     def total(self) -> int:
         """Bytes of all meshes."""
         return sum(self._sizes.values())

@@ -25,6 +25,25 @@ IMMUTABLE = {"Cache-Control": "private, max-age=31536000, immutable"}
 UNSTORED = {"Cache-Control": "no-store"}
 REVALIDATED = {"Cache-Control": "private, no-cache"}
 
+OF_FILES = ("Accept-Ranges", "Cache-Control", "ETag", "Last-Modified")
+"""The headers of answers that are files of the store."""
+ENDS = (
+    "mesh_not_found",
+    "result_too_large",
+    "invalid_request",
+    "invalid_point",
+    "limit_exceeded",
+    "memory_limit",
+    "worker_died",
+    "mesh_damaged",
+    "queue_full",
+    "engine_unavailable",
+    "draining",
+    "deadline_exceeded",
+    "storage_full",
+)
+"""The problems that a query can meet when its body is right, at once or as a job."""
+
 
 def problem_response(problem: Problem, instance: str, request_id: str) -> Response:
     """Return ``problem`` as ``application/problem+json``."""
@@ -42,6 +61,11 @@ def problems(*codes: str) -> dict[int | str, dict[str, Any]]:
         status: {"model": ProblemDocument, "description": ", ".join(names)}
         for status, names in by_status.items()
     }
+
+
+def documented(*names: str) -> dict[str, Any]:
+    """Describe the headers of an answer, for OpenAPI."""
+    return {name: {"$ref": f"#/components/headers/{name}"} for name in names}
 
 
 def server_timing(seconds: Mapping[str, float]) -> dict[str, str]:

@@ -119,6 +119,11 @@ class ResultStore:
             half_written.unlink()
         self._evict()
 
+    @property
+    def nbytes(self) -> int:
+        """Size of all results."""
+        return self._total
+
     async def find(self, name: str) -> Result | None:
         """Take the result ``name``, if it is there and whole."""
         if name not in self._sizes:

@@ -16,7 +16,7 @@ from pydantic import (
 
 Merge = Literal["none", "exact"]
 MeshFormat = Literal["obj", "off", "ply", "stl", "glb"]
-SampleName = Literal["knot", "sphere", "plane"]
+SampleName = Literal["knot", "sphere", "terrain", "obstacles", "plane"]
 Method = Literal["exact", "approximate"]
 JobStatus = Literal["accepted", "running", "successful", "failed", "dismissed"]
 Layout = Literal["dense", "sparse", "pairs"]

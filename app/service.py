@@ -1,6 +1,7 @@
 """What the routes ask for: meshes in the store, and answers to queries, computed or kept."""
 
 import asyncio
+from collections import Counter, defaultdict
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
@@ -79,6 +80,11 @@ class Service:
         self.engine: Engine = LocalEngine(settings, results)
         self._job_book = settings.store / JOB_BOOK
         self.jobs = Jobs(JobBook(self._job_book), self.results, settings.job_ttl)
+        self.lookups = {"hit": 0, "miss": 0}
+        """Whether answers asked for were kept"""
+        self.solves: Counter[str] = Counter()
+        """By kind of query"""
+        self.solve_seconds: defaultdict[str, float] = defaultdict(float)
         self._flights: Flights[Done] = Flights()
 
     @asynccontextmanager
@@ -196,14 +202,21 @@ class Service:
             query.refuse_answer(form.media_type, size, self.settings)
             name = result_name(query.mesh_id, result_key(query, form))
             kept = await self.results.find(name)
+            self.lookups["miss" if kept is None else "hit"] += 1
             if kept is not None:
                 return Answered(kept, {})
             work = Answering(query, form, name)
             order = Order(work, client, query.topics, query.is_small(size))
-            done = await self._flights.join(name, partial(self.engine.run, order), told)
+            done = await self._flights.join(name, partial(self._solve, order, query.kind), told)
             assert done.answer is not None, "this kind of work answers"  # noqa: S101
             result = self.results.take_new(name, done.answer, is_kept=query.is_repeatable)
             return Answered(result, done.seconds)
+
+    async def _solve(self, order: Order, kind: str, told: Told) -> Done:
+        done = await self.engine.run(order, told)
+        self.solves[kind] += 1
+        self.solve_seconds[kind] += done.seconds["compute"]
+        return done
 
     @asynccontextmanager
     async def within(self, seconds: float, setting: str = "deadline_s") -> AsyncIterator[None]:

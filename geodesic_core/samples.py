@@ -8,6 +8,7 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument
+from geodesic_core.noise import hashed, noise
 
 Sample = tuple[Floats, Ints]
 """(V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside."""
@@ -18,6 +19,11 @@ _TUBE_RADIUS = 0.45
 """Of the knot, whose strands stay 1.66 apart and bend with a radius of 1.43 or more."""
 _KNOT_LENGTH = 31.9
 """Of the knot's centre line."""
+
+_TILES = 4
+"""In a row of the obstacles, each with a hole."""
+_WALLS = ((1.0, 0.0), (0.0, 1.0), (0.8, 0.6), (-0.6, 0.8), (0.6, 0.8), (-0.8, 0.6))
+"""Directions that the longer holes have."""
 
 
 def knot(faces: int) -> Sample:
@@ -89,8 +95,105 @@ def plane(faces: int) -> Sample:
     return vertices, _split_quads(ids.T)
 
 
-SAMPLES: dict[str, Callable[[int], Sample]] = {"knot": knot, "sphere": sphere, "plane": plane}
+def terrain(faces: int) -> Sample:
+    """Return mountains and valleys over a square, 10 units wide, seen from above.
+
+    Ridges of noise on ever finer lattices, as fine as the grid of vertices has room for. Heights
+    are the same to the bit on every machine, since only arithmetic goes into them.
+    """
+    _refuse_count(faces, fewest=200)
+    rows = round(sqrt(faces / 2))
+    columns = round(faces / (2 * rows))
+    y, x = np.meshgrid(
+        np.linspace(0.0, 10.0, rows + 1), np.linspace(0.0, 10.0, columns + 1), indexing="ij"
+    )
+    # Mountains stand where the land is high, and are the rougher the higher; valleys are smooth.
+    land = 0.5 + 0.7 * noise(0.17 * x + 0.6, 0.17 * y + 0.3, 4)
+    height, rough = 1.5 * land, np.clip(land, 0.0, 1.0)
+    bend_x, bend_y = 0.5 * noise(0.6 * x, 0.6 * y, 2), 0.5 * noise(0.6 * x, 0.6 * y, 3)
+    amplitude, frequency, octave = 1.9, 0.25, 5
+    while 4.0 * frequency <= rows / 10.0 and octave < 16:
+        bent = noise(frequency * (x + bend_x), frequency * (y + bend_y), octave)
+        ridge = (1.0 - 1.4 * np.sqrt(bent * bent + 0.003)) * rough
+        height += amplitude * ridge * np.abs(ridge)
+        rough = np.clip(1.2 * ridge, 0.05, 1.0)
+        amplitude, frequency, octave = 0.42 * amplitude, 2.1 * frequency, octave + 1
+    vertices = np.stack([x, y, height - height.min()], axis=2)
+    ids: Longs = np.arange(x.size, dtype=np.int64).reshape(x.shape)
+    return vertices.reshape(-1, 3), _split_quads_short(vertices.swapaxes(0, 1), ids.T)
+
+
+def obstacles(faces: int) -> Sample:
+    """Return a gently curved sheet with 16 holes, pillars and walls to pass; 8 units wide."""
+    _refuse_count(faces, fewest=500)
+    side, rings = _tile_counts(faces)
+    # Around a hole in a tile go rings of points, from the border of the tile to that of the hole.
+    step = np.arange(side)
+    low, high = np.zeros(side, int), np.full(side, side)
+    border = np.concatenate(
+        [
+            np.stack(pair, axis=1)
+            for pair in ((step, low), (high, step), (side - step, high), (low, side - step))
+        ]
+    )
+    tile_y, tile_x = (each.ravel() for each in np.indices((_TILES, _TILES)))
+    lattice = np.stack([tile_x, tile_y], axis=1)[:, None] * side + border
+    away = 2.0 * border / side - 1.0
+    inner = np.stack([_reach(tile, away) for tile in range(_TILES * _TILES)])
+    share = np.arange(rings + 1)[None, :, None, None] / rings
+    spread = (1.0 - share) * away + share * inner[:, None]
+    centres = np.stack([tile_x, tile_y], axis=1) * 2.0 + (1.0 - _TILES)
+    flat = (centres[:, None, None] + spread).reshape(-1, 2)
+    # Tiles share the points on their borders, which are known by their place on a lattice.
+    keys = np.arange(len(flat)).reshape(spread.shape[:3]) + (_TILES * side + 1) ** 2
+    keys[:, 0] = lattice[..., 1] * (_TILES * side + 1) + lattice[..., 0]
+    _, first, ids = np.unique(keys, return_index=True, return_inverse=True)
+    x, y = flat[first].T
+    vertices = np.stack(
+        [
+            x + 0.35 * noise(0.23 * x, 0.23 * y, 101),
+            y + 0.35 * noise(0.23 * x, 0.23 * y, 102),
+            1.2 * noise(0.17 * x, 0.17 * y, 103),
+        ],
+        axis=1,
+    )
+    around = np.pad(ids.reshape(keys.shape), ((0, 0), (0, 0), (0, 1)), mode="wrap")
+    return vertices, np.concatenate([_split_quads(tile.T) for tile in around])
+
+
+SAMPLES: dict[str, Callable[[int], Sample]] = {
+    "knot": knot,
+    "sphere": sphere,
+    "terrain": terrain,
+    "obstacles": obstacles,
+    "plane": plane,
+}
 """The samples by name."""
+
+
+def _tile_counts(faces: int) -> tuple[int, int]:
+    """Return how many points a side of a tile has, and how many rings, for about so many faces."""
+    wanted = faces / (8 * _TILES * _TILES)
+    middle = round(sqrt(2.0 * wanted))
+    sides = range(max(2, middle - 3), middle + 4)
+    pairs = [(side, max(1, round(wanted / side))) for side in sides]
+    return min(pairs, key=lambda pair: abs(pair[0] * pair[1] - wanted))
+
+
+def _reach(tile: int, away: Floats) -> Floats:
+    """Return the points of a hole's border in the directions of those of its tile's border."""
+    chance = hashed(np.array([tile]), np.array([7]), 100)[0]
+    direction: Floats = away / np.sqrt((away * away).sum(axis=1, keepdims=True))
+    if chance % 3 == 0:  # a pillar
+        radius: float = 0.4 + (chance >> 8) % 256 / 768.0
+        return direction * radius
+    # A wall: an ellipse, nearly as long as its tile has room for.
+    cosine, sine = _WALLS[(chance >> 4) % len(_WALLS)]
+    long, short = 0.86 / max(abs(cosine), abs(sine)), 0.18
+    along = direction[:, 0] * cosine + direction[:, 1] * sine
+    across = direction[:, 1] * cosine - direction[:, 0] * sine
+    reach: Floats = 1.0 / np.sqrt((along / long) ** 2 + (across / short) ** 2)
+    return direction * reach[:, None]
 
 
 def _refuse_count(faces: int, fewest: int) -> None:
@@ -104,6 +207,17 @@ def _split_quads(ids: Longs) -> Ints:
     """Return two triangles per cell of a grid of ids, turning from the first axis to the second."""
     a, b, c, d = ids[:-1, :-1], ids[1:, :-1], ids[1:, 1:], ids[:-1, 1:]
     return np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3).astype(np.int32)
+
+
+def _split_quads_short(corners: Floats, ids: Longs) -> Ints:
+    """Return the same, each cell cut along its shorter diagonal: so edges run along ridges."""
+    faces = _split_quads(ids).reshape(-1, 2, 3)
+    height = corners[..., 2]
+    forth = np.abs(height[:-1, :-1] - height[1:, 1:]).ravel()
+    back = np.abs(height[1:, :-1] - height[:-1, 1:]).ravel()
+    a, b, c, d = faces[:, 0, 0], faces[:, 0, 1], faces[:, 0, 2], faces[:, 1, 2]
+    turned = np.stack([a, b, d, b, c, d], axis=1).reshape(-1, 2, 3)
+    return np.where((back < forth)[:, None, None], turned, faces).reshape(-1, 3)
 
 
 def _icosahedron() -> tuple[Floats, Ints]:

@@ -79,7 +79,7 @@ def error_line(ran: Ran) -> str:
     return ran.err
 
 
-@pytest.mark.parametrize("name", ["knot", "sphere", "plane"])
+@pytest.mark.parametrize("name", gc.samples.SAMPLES)
 def test_a_sample_is_written_as_it_is(run: Run, name: str) -> None:
     assert run("sample", name, "--faces", 600, "mesh.ply").code == 0
     mesh = gc.load_mesh("mesh.ply")

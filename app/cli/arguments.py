@@ -39,6 +39,8 @@ class SampleName(StrEnum):
 
     KNOT = "knot"
     SPHERE = "sphere"
+    TERRAIN = "terrain"
+    OBSTACLES = "obstacles"
     PLANE = "plane"
 
 

@@ -3,7 +3,7 @@
 ``Engine`` is what the service sees; ``LocalEngine`` keeps worker processes on this machine.
 """
 
-from app.engine.interface import Engine
+from app.engine.interface import Engine, Load
 from app.engine.local import LocalEngine
 from app.engine.work import (
     Answering,
@@ -22,6 +22,7 @@ __all__ = [
     "Done",
     "Engine",
     "Estimating",
+    "Load",
     "LocalEngine",
     "MeshFromFile",
     "MeshFromSample",

@@ -1,6 +1,7 @@
 """What the service expects of whatever computes its answers."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Protocol
 
 from app.engine.work import Done, Order
@@ -9,8 +10,28 @@ Told = Callable[[float], None]
 """Is told which share of some work is done: 0 when it begins, never less than before."""
 
 
+@dataclass(frozen=True)
+class Load:
+    """What an engine is doing, and what became of workers and work since it began."""
+
+    waiting: int
+    """Orders in the queue"""
+    idle: int
+    busy: int
+    missing: int
+    """Places without a worker: it is being started, or replaced"""
+    lost: int
+    """Workers that died, or were killed, so far"""
+    cancelled: int
+    """Work so far that was stopped since nobody waited for it any longer"""
+
+
 class Engine(Protocol):
     """Runs work elsewhere than in the process that serves requests."""
+
+    @property
+    def load(self) -> Load:
+        """What it is doing."""
 
     @property
     def is_ready(self) -> bool:

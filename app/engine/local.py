@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from app.engine.interface import Told
+from app.engine.interface import Load, Told
 from app.engine.queue import FairQueue
 from app.engine.slot import Slot, WorkerLostError
 from app.engine.work import Done, Order, Outcome, Work
@@ -50,6 +50,7 @@ class LocalEngine:
         self._idle: list[Slot] = []
         self._waiting: FairQueue[_Place] = FairQueue()
         self._open: set[Slot] = set()
+        self._lost = self._cancelled = 0
         self._is_failing = False
         self.is_draining = False
         self._kernels_are_compiled = asyncio.Event()
@@ -59,6 +60,14 @@ class LocalEngine:
     def is_ready(self) -> bool:
         """Whether a worker that takes any work is warm and alive."""
         return bool(self._open - {self._small})
+
+    @property
+    def load(self) -> Load:
+        """What it is doing, see ``Engine``."""
+        idle = sum(slot.is_alive for slot in self._idle)
+        busy = sum(slot.is_alive for slot in self._open) - idle
+        missing = len(self._slots) - idle - busy
+        return Load(len(self._waiting), idle, busy, missing, self._lost, self._cancelled)
 
     async def start(self) -> None:
         """Start the workers, in the background."""
@@ -116,6 +125,7 @@ class LocalEngine:
                     slot.ask_to_stop()
             result = outcome.result()
         except asyncio.CancelledError:
+            self._cancelled += 1
             self._spawn(self._end(slot, outcome, order.work))
             raise
         except WorkerLostError:
@@ -156,6 +166,7 @@ class LocalEngine:
             self._open.add(slot)
             self._give_back(slot)
             await slot.until_dead()
+            self._lost += 1
             logger.warning("a worker is gone and will be replaced")
             self._open.discard(slot)
             if slot in self._idle:

@@ -174,7 +174,7 @@ def _make_mesh(origin: MeshOrigin, max_faces: int) -> gc.TriangleMesh:
     faces: NDArray[np.int32] | NDArray[np.int64]
     match origin:
         case MeshFromSample():
-            vertices, faces = SAMPLES[origin.name](origin.faces)
+            vertices, faces = gc.samples.SAMPLES[origin.name](origin.faces)
         case MeshFromFile(file_type="json"):
             refuse_beyond_limit(_JSON_GROWS * origin.path.stat().st_size)
             vertices, faces = read_json_mesh(origin.path.read_bytes())
@@ -187,8 +187,6 @@ def _make_mesh(origin: MeshOrigin, max_faces: int) -> gc.TriangleMesh:
 
 _JSON_GROWS = 40
 """Bytes that orjson takes for one of JSON; 37 were the most measured. Lacking them, it crashes."""
-
-SAMPLES = {"knot": gc.samples.knot, "sphere": gc.samples.sphere, "plane": gc.samples.plane}
 
 # pebble calls module functions: the state of the process has to live beside them.
 _worker: Worker | None = None

@@ -87,6 +87,11 @@ class JobBook:
         jobs = [Job.model_validate_json(record) for _, record in rows[:limit]]
         return jobs, rows[limit - 1][0] if len(rows) > limit else None
 
+    async def count_finished(self) -> dict[str, int]:
+        """Return how many jobs have finished, by status."""
+        counted = "SELECT status, COUNT(*) FROM jobs WHERE finished IS NOT NULL GROUP BY status"
+        return dict(await self._rows(counted))
+
     async def unfinished(self) -> list[Job]:
         """Return the jobs of which something was still to become."""
         return await self._jobs("WHERE finished IS NULL")

@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime, timedelta
@@ -130,6 +131,12 @@ class Jobs:
         """Return ``limit`` jobs of an owner, the newest first, and where to go on, if anywhere."""
         jobs, after = await self._book.page(owner, limit, before)
         return [self._live[job.id].job if job.id in self._live else job for job in jobs], after
+
+    async def count(self) -> Counter[str]:
+        """Return how many jobs there are, of all owners, by status."""
+        finished = Counter(await self._book.count_finished())
+        jobs = [live.job for live in self._live.values()]
+        return finished + Counter(job.status for job in jobs if not job.is_finished)
 
     async def dismiss(self, owner: str | None, job_id: str) -> Job:
         """Stop a job, or forget it where it has finished; return it as it was left."""

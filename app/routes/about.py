@@ -2,14 +2,16 @@
 
 from typing import get_args
 
-from fastapi import APIRouter, Response
+from fastapi import APIRouter, Request, Response
+from starlette.responses import PlainTextResponse
 
 from app import __version__
 from app.dependencies import ServiceDep
 from app.encoding import FORMATS
 from app.errors import CODES, refuse
-from app.responses import problems
-from app.schemas import About, Health, Index, Method, ProblemCode
+from app.metrics import Metrics
+from app.responses import UNSTORED, documented, problems
+from app.schemas import About, Health, Index, Method, ProblemCode, SampleName
 from app.settings import variable_of
 from app.uploads import FORMATS as MESH_FORMATS
 
@@ -75,9 +77,28 @@ async def get_about(service: ServiceDep) -> About:
         methods=list(get_args(Method)),
         mesh_formats=[*MESH_FORMATS, "json"],
         answer_formats=dict(FORMATS),
-        samples=["knot", "sphere", "plane"],
+        samples=list(get_args(SampleName)),
         limits={name: limit for name, limit in limits.items() if limit is not None},
     )
+
+
+@router.get(
+    "/metrics",
+    operation_id="getMetrics",
+    summary="Metrics, as Prometheus reads them",
+    response_class=PlainTextResponse,
+    responses={
+        200: {
+            "description": "Metrics named `geodesic_…`, in Prometheus's text format",
+            "headers": documented("Cache-Control"),
+        }
+    },
+)
+async def get_metrics(request: Request) -> Response:
+    """Return what an operator watches: requests, workers, queue, results, jobs."""
+    metrics: Metrics = request.app.state.metrics
+    text, media_type = await metrics.written(request.headers.get("accept", ""))
+    return Response(text, headers={**UNSTORED, "Content-Type": media_type})
 
 
 @router.get(
@@ -85,7 +106,10 @@ async def get_about(service: ServiceDep) -> About:
     operation_id="getProblem",
     summary="What an error code means",
     response_model=ProblemCode,
-    responses=problems("not_found"),
+    responses={
+        200: {"description": "The meaning", "headers": documented("Cache-Control")},
+        **problems("not_found"),
+    },
 )
 async def get_problem(code: str, response: Response) -> ProblemCode:
     """Return the row of the error table; the `type` of a problem leads here."""

@@ -7,11 +7,15 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app.dependencies import CallerDep, ServiceDep
+from app.encoding import JSON
 from app.errors import refuse
 from app.jobs import Job
 from app.responses import (
+    ENDS,
+    OF_FILES,
     REVALIDATED,
     UNSTORED,
+    documented,
     etag_of,
     job_document,
     not_modified,
@@ -38,7 +42,10 @@ JobDep = Annotated[Job, Depends(get_job_asked_for)]
     summary="List your jobs",
     response_model=JobList,
     response_model_exclude_unset=True,
-    responses=problems("invalid_request"),
+    responses={
+        200: {"description": "The jobs", "headers": documented("Cache-Control")},
+        **problems("invalid_request"),
+    },
 )
 async def list_jobs(
     parameters: Annotated[ListParameters, Query()],
@@ -60,7 +67,10 @@ async def list_jobs(
     summary="How far is a job?",
     response_model=JobDocument,
     response_model_exclude_unset=True,
-    responses=problems("job_not_found"),
+    responses={
+        200: {"description": "The job", "headers": documented("Cache-Control")},
+        **problems("job_not_found"),
+    },
 )
 async def get_job(job: JobDep, response: Response) -> dict[str, Any]:
     """Return the state of a job; the status is 200 whatever has become of it."""
@@ -90,8 +100,19 @@ async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> di
     summary="Read the answer of a job",
     response_class=Response,
     responses={
-        200: {"description": "What the query itself would have been answered with"},
-        **problems("job_not_found", "job_not_finished", "job_dismissed", "mesh_damaged"),
+        200: {
+            "description": "What the query itself would have been answered with",
+            "content": {JSON: {"schema": {}}},
+            "headers": documented("Server-Timing", *OF_FILES),
+        },
+        206: {
+            "description": "The range asked for",
+            "headers": documented("Server-Timing", "Content-Range", *OF_FILES),
+        },
+        304: {"description": "The answer is the one that is known", "headers": documented("ETag")},
+        **problems(
+            "job_not_found", "job_not_finished", "job_dismissed", *ENDS, "range_not_satisfiable"
+        ),
     },
 )
 async def get_job_results(
@@ -112,7 +133,10 @@ async def get_job_results(
     operation_id="watchJob",
     summary="Watch a job",
     response_class=EventSourceResponse,
-    responses=problems("job_not_found"),
+    responses={
+        200: {"description": "Events, the data of each of which is a `JobDocument`"},
+        **problems("job_not_found"),
+    },
 )
 async def watch_job(
     job: JobDep,

@@ -12,8 +12,10 @@ from app.engine import MeshFromFile, MeshFromSample
 from app.errors import Fault, over_limit, refuse
 from app.responses import (
     IMMUTABLE,
+    OF_FILES,
     REVALIDATED,
     StoredFileResponse,
+    documented,
     etag_of,
     not_modified,
     problems,
@@ -63,10 +65,6 @@ _BODIES = {
                         },
                     },
                 },
-                "example": {
-                    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]],
-                    "faces": [[0, 1, 2]],
-                },
             },
         }
     }
@@ -80,7 +78,15 @@ _BODIES = {
     status_code=201,
     response_model=MeshDocument,
     responses={
-        200: {"model": MeshDocument, "description": "The mesh was in the store already"},
+        200: {
+            "model": MeshDocument,
+            "description": "The mesh was in the store already",
+            "headers": documented("Location", "Server-Timing"),
+        },
+        201: {
+            "description": "The mesh is new in the store",
+            "headers": documented("Location", "Server-Timing"),
+        },
         **problems(
             "malformed_body",
             "upload_too_large",
@@ -90,8 +96,10 @@ _BODIES = {
             "limit_exceeded",
             "memory_limit",
             "worker_died",
+            "mesh_damaged",
             "queue_full",
             "engine_unavailable",
+            "draining",
             "deadline_exceeded",
             "storage_full",
         ),
@@ -142,16 +150,20 @@ async def list_meshes(
     operation_id="getMesh",
     summary="Describe a mesh",
     response_model=MeshDocument,
-    responses=problems("mesh_not_found", "mesh_damaged"),
+    responses={
+        200: {"description": "The report", "headers": documented("ETag", "Cache-Control")},
+        304: {"description": "The report is the one that is known", "headers": documented("ETag")},
+        **problems("mesh_not_found", "mesh_damaged"),
+    },
 )
 async def get_mesh(
     mesh_id: str, request: Request, response: Response, service: ServiceDep
 ) -> Response | dict[str, object]:
     """Return the report that the upload was answered with."""
     described = service.describe(mesh_id)
-    headers = {**REVALIDATED, "ETag": etag_of(mesh_id)}
-    response.headers.update(headers)
-    return not_modified(request, etag_of(mesh_id), headers) or described
+    kept = {**REVALIDATED, "ETag": etag_of(mesh_id)}
+    response.headers.update(kept)
+    return not_modified(request, etag_of(mesh_id), kept) or described
 
 
 @router.delete(
@@ -175,8 +187,17 @@ async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> N
     summary="Read an array of a mesh",
     response_class=Response,
     responses={
-        200: {"content": {NPY: _BINARY}, "description": "The array in numpy's own format"},
-        206: {"content": {NPY: _BINARY}, "description": "The range asked for"},
+        200: {
+            "content": {NPY: _BINARY},
+            "description": "The array in numpy's own format",
+            "headers": documented(*OF_FILES),
+        },
+        206: {
+            "content": {NPY: _BINARY},
+            "description": "The range asked for",
+            "headers": documented("Content-Range", *OF_FILES),
+        },
+        304: {"description": "The array is the one that is known", "headers": documented("ETag")},
         **problems("mesh_not_found", "not_found", "range_not_satisfiable"),
     },
 )

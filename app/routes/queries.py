@@ -14,8 +14,8 @@ from app.dependencies import (
     require_json,
     while_connected,
 )
-from app.encoding import CSV, GEOJSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
-from app.encoding.form import TEXTS
+from app.encoding import CSV, GEOJSON, JSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
+from app.encoding.form import ARRAYS, TEXTS
 from app.queries import (
     DistancesQuery,
     IsolinesQuery,
@@ -31,8 +31,11 @@ from app.queries import (
 from app.queries import Query as ValidQuery
 from app.responses import (
     CACHED,
+    ENDS,
+    OF_FILES,
     UNSTORED,
     accepted_response,
+    documented,
     estimate_response,
     etag_of,
     not_modified,
@@ -64,22 +67,7 @@ from app.service import Asker, Service
 
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"])
 
-_CODES = (
-    "mesh_not_found",
-    "not_acceptable",
-    "result_too_large",
-    "invalid_request",
-    "invalid_point",
-    "limit_exceeded",
-    "memory_limit",
-    "worker_died",
-    "mesh_damaged",
-    "queue_full",
-    "engine_unavailable",
-    "draining",
-    "deadline_exceeded",
-    "storage_full",
-)
+_CODES = ("not_acceptable", *ENDS, "range_not_satisfiable")
 _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
 
 
@@ -87,9 +75,27 @@ def _answers(model: type, description: str, *others: str) -> dict[int | str, dic
     """Describe an answer in JSON, and in ``others``, which have no room for all of it."""
     description += ". In formats other than JSON the rest comes as `Geodesic-…` headers"
     content = {name: {"schema": _TEXT if name in TEXTS else _BINARY} for name in others}
+    described = documented("Vary", "Server-Timing", *OF_FILES)
+    accepted = documented("Location", "Preference-Applied", "Cache-Control")
+    if any(name in ARRAYS for name in others):
+        described |= documented("Geodesic-Dtype", "Geodesic-Shape")
     return {
-        200: {"model": model | Estimate, "content": content, "description": description},
-        202: {"model": JobDocument, "description": "With `Prefer: respond-async`: the job"},
+        200: {
+            "model": model | Estimate,
+            "content": content,
+            "description": description,
+            "headers": described,
+        },
+        202: {
+            "model": JobDocument,
+            "description": "With `Prefer: respond-async`: the job",
+            "headers": accepted,
+        },
+        206: {
+            "content": {name: {"schema": _BINARY} for name in (JSON, *others)},
+            "description": "The range asked for",
+            "headers": documented("Vary", "Server-Timing", "Content-Range", *OF_FILES),
+        },
     }
 
 
@@ -139,8 +145,8 @@ class Asked:
             return unchanged
         answered = await while_connected(request, service.answer(query, form, asker))
         is_cacheable = request.method == "GET" and query.is_repeatable
-        headers = CACHED if is_cacheable else UNSTORED
-        return result_response(request, answered, form.media_type, service.results, headers)
+        caching = CACHED if is_cacheable else UNSTORED
+        return result_response(request, answered, form.media_type, service.results, caching)
 
 
 async def get_asked(
@@ -211,7 +217,14 @@ async def compute_path(
     operation_id="getPath",
     summary="The shortest path between two points, cacheable",
     response_class=Response,
-    responses={**_answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES), **problems(*_CODES)},
+    responses={
+        **_answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES),
+        304: {
+            "description": "The answer is the one that is known",
+            "headers": documented("ETag", "Cache-Control", "Vary"),
+        },
+        **problems(*_CODES),
+    },
 )
 async def get_path(parameters: Annotated[PathParameters, Query()], asked: AskedDep) -> Response:
     """Return the same as `POST`, for points written as `v12` or `f7:0.2,0.3,0.5`."""

@@ -1,13 +1,17 @@
 from io import BytesIO
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 from starlette.testclient import TestClient
 
+from app import schemas
+from app.cli.arguments import SampleName
 from app.settings import Settings
+from geodesic_core import samples
 
-from .conftest import check_problem, serving, upload_sample
+from .conftest import check_problem, mesh_of, serving, upload_sample
 
 TETRAHEDRON = {
     "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -66,12 +70,31 @@ def test_new_is_201_and_known_is_200(client: TestClient) -> None:
     assert [client.post("/v1/meshes", json=mesh).status_code for _ in range(2)] == [201, 200]
 
 
-@pytest.mark.parametrize("name", ["knot", "sphere", "plane"])
+def test_samples_have_the_same_names_everywhere(client: TestClient) -> None:
+    names = list(samples.SAMPLES)
+
+    assert list(get_args(schemas.SampleName)) == names
+    assert list(SampleName) == names, "the command line's"
+    assert client.get("/v1").json()["samples"] == names
+
+
+@pytest.mark.parametrize("name", samples.SAMPLES)
 def test_samples(client: TestClient, name: str) -> None:
     mesh_id = upload_sample(client, name, 500)
 
-    report = client.get(f"/v1/meshes/{mesh_id}").json()
-    assert 250 <= report["faces"] <= 1000
+    vertices, faces = samples.SAMPLES[name](500)
+    mesh = mesh_of(client, mesh_id)
+    np.testing.assert_array_equal(mesh.vertices, vertices)
+    np.testing.assert_array_equal(mesh.faces, faces)
+
+
+@pytest.mark.parametrize(("name", "fewest"), [("knot", 500), ("terrain", 200), ("obstacles", 500)])
+def test_a_sample_of_too_few_faces_is_refused_with_the_fewest(
+    client: TestClient, name: str, fewest: int
+) -> None:
+    response = client.post("/v1/meshes", params={"sample": name, "faces": fewest - 1})
+
+    assert f"{fewest} to" in check_problem(response, 422, "invalid_request")["detail"]
 
 
 def test_merging_gives_a_vertex_map(client: TestClient) -> None:

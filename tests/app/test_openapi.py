@@ -37,6 +37,33 @@ def test_errors_are_problems(client) -> None:
                     assert list(response["content"]) == [PROBLEM_JSON]
 
 
+def test_whatever_can_fail_says_so(client) -> None:
+    for path in client.get("/openapi.json").json()["paths"].values():
+        for operation in path.values():
+            assert "internal_error" in operation["responses"]["500"]["description"]
+
+
+def test_headers_are_described(client) -> None:
+    paths = client.get("/openapi.json").json()["paths"]
+    query = paths["/v1/meshes/{mesh_id}/distances"]["post"]
+    sent = {parameter["name"].lower() for parameter in query["parameters"]}
+    assert {"prefer", "idempotency-key", "x-timeout-ms", "range"} <= sent
+
+    answers = query["responses"]
+    assert {"ETag", "Server-Timing", "Accept-Ranges"} <= set(answers["200"]["headers"])
+    assert {"Location", "Preference-Applied"} <= set(answers["202"]["headers"])
+    assert "Content-Range" in answers["206"]["headers"]
+    assert "WWW-Authenticate" in answers["401"]["headers"]
+    assert all("Retry-After" in answers[status]["headers"] for status in ("429", "503"))
+    for path in paths.values():
+        for operation in path.values():
+            for response in operation["responses"].values():
+                assert "X-Request-ID" in response["headers"]
+            names = {each["name"] for each in operation.get("parameters", ())}
+            assert ("304" in operation["responses"]) == ("If-None-Match" in names)
+            assert ("206" in operation["responses"]) == ("Range" in names)
+
+
 def test_no_error_of_the_framework_is_left(client) -> None:
     assert "HTTPValidationError" not in client.get("/openapi.json").text
 

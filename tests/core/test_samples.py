@@ -1,14 +1,17 @@
 """The samples: sizes, orientation, and that they are what they say."""
 
+from hashlib import blake2b
+
 import numpy as np
 import pytest
 
-from geodesic_core import samples
+from geodesic_core import samples, shortest_path
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.mesh import TriangleMesh
 
-EULER = {"knot": 0, "sphere": 2, "plane": 1}
-BOUNDARIES = {"knot": 0, "sphere": 0, "plane": 1}
+EULER = {"knot": 0, "sphere": 2, "terrain": 1, "obstacles": -15, "plane": 1}
+BOUNDARIES = {"knot": 0, "sphere": 0, "terrain": 1, "obstacles": 17, "plane": 1}
+FEWEST = {"knot": 500, "sphere": 20, "terrain": 200, "obstacles": 500, "plane": 2}
 
 
 def test_the_registry_names_all_samples() -> None:
@@ -69,8 +72,84 @@ def test_the_plane_is_the_unit_square_seen_from_above() -> None:
 
 @pytest.mark.parametrize(
     ("name", "faces"),
-    [("knot", 499), ("sphere", 19), ("plane", 1), ("knot", -5), ("sphere", 0), ("plane", 10**9)],
+    [
+        *((name, fewest - 1) for name, fewest in FEWEST.items()),
+        *((name, 10**9) for name in FEWEST),
+        ("knot", -5),
+        ("sphere", 0),
+    ],
 )
 def test_a_size_out_of_the_domain_is_refused(name: str, faces: int) -> None:
-    with pytest.raises(InvalidArgument, match=f"faces is {faces}"):
+    words = f"faces is {faces}; this sample can have {FEWEST[name]} to 50000000 of them"
+    with pytest.raises(InvalidArgument, match=words):
         samples.SAMPLES[name](faces)
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("name", ["terrain", "obstacles"])
+def test_any_size_from_the_fewest_on_is_a_sound_mesh(name: str) -> None:
+    fewest = FEWEST[name]
+    for faces in [*range(fewest, fewest + 40), *range(fewest + 40, 5_000, 171)]:
+        vertices, triangles = samples.SAMPLES[name](faces)
+        assert len(triangles) == pytest.approx(faces, rel=0.12 if faces < 3_000 else 0.06)
+        report = TriangleMesh(vertices, triangles).report
+        assert (report.components, report.euler_characteristic) == (1, EULER[name])
+        assert report.degenerate_faces.count == report.misoriented_edges.count == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "digest"),
+    [("terrain", "9010b1031e37c932"), ("obstacles", "6a601e3abdb94262")],
+)
+def test_a_sample_made_by_arithmetic_is_the_same_to_the_bit_anywhere(
+    name: str, digest: str
+) -> None:
+    vertices, triangles = samples.SAMPLES[name](2_000)
+    assert blake2b(vertices.tobytes() + triangles.tobytes(), digest_size=8).hexdigest() == digest
+
+
+def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    corners = vertices[faces]
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+@pytest.mark.parametrize("faces", [200, 3_000, 50_000])
+def test_the_terrain_is_a_height_field_with_hills_and_valleys(faces: int) -> None:
+    vertices, triangles = samples.terrain(faces)
+    normals = _normals(vertices, triangles)
+    assert (normals[:, 2] > 0).all()
+    assert 0.5 * normals[:, 2].sum() == pytest.approx(100.0)
+    heights = vertices[:, 2]
+    assert heights.min() == 0.0
+    assert 1.0 < heights.max() < 4.0
+    assert 0.2 < heights.std() < 1.0
+
+
+def test_the_terrain_s_faces_have_the_shorter_diagonals_of_their_cells() -> None:
+    vertices, faces = samples.terrain(3_000)
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    flat = np.linalg.norm(vertices[edges[:, 0], :2] - vertices[edges[:, 1], :2], axis=1)
+    diagonals = np.unique(edges[flat > 1.2 * np.median(flat)], axis=0)
+    width = int((vertices[:, 1] == 0).sum())
+    assert len(diagonals) == len(faces) // 2
+    for a, b in diagonals.tolist():
+        other = {width + 1: (a + 1, b - 1), width - 1: (a - 1, b + 1)}[b - a]
+        here, there = (abs(vertices[i, 2] - vertices[j, 2]) for i, j in ((a, b), other))
+        assert here <= there
+
+
+@pytest.mark.jit
+def test_the_obstacles_are_seen_from_above_and_have_holes_to_walk_around() -> None:
+    vertices, faces = samples.obstacles(20_000)
+    assert (_normals(vertices, faces)[:, 2] > 0).all()
+    mesh = TriangleMesh(vertices, faces)
+    path = shortest_path(mesh, *_ends(vertices))
+    straight = np.linalg.norm(path.points[0] - path.points[-1])
+    assert path.length > 1.005 * straight
+    edges = np.linalg.norm(vertices[faces] - vertices[np.roll(faces, 1, axis=1)], axis=2)
+    assert edges.max() < 40.0 * edges.min()
+
+
+def _ends(vertices: np.ndarray) -> tuple[int, int]:
+    corner = vertices[:, 0] + vertices[:, 1]
+    return int(corner.argmin()), int(corner.argmax())
