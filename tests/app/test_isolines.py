@@ -146,11 +146,11 @@ def test_the_grant_is_in_force_throughout(
         return asked == stop_at
 
     monkeypatch.setattr(WholeSweep, "run", watch)
-    grant = Grant(cancel, 2**30, 10**7)
+    grant = Grant(cancel, lambda _: None, 2**30, 10**7)
     stop_at = -1
     query.answer(opened, grant)
 
-    assert watched == [grant.options] * sweeps
+    assert watched == [{"cancel": cancel, "memory_limit": grant.memory_limit}] * sweeps
     assert asked >= sweeps + 1 + 2 * 4, "each sweep, all faces, and cutting and joining each level"
     for stop_at in range(1, asked + 1):
         asked = 0
