@@ -91,7 +91,13 @@ class Worker:
 
     def _answer(self, work: Answering, clock: "Clock", cancel: Callable[[], bool]) -> Done:
         settings = self.settings
-        grant = Grant(cancel, self._report, settings.query_memory_bytes, settings.max_json_values)
+        grant = Grant(
+            cancel,
+            self._report,
+            settings.query_memory_bytes,
+            settings.max_json_values,
+            settings.max_matrix_cells,
+        )
         with clock.phase("load"):
             opened = self._open(work.query)
         with clock.phase("compute"):

@@ -46,6 +46,8 @@ class Grant:
     memory_limit: int
     max_values: int
     """Most values of the answer, where it is written as JSON."""
+    max_cells: int
+    """Most cells of a matrix that tells its number only once it is there."""
 
     def part(self, part: int, parts: int) -> "Grant":
         """Return the grant of one of several calls, of about the same length, for one answer."""

@@ -151,7 +151,7 @@ def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mes
     told = estimate(query, Form(JSON), opened, lambda: False)
     tracemalloc.start()
     try:
-        query.answer(opened, Grant(lambda: False, print, 2**40, 10**7))
+        query.answer(opened, Grant(lambda: False, print, 2**40, 10**7, 10**7))
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
@@ -171,8 +171,8 @@ def test_memory_that_suffices(
     told = estimate(query, Form(JSON), opened, lambda: False)
 
     with pytest.raises(gc.errors.MemoryLimitExceeded):
-        query.answer(opened, Grant(lambda: False, print, told.memory_bytes // 3, 10**7))
-    query.answer(opened, Grant(lambda: False, print, 3 * told.memory_bytes, 10**7))
+        query.answer(opened, Grant(lambda: False, print, told.memory_bytes // 3, 10**7, 10**7))
+    query.answer(opened, Grant(lambda: False, print, 3 * told.memory_bytes, 10**7, 10**7))
 
 
 def test_seconds_grow_with_the_work(client: TestClient, ids: dict[str, str]) -> None:

@@ -146,7 +146,7 @@ def test_the_grant_is_in_force_throughout(
         return asked == stop_at
 
     monkeypatch.setattr(WholeSweep, "run", watch)
-    grant = Grant(cancel, lambda _: None, 2**30, 10**7)
+    grant = Grant(cancel, lambda _: None, 2**30, 10**7, 10**7)
     stop_at = -1
     query.answer(opened, grant)
 

@@ -315,7 +315,7 @@ def test_looking_for_points_can_be_stopped() -> None:
     ]
     for query in queries:
         with pytest.raises(gc.errors.Cancelled, match="looked for"):
-            query.answer(OpenMesh(gc.Solver(mesh), []), Grant(lambda: True, print, 2**30, 100))
+            query.answer(OpenMesh(gc.Solver(mesh), []), Grant(lambda: True, print, 2**30, 100, 100))
 
 
 # Refusals
