@@ -29,8 +29,12 @@ def install(app: FastAPI, settings: Settings) -> None:
     async def on_framework(request: Request, error: HTTPException) -> Response:
         if error.status_code == 413:
             return _respond(request, body_too_large(request.scope, settings))
-        if isinstance(error.__cause__, ProblemError):  # FastAPI's 400 for whatever stops a body
-            return _respond(request, error.__cause__.problem)
+        # FastAPI's 400 for whatever stops a body
+        match error.__cause__:
+            case ProblemError() as refused:
+                return _respond(request, refused.problem)
+            case RequestValidationError() as invalid:
+                return _respond(request, validation_problem(invalid.errors()))
         detail = f"{request.method} {request.url.path}: {error.detail}"
         headers = error.headers
         if error.status_code == 405:

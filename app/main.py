@@ -4,6 +4,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
+from anyio import CapacityLimiter
 from fastapi import FastAPI
 from starlette.middleware.cors import CORSMiddleware
 
@@ -37,6 +38,7 @@ def create_app(settings: Settings) -> FastAPI:
     )
     app.state.service = service
     app.state.metrics = metrics = Metrics(service)
+    app.state.large_bodies = CapacityLimiter(1)
     # The last is the outermost.
     app.add_middleware(BodyDeadlineMiddleware, settings=settings)
     app.add_middleware(AdmissionMiddleware, settings=settings)

@@ -1,7 +1,7 @@
 """From a point as a client wrote it to the point of a mesh, and what answers say of that."""
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
 
 import geodesic_core as gc
 from app.schemas import EdgePoint, FacePoint, Point, PositionPoint, VertexPoint
@@ -35,10 +35,17 @@ def described(mesh: gc.TriangleMesh, place: gc.SurfacePoint) -> Mapping[str, Any
     return {"face": place.face_index, "barycentric": place.barycentric, "position": position}
 
 
+def described_origin(
+    mesh: gc.TriangleMesh, origin: gc.SurfacePoint | gc.Curve
+) -> Mapping[str, Any]:
+    """Return what answers say of where paths start: at a resolved point, or on a curve of such."""
+    if isinstance(origin, gc.Curve):
+        places = cast(Sequence[gc.SurfacePoint], origin.points)
+        return {"polyline": [described(mesh, place) for place in places]}
+    return described(mesh, origin)
+
+
 def described_source(mesh: gc.TriangleMesh, source: gc.Source) -> Mapping[str, Any]:
-    """Return what answers say of a source: its point or its curve, and where it starts."""
-    if isinstance(source.point, gc.Curve):
-        line = [described(mesh, mesh.point(point)) for point in source.point.points]
-        return {"polyline": line, "start_distance": source.start_distance}
-    place = described(mesh, mesh.point(source.point))
-    return {**place, "start_distance": source.start_distance}
+    """Return what answers say of a resolved source: where it is, and what distances start at."""
+    origin = described_origin(mesh, cast(gc.SurfacePoint | gc.Curve, source.point))
+    return {**origin, "start_distance": source.start_distance}

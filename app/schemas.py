@@ -251,6 +251,9 @@ class IsolinesRequest(Accuracy, AmongBarriers):
     )
 
 
+_LONGEST = "There is no path that is longer than this, past all waypoints"
+
+
 class PathRequest(Accuracy, AmongBarriers):
     """The shortest path from ``source`` to ``target``, past ``waypoints`` in their order."""
 
@@ -269,6 +272,7 @@ class PathRequest(Accuracy, AmongBarriers):
         default=[],
         description="The path is shortest from each stop to the next; for `exact` only",
     )
+    max_distance: NonNegative | None = Field(default=None, description=_LONGEST)
     explain: StrictBool = Field(
         default=False,
         description="Also tell what each step of the search did, in `steps`; for `exact` and JSON "
@@ -396,6 +400,7 @@ class PathParameters(PathAnswerParameters, Accuracy):
         description="A waypoint, written likewise; may be given again, in order",
         examples=[["v7"]],
     )
+    max_distance: NonNegative | None = Field(default=None, description=_LONGEST)
 
 
 class UploadParameters(Wire):

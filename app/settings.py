@@ -105,7 +105,7 @@ class Settings(BaseSettings):
     max_sources: PositiveInt = 10_000
     """Most sources of a query; each point of a curve counts."""
     max_matrix_cells: PositiveInt = 10_000_000
-    """Most cells of a matrix, sources by targets, or pairs."""
+    """Most cells of a matrix: sources by targets, pairs, or what is reached of a sparse one."""
     max_waypoints: PositiveInt = 100
     """Most waypoints of a path."""
     max_levels: PositiveInt = 1000

@@ -69,27 +69,36 @@ def on_edge(topology: Topology, faces: Ints, start: int, end: int, t: float) -> 
     return _on_edge(topology, faces, {u: 1.0 - t, v: t})
 
 
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+
+
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Return the cross products of vectors (…, 3): numpy's own takes ten times as long for few."""
+    product: Floats = a[..., _NEXT] * b[..., _LAST] - a[..., _LAST] * b[..., _NEXT]
+    return product
+
+
 def weights_of(point: Floats, corners: Floats, snap: float) -> list[float]:
     """Return the weights of a point of a face, zero where it is nearer than ``snap`` to an edge.
 
     Each from the height above its edge: of a face of no area, from places along its longest edge.
     """
-    edges = np.roll(corners, -1, axis=0) - corners  # from each corner to the next
-    normal = np.cross(edges[0], edges[1])
+    edges = corners[_NEXT] - corners  # from each corner to the next
+    away = point - corners
+    normal = _cross(edges[0], edges[1])
     area = float(np.linalg.norm(normal))  # twice
     lengths = np.linalg.norm(edges, axis=1)
     if area > 0.0:
-        parts = np.cross(edges, point - corners) @ normal / area  # height times length, by edge
+        parts = _cross(edges, away) @ normal / area  # height times length, by edge
         parts[parts <= snap * lengths] = 0.0
-        weights = np.roll(parts / area, -1)  # what is above an edge is the share of its apex
+        weights = parts[_NEXT] / area  # what is above an edge is the share of its apex
     else:
         longest = int(np.argmax(lengths))
-        share = float((point - corners[longest]) @ edges[longest]) / lengths[longest] ** 2
+        share = float(away[longest] @ edges[longest]) / lengths[longest] ** 2
         weights = np.zeros(3)
         weights[longest], weights[(longest + 1) % 3] = 1.0 - share, share
-    for i in range(3):  # of two corners, that within reach takes all
-        if float(np.linalg.norm(point - corners[i])) <= snap:
-            weights = np.eye(3)[i]
+    for i in np.flatnonzero(np.linalg.norm(away, axis=1) <= snap):
+        weights = np.eye(3)[i]  # of two corners, that within reach takes all
     return [max(float(weight), 0.0) for weight in weights]
 
 

@@ -7,7 +7,7 @@ Every refusal and every early stop of the library is one of these::
     │   └── TooManyFaces        more than the caller allows
     ├── InvalidPoint            a source or target that is not on the mesh
     ├── InvalidArgument         any other argument out of its domain
-    ├── NoPath                  the two points are not connected (``reason``)
+    ├── NoPath                  not connected, or farther than a limit (``reason``)
     ├── Cancelled               the caller asked the sweep to stop
     ├── DeadlineExceeded        the time the caller granted is over
     ├── MemoryLimitExceeded     the memory the caller granted does not suffice

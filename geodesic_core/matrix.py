@@ -11,7 +11,7 @@ from scipy.sparse import coo_array, csr_array
 
 from geodesic_core.arguments import as_limit, is_index
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.errors import InvalidArgument
+from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nodes import as_points, component_of, ends_of
 from geodesic_core.path_search import PathSearch
@@ -19,6 +19,7 @@ from geodesic_core.run import Control
 from geodesic_core.surface_point import Point, SurfacePoint
 from geodesic_core.sweeper import Sweeper
 from geodesic_core.threads import available_cores, share_out
+from geodesic_core.tolerances import AT_LIMIT
 
 Layout = Literal["dense", "sparse", "pairs"]
 
@@ -153,13 +154,17 @@ def _searched(
 ) -> float:
     """Return the distance of two points, infinite beyond the limit, by a search."""
     mesh = search.mesh
-    straight = float(np.linalg.norm(mesh.position(source) - mesh.position(target)))
-    if component_of(mesh, source) != component_of(mesh, target) or straight > limit:
+    if component_of(mesh, source) != component_of(mesh, target):
         control.look_up(0.0)
         return math.inf
-    length = search.find(source, target, control, explain=False).length
-    search.add_landmark_if_due(source, replace(control, progress=None))
-    return length if length <= limit else math.inf
+    try:
+        return search.find(
+            source, target, control, explain=False, limit=limit * (1.0 + AT_LIMIT)
+        ).length
+    except NoPath:
+        return math.inf
+    finally:
+        search.add_landmark_if_due(source, replace(control, progress=None))
 
 
 def _sweep_all(

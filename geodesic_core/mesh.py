@@ -319,6 +319,13 @@ class TriangleMesh:
     def point_on_edge(self, start: int, end: int, t: float) -> SurfacePoint:
         """Return the canonical point at share ``t`` of the way between the ends of an edge.
 
+        Parameters
+        ----------
+        start, end
+            Vertex indices; an edge of the surface joins them.
+        t
+            Share of the way from the first to the second, 0 to 1.
+
         Raises
         ------
         InvalidPoint

@@ -6,6 +6,9 @@
 3. Its backtraced path: a tighter U.
 4. The exact sweep from the start, pruned by U and the lower bounds: a thin region.
 5. Its backtraced path, which is the answer.
+
+Where no more than a limit is asked for, it takes the place of U as soon as it is below: what is not
+reached then is farther.
 """
 
 import math
@@ -22,6 +25,7 @@ from geodesic_core.errors import (
     DeadlineExceeded,
     InternalError,
     MemoryLimitExceeded,
+    NoPath,
     NotConverged,
 )
 from geodesic_core.kernels import edge_path, prune, straighten, wavefront
@@ -81,29 +85,36 @@ class PathSearch:
         return kept + wavefront.bytes_of(self._toward) + wavefront.bytes_of(self._outward)
 
     def find(
-        self, source: SurfacePoint, target: SurfacePoint, control: Control, *, explain: bool
+        self,
+        source: SurfacePoint,
+        target: SurfacePoint,
+        control: Control,
+        *,
+        explain: bool,
+        limit: float = math.inf,
     ) -> GeodesicPath:
         """Return an exact path between two canonical points of one component.
 
         Raises
         ------
+        NoPath
+            It is longer than ``limit``.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As in `run_sweep`.
         """
         control.grant_memory(self.nbytes)
         control.look_up(0.0)
-        start, end = _End(self.mesh, source), _End(self.mesh, target)
-        ends = start, end
+        ends = _End(self.mesh, source), _End(self.mesh, target)
         try:
-            log = _Log(self, explain)
-            return self._search(_Leg(*ends, SEARCH_SLACK, control, log))
+            return self._search(_Leg(*ends, limit, SEARCH_SLACK, control, _Log(self, explain)))
         except (InternalError, NotConverged):
             # Rounding on slivers can exceed any slack; without bounds there is nothing to lose.
             # Where many faces lie near each other, merging may go in circles, or its path be lost.
-            log = _Log(self, explain)
-            return self._search(_Leg(*ends, math.inf, control, log))
+            return self._search(_Leg(*ends, limit, math.inf, control, _Log(self, explain)))
 
     def _search(self, leg: "_Leg") -> GeodesicPath:
+        if leg.straight > leg.limit:
+            raise leg.beyond()
         try:
             upper = self._search_edges(leg)
             goal = self._goal(leg.start, math.inf)
@@ -112,6 +123,8 @@ class PathSearch:
             path = self._sweep_outward(leg, upper, goal)
         finally:
             self._forget()
+        if path.length > leg.limit:
+            raise leg.beyond()
         return replace(path, steps=leg.log.steps)
 
     def add_landmark_if_due(self, beside: SurfacePoint, control: Control) -> None:
@@ -148,13 +161,13 @@ class PathSearch:
         # Unfolding rounds: by more than the slack of the searches, where faces are slivers.
         upper = min(upper, straighten.shortened(topology, path) * (1.0 + STRAIGHT)) + beside
         if leg.start.point.face_index == leg.end.point.face_index:
-            upper = min(upper, float(np.linalg.norm(leg.start.position - leg.end.position)))
+            upper = min(upper, leg.straight)
         leg.log.add("shorten", upper)
         return upper
 
     def _sweep_toward(self, leg: "_Leg", upper: float) -> tuple[float, Goal]:
         """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
-        limit = upper * (1.0 + leg.slack) + self._margin
+        limit = leg.bound(upper) * (1.0 + leg.slack) + self._margin
         goal = self._goal(leg.start, limit)
         bounds = wavefront.merging_bounds(math.inf, GUIDE_ERROR, math.inf, goal)
         nodes = nodes_of(self.mesh, [(leg.end.point,)], [leg.start.point])
@@ -162,13 +175,13 @@ class PathSearch:
         wave = self._toward = self._run(self._toward, nodes, bounds, leg.control, _AFTER_EDGES)
         node = int(nodes.targets[0])
         if math.isinf(wave.distance[node]):
-            raise leg.lost("by the merging sweep")
+            raise leg.missed("by the merging sweep", upper)
         self._touched += int(wave.counters[TOUCHED])
         leg.log.add("approximate", upper, wave)
         guide = traced_path(self.mesh, winners_of(wave, self._nearest), nodes, node, EXACT)
         upper = min(upper, length_of(guide.points))
         leg.log.add("backtrace", upper)
-        known = self._goal(leg.start, upper * (1.0 + leg.slack))
+        known = self._goal(leg.start, leg.bound(upper) * (1.0 + leg.slack))
         return upper, known._replace(known=wave.distance, ceiling=limit)
 
     def _sweep_outward(self, leg: "_Leg", upper: float, goal: Goal) -> GeodesicPath:
@@ -182,7 +195,7 @@ class PathSearch:
         node = int(nodes.targets[0])
         distance = float(wave.distance[node])
         if not distance <= upper * (1.0 + leg.slack):
-            raise leg.lost("by the exact sweep")
+            raise leg.missed("by the exact sweep", upper)
         leg.log.add("exact", distance, wave)
         path = traced_path(self.mesh, winners_of(wave, self._nearest), nodes, node, EXACT)
         if abs(path.length - distance) > PATH_LENGTH * distance:
@@ -225,10 +238,35 @@ class _Leg(NamedTuple):
 
     start: _End
     end: _End
+    limit: float
+    """Length of the longest path that is asked for, mesh units"""
     slack: float
     """Relative amount by which it looks beyond its bounds; infinite where it is not to have any"""
     control: Control
     log: "_Log"
+
+    @property
+    def straight(self) -> float:
+        """Distance of its ends as the crow flies."""
+        return float(np.linalg.norm(self.start.position - self.end.position))
+
+    def bound(self, upper: float) -> float:
+        """Return how far to look where a path of length ``upper`` is known.
+
+        Beyond the limit by more than slivers round: what is missed is farther than the limit.
+        """
+        return min(upper, self.limit * (1.0 + STRAIGHT))
+
+    def missed(self, how: str, upper: float) -> NoPath | InternalError:
+        """Return the error of not having reached the end, though a path so long leads there."""
+        return self.lost(how) if self.bound(upper) == upper else self.beyond()
+
+    def beyond(self) -> NoPath:
+        """Return the error of a path that is longer than the limit."""
+        return NoPath(
+            f"{self.end.point} is farther than {self.limit:g} from {self.start.point}",
+            "beyond_max_distance",
+        )
 
     def lost(self, how: str) -> InternalError:
         """Return the error of not having reached the end."""

@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from geodesic_core.arguments import as_barriers, as_limit, is_number
 from geodesic_core.arrays import Floats
 from geodesic_core.curve import Curve, Polyline, polyline_of
-from geodesic_core.errors import InvalidArgument, InvalidPoint
+from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.kernels import kept, wavefront
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept
@@ -29,7 +29,7 @@ from geodesic_core.result import DistanceField, Source, Sources, SweepStats
 from geodesic_core.run import Control
 from geodesic_core.surface_point import Point, SurfacePoint
 from geodesic_core.sweeper import Sweeper
-from geodesic_core.tolerances import WIDEST_ERROR
+from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
 from geodesic_core.whole_sweep import WholeSweep, all_winners, peak_bytes
 
 
@@ -162,6 +162,7 @@ def shortest_path(
     source: Point,
     target: Point,
     waypoints: Sequence[Point] = (),
+    max_distance: float | None = None,
     *,
     explain: bool = False,
     progress: Callable[[float], None] | None = None,
@@ -181,6 +182,9 @@ def shortest_path(
         Vertex indices, or `SurfacePoint` of vertices.
     waypoints
         Points that the path passes in order; it is shortest from each to the next.
+    max_distance
+        A path longer than this (mesh units), past all waypoints, is not looked for: the search ends
+        once it is certain that there is no other.
     explain
         Also return what each step of the search did, in `GeodesicPath.steps`.
     progress, cancel, deadline_s, memory_limit
@@ -189,7 +193,7 @@ def shortest_path(
     Raises
     ------
     NoPath
-        Two of the points are not connected.
+        Two of the points are not connected, or the path is longer than ``max_distance``.
     InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `exact_distance`.
 
@@ -199,8 +203,9 @@ def shortest_path(
     the state is O(V + F), about two thirds of the mesh's own arrays.
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
+    limit = as_limit(max_distance)
     stops = _as_stops(mesh, source, target, waypoints)
-    return _shortest_through(PathSearch(mesh), stops, control, explain=explain)
+    return _shortest_through(PathSearch(mesh), stops, limit, control, explain=explain)
 
 
 class Solver:
@@ -234,6 +239,7 @@ class Solver:
         source: Point,
         target: Point,
         waypoints: Sequence[Point] = (),
+        max_distance: float | None = None,
         *,
         explain: bool = False,
         progress: Callable[[float], None] | None = None,
@@ -243,9 +249,10 @@ class Solver:
     ) -> GeodesicPath:
         """Do as `shortest_path` does, on this mesh; in time that does not depend on its size."""
         control = Control(progress, cancel, deadline_s, memory_limit)
+        limit = as_limit(max_distance)
         stops = _as_stops(self.mesh, source, target, waypoints)
         search = self._kept_search()
-        path = _shortest_through(search, stops, control, explain=explain)
+        path = _shortest_through(search, stops, limit, control, explain=explain)
         search.add_landmark_if_due(stops[0], replace(control, progress=None))
         return path
 
@@ -299,14 +306,32 @@ class Solver:
 
 
 def _shortest_through(
-    search: PathSearch, stops: Sequence[SurfacePoint], control: Control, *, explain: bool
+    search: PathSearch,
+    stops: Sequence[SurfacePoint],
+    limit: float,
+    control: Control,
+    *,
+    explain: bool,
 ) -> GeodesicPath:
+    """Search for leg after leg, each no longer than what those before and after it leave."""
     legs: list[GeodesicPath] = []
+    positions = np.array([search.mesh.position(stop) for stop in stops])
+    straight = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    left = limit * (1.0 + AT_LIMIT)
     for here, there in pairwise(stops):
         leg_control = control.for_part(len(legs), len(stops) - 1)
         if legs:
             search.add_landmark_if_due(here, replace(control, progress=None))
-        legs.append(search.find(here, there, leg_control, explain=explain))
+        rest = float(straight[len(legs) + 1 :].sum())
+        try:
+            leg = search.find(here, there, leg_control, explain=explain, limit=left - rest)
+        except NoPath:
+            raise NoPath(
+                f"the path from {stops[0]} to {stops[-1]} is longer than max_distance = {limit:g}",
+                "beyond_max_distance",
+            ) from None
+        left -= leg.length
+        legs.append(leg)
     if control.progress is not None:
         control.progress(1.0)
     return legs[0] if len(legs) == 1 else joined(legs)

@@ -150,6 +150,12 @@ SEARCH_SLACK = 1e-10
 The path itself must not be pruned by rounding.
 """
 
+AT_LIMIT = 1e-12
+"""Relative amount by which the path between two points may exceed ``max_distance``: rounding.
+
+A path exactly at the limit is found, whichever sweep its distance was taken from.
+"""
+
 SAME_PLACE = 1e-9
 """Relative difference up to which a vertex counts as where a path unfolds its pseudosource to.
 

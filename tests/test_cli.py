@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from gc import get_freeze_count, unfreeze
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -501,6 +502,68 @@ def test_nearest_prints_candidates_as_they_were_written(run: Run, knot: Path) ->
     assert ran.figure("found") == "1 of 3"
 
 
+def test_curves_are_sources(run: Run, knot: Path) -> None:
+    """The points of a path, as they are written, in each command that takes curves."""
+    mesh = gc.load_mesh(knot)
+    line = gc.shortest_path(mesh, 3, 700).locations
+    written = "/".join(
+        f"f{place.face_index}:{','.join(map(repr, place.barycentric))}" for place in line
+    )
+    field = gc.exact_distance(mesh, [gc.Curve(line), 40])
+    along = gc.exact_distance(mesh, gc.Curve(line))
+
+    sources = point_options("--source", written, 40)
+    assert run("distance", knot, *sources, "--out", "d.npy").code == 0
+    np.testing.assert_array_equal(np.load("d.npy"), field.distances)
+    assert run("distance", knot, *sources, "--out", "d.json").code == 0
+    curve, point = json.loads(Path("d.json").read_text())["sources"]
+    assert len(curve["polyline"]) == len(line)
+    assert point["vertex"] == 40
+    ran = run("paths", knot, "--source", written, "--target", 900, "--out", "p.json")
+    assert repr(along.path_to(900).length) in ran.out
+    ran = run("isolines", knot, *sources, "--level", 0.5, "--out", "l.json")
+    drawn = json.loads(Path("l.json").read_text())["isolines"][0]["lines"]
+    assert [each["length"] for each in drawn] == [each.length for each in field.isolines([0.5])[0]]
+
+
+@pytest.mark.parametrize("method", ["exact", "approximate"])
+def test_gradients_are_written_beside_distances(run: Run, knot: Path, method: str) -> None:
+    mesh = gc.load_mesh(knot)
+    solve = gc.exact_distance if method == "exact" else gc.approximate_distance
+    field = solve(mesh, 3, max_distance=4.0)
+    arguments = "distance", knot, "--source", 3, "--max-distance", 4, "--method", method
+    expected = np.column_stack([field.distances, field.gradient])
+    assert np.isinf(expected).any()
+
+    for out in ("g.npy", "g.csv", "g.json", "g.ply"):
+        assert run(*arguments, "--gradient", "--out", out).code == 0
+
+    np.testing.assert_array_equal(np.load("g.npy"), expected)
+    with Path("g.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    names = "distance", "gradient_x", "gradient_y", "gradient_z"
+    cells = [[float(row[name] or "nan") for name in names] for row in rows]
+    np.testing.assert_array_equal(cells, np.where(np.isfinite(expected), expected, np.nan))
+    told = json.loads(Path("g.json").read_text())["gradient"]
+    np.testing.assert_array_equal(np.array(told, float), expected[:, 1:])
+    assert b"property double gradient_z" in Path("g.ply").read_bytes()
+    assert run(*arguments, "--out", "d.npy").code == 0
+    np.testing.assert_array_equal(np.load("d.npy"), field.distances)
+
+
+@pytest.mark.parametrize("method", ["exact", "approximate"])
+def test_a_path_stops_at_max_distance(run: Run, knot: Path, method: str) -> None:
+    length = gc.exact_distance(gc.load_mesh(knot), 3).distances[700]
+    ends = "path", knot, "--source", 3, "--target", 700, "--out", "p.obj", "--method", method
+
+    beyond = run(*ends, "--max-distance", 0.99 * length)
+    within = run(*ends, "--max-distance", length)
+
+    assert beyond.code == 1
+    assert "max_distance" in error_line(beyond)
+    assert float(within.figure("length")) == pytest.approx(length, rel=1e-3)
+
+
 def test_a_path_to_its_own_source_is_a_point(run: Run, plane: Path) -> None:
     assert run("path", plane, "--source", 7, "--target", 7, "--out", "p.obj").code == 0
     assert Path("p.obj").read_text().splitlines()[-1] == "p 1"
@@ -573,6 +636,12 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
             "--candidate f200:1,0,0: the point is face 200",
         ),
         ("nearest plane.ply --source 0 --candidate 1 --max-distance -1", "max_distance"),
+        ("path plane.ply --source 0 --target 1 --max-distance -1 --out p.obj", "max_distance"),
+        (
+            "distance plane.ply --source 0/120 --out d.npy",
+            "--source 0/120: the points 0 and 1 of the curve",
+        ),
+        ("paths plane.ply --source 0/999 --target 1 --out p.obj", "--source 999: the point is"),
         ("locate plane.ply --at 0,0,-1e99", "--at 0,0,-1e99: the position is"),
         ("locate nowhere.ply --at 0,0,0", "cannot read nowhere.ply"),
         *(
@@ -644,6 +713,8 @@ def test_what_fails_says_why_in_one_line(
             "path plane.ply --source 0 --target 1 --out p.obj --method approximate --explain",
             "--explain goes with --method exact only",
         ),
+        ("distance plane.ply --source 0/x --out d.npy", "'x' is not a point"),
+        ("matrix plane.ply --source 0/1 --target 1 --out m.npy", "'0/1' is not a point"),
         ("paths plane.ply --source 0 --out p.obj", "--target"),
         ("paths plane.ply --source 0 --target 1 --out p.npy", ".geojson or .json"),
         (
@@ -865,6 +936,7 @@ def served(monkeypatch: pytest.MonkeyPatch) -> list[uvicorn.Config]:
     def note(server: uvicorn.Server) -> None:
         configs.append(server.config)
         server.started = True
+        assert get_freeze_count() > 10_000, "not looked through for garbage"
 
     monkeypatch.setattr(uvicorn.Server, "run", note)
     return configs
@@ -875,6 +947,7 @@ def test_serve_runs_the_application(
 ) -> None:
     monkeypatch.setenv("GEODESIC_DRAIN_S", "7.5")
     assert run("serve", "--host", "127.0.0.9", "--port", 8123).code == 0
+    unfreeze()
     (config,) = served
     assert isinstance(config.app, FastAPI)
     assert (config.host, config.port) == ("127.0.0.9", 8123)

@@ -4,13 +4,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from app.encoding import Answer
     from geodesic_core import DistanceField, GeodesicPath, Isoline
     from geodesic_core.errors import NoPath
 
 
-def of_distances(field: "DistanceField") -> "Answer":
-    """Return the distances of all vertices."""
+def of_distances(field: "DistanceField", *, gradient: bool = False) -> "Answer":
+    """Return the distances of all vertices, with the directions in which they grow if wanted."""
     from app.encoding import Answer, Indices
     from app.points import described_source
     from app.queries.views import columns_of, surface_of, table_of_distances
@@ -19,6 +21,7 @@ def of_distances(field: "DistanceField") -> "Answer":
         "sources": [described_source(field.mesh, source) for source in field.sources],
         "distances": field.distances,
         "nearest_source": Indices(field.nearest_source),
+        **({"gradient": field.gradient} if gradient else {}),
         "error_bound": field.error_bound,
         "stats": field.stats.as_dict(),
     }
@@ -29,6 +32,13 @@ def of_distances(field: "DistanceField") -> "Answer":
         table=table_of_distances("vertex", columns),
         surface=surface_of(field.mesh, columns),
     )
+
+
+def of_array(array: "NDArray[Any]") -> "Answer":
+    """Return a bare array."""
+    from app.encoding import Answer
+
+    return Answer({"array": array}, ("array",))
 
 
 def of_path(path: "GeodesicPath") -> "Answer":

@@ -64,6 +64,18 @@ class Point(NamedTuple):
 _INDEX = re.compile(r"-?[0-9]+")
 
 
+class Origin(NamedTuple):
+    """A point, or the points of a curve, where paths start, as they were written."""
+
+    text: str
+    points: Sequence[Point]
+
+    @classmethod
+    def parse(cls, text: str) -> "Origin":
+        """Return the point or the curve that an option names."""
+        return cls(text, [Point.parse(part) for part in text.split("/")])
+
+
 def position(text: str) -> Point:
     """Return the position that an option names."""
     try:
@@ -110,6 +122,7 @@ MergeOption = Annotated[
     Merge, typer.Option("--merge", help="'exact' joins vertices at equal positions.")
 ]
 MaxDistance = Annotated[float | None, typer.Option(help="Go no farther than this, in mesh units.")]
+CURVES = "or a curve: points that are each in a face with the next, as 12/e13-14:0.5/15"
 Sources = Annotated[
     list[Point],
     typer.Option(
@@ -117,6 +130,24 @@ Sources = Annotated[
         parser=Point.parse,
         metavar="POINT",
         help=f"A source, {SPELLINGS}; may be given again.",
+    ),
+]
+Origins = Annotated[
+    list[Origin],
+    typer.Option(
+        "--source",
+        parser=Origin.parse,
+        metavar="POINT",
+        help=f"A source, {SPELLINGS}, {CURVES}; may be given again.",
+    ),
+]
+OriginOption = Annotated[
+    Origin,
+    typer.Option(
+        "--source",
+        parser=Origin.parse,
+        metavar="POINT",
+        help=f"What to start from, {SPELLINGS}, {CURVES}.",
     ),
 ]
 Source = Annotated[

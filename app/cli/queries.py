@@ -17,6 +17,8 @@ from app.cli.arguments import (
     MeshFile,
     Method,
     MethodOption,
+    OriginOption,
+    Origins,
     Point,
     RelativeError,
     Source,
@@ -25,7 +27,7 @@ from app.cli.arguments import (
     granted_errors,
     writable,
 )
-from app.cli.steps import point_of, read, showing
+from app.cli.steps import origin_of, point_of, read, showing
 
 if TYPE_CHECKING:
     from geodesic_core import ErrorBound, GeodesicPath, TriangleMesh
@@ -36,7 +38,7 @@ LINES = ".obj", ".csv", ".svg", ".geojson", ".json"
 
 def distance(
     mesh_file: MeshFile,
-    source: Sources,
+    source: Origins,
     out: Annotated[
         Path,
         typer.Option(
@@ -44,6 +46,14 @@ def distance(
             callback=writable(".npy", ".csv", ".json", ".ply"),
         ),
     ],
+    gradient: Annotated[
+        bool,
+        typer.Option(
+            "--gradient",
+            help="Also the direction in which distance grows, at each vertex; in .npy as three "
+            "more columns.",
+        ),
+    ] = False,
     max_distance: MaxDistance = None,
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
@@ -58,13 +68,19 @@ def distance(
 
     from geodesic_core import approximate_distance, exact_distance
 
-    sources = [point_of(mesh, "--source", written) for written in source]
+    sources = [origin_of(mesh, "--source", written) for written in source]
     with showing("Computing distances") as step:
         if granted is None:
             field = exact_distance(mesh, sources, max_distance, **step._asdict())
         else:
-            field = approximate_distance(mesh, sources, *granted, max_distance, **step._asdict())
-    files.write_answer(out, answers.of_distances(field))
+            field = approximate_distance(
+                mesh, sources, *granted, max_distance, keep_windows=gradient, **step._asdict()
+            )
+    if gradient and out.suffix.lower() == ".npy":
+        table = np.column_stack([field.distances, field.gradient])
+        files.write_answer(out, answers.of_array(table))
+    else:
+        files.write_answer(out, answers.of_distances(field, gradient=gradient))
     reached = np.isfinite(field.distances)
     farthest = int(np.argmax(np.where(reached, field.distances, -1.0)))
     _tell_size(mesh)
@@ -102,6 +118,7 @@ def path(
         bool,
         typer.Option("--explain", help="Tell what each step of the search did; exact paths only."),
     ] = False,
+    max_distance: MaxDistance = None,
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
@@ -121,10 +138,12 @@ def path(
     with showing("Computing the path") as step:
         start = perf_counter()
         if granted is None:
-            found = shortest_path(mesh, first, last, between, explain=explain, **step._asdict())
+            found = shortest_path(
+                mesh, first, last, between, max_distance, explain=explain, **step._asdict()
+            )
         else:
             field = approximate_distance(
-                mesh, first, *granted, targets=[last], keep_windows=True, **step._asdict()
+                mesh, first, *granted, max_distance, [last], keep_windows=True, **step._asdict()
             )
             found = field.path_to(last)
         solved = perf_counter() - start
@@ -144,7 +163,7 @@ def path(
 
 def paths(
     mesh_file: MeshFile,
-    source: Source,
+    source: OriginOption,
     target: Targets,
     out: Annotated[
         Path,
@@ -166,7 +185,7 @@ def paths(
     from geodesic_core import approximate_distance, exact_distance
     from geodesic_core.errors import NoPath
 
-    start = point_of(mesh, "--source", source)
+    start = origin_of(mesh, "--source", source)
     ends = [point_of(mesh, "--target", written) for written in target]
     found: list[GeodesicPath | NoPath] = []
     with showing("Computing the paths") as step:
@@ -197,7 +216,7 @@ def paths(
 
 def isolines(
     mesh_file: MeshFile,
-    source: Sources,
+    source: Origins,
     out: Annotated[
         Path,
         typer.Option(
@@ -231,7 +250,7 @@ def isolines(
     mesh, seconds = read(mesh_file, merge, barriers)
     from geodesic_core import approximate_distance, exact_distance
 
-    sources = [point_of(mesh, "--source", written) for written in source]
+    sources = [origin_of(mesh, "--source", written) for written in source]
     began = perf_counter()
     with showing("Computing distances") as step:
         options = step._asdict()

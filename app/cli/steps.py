@@ -8,10 +8,10 @@ from time import perf_counter
 from types import FrameType
 from typing import TYPE_CHECKING, NamedTuple
 
-from app.cli.arguments import Merge, Point
+from app.cli.arguments import Merge, Origin, Point
 
 if TYPE_CHECKING:
-    from geodesic_core import SurfacePoint, TriangleMesh
+    from geodesic_core import Curve, SurfacePoint, TriangleMesh
 
 
 class Failure(Exception):  # noqa: N818 - not an error of this program
@@ -43,6 +43,21 @@ def point_of(mesh: "TriangleMesh", option: str, written: Point) -> "SurfacePoint
 
     try:
         return resolve(mesh, written.point)
+    except InvalidPoint as error:
+        raise Failure(f"{option} {written.text}: {error}") from None
+
+
+def origin_of(mesh: "TriangleMesh", option: str, written: Origin) -> "SurfacePoint | Curve":
+    """Return the point or the curve that an option names."""
+    points = [point_of(mesh, option, point) for point in written.points]
+    if len(points) == 1:
+        return points[0]
+    from geodesic_core import Curve
+    from geodesic_core.curve import polyline_of
+    from geodesic_core.errors import InvalidPoint
+
+    try:
+        return Curve(polyline_of(mesh, Curve(points), "the curve"))
     except InvalidPoint as error:
         raise Failure(f"{option} {written.text}: {error}") from None
 

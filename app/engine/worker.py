@@ -100,6 +100,7 @@ class Worker:
             self.fields,
             settings.query_memory_bytes,
             settings.max_json_values,
+            settings.max_matrix_cells,
         )
         with clock.phase("load"):
             opened = self._open(work.query)

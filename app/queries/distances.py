@@ -12,7 +12,7 @@ from app import schemas
 from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, refuse
 from app.mesh_store import OpenMesh
-from app.points import described
+from app.points import described, described_source
 from app.queries.accuracy import (
     bound_of,
     likely_bound,
@@ -32,7 +32,7 @@ from app.queries.costs import (
 from app.queries.places import Places, components_of, positions_of, unreachable
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_more, refuse_places
-from app.queries.sources import described_sources, named_sources, point_count, starts_of
+from app.queries.sources import named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
 from app.queries.views import columns_of, surface_of, table_of_distances
 from app.settings import Settings
@@ -104,10 +104,11 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         """Sweep once."""
         request = self.request
         sources, targets = self._parted(places)
+        starts = starts_of(opened.mesh, request.sources, sources)
         field = solve_field(
             opened,
             request,
-            starts_of(opened.mesh, request.sources, sources),
+            starts,
             grant,
             max_distance=request.max_distance,
             targets=targets or (),
@@ -120,13 +121,13 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         if "gradient" in self._included:
             included["gradient"] = field.gradient
         bound, stats = bound_of(field.error_bound), stats_of(field.stats)
-        return self._answer(opened, places, distances, included, bound, stats)
+        return self._answer(opened, places, starts, distances, included, bound, stats)
 
     def likely(self, opened: OpenMesh, places: Places) -> Likely:
         """Return what one sweep costs; the numbers of the answer are straight distances."""
         request, mesh = self.request, opened.mesh
         sources, targets = self._parted(places)
-        starts_of(mesh, request.sources, sources)  # refuses curves that jump
+        starts = starts_of(mesh, request.sources, sources)
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(sources) * float(share_within(mesh, request.max_distance)))
@@ -138,10 +139,10 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         if "nearest_source" in self._included:
             included["nearest_source"] = nearest
         if "gradient" in self._included:
-            starts = positions_of(mesh, sources)
-            included["gradient"] = _straight_gradient(mesh, starts[nearest], away)
+            ahead = mesh.vertices - positions_of(mesh, sources)[nearest]
+            included["gradient"] = _straight_gradient(ahead, away)
         stats = likely_stats(mesh, share)
-        return Likely(cost, self._answer(opened, places, away, included, bound, stats))
+        return Likely(cost, self._answer(opened, places, starts, away, included, bound, stats))
 
     @property
     def _included(self) -> Sequence[str]:
@@ -156,6 +157,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
         self,
         opened: OpenMesh,
         places: Places,
+        starts: Sequence[gc.Source],
         distances: NDArray[np.float64],
         included: Mapping[str, NDArray[Any]],
         error_bound: Mapping[str, Any],
@@ -167,7 +169,7 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
             "mesh_id": self.mesh_id,
             **method_of(self.request),
             "error_bound": error_bound,
-            "sources": described_sources(mesh, self.request.sources, sources),
+            "sources": [described_source(mesh, start) for start in starts],
         }
         if targets is not None:
             members["targets"] = [described(mesh, place) for place in targets]
@@ -190,10 +192,9 @@ class DistancesQuery(Query[schemas.DistancesRequest]):
 
 
 def _straight_gradient(
-    mesh: gc.TriangleMesh, starts: NDArray[np.float64], away: NDArray[np.float64]
+    ahead: NDArray[np.float64], away: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the directions (V, 3) from straight ahead; NaN as in the real one."""
-    ahead: NDArray[np.float64] = mesh.vertices - starts
+    """Return the directions (V, 3) of what is straight ahead; NaN as in the real one."""
     length = np.linalg.norm(ahead, axis=1)
     length[~np.isfinite(away) | (length == 0.0)] = np.nan
     ahead /= length[:, None]

@@ -11,6 +11,7 @@ import geodesic_core as gc
 from app import schemas
 from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
 from app.mesh_store import OpenMesh
+from app.points import described_source
 from app.queries.accuracy import (
     bound_of,
     likely_bound,
@@ -37,7 +38,7 @@ from app.queries.costs import (
 from app.queries.places import Places
 from app.queries.query import Grant, Likely, Query
 from app.queries.refusals import MeshSize, Named, refuse_large_json, refuse_more, refuse_places
-from app.queries.sources import described_sources, named_sources, point_count, starts_of
+from app.queries.sources import named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
 from app.queries.views import lines_of
 from app.settings import Settings
@@ -89,10 +90,11 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep, and draw level after level, as long as they fit into the answer."""
         chord_error = self._chord_error(opened.mesh)
+        starts = starts_of(opened.mesh, self.request.sources, places)
         field = solve_field(
             opened,
             self.request,
-            starts_of(opened.mesh, self.request.sources, places),
+            starts,
             grant.part(0, 2),
             max_distance=self.request.max_distance,
             isolines=True,
@@ -107,12 +109,13 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
             refuse_large_json(values, grant.max_values, self.hint)
             found.append(told_of(level, lines))
         bound, stats = bound_of(field.error_bound), stats_of(field.stats)
-        return self._answer(opened, places, chord_error, found, bound, stats)
+        return self._answer(opened, starts, chord_error, found, bound, stats)
 
     def likely(self, opened: OpenMesh, places: Places) -> Likely:
         """Return what a sweep and its lines cost, each as it would be were geodesics straight."""
         request, mesh = self.request, opened.mesh
         chord_error = self._chord_error(mesh)
+        starts = starts_of(mesh, request.sources, places)
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(places) * float(share_within(mesh, request.max_distance)))
@@ -132,7 +135,7 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
         pieces = _pieces(mesh, request, np.array(levels), chord_error)
         times = float(counts @ pieces) / counts.sum() if counts.any() else 1.0
         bound, stats = likely_bound(request), likely_stats(mesh, share)
-        answer = self._answer(opened, places, chord_error, found, bound, stats)
+        answer = self._answer(opened, starts, chord_error, found, bound, stats)
         return Likely(Cost(seconds, sweep.memory_bytes), answer, times)
 
     @property
@@ -160,7 +163,7 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
     def _answer(
         self,
         opened: OpenMesh,
-        places: Places,
+        starts: Sequence[gc.Source],
         chord_error: float,
         found: Sequence[Mapping[str, Any]],
         error_bound: Mapping[str, Any],
@@ -172,7 +175,7 @@ class IsolinesQuery(Query[schemas.IsolinesRequest]):
                 **method_of(self.request),
                 "error_bound": error_bound,
                 "chord_error": chord_error,
-                "sources": described_sources(opened.mesh, self.request.sources, places),
+                "sources": [described_source(opened.mesh, start) for start in starts],
                 "isolines": found,
                 "stats": stats,
                 "warnings": opened.warnings,

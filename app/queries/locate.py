@@ -58,8 +58,9 @@ class LocateQuery(Query[schemas.LocateRequest]):
             if limit is None:  # it did not miss: its numbers are too large
                 raise refuse_points([Fault(f"/points/{i}", str(error))]) from None
             return None
-        away = float(np.linalg.norm(mesh.position(place) - position))
-        return {**described(mesh, place), "distance": away}
+        told = described(mesh, place)
+        away = float(np.linalg.norm(np.subtract(told["position"], position)))
+        return {**told, "distance": away}
 
     def _answer(self, opened: OpenMesh, found: Sequence[Mapping[str, Any] | None]) -> Answer:
         return Answer(

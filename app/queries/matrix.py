@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 import geodesic_core as gc
 from app import schemas
 from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer
+from app.errors import over_limit
 from app.mesh_store import OpenMesh
 from app.points import described
 from app.queries.accuracy import CERTAIN
@@ -33,6 +34,10 @@ from app.queries.views import table_of_matrix, table_of_sparse
 from app.settings import Settings
 from geodesic_core.matrix import SWEEP_FROM
 from geodesic_core.threads import available_cores
+
+_CELLS = "cells of the matrix"
+_AT_A_TIME = 2**20
+"""Straight distances that are worked on at a time."""
 
 
 class MatrixQuery(Query[schemas.MatrixRequest]):
@@ -63,9 +68,10 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
         return super().hint
 
     def refuse(self, settings: Settings) -> None:
-        """Refuse too many sources or cells."""
+        """Refuse too many sources or cells, where these can be told before they are found."""
         refuse_more("sources", len(self.request.sources), settings, "max_sources")
-        refuse_more("cells of the matrix", self._cells, settings, "max_matrix_cells")
+        if self.request.layout != "sparse" or self.request.max_distance is None:
+            refuse_more(_CELLS, self._cells, settings, "max_matrix_cells")
 
     def value_count(self, size: MeshSize) -> int:
         """Return the number of cells and of what is told of each point."""
@@ -89,9 +95,13 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
         """Sweep from the smaller side."""
         sources, targets = self._parted(places)
         request = self.request
-        found = opened.solver.distance_matrix(
+        found: Any = opened.solver.distance_matrix(
             sources, targets, request.max_distance, request.layout, **grant.options
         )
+        if request.layout == "sparse" and found.nnz > grant.max_cells:
+            raise over_limit(
+                "limit_exceeded", _CELLS, found.nnz, grant.max_cells, "max_matrix_cells"
+            )
         return self._answer(opened, places, found)
 
     def likely(self, opened: OpenMesh, places: Places) -> Likely:
@@ -102,13 +112,16 @@ class MatrixQuery(Query[schemas.MatrixRequest]):
         if self.request.layout == "pairs":
             found = straight_along(mesh, sources, targets, limit)
             cost = _cost_of_pairs(mesh, sources, targets, found)
-        else:
+        elif self.request.layout == "dense":
             found = straight_between(mesh, sources, targets, limit)
             from_sources = len(sources) <= len(targets)
             cost = _cost_of_sweeps(mesh, _farthest(found if from_sources else found.T))
-        if self.request.layout == "sparse":
-            rows, columns = np.nonzero(np.isfinite(found))
-            found = coo_array((found[rows, columns], (rows, columns)), shape=found.shape)
+        else:
+            found = _straight_sparse(mesh, sources, targets, limit)
+            from_sources = len(sources) <= len(targets)
+            radii = np.zeros(min(found.shape))
+            np.maximum.at(radii, found.row if from_sources else found.col, found.data)
+            cost = _cost_of_sweeps(mesh, radii)
         seconds = cost.seconds + PER_POINT * len(places)
         table = found.nnz * 12 if self.request.layout == "sparse" else found.nbytes
         return Likely(Cost(seconds, cost.memory_bytes + table), self._answer(opened, places, found))
@@ -167,6 +180,22 @@ def _told(
         {**described(mesh, place), "component": component}
         for place, component in zip(places, components.tolist(), strict=True)
     ]
+
+
+def _straight_sparse(
+    mesh: gc.TriangleMesh, sources: Places, targets: Places, limit: float | None
+) -> coo_array:
+    """Return the straight distances that there are: some sources at a time, of all they are few."""
+    size = max(1, _AT_A_TIME // len(targets))
+    rows, columns, values = [], [], []
+    for first in range(0, len(sources), size):
+        table = straight_between(mesh, sources[first : first + size], targets, limit)
+        row, column = np.nonzero(np.isfinite(table))
+        rows.append(first + row)
+        columns.append(column)
+        values.append(table[row, column])
+    places = np.concatenate(rows), np.concatenate(columns)
+    return coo_array((np.concatenate(values), places), shape=(len(sources), len(targets)))
 
 
 def _farthest(distances: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,7 +16,16 @@ from app.errors import Fault, ProblemError, pointer
 from app.mesh_store import OpenMesh
 from app.points import described
 from app.queries.accuracy import method_of, solve_field, with_its_error
-from app.queries.costs import PER_PATH, PER_POINT, Cost, search_cost, sweep_cost, typical_edge
+from app.queries.costs import (
+    PER_PATH,
+    PER_POINT,
+    Cost,
+    rough_share,
+    search_cost,
+    share_within,
+    sweep_cost,
+    typical_edge,
+)
 from app.queries.outline import SHOWN, likely_outline, no_outline, outline_of
 from app.queries.places import Places, components_of, positions_of
 from app.queries.query import Grant, Likely, Query, numbered
@@ -75,7 +84,8 @@ class PathQuery(Query[schemas.PathRequest]):
         """Return the cost of a search for each leg, or of a sweep."""
         request = self.request
         if request.method == "approximate":
-            return sweep_cost(size.faces, request, paths=True).seconds
+            share = rough_share(size, 1, request.max_distance)
+            return sweep_cost(size.faces, request, share, paths=True).seconds
         return search_cost(size.faces, 1 + len(request.waypoints)).seconds
 
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
@@ -85,11 +95,23 @@ class PathQuery(Query[schemas.PathRequest]):
         try:
             if request.method == "exact":
                 path = opened.solver.shortest_path(
-                    source, target, waypoints, explain=request.explain, **grant.options
+                    source,
+                    target,
+                    waypoints,
+                    request.max_distance,
+                    explain=request.explain,
+                    **grant.options,
                 )
             else:
                 start = [gc.Source(source)]
-                field = solve_field(opened, request, start, grant, targets=[target])
+                field = solve_field(
+                    opened,
+                    request,
+                    start,
+                    grant,
+                    max_distance=request.max_distance,
+                    targets=[target],
+                )
                 path = field.path_to(target, **grant.options)
         except gc.errors.NoPath as error:
             return self._answer(opened, places, no_outline(error.reason))
@@ -102,15 +124,17 @@ class PathQuery(Query[schemas.PathRequest]):
 
     def likely(self, opened: OpenMesh, places: Places) -> Likely:
         """Return what its searches or its sweep cost; the path leads straight to each stop."""
-        mesh = opened.mesh
+        mesh, limit = opened.mesh, self.request.max_distance
         source, target, *waypoints = places
         if self.request.method == "exact":
             cost = search_cost(len(mesh.faces), len(places) - 1)
         else:
-            cost = sweep_cost(len(mesh.faces), self.request, paths=True)
+            share = 1.0 if limit is None else float(share_within(mesh, limit))
+            cost = sweep_cost(len(mesh.faces), self.request, share, paths=True)
         stops = positions_of(mesh, [source, *waypoints, target])
         length = sum(float(np.linalg.norm(there - here)) for here, there in pairwise(stops))
-        if len(set(components_of(mesh, places).tolist())) > 1:
+        is_beyond = limit is not None and length > limit
+        if is_beyond or len(set(components_of(mesh, places).tolist())) > 1:
             length = math.inf
         found = likely_outline(mesh, stops[0], stops[-1], length, typical_edge(mesh))
         seconds = cost.seconds + PER_PATH + PER_POINT * len(places)
@@ -138,6 +162,7 @@ def written_request(parameters: schemas.PathParameters) -> schemas.PathRequest:
         source=_parsed("/source", parameters.source),
         target=_parsed("/target", parameters.target),
         waypoints=[_parsed(pointer("waypoints", i), text) for i, text in enumerate(parameters.via)],
+        max_distance=parameters.max_distance,
         explain=parameters.explain,
         **parameters.model_dump(include=set(schemas.Accuracy.model_fields)),
     )

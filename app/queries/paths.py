@@ -8,7 +8,7 @@ import geodesic_core as gc
 from app import schemas
 from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
 from app.mesh_store import OpenMesh
-from app.points import described
+from app.points import described, described_origin
 from app.queries.accuracy import method_of, solve_field, topics_of, with_its_error
 from app.queries.costs import (
     PER_PATH,
@@ -24,7 +24,7 @@ from app.queries.outline import likely_outline, no_outline, outline_of
 from app.queries.places import Places, look_up, positions_of
 from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
 from app.queries.refusals import MeshSize, Named, refuse_large_json, refuse_more
-from app.queries.sources import described_origin, named_origin, origin_of, point_count
+from app.queries.sources import named_origin, origin_of, point_count
 from app.queries.stats import likely_stats, stats_of
 from app.queries.views import line_of
 from app.settings import Settings
@@ -74,10 +74,11 @@ class PathsQuery(Query[schemas.PathsRequest]):
     def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
         """Sweep once, and trace path after path, as long as they fit into the answer."""
         starts, targets = self._parted(places)
+        origin = origin_of(opened.mesh, "/source", self.request.source, starts)
         field = solve_field(
             opened,
             self.request,
-            [gc.Source(origin_of(opened.mesh, "/source", self.request.source, starts))],
+            [gc.Source(origin)],
             grant,
             max_distance=self.request.max_distance,
             targets=targets,
@@ -94,13 +95,13 @@ class PathsQuery(Query[schemas.PathsRequest]):
             values += VALUES_OF_POINT * len(path.points)
             refuse_large_json(values, grant.max_values, self.hint)
             found.append(outline_of(path))
-        return self._answer(opened, places, found, stats_of(field.stats))
+        return self._answer(opened, origin, targets, found, stats_of(field.stats))
 
     def likely(self, opened: OpenMesh, places: Places) -> Likely:
         """Return what a sweep and as many paths cost; those lead straight to their targets."""
         mesh, limit = opened.mesh, self.request.max_distance
         starts, targets = self._parted(places)
-        origin_of(mesh, "/source", self.request.source, starts)  # refuses a curve that jumps
+        origin = origin_of(mesh, "/source", self.request.source, starts)
         share = 1.0 if limit is None else float(share_within(mesh, limit))
         sweep = sweep_cost(len(mesh.faces), self.request, share, paths=True)
         seconds = sweep.seconds + (PER_PATH + PER_POINT) * len(targets)
@@ -112,7 +113,7 @@ class PathsQuery(Query[schemas.PathsRequest]):
             likely_outline(mesh, start, end, length, edge)
             for start, end, length in zip(*ends, lengths.tolist(), strict=True)
         ]
-        answer = self._answer(opened, [*starts, *some], found, likely_stats(mesh, share))
+        answer = self._answer(opened, origin, some, found, likely_stats(mesh, share))
         return Likely(Cost(seconds, sweep.memory_bytes), answer, len(targets) / len(some))
 
     def _parted(self, places: Places) -> tuple[Places, Places]:
@@ -123,12 +124,12 @@ class PathsQuery(Query[schemas.PathsRequest]):
     def _answer(
         self,
         opened: OpenMesh,
-        places: Places,
+        origin: gc.SurfacePoint | gc.Curve,
+        targets: Places,
         found: Sequence[Mapping[str, Any]],
         stats: Mapping[str, Any],
     ) -> Answer:
         mesh = opened.mesh
-        starts, targets = self._parted(places)
         paths = [
             {"target": described(mesh, target), **path}
             for target, path in zip(targets, found, strict=True)
@@ -137,7 +138,7 @@ class PathsQuery(Query[schemas.PathsRequest]):
             {
                 "mesh_id": self.mesh_id,
                 **method_of(self.request),
-                "source": described_origin(mesh, self.request.source, starts),
+                "source": described_origin(mesh, origin),
                 "paths": paths,
                 "stats": stats,
                 "warnings": opened.warnings,

@@ -1,13 +1,11 @@
-"""Where sweeps start: points and curves, as they were written, as the library has them, as told."""
+"""Where sweeps start: points and curves, as they were written, and as the library has them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from itertools import chain, islice, pairwise
-from typing import Any
 
 import geodesic_core as gc
 from app import schemas
 from app.errors import Fault
-from app.points import described
 from app.queries.places import Places
 from app.queries.query import numbered
 from app.queries.refusals import FAULTS_SHOWN, Named, refuse_points
@@ -59,33 +57,11 @@ def starts_of(
     mesh: gc.TriangleMesh, written: Sequence[schemas.Source], places: Places
 ) -> list[gc.Source]:
     """Return sources as the library has them; refuse curves that jump."""
-    return [
-        gc.Source(origin_of(mesh, f"/sources/{i}", source, points), source.start_distance)
-        for i, (source, points) in enumerate(_with_points(written, places))
-    ]
-
-
-def described_origin(
-    mesh: gc.TriangleMesh, written: schemas.Origin | schemas.Source, places: Places
-) -> Mapping[str, Any]:
-    """Return what answers say of a resolved point or curve."""
-    if isinstance(written, schemas.Polyline):
-        return {"polyline": [described(mesh, place) for place in places]}
-    return described(mesh, places[0])
-
-
-def described_sources(
-    mesh: gc.TriangleMesh, written: Sequence[schemas.Source], places: Places
-) -> list[Mapping[str, Any]]:
-    """Return what answers say of resolved sources."""
-    return [
-        {**described_origin(mesh, source, points), "start_distance": source.start_distance}
-        for source, points in _with_points(written, places)
-    ]
-
-
-def _with_points(
-    written: Sequence[schemas.Source], places: Places
-) -> Iterator[tuple[schemas.Source, Places]]:
     rest = iter(places)
-    return ((source, tuple(islice(rest, point_count(source)))) for source in written)
+    return [
+        gc.Source(
+            origin_of(mesh, f"/sources/{i}", source, tuple(islice(rest, point_count(source)))),
+            source.start_distance,
+        )
+        for i, source in enumerate(written)
+    ]

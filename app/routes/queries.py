@@ -42,6 +42,7 @@ from app.responses import (
     problems,
     result_response,
 )
+from app.routes.bodies import QueryRoute, beside_the_loop
 from app.schemas import (
     AnswerParameters,
     DistancesAnswer,
@@ -65,7 +66,7 @@ from app.schemas import (
 )
 from app.service import Asker, Service
 
-router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"])
+router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"], route_class=QueryRoute)
 
 _CODES = ("not_acceptable", *ENDS, "range_not_satisfiable")
 _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
@@ -132,7 +133,14 @@ class Asked:
     ) -> Response:
         """Answer the query of a kind that a body asks, or tell what that would take."""
         service, request, asker = self.service, self.request, self.asker
-        query = kind.ask(self.mesh_id, service.size(self.mesh_id), body, service.settings)
+        size = service.size(self.mesh_id)
+
+        def ask() -> ValidQuery[Any]:
+            query = kind.ask(self.mesh_id, size, body, service.settings)
+            query.written  # noqa: B018 - kept by it
+            return query
+
+        query = await beside_the_loop(request, ask)
         form = form_of(request, parameters, query.offers)
         if parameters.estimate:
             estimating = service.estimate(query, form, asker)

@@ -20,6 +20,7 @@ from geodesic_core.kernels.topology import (
     OPPOSITE,
     ROW,
     SIN_LEFT,
+    weights_in_frame,
 )
 from geodesic_core.kernels.wavefront import (
     FACE,
@@ -39,22 +40,12 @@ def is_piece(ints: Any, node: int) -> bool:
 
 
 @kernel
-def end_in_frame(geometry: Any, ends: Any, first: int, h: int) -> tuple[float, float]:
-    """Where the point whose weights begin at ``first`` lies in the frame of h, of its face."""
-    row, i = ROW * h, h % 3
-    along, up = ends[first + (i + 1) % 3], ends[first + (i + 2) % 3]
-    ax = geometry[row + COS_LEFT] * geometry[row + LENGTH_LEFT]
-    ay = geometry[row + SIN_LEFT] * geometry[row + LENGTH_LEFT]
-    return along * geometry[row + LENGTH] + up * ax, up * ay
-
-
-@kernel
 def emit_piece(wave: Any, ints: Any, ends: Any, k: int) -> None:
     """Send the strips of the piece of row k over the edges of its face, and reach the corners."""
     node, face = ints[PIECE * k + NODE], ints[PIECE * k + FACE]
     for h in range(3 * face, 3 * face + 3):
-        px, py = end_in_frame(wave.geometry, ends, PIECE_ENDS * k, h)
-        qx, qy = end_in_frame(wave.geometry, ends, PIECE_ENDS * k + PIECE_END, h)
+        px, py = weights_in_frame(wave.geometry, ends, PIECE_ENDS * k, h)
+        qx, qy = weights_in_frame(wave.geometry, ends, PIECE_ENDS * k + PIECE_END, h)
         reach = math.hypot(qx - px, qy - py)
         dx, dy = (qx - px) / reach, (qy - py) / reach
         if dx < 0.0:
@@ -119,8 +110,8 @@ def reach_corner(
 @kernel
 def distance_to_piece(geometry: Any, ends: Any, k: int, h: int, x: float, y: float) -> float:
     """Distance of the piece of row k from (x, y) in the frame of h, of the same face."""
-    px, py = end_in_frame(geometry, ends, PIECE_ENDS * k, h)
-    qx, qy = end_in_frame(geometry, ends, PIECE_ENDS * k + PIECE_END, h)
+    px, py = weights_in_frame(geometry, ends, PIECE_ENDS * k, h)
+    qx, qy = weights_in_frame(geometry, ends, PIECE_ENDS * k + PIECE_END, h)
     dx, dy = qx - px, qy - py
     t = ((x - px) * dx + (y - py) * dy) / (dx * dx + dy * dy)
     t = min(max(t, 0.0), 1.0)

@@ -23,6 +23,7 @@ from geodesic_core.kernels.topology import (
     ROW,
     SIN_LEFT,
     TAIL,
+    weights_in_frame,
 )
 from geodesic_core.kernels.wavefront import (
     FACE,
@@ -57,23 +58,12 @@ from geodesic_core.tolerances import BEND, GAP
 
 
 @kernel
-def site_in_frame(wave: Any, k: int, h: int) -> tuple[float, float]:
-    """Where the site of row k lies in the frame of half-edge h, of its face."""
-    row, i = ROW * h, h % 3
-    along = wave.site_weights[3 * k + (i + 1) % 3]
-    up = wave.site_weights[3 * k + (i + 2) % 3]
-    ax = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
-    ay = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
-    return along * wave.geometry[row + LENGTH] + up * ax, up * ay
-
-
-@kernel
 def emit_site(wave: Any, k: int) -> None:
     """Send windows from the site of row k over all edges of its face, and reach the corners."""
     node, face = wave.site_ints[SITE * k + NODE], wave.site_ints[SITE * k + FACE]
     sigma = wave.distance[node]
     for h in range(3 * face, 3 * face + 3):
-        x, y = site_in_frame(wave, k, h)
+        x, y = weights_in_frame(wave.geometry, wave.site_weights, 3 * k, h)
         row = ROW * h
         length = wave.geometry[row + LENGTH]
         if wave.links[row + OPPOSITE] != NO_FACE and y > 0.0:
@@ -119,7 +109,7 @@ def reach_site(wave: Any, h: int, count: int, k: int) -> None:
     Unlike an apex it asks them all: it has no neighbours that would make up for a gap.
     """
     node = wave.site_ints[SITE * k + NODE]
-    x, y = site_in_frame(wave, k, h)
+    x, y = weights_in_frame(wave.geometry, wave.site_weights, 3 * k, h)
     gap = GAP * wave.geometry[ROW * h + LENGTH]
     for i in range(count):
         w = WIDTH * i
@@ -188,17 +178,17 @@ def reach_sites_inside(topology: Any, wavefront: Any, bounds: Any, first: int) -
     for k in range(first, wave.site_count):
         node, face = wave.site_ints[SITE * k + NODE], wave.site_ints[SITE * k + FACE]
         for h in range(3 * face, 3 * face + 3):
-            x, y = site_in_frame(wave, k, h)
+            x, y = weights_in_frame(wave.geometry, wave.site_weights, 3 * k, h)
             corner = wave.links[ROW * h + TAIL]
             distance = wave.distance[corner] + math.hypot(x, y)
             if distance < math.inf:
                 improve_site(wave, node, distance, h, 0.0, 0.0, corner, -1 - corner)
         h = 3 * face
-        x, y = site_in_frame(wave, k, h)
+        x, y = weights_in_frame(wave.geometry, wave.site_weights, 3 * k, h)
         for source in range(first):
             if wave.site_ints[SITE * source + FACE] == face:
                 root = wave.site_ints[SITE * source + NODE]
-                sx, sy = site_in_frame(wave, source, h)
+                sx, sy = weights_in_frame(wave.geometry, wave.site_weights, 3 * source, h)
                 distance = wave.distance[root] + math.hypot(x - sx, y - sy)
                 improve_site(wave, node, distance, h, sx, sy, root, -1 - root)
         ints, ends = pointer(wavefront.piece_ints), pointer(wavefront.piece_ends)

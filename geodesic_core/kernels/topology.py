@@ -134,6 +134,16 @@ def point_in_frame(geometry: Floats, h: int, weights: Floats) -> tuple[float, fl
 
 
 @kernel
+def weights_in_frame(geometry: Any, weights: Any, first: int, h: int) -> tuple[float, float]:
+    """Do the same by raw pointers, for the weights that begin at ``first``."""
+    row, i = ROW * h, h % 3
+    along, up = weights[first + (i + 1) % 3], weights[first + (i + 2) % 3]
+    reach = up * geometry[row + LENGTH_LEFT]
+    x = along * geometry[row + LENGTH] + reach * geometry[row + COS_LEFT]
+    return x, reach * geometry[row + SIN_LEFT]
+
+
+@kernel
 def half_edge_in_face(geometry: Floats, h: int) -> tuple[float, float, float, float]:
     """Tail and direction of h in the frame of its face's first half-edge."""
     first = h - h % 3

@@ -112,10 +112,13 @@ def distances(client: TestClient, mesh_id: str, headers: Any = None, **body: Any
 
 
 def granted(
-    cancel: Callable[[], bool] = lambda: False, memory: int = 2**40, values: int = 10**7
+    cancel: Callable[[], bool] = lambda: False,
+    memory: int = 2**40,
+    fields: Fields | None = None,
 ) -> Grant:
-    """Return a grant that nobody reads the progress of, with no field known."""
-    return Grant(cancel, lambda _: None, Fields(10**9), memory, values)
+    """Return a grant that nobody reads the progress of, by default with no field known."""
+    known = Fields(10**9) if fields is None else fields
+    return Grant(cancel, lambda _: None, known, memory, 10**7, 10**7)
 
 
 def mesh_of(client: TestClient, mesh_id: str) -> gc.TriangleMesh:

@@ -12,10 +12,10 @@ import geodesic_core as gc
 from app.encoding import Form, encode
 from app.engine.worker import Worker
 from app.mesh_store import OpenMesh
-from app.queries import DistancesQuery, Fields, Grant, IsolinesQuery, PathsQuery
+from app.queries import DistancesQuery, Fields, IsolinesQuery, PathsQuery
 from geodesic_core import whole_sweep
 
-from .conftest import store_mesh
+from .conftest import granted, store_mesh
 from .test_engine import asked, config
 
 APPROXIMATE = {"method": "approximate", "relative_error": 0.01}
@@ -41,7 +41,7 @@ def sweeps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
 def ask(opened: OpenMesh, fields: Fields, kind: Any, **body: Any) -> bytes:
     query = kind("id", kind.normal(kind.model(**body)))
-    answer = query.answer(opened, Grant(lambda: False, lambda _: None, fields, 2**40, 10**7))
+    answer = query.answer(opened, granted(fields=fields))
     return b"".join(encode(answer, Form("application/json")).parts)
 
 
@@ -176,7 +176,7 @@ def test_a_worker_drops_fields_with_their_mesh(tmp_path: Path) -> None:
     for mesh_id in ids:
         query = asked(mesh_id)
         opened = state._open(query)
-        query.answer(opened, Grant(lambda: False, lambda _: None, state.fields, 2**40, 10**7))
+        query.answer(opened, granted(fields=state.fields))
 
     assert [name for (name, _), _ in state.fields._fields] == [ids[1]]
     state.forget_all()

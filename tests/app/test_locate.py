@@ -8,6 +8,10 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
+from app.mesh_store import OpenMesh
+from app.queries import LocateQuery
+from app.queries.query import Grant
+from geodesic_core.nearest_face import NearestFace
 
 from .conftest import NPY, check_problem, mesh_of, serving, upload_sample
 
@@ -159,3 +163,22 @@ def test_points_are_limited_by_the_size_of_their_answer(tmp_path: Path) -> None:
         problem = check_problem(response, 413, "result_too_large")
         assert (problem["limit"], problem["actual"]) == (20, 24)
         assert "fewer points" in problem["hint"]
+
+
+def test_the_search_tree_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By the first of many positions; queries on the same open mesh share it."""
+    opened = OpenMesh(gc.Solver(gc.TriangleMesh(*gc.samples.knot(500))), [])
+    made: list[NearestFace] = []
+    build = NearestFace.__init__
+
+    def note(tree: NearestFace, *arguments: Any) -> None:
+        made.append(tree)
+        build(tree, *arguments)
+
+    monkeypatch.setattr(NearestFace, "__init__", note)
+    positions = np.random.default_rng(2).normal(size=(50, 3)).tolist()
+    query = LocateQuery("m", LocateQuery.model.model_validate({"points": positions}))
+    grant = Grant(lambda: False, print, 2**30, 10**7, 10**7)
+    first, second = (query.answer(opened, grant).members["points"] for _ in range(2))
+    assert first == second
+    assert len(made) == 1

@@ -226,6 +226,19 @@ def test_limits_of_matrices(tmp_path: Path) -> None:
             assert (problem["limit"], problem["actual"]) == (12, 14)
             assert problem["setting"] == "GEODESIC_MAX_MATRIX_CELLS"
 
+        # What is reached counts where it may be less: the neighbours of a corner, and not all.
+        around = {"sources": [vertex, vertex], "targets": [{"vertex": i} for i in range(40)]}
+        link = "?format=npz"
+        near = matrix(client, mesh_id, link, **around, layout="sparse", max_distance=0.25)
+        reached = load_npz(BytesIO(near.content)).nnz
+        assert 2 < reached <= 12
+        estimate = {**around, "layout": "sparse", "max_distance": 0.25}
+        assert matrix(client, mesh_id, "?format=npz&estimate=true", **estimate).status_code == 200
+        far = matrix(client, mesh_id, link, **around, layout="sparse", max_distance=9)
+        problem = check_problem(far, 422, "limit_exceeded")
+        assert (problem["limit"], problem["actual"]) == (12, 80)
+        assert problem["setting"] == "GEODESIC_MAX_MATRIX_CELLS"
+
         large = {"sources": [vertex] * 3, "targets": [vertex] * 4}
         for layout, name, values in (("dense", "npy", 68), ("sparse", "npz", 92)):
             body = {**large, "layout": layout}

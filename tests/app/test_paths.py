@@ -245,3 +245,44 @@ def test_steps_that_are_too_large_for_json(tmp_path: Path) -> None:
         problem = check_problem(client.get(f"{link}&explain=true"), 413, "result_too_large")
         assert problem["actual"] > problem["limit"] == 300
         assert "without explain" in problem["hint"]
+
+
+@pytest.mark.parametrize("method", ["exact", "approximate"])
+def test_no_path_beyond_a_largest_distance(client: TestClient, plane: str, method: str) -> None:
+    """At the very limit it is there; beyond it there is none, with the reason."""
+    link = f"/v1/meshes/{plane}/path"
+    body = {"source": {"vertex": 0}, "target": {"vertex": 60}, "method": method}
+    length = gc.exact_distance(mesh_of(client, plane), 0).distances[60]
+
+    for limit, status in ((length, "ok"), (0.999 * length, "no_path"), (0, "no_path")):
+        posted = client.post(link, json=body | {"max_distance": limit}).json()
+        asked = {"from": "v0", "to": "v60", "method": method, "max_distance": limit}
+        assert client.get(link, params=asked).json() == posted
+        assert posted["status"] == status
+        assert posted.get("reason") == (None if status == "ok" else "beyond_max_distance")
+
+
+def test_the_largest_distance_is_that_of_the_whole_path(client: TestClient, plane: str) -> None:
+    body = {**_ENDS, "waypoints": [{"vertex": 7}]}
+    link = f"/v1/meshes/{plane}/path"
+    length = client.post(link, json=body).json()["length"]
+
+    found = client.post(link, json=body | {"max_distance": length}).json()
+    missed = client.post(link, json=body | {"max_distance": 0.99 * length, "explain": True}).json()
+    estimate = client.post(link, params={"estimate": True}, json=body | {"max_distance": 0.1})
+
+    assert found["length"] == length
+    assert (missed["status"], missed["reason"]) == ("no_path", "beyond_max_distance")
+    assert estimate.json()["response_bytes"] < 1000
+
+
+@pytest.mark.parametrize("limit", [-1, "nan", "much"])
+def test_largest_distances_that_are_none(client: TestClient, plane: str, limit: object) -> None:
+    link = f"/v1/meshes/{plane}/path"
+
+    posted = client.post(link, json={**_ENDS, "max_distance": limit})
+    got = client.get(link, params={"from": "v0", "to": "v60", "max_distance": limit})
+
+    for response, place in ((posted, "/max_distance"), (got, "/query/max_distance")):
+        problem = check_problem(response, 422, "invalid_request")
+        assert [fault["pointer"] for fault in problem["errors"]] == [place]

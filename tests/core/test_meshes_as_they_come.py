@@ -26,16 +26,37 @@ def agrees_with_the_oracle(vertices, faces):
         np.testing.assert_allclose(distances(vertices, faces, source), matrix[source], rtol=1e-9)
 
 
-@pytest.mark.parametrize("name", ["three_faces_at_an_edge", "cubes_at_an_edge", "face_twice"])
-def test_non_manifold_edges(name):
+@pytest.mark.parametrize(
+    ("name", "edge"), [("three_faces_at_an_edge", (0, 1)), ("cubes_at_an_edge", (5, 6))]
+)
+def test_non_manifold_edges(name, edge):
+    """They are told from those that are only run the same way twice."""
     case = zoo.IRREGULAR[name]
     agrees_with_the_oracle(case.vertices, case.faces)
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    assert mesh.report.non_manifold_edges == gc.Sample(1, (edge,))
+    assert mesh.report.misoriented_edges.count == 0
+    assert not mesh.report.inconsistent_orientation
+    assert f"three faces or more; the first joins the vertices {edge}" in mesh.warnings[0]
 
 
-@pytest.mark.parametrize("name", ["misoriented", "flipped_face", "moebius"])
-def test_mixed_winding(name):
+@pytest.mark.parametrize(
+    ("name", "edges"),
+    [
+        ("misoriented", ((0, 1),)),
+        ("flipped_face", ((0, 2), (0, 3), (2, 3))),
+        ("moebius", ((0, 9),)),
+        ("face_twice", ((0, 1), (0, 2), (1, 2))),
+    ],
+)
+def test_mixed_winding(name, edges):
     case = zoo.IRREGULAR[name]
     agrees_with_the_oracle(case.vertices, case.faces)
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    assert mesh.report.misoriented_edges == gc.Sample(len(edges), edges)
+    assert mesh.report.inconsistent_orientation
+    assert mesh.report.non_manifold_edges.count == 0
+    assert f"inconsistent; the first joins the vertices {edges[0]}" in mesh.warnings[-1]
 
 
 @pytest.mark.parametrize("repeats", [(1, 1, 2), (1, 2, 1), (2, 1, 1), (3, 3, 3)])

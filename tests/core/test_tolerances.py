@@ -51,6 +51,7 @@ from geodesic_core.nodes import nodes_of
 from geodesic_core.polygons import triangulated
 from geodesic_core.run import Control, run_sweep
 from geodesic_core.tolerances import (
+    AT_LIMIT,
     BEND,
     DOUBLE_ROOT,
     EDGE_STEPS,
@@ -541,6 +542,20 @@ def test_search_slack_keeps_the_path_itself(case):
 
 
 # Points -----------------------------------------------------------------------------------------
+
+
+@SCALES
+@pytest.mark.parametrize(("share", "is_found"), [(0.9, True), (1.1, False)])
+def test_at_limit_is_how_much_longer_a_path_may_be(scale, share, is_found):
+    mesh = gc.TriangleMesh(np.eye(3)[[0, 0, 1]] * scale * [[0], [1], [1]], [[0, 1, 2]])
+    limit = scale / (1.0 + share * AT_LIMIT)
+    found = gc.distance_matrix(mesh, [0], [1], limit, "pairs")
+    assert np.isfinite(found).tolist() == [is_found]
+    if is_found:
+        assert gc.shortest_path(mesh, 0, 1, max_distance=limit).length == scale
+    else:
+        with pytest.raises(gc.errors.NoPath):
+            gc.shortest_path(mesh, 0, 1, max_distance=limit)
 
 
 @SCALES
