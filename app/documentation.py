@@ -9,8 +9,12 @@ from app.admission import is_open
 from app.errors import PROBLEM_JSON
 from app.responses import documented, problems
 
-EXAMPLES = Path(__file__).parents[1] / "openapi" / "examples"
-"""A file for each operation, by its id: examples by name, of a request and its answer."""
+_PACKAGED = Path(__file__).with_name("examples")
+EXAMPLES = _PACKAGED if _PACKAGED.is_dir() else Path(__file__).parents[1] / "openapi" / "examples"
+"""A file for each operation, by its id: examples by name, of a request and its answer.
+
+In the wheel they are inside the package, in a checkout beside the document.
+"""
 
 _FASTAPI_S_OWN = "Validation Error"  # what it supposes of each operation with parameters
 _TEXT, _NUMBER = {"type": "string"}, {"type": "integer"}
