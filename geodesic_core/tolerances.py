@@ -159,7 +159,8 @@ A path exactly at the limit is found, whichever sweep its distance was taken fro
 SAME_PLACE = 1e-9
 """Relative difference up to which a vertex counts as where a path unfolds its pseudosource to.
 
-Asked only where several faces may be behind an edge, of which the others lead elsewhere.
+Up to it, too, a straight piece counts as no longer than the distance. Asked only where several
+faces may be behind an edge, of which the others lead elsewhere.
 """
 
 WEIGHT = 2.0**-41

@@ -12,6 +12,7 @@ from geodesic_core.kernels.topology import (
     COS_LEFT,
     LENGTH,
     LENGTH_LEFT,
+    PINCHED,
     ROW,
     SIN_LEFT,
 )
@@ -89,7 +90,7 @@ def light_vertex(
     if lo > hi:
         lo, hi = angle, angle
     else:
-        if not wave.flags[v] & BOUNDARY:
+        if not wave.flags[v] & (BOUNDARY | PINCHED):  # around a tip there may be no angle at all
             turn = wave.total_angle[v]
             angle -= turn * math.floor((angle - 0.5 * (lo + hi)) / turn + 0.5)
         if lo <= angle <= hi:

@@ -31,6 +31,7 @@ from geodesic_core.kernels.topology import (
     LENGTH_RIGHT,
     NO_FACE,
     OPPOSITE,
+    PINCHED,
     SIN_LEFT,
     SIN_RIGHT,
     TAIL,
@@ -96,10 +97,59 @@ def cross_edge(
     """
     along, ahead = sx * cosine + sy * sine, sy * cosine - sx * sine
     ex, ey = x * cosine, -x * sine
-    if ahead <= sw * ey:  # parallel within rounding: s lies on the edge's line
+    if ahead <= 0.0:  # within rounding, s lies on the edge's line, or before it
         return min(max(along, 0.0), length), along, ahead
     u = ex - (along - sw * ex) * ey / (ahead - sw * ey)
     return min(max(u, 0.0), length), along, ahead
+
+
+@kernel
+def leave(
+    geometry: Floats,
+    h: int,
+    x: float,
+    sx: float,
+    sy: float,
+    sw: float,
+    is_left: bool,
+) -> tuple[int, float, float, float, float]:
+    """Walk from (x, 0) on h toward s, out over the left or the right edge of the face.
+
+    Returns that half-edge, the exit in its frame, s in the same, behind it, and how far it was.
+    """
+    if is_left:
+        m, side = previous(h), geometry[h, LENGTH_LEFT]
+        cosine, sine = geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
+    else:  # the same, in the mirror
+        m, side = following(h), geometry[h, LENGTH_RIGHT]
+        cosine, sine = geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT]
+        x, sx = geometry[h, LENGTH] - x, sw * geometry[h, LENGTH] - sx
+    u, sx, sy = cross_edge(x, sx, sy, sw, side, cosine, sine)
+    step = math.hypot(u * cosine - x, u * sine)
+    if is_left:
+        u, sx = side - u, sw * side - sx
+    return m, u, sx, -sy, step
+
+
+@kernel
+def put_fork(
+    forks: Floats,
+    fork_ints: Ints,
+    i: int,
+    m: int,
+    x: float,
+    sx: float,
+    sy: float,
+    walked: float,
+    sigma: float,
+    after: int,
+    reference: int,
+    count: int,
+) -> None:
+    """Note at i where a line may go on otherwise: over m, into the faces that follow ``after``."""
+    forks[i, 0], forks[i, 1], forks[i, 2], forks[i, 3], forks[i, 4] = x, sx, sy, walked, sigma
+    fork_ints[i, 0], fork_ints[i, 1] = m, after
+    fork_ints[i, 2], fork_ints[i, 3] = reference, count
 
 
 @kernel
@@ -259,12 +309,13 @@ def trace_line(
     rise = sw * ay - sy
     x = (sx * ay - ax * sy) / rise if rise > 0.0 else sx
     x = min(max(x, 0.0), length)
-    sigma = distance[v] - math.hypot(ax - x, ay)  # of a strip, the distance at x
+    walked = math.hypot(ax - x, ay)
+    sigma = distance[v] - walked  # of a strip, the distance at x
     if sw > 0.0:
         sigma -= math.hypot(sx - x, sy)
     # Where other faces may be tried: what was known there, and which one was the last
-    forks, fork_ints = np.empty((FORKS, 4)), np.empty((FORKS, 4), np.int32)
-    fork_count, after = 0, -1
+    forks, fork_ints = np.empty((FORKS, 5)), np.empty((FORKS, 4), np.int32)
+    fork_count, after, milestone = 0, -1, count
     slack = (WIDEST_ERROR if len(winners.reference) > 0 else SAME_PLACE) * distance[v]
     for _ in range(TRIES * len(nodes)):
         # At (x, 0) on m, whose face lies ahead; the pseudosource is behind
@@ -279,10 +330,9 @@ def trace_line(
             return (TRACED if stop >= 0 else LOST), count, stop
         if not is_lost:
             if links[m, OPPOSITE] == IRREGULAR and fork_count < FORKS:
-                forks[fork_count, 0], forks[fork_count, 1] = x, sx
-                forks[fork_count, 2], forks[fork_count, 3] = sy, sigma
-                fork_ints[fork_count, 0], fork_ints[fork_count, 1] = m, h
-                fork_ints[fork_count, 2], fork_ints[fork_count, 3] = reference, count
+                put_fork(
+                    forks, fork_ints, fork_count, m, x, sx, sy, walked, sigma, h, reference, count
+                )
                 fork_count += 1
             length = geometry[m, LENGTH]
             sy = -sy
@@ -292,59 +342,69 @@ def trace_line(
                 return NO_ROOM, count, -1
             nodes[count], parameters[count], face = h, x / length, h // 3
             faces[count] = face
+            # In a face that the path did not come from, a line may wind about a tip without end.
+            milestone = min(milestone, count)
+            is_wound = milestone < count and nodes[milestone] == h
             count += 1
+            if count >= 2 * milestone:
+                milestone = count - 1
             # At (x, 0) on h, its face and the pseudosource ahead
-            # The root may be in this face, but elsewhere, where the path did not come from it.
-            rest = math.sqrt((sx - x) * (sx - x) + sy * sy) if sw > 0.0 else 0.0
-            most = rest if fork_count > 0 else math.inf
-            if row_in_face(winners, root, face) >= 0:
-                px, py = target_in_frame(topology, winners, root, h)
-                if math.hypot(px - x, py) <= most * (1.0 + SAME_PLACE) + GAP * length:
-                    return TRACED, count, root
-            k = piece_in_face(winners, root, face)
-            if k >= 0:
-                ends = pointer(winners.piece_ends)
-                reach = distance_to_piece(pointer(geometry), ends, k, h, x, 0.0)
-                if fork_count == 0 or distance[root] + reach <= sigma + SAME_PLACE * length:
-                    return TRACED, count, root
             apex = links[h, APEX]
             ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
             ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
             reach = math.sqrt((ax - x) * (ax - x) + ay * ay)
-            is_lost = fork_count > 0 and distance[apex] > sigma + rest + reach + slack
-            is_root = apex == root and reach <= most * (1.0 + SAME_PLACE) + GAP * length
-            is_end = is_root or is_on_path(winners, apex, reach, sigma + rest, v)
-            if is_end and not is_lost:
-                return TRACED, count, apex
-            if (ax - x) * sy - ay * (sx - sw * x) >= 0.0:  # s is left of the apex
-                m, side = previous(h), geometry[h, LENGTH_LEFT]
-                cosine, sine = geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
-            else:  # the same, in the mirror
-                m, side = following(h), geometry[h, LENGTH_RIGHT]
-                cosine, sine = geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT]
-                x, sx = length - x, sw * length - sx
-            u, sx, sy = cross_edge(x, sx, sy, sw, side, cosine, sine)
-            left = sy  # how far the root is, at least
+            rest = math.sqrt((sx - x) * (sx - x) + sy * sy) if sw > 0.0 else 0.0
+            here = sigma + rest
+            is_too_long = walked + here > distance[v] + slack
+            is_wrong = is_wound or is_too_long or distance[apex] > here + reach + slack
+            is_lost = fork_count > 0 and is_wrong
+            if not is_lost:
+                # The root may be in this face, but elsewhere, where the path did not come from it.
+                most = rest if fork_count > 0 else math.inf
+                if row_in_face(winners, root, face) >= 0:
+                    px, py = target_in_frame(topology, winners, root, h)
+                    if math.hypot(px - x, py) <= most * (1.0 + SAME_PLACE) + GAP * length:
+                        return TRACED, count, root
+                k = piece_in_face(winners, root, face)
+                if k >= 0:
+                    ends = pointer(winners.piece_ends)
+                    off = distance_to_piece(pointer(geometry), ends, k, h, x, 0.0)
+                    if fork_count == 0 or distance[root] + off <= sigma + SAME_PLACE * length:
+                        return TRACED, count, root
+                is_root = apex == root and reach <= most * (1.0 + SAME_PLACE) + GAP * length
+                if is_root or is_on_path(winners, apex, reach, here, v):
+                    return TRACED, count, apex
+            ahead, aside = (ax - x) * sy, ay * (sx - sw * x)
+            is_left = ahead >= aside  # s is left of the apex
+            # In a face of no area rounding alone may say so.
+            is_tie = abs(ahead - aside) <= GAP * (abs(ahead) + abs(aside))
+            is_tie = topology.flags[apex] & PINCHED != 0 and (is_tie or reach <= GAP * length)
+            if is_tie and not is_lost and fork_count < FORKS:
+                g, u, ux, uy, step = leave(geometry, h, x, sx, sy, sw, not is_left)
+                far, below = walked + step, sigma if sw > 0.0 else sigma - step
+                put_fork(
+                    forks, fork_ints, fork_count, g, u, ux, uy, far, below, -1, reference, count
+                )
+                fork_count += 1
+            m, x, sx, sy, step = leave(geometry, h, x, sx, sy, sw, is_left)
+            walked, left = walked + step, -sy  # how far the root is, at least
             if sw == 0.0:
-                sigma -= math.hypot(u * cosine - x, u * sine)
+                sigma -= step
                 left = sigma - distance[root]
-            x = u
-            if m == previous(h):
-                x, sx = side - u, sw * side - sx
             # In a face that the path did not come from, the line ends where there is no root; or
             # before it meets the edge on which windows were merged. A root that lies on the edge
             # may be beyond, in a face of no area.
             is_due = reference >= 0 and winners.merge_ints[reference, MERGED_ON] == m
-            close = SAME_PLACE * side
+            close = SAME_PLACE * geometry[m, LENGTH]
             ends = left < -close or (sw > 0.0 and left <= close and rest <= close)
             is_lost = is_lost or (fork_count > 0 and not is_due and ends)
-            sy, after = -sy, -1
+            after = -1
         if is_lost:
             if fork_count == 0:
                 return LOST, count, -1
             fork_count -= 1
             x, sx = forks[fork_count, 0], forks[fork_count, 1]
-            sy, sigma = forks[fork_count, 2], forks[fork_count, 3]
+            sy, walked, sigma = forks[fork_count, 2], forks[fork_count, 3], forks[fork_count, 4]
             m, after = fork_ints[fork_count, 0], fork_ints[fork_count, 1]
             reference, count = fork_ints[fork_count, 2], fork_ints[fork_count, 3]
             root = -1 - reference if reference < 0 else -1

@@ -54,7 +54,7 @@ from geodesic_core.kernels.window import (
     distance_at,
     straight_distance,
 )
-from geodesic_core.tolerances import BEND, GAP
+from geodesic_core.tolerances import BEND, FLAT, GAP
 
 
 @kernel
@@ -66,8 +66,11 @@ def emit_site(wave: Any, k: int) -> None:
         x, y = weights_in_frame(wave.geometry, wave.site_weights, 3 * k, h)
         row = ROW * h
         length = wave.geometry[row + LENGTH]
-        if wave.links[row + OPPOSITE] != NO_FACE and y > 0.0:
-            slot = put_window(wave, 0.0, length, length - x, -y, sigma, node, 0.0, -1 - node)
+        # In a face of no area the point lies on the edge all the same: see `emit_sector`.
+        is_off_edge = wave.site_weights[3 * k + (h + 2) % 3] > 0.0
+        if wave.links[row + OPPOSITE] != NO_FACE and is_off_edge:
+            sy = min(-y, -FLAT * length)
+            slot = put_window(wave, 0.0, length, length - x, sy, sigma, node, 0.0, -1 - node)
             send_out(wave, h, slot)
         ax = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
         ay = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]

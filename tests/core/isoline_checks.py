@@ -3,6 +3,7 @@
 import itertools
 
 import numpy as np
+from scipy.optimize import nnls
 
 import geodesic_core as gc
 
@@ -14,7 +15,12 @@ def weights_in(corners, point):
     """Barycentric weights of a point of a triangle, by least squares."""
     edges = (corners[1:] - corners[0]).T
     v, w = np.linalg.lstsq(edges, point - corners[0], rcond=None)[0]
-    return np.array([1.0 - v - w, v, w])
+    if min(1.0 - v - w, v, w) > -1e-9:
+        return np.array([1.0 - v - w, v, w])
+    # Of a triangle of no area, some that are not negative
+    scaled = np.vstack([edges / np.abs(edges).max(), np.ones(2)])
+    system = np.hstack([[[0.0], [0.0], [0.0], [1.0]], scaled])
+    return nnls(system, [*(point - corners[0]) / np.abs(edges).max(), 1.0])[0]
 
 
 def line_points(mesh, line):

@@ -272,6 +272,83 @@ def test_a_pillow_of_faces_of_no_area(faces, noise):
         np.testing.assert_allclose(near, found.distances, rtol=1e-3)
 
 
+LINES = {
+    "the middle of two flat faces upon each other": (
+        [(1, 2, 1), (0, 0, 0), (0, 1, 0), (1, 0, 1), (1, 2, 0), (2, 0, 2)],
+        [(5, 0, 3), (1, 5, 3), (1, 3, 2), (3, 0, 5), (3, 5, 1), (3, 1, 4)],
+    ),
+    "a crossing that rounding alone says where": (
+        [
+            (1.9999999999989242, 2.285470755522246e-12, 2.250574277703337e-13),
+            (2.9999999999991642, 1.2332385122516276e-13, 5.209278692188834e-13),
+            (0.9999999999989271, -1.1605693521082693e-12, 5.671545734155407e-13),
+            (6.000000000000831, 3.7867712050104383e-13, -6.838885757396252e-13),
+        ],
+        [(2, 3, 1), (2, 3, 1), (2, 0, 1), (2, 1, 3), (2, 1, 3)],
+    ),
+    "the same on a larger share of the edge": (
+        [
+            (0.0431, -4.83e-10, -9.63e-10),
+            (0.465, -1.34e-10, -1.06e-09),
+            (0.629, -3.42e-10, 1.08e-09),
+            (0.267, -3.22e-10, 7.14e-10),
+        ],
+        [(3, 0, 2), (2, 1, 0), (3, 2, 0)],
+    ),
+    "a wrong face that is wound about": (
+        [
+            (-0.6038942229, 0.4530588625, 0.450438413),
+            (-0.5870028197, 0.4403864732, 0.4378394652),
+            (-0.311062268, 0.2333679527, 0.2320179111),
+            (-0.2842165181, 0.2132273851, 0.2119942362),
+        ],
+        [(2, 3, 0), (1, 0, 2), (1, 2, 0)],
+    ),
+    "several of them": (
+        [
+            (5.99999999985, 2.863549375456e-11, 8.740570438307e-11),
+            (4.000000000163, 9.854477102241e-11, 6.742941244088e-11),
+            (-2.26889917096e-10, -1.496904113967e-10, -6.708761973581e-11),
+            (6.999999999975, 1.10513663388e-10, -2.873894028664e-12),
+            (0.9999999999807, -7.109512152232e-11, -1.441321208171e-10),
+        ],
+        [(1, 2, 0), (0, 3, 4), (4, 3, 2), (4, 2, 3)],
+    ),
+}
+"""Random faces on a line, or nearly: each case was found by chance, and its path was lost."""
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_paths_through_faces_of_no_area(name):
+    vertices, faces = (np.array(each) for each in LINES[name])
+    mesh = gc.TriangleMesh(vertices, faces)
+    for source in range(len(vertices)):
+        field = gc.exact_distance(mesh, source, deadline_s=20)
+        for target in np.flatnonzero(np.isfinite(field.distances)).tolist():
+            path = gc.shortest_path(mesh, source, target)
+            check_path(mesh, path, source, target, field.distances[target])
+            check_path(mesh, field.path_to(target), source, target, field.distances[target])
+
+
+def test_points_inside_a_face_of_no_area():
+    """They lie on all of its edges, and are seen from the faces beyond each."""
+    vertices = [(0, 0, 0), (3, 0, 0), (8, 0, 0), (4, 3, 0), (1, -2, 0)]
+    mesh = gc.TriangleMesh(vertices, [(0, 1, 2), (0, 2, 3), (1, 0, 4)])
+    source = gc.SurfacePoint.face(0, (0.5, 0.2, 0.3))  # at x = 3, and as far
+    near = gc.SurfacePoint.face(0, (0.5, 0.4, 0.1))  # at x = 2
+    inside = gc.SurfacePoint.face(1, (0.25, 0.25, 0.5))  # at (4, 1.5)
+    expected = np.linalg.norm(mesh.vertices - mesh.vertices[1], axis=1)
+    for keep in (False, True):
+        field = gc.exact_distance(mesh, source, keep_windows=keep)
+        np.testing.assert_allclose(field.distances, expected, rtol=1e-14, atol=1e-13)
+        assert field.distance_at(near) == pytest.approx(1.0, rel=1e-14)
+        assert field.distance_at(inside) == pytest.approx(np.hypot(1, 1.5), rel=1e-14)
+        for target in (near, inside, 3, 4):
+            check_path(mesh, field.path_to(target), source, target, field.distance_at(target))
+    across = gc.exact_distance(mesh, inside).distance_at(near)
+    assert across == pytest.approx(np.hypot(2, 1.5), rel=1e-14)
+
+
 def test_what_is_pinched_is_no_other_mesh_to_the_report():
     """Edges that windows cross as irregular ones are plain edges to all others."""
     vertices = [(0, 0, 0), (1, 0, 0), (3, 0, 0), (1, 2, 0)]

@@ -83,6 +83,35 @@ def test_unfolding_walks_through_every_sheet_of_a_non_manifold_edge():
     assert matrix[2, 4] == pytest.approx(math.hypot(2, 0.6))
 
 
+LINE = [(x, 0, 0) for x in (3, 5, 7, 6, 2, 0)] + [(3, 2, 0), (5, 2, 0)]
+"""Some points of a line, and two beside it."""
+
+
+@pytest.mark.parametrize(
+    ("faces", "start", "end", "expected"),
+    [
+        ([(4, 3, 0), (4, 3, 1)], 0, 1, 2.0),
+        ([(4, 3, 0), (4, 3, 1)], 0, 2, math.inf),
+        ([(5, 1, 0), (1, 2, 3), (5, 0, 4)], 4, 2, 5.0),
+        # A triangle whose edge is cut, one beyond, and one between the ends of the cut
+        ([(4, 3, 6), (4, 3, 0)], 0, 6, 2.0),
+        ([(4, 3, 6), (4, 3, 0), (0, 3, 7)], 7, 6, math.sqrt(20)),
+        ([(4, 3, 6), (4, 3, 1), (1, 6, 5)], 5, 4, math.sqrt(13) + math.sqrt(5)),
+    ],
+)
+def test_unfolding_glues_faces_of_no_area_shut(faces, start, end, expected):
+    assert unfolding.distance_matrix(LINE, faces)[start, end] == pytest.approx(expected)
+
+
+def test_unfolding_says_where_it_does_not_know():
+    tip = [(0, 0, 0), (1, 0, 0), (1, 1e-7, 0), (1, 0, 1e-7)]
+    with pytest.raises(unfolding.UnknownError):
+        unfolding.distance_matrix(tip, [(0, 1, 2), (0, 2, 3), (0, 3, 1), (1, 3, 2)])
+    sheets = [(a, b, c) for a in range(6) for b in range(a) for c in range(b)]
+    with pytest.raises(unfolding.UnknownError):
+        unfolding.distance_matrix(LINE, sheets)
+
+
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_unfolding_is_a_metric_between_its_bounds(case):
     matrix = unfolding.distance_matrix(case.vertices, case.faces)

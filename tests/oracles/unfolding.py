@@ -19,9 +19,14 @@ let U(u) be the length of some path from s to u. If U(u) + |uB| < |sB|, then for
 and no ray of the cone is a shortest path beyond that edge. The same holds with v and A.
 
 And a cone that lies as one before it does, in the plane and before the same face, is left out: so
-sheets upon each other, and faces of no area, are not gone through in every order.
+sheets upon each other are not gone through in every order.
 
-Planar points are complex numbers, with s at the origin. Cost: seconds at 150 faces.
+No light crosses a face of no area. It is glued shut before: its longest edge is the same line as
+the two others, so that the third corner cuts all other faces at that edge in two.
+
+Around the tip of a needle light winds for long, and many faces of no area upon each other cut each
+other without end: there the answer is not known, and an `UnknownError` says so. Planar points are
+complex numbers, with s at the origin. Cost: seconds at 150 faces.
 """
 
 import heapq
@@ -38,6 +43,20 @@ SLACK = 1e-12
 GRAIN = 1e-12
 """Share of the longest edge up to which cones lie alike."""
 
+NO_AREA = 1e-14
+"""Height of a face, as a share of its longest edge, up to which it has no area."""
+
+MOST = 30_000
+"""Cones of one source after which it is given up."""
+
+
+MOST_CUTS = 30
+"""Points of cuts after which a mesh is given up."""
+
+
+class UnknownError(Exception):
+    """There are needles that light winds about for too long, or too many faces of no area."""
+
 
 class Side(NamedTuple):
     """An edge of a face, seen from its first end: the face lies above it."""
@@ -53,12 +72,64 @@ class Side(NamedTuple):
 
 def distance_matrix(vertices, faces) -> np.ndarray:
     """Exact geodesic distances (V, V) between all vertices; infinite between components."""
-    sides, sides_at = _sides(vertices, faces)
-    graph = edge_graph(vertices, faces)
-    direct = np.full((len(vertices), len(vertices)), np.inf)
-    for source in range(len(vertices)):
+    points, faces, wires = _glued(np.asarray(vertices, dtype=float), np.asarray(faces).tolist())
+    sides, sides_at = _sides(points, faces)
+    graph = edge_graph(points, faces)
+    for a, b, length in wires:
+        graph[a].append((b, length))
+        graph[b].append((a, length))
+    direct = np.full((len(points), len(points)), np.inf)
+    for source in range(len(points)):
         direct[source] = _straight_distances(source, graph, sides, sides_at)
-    return all_pairs(direct)
+    return all_pairs(direct)[: len(vertices), : len(vertices)]
+
+
+def _glued(points, faces) -> tuple[np.ndarray, list[list[int]], list[tuple[int, int, float]]]:
+    """Glue faces of no area shut: return the points, the other faces, and what is left of those.
+
+    That are their edges. The one with the longest edge goes first, so that what it cuts of others
+    of no area is never longer. A cut has a point of its own in its middle: no edge that is there
+    already has its ends by chance.
+    """
+    count, points, faces, wires = len(points), list(points), [list(face) for face in faces], []
+
+    def length(a, b):
+        return float(np.linalg.norm(points[a] - points[b]))
+
+    def ends_and_middle(face):
+        return max(itertools.permutations(face), key=lambda abc: length(*abc[:2]))
+
+    def is_flat(face):
+        a, b, middle = ends_and_middle(face)
+        area = np.linalg.norm(np.cross(points[b] - points[a], points[middle] - points[a]))
+        return area <= NO_AREA * length(a, b) ** 2
+
+    def upon_each_other(face):
+        return [(u, v) for u, v in itertools.combinations(face, 2) if length(u, v) == 0.0]
+
+    def first(face):
+        return bool(upon_each_other(face)), length(*ends_and_middle(face)[:2])
+
+    while flat := [face for face in faces if is_flat(face)]:
+        shut = max(flat, key=first)
+        a, b, middle = ends_and_middle(shut)
+        faces.remove(shut)
+        wires += [(u, v, length(u, v)) for u, v in itertools.combinations(shut, 2)]
+        for u, v in upon_each_other(shut):
+            faces = [[u if corner == v else corner for corner in face] for face in faces]
+        if upon_each_other(shut):
+            faces = [face for face in faces if len(set(face)) == 3]
+            continue
+        for face in [face for face in faces if {a, b} <= set(face)]:
+            faces.remove(face)
+            (third,) = set(face) - {a, b}
+            if third != middle:
+                cut = len(points)
+                if cut == MOST_CUTS + count:
+                    raise UnknownError
+                points.append((points[middle] + points[third]) / 2.0)
+                faces += [[a, middle, cut], [middle, b, cut], [b, third, cut], [third, a, cut]]
+    return np.array(points), faces, wires
 
 
 def _sides(vertices, faces) -> tuple[list[Side], dict[tuple[int, int], list[Side]]]:
@@ -83,7 +154,7 @@ def _straight_distances(source, graph, sides, sides_at) -> list[float]:
     bounds = dijkstra(graph, {source: 0.0}, len(graph)).tolist()
     cones: list[tuple] = []
     number = itertools.count()
-    grain = GRAIN * max(side.length for side in sides)
+    grain = GRAIN * max((side.length for side in sides), default=1.0)
     seen: set[tuple] = set()
 
     def shine(face, tail, head, length, start, direction, left, right):
@@ -104,6 +175,8 @@ def _straight_distances(source, graph, sides, sides_at) -> list[float]:
             seen.add((face, tail, head, laid))
             cone = (face, tail, head, start, direction, left, right)
             heapq.heappush(cones, (min(to_a, to_b), next(number), cone))
+            if len(seen) > MOST:
+                raise UnknownError
 
     for side in sides:
         if side.apex == source:
