@@ -5,10 +5,14 @@ from hypothesis import given
 
 import geodesic_core as gc
 from tests.core.isoline_checks import check_pieces, check_points
-from tests.properties.test_soups import check_distances, close_to, mess, oracle_of, seeds
-
-DEADLINE = 20.0
-"""Seconds: else a case that hangs has no name."""
+from tests.properties.test_soups import (
+    DEADLINE,
+    check_distances,
+    close_to,
+    mess,
+    oracle_of,
+    seeds,
+)
 
 PIECES = 8
 """Into which a curve is divided by its samples."""
