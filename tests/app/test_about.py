@@ -1,3 +1,4 @@
+import gc
 import re
 import time
 
@@ -65,3 +66,8 @@ def test_another_is_not(client: TestClient, given: str) -> None:
     response = client.get("/livez", headers={"X-Request-ID": given})
 
     assert response.headers["x-request-id"] != given
+
+
+def test_what_is_imported_is_not_looked_through_for_garbage(client: TestClient) -> None:
+    assert is_ready(client)
+    assert gc.get_freeze_count() > 10_000

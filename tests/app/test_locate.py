@@ -10,10 +10,9 @@ from starlette.testclient import TestClient
 import geodesic_core as gc
 from app.mesh_store import OpenMesh
 from app.queries import LocateQuery
-from app.queries.query import Grant
 from geodesic_core.nearest_face import NearestFace
 
-from .conftest import NPY, check_problem, mesh_of, serving, upload_sample
+from .conftest import NPY, check_problem, granted, mesh_of, serving, upload_sample
 
 
 def locate(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
@@ -167,7 +166,7 @@ def test_points_are_limited_by_the_size_of_their_answer(tmp_path: Path) -> None:
 
 def test_the_search_tree_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """By the first of many positions; queries on the same open mesh share it."""
-    opened = OpenMesh(gc.Solver(gc.TriangleMesh(*gc.samples.knot(500))), [])
+    opened = OpenMesh(("", b""), gc.Solver(gc.TriangleMesh(*gc.samples.knot(500))), [])
     made: list[NearestFace] = []
     build = NearestFace.__init__
 
@@ -178,7 +177,6 @@ def test_the_search_tree_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(NearestFace, "__init__", note)
     positions = np.random.default_rng(2).normal(size=(50, 3)).tolist()
     query = LocateQuery("m", LocateQuery.model.model_validate({"points": positions}))
-    grant = Grant(lambda: False, print, 2**30, 10**7, 10**7)
-    first, second = (query.answer(opened, grant).members["points"] for _ in range(2))
+    first, second = (query.answer(opened, granted()).members["points"] for _ in range(2))
     assert first == second
     assert len(made) == 1
