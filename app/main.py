@@ -6,7 +6,7 @@ from typing import Any
 
 from fastapi import FastAPI
 
-from app import __version__, handlers
+from app import __version__, handlers, page
 from app.errors import PROBLEM_JSON
 from app.middleware import RequestMiddleware
 from app.routes import about, jobs, meshes, queries
@@ -38,6 +38,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.include_router(meshes.router, prefix="/v1", max_body_size=settings.max_upload_bytes)
     app.include_router(jobs.router, prefix="/v1", max_body_size=settings.max_query_bytes)
     app.include_router(queries.router, prefix="/v1", max_body_size=settings.max_query_bytes)
+    app.mount(page.ASSETS, page.Assets())
     return app
 
 

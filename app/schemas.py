@@ -793,6 +793,7 @@ class Index(BaseModel):
 
     service: str
     version: str
+    page: str = Field(description="Whether this address has a page to show to browsers")
     links: dict[str, str]
 
 
