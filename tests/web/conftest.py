@@ -75,11 +75,35 @@ def _wait_until_ready(address: str, process: "subprocess.Popen[bytes]") -> None:
     raise AssertionError("the service did not become ready")
 
 
+def _sample(service: str, name: str, faces: int) -> str:
+    parameters = {"sample": name, "faces": faces}
+    answer = httpx2.post(f"{service}/v1/meshes", params=parameters, timeout=120)
+    return str(answer.json()["id"])
+
+
 @pytest.fixture(scope="session")
 def sphere(service: str) -> str:
     """The id of a sphere of radius 1."""
-    answer = httpx2.post(f"{service}/v1/meshes", params={"sample": "sphere", "faces": 5000})
-    return str(answer.json()["id"])
+    return _sample(service, "sphere", 5000)
+
+
+@pytest.fixture(scope="session")
+def knot(service: str) -> str:
+    return _sample(service, "knot", 10_000)
+
+
+@pytest.fixture(scope="session")
+def large(service: str) -> str:
+    """The id of a mesh whose distances take seconds, as an estimate tells."""
+    return _sample(service, "knot", 1_000_000)
+
+
+@pytest.fixture
+def wedge() -> str:
+    """A file of three faces at one edge."""
+    corners = ("0 0 0", "0 0 1", "1 0 0", "-1 0.6 0", "-1 -0.6 0")
+    lines = [f"v {corner}" for corner in corners] + ["f 1 2 3", "f 1 2 4", "f 1 2 5"]
+    return "\n".join(lines)
 
 
 @pytest.fixture

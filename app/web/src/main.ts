@@ -5,7 +5,7 @@ import { Fields } from "./ask/fields";
 import { Routes } from "./ask/routes";
 import { dismissHint, isDark, setUpAppearance, showHint } from "./panel/appearance";
 import { Controls, resolved } from "./panel/controls";
-import { byId } from "./panel/dom";
+import { byId } from "./dom";
 import { listenToKeys } from "./panel/keys";
 import { Meshes } from "./panel/meshes";
 import { Pointer } from "./panel/pointer";
@@ -67,7 +67,7 @@ function open(state: State): void {
     await shown.open(document, stop.signal);
     stop.signal.throwIfAborted();
     const now = store.state;
-    stage.look(now.view);
+    stage.look(now.view ?? shown.viewOf(now));
     showReport(document, shown);
     if (now.sources.length === 0) showHint();
     drawPoints(now);

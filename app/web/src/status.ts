@@ -1,6 +1,6 @@
 // What the page is doing: loading, ready, busy or error, for the eye, for the reader, for tests.
 import { isAbort, Refusal, setKey } from "./api/http";
-import { byId } from "./panel/dom";
+import { byId } from "./dom";
 
 type Kind = "loading" | "busy";
 type Work<T> = (onProgress: (share: number) => void) => Promise<T>;

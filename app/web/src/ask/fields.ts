@@ -2,7 +2,7 @@
 import type { Field, Question } from "../api/queries";
 import { askDistances, askTerritories } from "../api/queries";
 import type { Method } from "../api/types";
-import { byId, duration, written } from "../panel/dom";
+import { byId, duration, written } from "../dom";
 import { writePoint } from "../state/point";
 import type { State } from "../state/state";
 import type { Status } from "../status";

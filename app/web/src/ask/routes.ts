@@ -2,7 +2,7 @@
 import { Latest } from "../api/latest";
 import { askRoute, type RouteQuestion } from "../api/queries";
 import type { Outline, Step } from "../api/types";
-import { byId, count, duration, written } from "../panel/dom";
+import { byId, count, duration, written } from "../dom";
 import { writePoint } from "../state/point";
 import type { State } from "../state/state";
 import type { Status } from "../status";
@@ -84,12 +84,13 @@ export class Routes {
   }
 
   private explain(): void {
-    const question = this.question;
-    if (!question) return;
+    const asked = this.question;
+    if (!asked) return;
+    const { mesh, ...question } = asked;
     const stop = new AbortController();
     this.status.run("busy", "Searching step by step…", stop, async () => {
-      const outline = await askRoute(question.mesh, { ...question, explain: true }, stop.signal);
-      if (question !== this.question) return;
+      const outline = await askRoute(mesh, { ...question, explain: true }, stop.signal);
+      if (asked !== this.question) return;
       this.steps = outline.steps ?? [];
       byId("explain-start").hidden = true;
       byId("steps").hidden = false;
@@ -105,7 +106,9 @@ export class Routes {
     const number = byId("step", HTMLInputElement).valueAsNumber;
     const step = this.steps[number];
     if (!step) return;
-    this.shown.region.show(this.shown.mesh, step.faces);
+    // A step that visits no face works in the region of the one before.
+    const region = this.steps.slice(0, number + 1).findLast(({ faces }) => faces.length > 0);
+    this.shown.region.show(this.shown.mesh, region?.faces ?? []);
     const legs = this.steps.at(-1)!.leg + 1;
     const leg = legs > 1 ? ` of leg ${step.leg + 1}` : "";
     byId("step-words").textContent =

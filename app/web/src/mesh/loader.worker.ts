@@ -55,7 +55,7 @@ function frameOf(points: Float64Array): { centre: [number, number, number]; radi
   return { centre, radius };
 }
 
-/** Normals at vertices, each face counting by its area. */
+/** Normals at vertices, each face counting by its area; outwards on the whole, however faces are wound. */
 function normalsOf(p: Float32Array, corners: Uint32Array): Float32Array<ArrayBuffer> {
   const normals = new Float32Array(p.length);
   for (let f = 0; f < corners.length; f += 3) {
@@ -69,8 +69,9 @@ function normalsOf(p: Float32Array, corners: Uint32Array): Float32Array<ArrayBuf
       normals[corner + 2]! += nz;
     }
   }
+  const outwards = normals.reduce((sum, x, i) => sum + x * p[i]!, 0) < 0 ? -1 : 1;
   for (let i = 0; i < normals.length; i += 3) {
-    const length = Math.hypot(normals[i]!, normals[i + 1]!, normals[i + 2]!) || 1;
+    const length = outwards * Math.hypot(normals[i]!, normals[i + 1]!, normals[i + 2]!) || 1;
     normals[i]! /= length;
     normals[i + 1]! /= length;
     normals[i + 2]! /= length;

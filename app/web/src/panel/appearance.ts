@@ -1,5 +1,5 @@
 // Dark or light, the folded panel, the hint that goes away.
-import { byId } from "./dom";
+import { byId } from "../dom";
 
 const THEME = "geodesic-theme";
 const HINT = "geodesic-hint";

@@ -6,7 +6,7 @@ import { readState, writeRanges } from "../state/permalink";
 import { INITIAL, type Lines, type Shade, type State, type Store } from "../state/state";
 import type { Status } from "../status";
 import type { Shown } from "../view/shown";
-import { byId } from "./dom";
+import { byId } from "../dom";
 import type { Tool } from "./pointer";
 
 export class Controls {

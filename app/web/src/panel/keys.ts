@@ -2,7 +2,7 @@
 import { INITIAL, type Store } from "../state/state";
 import type { Status } from "../status";
 import type { Shown } from "../view/shown";
-import { byId } from "./dom";
+import { byId } from "../dom";
 import type { Pointer, Tool } from "./pointer";
 
 const STEP = 0.12;

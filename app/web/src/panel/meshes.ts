@@ -3,7 +3,7 @@ import { listMeshes, makeSample, uploadMesh } from "../api/meshes";
 import type { MeshDocument } from "../api/types";
 import { WITHOUT_POINTS, type Store } from "../state/state";
 import type { Status } from "../status";
-import { button, byId, count } from "./dom";
+import { button, byId, count } from "../dom";
 
 const SAMPLES = [
   ["knot", "Knot", 30_000],

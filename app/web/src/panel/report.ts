@@ -2,7 +2,7 @@
 import type { MeshDocument } from "../api/types";
 import { positionOf } from "../mesh/picking";
 import type { Shown } from "../view/shown";
-import { button, byId, count, written } from "./dom";
+import { button, byId, count, written } from "../dom";
 
 type Found = MeshDocument["degenerate_faces"];
 type Kind = "face" | "vertex" | "edge";

@@ -7,7 +7,7 @@ import { writeState } from "../state/permalink";
 import type { State, Store } from "../state/state";
 import type { Status } from "../status";
 import type { Stage } from "../view/scene";
-import { button, byId } from "./dom";
+import { button, byId } from "../dom";
 import { curlOf, pythonOf } from "./snippets";
 
 type What = "distances" | "path" | "isolines";

@@ -1,6 +1,6 @@
 // What the colours mean.
 import { css, RAMP, territory } from "./colours";
-import { byId, written } from "../panel/dom";
+import { byId, written } from "../dom";
 
 export function drawRamp(): void {
   const strip = byId("ramp", HTMLCanvasElement);

@@ -1,5 +1,5 @@
 // How long a round number of mesh units is on the screen.
-import { byId, written } from "../panel/dom";
+import { byId, written } from "../dom";
 import type { Stage } from "./scene";
 
 const LONGEST_PX = 150;

@@ -80,11 +80,18 @@ export class Stage {
 
   /** Look as ``view`` says; null: at all of it. */
   look(view: number[] | null): void {
-    const [theta, phi, radius, x, y, z] = view ?? [0.6, 1.2, AWAY, 0, 0, 0];
+    const [theta, phi, radius, x, y, z] = view ?? this.viewFrom(new Vector3(0.5, 0.35, 0.8));
     this.controls.target.set(x!, y!, z!);
     this.camera.position.setFromSpherical(new Spherical(radius, phi, theta)).add(this.controls.target);
     this.controls.update();
     this.invalidate();
+  }
+
+  /** Return the view of all of it, from a direction; not quite from above, where up is nowhere. */
+  viewFrom(direction: Vector3): number[] {
+    const { theta, phi } = new Spherical().setFromVector3(direction);
+    const away = AWAY / Math.min(1, this.canvas.clientWidth / this.canvas.clientHeight);
+    return [theta, Math.min(Math.max(phi, 0.4), Math.PI - 0.4), away, 0, 0, 0];
   }
 
   /** Turn by angles, and come nearer by a factor, as keys ask for. */

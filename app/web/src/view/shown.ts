@@ -1,4 +1,5 @@
 // The mesh on the stage, with all that is drawn on it.
+import { Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
 import type { MeshDocument, Outline, Point } from "../api/types";
 import { loadMesh, type LoadedMesh } from "../mesh/loader";
@@ -65,6 +66,20 @@ export class Shown {
   /** Return the point of the surface under a place of the canvas, or null where there is none. */
   pick(x: number, y: number): FacePoint | null {
     return this.mesh && this.tree ? pick(this.mesh, this.tree, this.stage.camera, x, y) : null;
+  }
+
+  /** Return the view in which points are seen; null where there are none. */
+  viewOf({ sources, target }: State): number[] | null {
+    const mesh = this.mesh;
+    const points = target ? [...sources, target] : sources;
+    if (!mesh || points.length === 0) return null;
+    const normals = mesh.geometry.getAttribute("normal");
+    const direction = new Vector3();
+    for (const point of points) {
+      const corner = "vertex" in point ? point.vertex : "edge" in point ? point.edge[0] : mesh.corners(point.face)[0];
+      direction.add(new Vector3().fromBufferAttribute(normals, corner));
+    }
+    return this.stage.viewFrom(direction);
   }
 
   showPoints({ sources, target, waypoints, shade }: State): void {

@@ -58,8 +58,8 @@ const FRAGMENT = /* glsl */ `
       }
     }
     vec3 normal = normalize(v_normal);
-    if (!gl_FrontFacing) normal = -normal;
     vec3 eye = normalize(-v_eye);
+    if (dot(normal, eye) < 0.0) normal = -normal; // from behind, or of a mesh wound the other way
     float key = max(dot(normal, normalize(vec3(0.35, 0.6, 0.9))), 0.0);
     float sky = 0.5 + 0.5 * normal.y;
     float gloss = pow(max(dot(normal, normalize(eye + vec3(0.35, 0.6, 0.9))), 0.0), 48.0);

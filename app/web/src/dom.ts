@@ -11,7 +11,7 @@ export function byId(id: string, kind: new () => HTMLElement = HTMLElement): HTM
 export function written(x: number, digits = 5): string {
   if (x === 0) return "0";
   const size = Math.abs(x);
-  if (size >= 1e6 || size < 1e-3) return x.toExponential(digits - 1).replace(/\.?0+e/, "e");
+  if (size >= 1e6 || size < 1e-4) return x.toExponential(digits - 1).replace(/\.?0+e/, "e");
   return Number(x.toPrecision(digits)).toLocaleString("en", { maximumSignificantDigits: digits });
 }
 
@@ -20,7 +20,7 @@ export function count(x: number, noun: string, plural = `${noun}s`): string {
 }
 
 export function duration(seconds: number): string {
-  return seconds < 1 ? `${Math.max(1, Math.round(1000 * seconds))} ms` : `${seconds.toFixed(2)} s`;
+  return seconds < 1 ? `${Number((1000 * seconds).toPrecision(2))} ms` : `${seconds.toFixed(2)} s`;
 }
 
 export function button(text: string, onClick: () => void): HTMLButtonElement {
