@@ -95,7 +95,7 @@ def knot(service: str) -> str:
 @pytest.fixture(scope="session")
 def large(service: str) -> str:
     """The id of a mesh whose distances take seconds, as an estimate tells."""
-    return _sample(service, "knot", 1_000_000)
+    return _sample(service, "knot", 600_000)
 
 
 @pytest.fixture
@@ -110,7 +110,7 @@ def wedge() -> str:
 def view(browser: Browser, service: str) -> Iterator[View]:
     """A new page, which must not have written errors by the end."""
     context = browser.new_context(
-        viewport={"width": 1100, "height": 700}, accept_downloads=True, base_url=service
+        viewport={"width": 1100, "height": 700}, has_touch=True, base_url=service
     )
     context.grant_permissions(["clipboard-read", "clipboard-write"])
     page: Page = context.new_page()

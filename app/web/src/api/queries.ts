@@ -16,7 +16,7 @@ import type {
 
 const NPY = "application/x-npy";
 /** Queries that are likely to take longer become jobs, which tell their progress. */
-const JOB_FROM_S = 1.5;
+const JOB_FROM_S = 0.5;
 
 export type Question = Partial<DistancesRequest> & Pick<DistancesRequest, "sources">;
 

@@ -84,6 +84,7 @@ export class Stage {
     this.controls.target.set(x!, y!, z!);
     this.camera.position.setFromSpherical(new Spherical(radius, phi, theta)).add(this.controls.target);
     this.controls.update();
+    this.camera.updateMatrixWorld(); // what is picked before the next frame is picked from here
     this.invalidate();
   }
 
