@@ -95,7 +95,7 @@ def knot(service: str) -> str:
 @pytest.fixture(scope="session")
 def large(service: str) -> str:
     """The id of a mesh whose distances take seconds, as an estimate tells."""
-    return _sample(service, "knot", 600_000)
+    return _sample(service, "knot", 450_000)
 
 
 @pytest.fixture

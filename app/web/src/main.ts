@@ -50,7 +50,8 @@ store.listen((state, before) => {
   if (state.lines !== before.lines) fields.stripe(state);
   if (state.wireframe !== before.wireframe) void showWires(state);
   if (state.sources.length > 0) dismissHint();
-  if (shown.mesh) drawPoints(state);
+  if (shown.mesh) shown.showPoints(state);
+  if (state.barriers !== before.barriers) shown.barriers.show(shown.mesh, state.barriers);
   writeAddress();
 });
 
@@ -70,16 +71,12 @@ function open(state: State): void {
     stage.look(now.view ?? shown.viewOf(now));
     showReport(document, shown);
     if (now.sources.length === 0) showHint();
-    drawPoints(now);
+    shown.showPoints(now);
+    shown.barriers.show(shown.mesh, now.barriers);
     fields.paint(now);
     routes.draw();
     await showWires(now);
   });
-}
-
-function drawPoints(state: State): void {
-  shown.showPoints(state);
-  shown.barriers.show(shown.mesh, state.barriers);
 }
 
 async function showWires({ wireframe }: State): Promise<void> {

@@ -44,8 +44,8 @@ export class Markers {
   private readonly hidden = this.points(0.25, false, 10);
 
   constructor(private readonly stage: Stage) {
-    stage.add(this.hidden);
-    stage.add(this.seen);
+    stage.addOverlay(this.hidden);
+    stage.addOverlay(this.seen);
   }
 
   show(marks: Mark[]): void {
@@ -62,7 +62,7 @@ export class Markers {
       points.visible = marks.length > 0;
       points.material.uniforms.ratio!.value = ratio;
     }
-    this.stage.invalidate();
+    this.stage.invalidateOverlay();
   }
 
   private points(opacity: number, depthTest: boolean, order: number): Points<BufferGeometry, ShaderMaterial> {

@@ -19,7 +19,7 @@ export class RouteLine {
       this.line({ color: COLOUR, linewidth: 4, opacity: 1, polygonOffsetUnits: -60000 }, 5),
     );
     this.object.visible = false;
-    stage.add(this.object);
+    stage.addOverlay(this.object);
   }
 
   /** Show a line through positions as they are drawn; none where there are fewer than two. */
@@ -31,7 +31,7 @@ export class RouteLine {
       this.geometry.setPositions(points.flat());
       for (const line of this.object.children) (line as Line2).geometry = this.geometry;
     }
-    this.stage.invalidate();
+    this.stage.invalidateOverlay();
   }
 
   private line(

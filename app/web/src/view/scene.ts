@@ -10,24 +10,31 @@ import {
   type Object3D,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { Backdrop } from "./backdrop";
 
 ColorManagement.enabled = false; // colours are written as they are shown
 
 const AWAY = 2.9; // of the camera from the unit ball, in its radii
 
 export class Stage {
-  readonly scene = new Scene();
+  private readonly scene = new Scene();
+  /** What moves while the mesh stands still: drawn over it. */
+  private readonly overlay = new Scene();
+  private readonly backdrop: Backdrop;
   readonly camera = new PerspectiveCamera(38, 1, 0.01, 50);
   readonly controls: OrbitControls;
   readonly renderer: WebGLRenderer;
   onMove: (view: number[]) => void = () => undefined;
   onFrame: () => void = () => undefined;
   private isDue = false;
+  private isStill = false;
   private readonly waiting: (() => void)[] = [];
 
   constructor(readonly canvas: HTMLCanvasElement) {
     this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
     this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.renderer.autoClear = false;
+    this.backdrop = new Backdrop(this.renderer);
     this.renderer.debug.checkShaderErrors = false; // asking would wait for the compiler
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
@@ -45,6 +52,17 @@ export class Stage {
 
   /** Draw a frame soon. */
   invalidate(): void {
+    this.isStill = false;
+    this.backdrop.forget();
+    this.schedule();
+  }
+
+  /** Draw a frame soon, in which only the overlay is another. */
+  invalidateOverlay(): void {
+    this.schedule();
+  }
+
+  private schedule(): void {
     if (this.isDue) return;
     this.isDue = true;
     requestAnimationFrame(() => this.render());
@@ -52,7 +70,7 @@ export class Stage {
 
   /** Wait until what is there now has been drawn. */
   drawn(): Promise<void> {
-    this.invalidate();
+    this.schedule();
     return new Promise((resolve) => this.waiting.push(resolve));
   }
 
@@ -64,6 +82,11 @@ export class Stage {
   add(object: Object3D): void {
     this.scene.add(object);
     this.invalidate();
+  }
+
+  addOverlay(object: Object3D): void {
+    this.overlay.add(object);
+    this.invalidateOverlay();
   }
 
   remove(object: Object3D): void {
@@ -135,7 +158,11 @@ export class Stage {
 
   /** Draw now, so that the canvas can be read before the browser shows it. */
   renderNow(): void {
-    this.renderer.render(this.scene, this.camera);
+    this.renderer.clear();
+    if (this.isStill) this.backdrop.draw(this.scene, this.camera);
+    else this.renderer.render(this.scene, this.camera);
+    this.isStill = true;
+    this.renderer.render(this.overlay, this.camera);
   }
 
   private render(): void {
