@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from benchmarks import approximate, exact, load, matrix, path, service, topology
+from benchmarks import approximate, exact, load, matrix, page, path, service, topology
 from benchmarks.inputs import Inputs
 from benchmarks.tables import keep
 
@@ -19,6 +19,7 @@ BENCHMARKS = {
     "matrix": matrix.run,
     "service": service.run,
     "load": load.run,
+    "page": page.run,
 }
 ROOT = Path(__file__).parents[1]
 

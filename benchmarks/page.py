@@ -59,8 +59,7 @@ _FOLLOW = """async places => {
         canvas.dispatchEvent(new PointerEvent('pointermove', {
             clientX, clientY, altKey: true, pointerId: 1, bubbles: true
         }));
-        const end = performance.now() + 1000;
-        while (readout.dataset.target === before && performance.now() < end) await frame();
+        for (let i = 0; i < 2; i++) await frame();  // it is picked in one, asked for by the next
         while (root.dataset.state !== 'ready') await frame();
         answered += readout.dataset.target !== before;
     }
@@ -95,7 +94,7 @@ def run(inputs: Inputs, runs: int) -> Section:
 
 def _http_rate(client: Client, body: bytes) -> float:
     made = json.loads(client.get("/v1/meshes?format=ply", body))
-    random = Random(1)
+    random = Random(1)  # noqa: S311 - targets, not secrets
     targets: list[dict[str, Any]] = []
     for _ in range(TARGETS // 2):
         targets.append({"vertex": random.randrange(made["vertices"])})
@@ -108,7 +107,6 @@ def _http_rate(client: Client, body: bytes) -> float:
     for target in targets:
         ask({"source": {"vertex": 0}, "target": target})
     seconds = time.perf_counter() - start
-    client.ask(f"/v1/meshes/{made['id']}")
     return TARGETS / seconds
 
 
@@ -153,7 +151,9 @@ def _follow(page: Page, address: str, body: bytes) -> float:
     box = page.locator("#canvas").bounding_box() or {}
     rows, columns = np.nonzero(np.ptp(image, axis=2) > 45)  # the mesh, by its colours
     inside = (columns > box["x"] + 200) & (rows < SIZE["height"] - 120)
-    chosen = Random(1).sample(range(int(inside.sum())), TARGETS + 1)
+    chosen = Random(1).sample(  # noqa: S311
+        range(int(inside.sum())), TARGETS + 1
+    )
     places = np.column_stack([columns[inside], rows[inside]])[chosen].tolist()
     page.keyboard.down("Alt")
     page.mouse.move(*places[0])

@@ -11,6 +11,7 @@ import httpx2
 import numpy as np
 import pytest
 from PIL import Image
+from playwright.sync_api import Route
 
 from .viewing import View
 
@@ -138,6 +139,32 @@ def test_a_refused_file_is_told_in_the_service_s_words(view: View) -> None:
     view.wait()
 
 
+def test_a_key_is_asked_for_and_sent(view: View) -> None:
+    sent: list[str | None] = []
+
+    def refuse_without_key(route: Route) -> None:
+        sent.append(route.request.headers.get("authorization"))
+        if sent[-1] == "Bearer letmein-letmein":
+            route.continue_()
+            return
+        problem = {"title": "Unauthorized", "detail": "no key", "status": 401, "request_id": "r1"}
+        route.fulfill(status=401, json=problem, content_type="application/problem+json")
+
+    view.page.route("**/v1**", refuse_without_key)
+    view.page.goto("/")
+    view.wait("error")
+    assert sent[-1] is None
+
+    view.page.fill("#key", "letmein-letmein")
+    view.page.press("#key", "Enter")
+    view.wait()
+    view.page.click("#samples [data-sample=sphere]")
+    view.wait()
+
+    assert "one piece, closed" in view.text("#report")
+    assert set(sent[sent.index("Bearer letmein-letmein") :]) == {"Bearer letmein-letmein"}
+
+
 # Ask
 
 
@@ -169,6 +196,32 @@ def test_the_path_follows_the_pointer(view: View, sphere: str) -> None:
 
     view.drag((100, 40), (0, 40))  # the target itself
     assert seen(view, PATH)[:, 0].max() < 20
+
+
+SLOW_PATHS = """
+    window.aborted = 0;
+    const real = window.fetch;
+    window.fetch = (address, init) => !String(address).endsWith('/path') ? real(address, init)
+        : new Promise((resolve, reject) => {
+            const due = setTimeout(() => real(address, init).then(resolve, reject), 700);
+            init.signal.addEventListener('abort', () => {
+                window.aborted += 1;
+                clearTimeout(due);
+                reject(new DOMException('', 'AbortError'));
+            });
+        });
+"""
+
+
+def test_of_targets_the_newest_wins_and_the_superseded_is_aborted(view: View, sphere: str) -> None:
+    view.page.add_init_script(SLOW_PATHS)
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(-100, 0)
+    view.drag((-100, 0), (0, 100), (60, 60), (100, 0), steps=6)
+
+    assert view.page.evaluate("window.aborted") >= 1
+    assert view.page.get_attribute("#readout", "data-target") == query_of(view)["target"][0]
+    assert length_of(view) == pytest.approx(2 * angle_at(view, 100), rel=0.01)
 
 
 def test_alt_sets_a_target_and_shift_adds_a_source(view: View, sphere: str) -> None:

@@ -74,9 +74,13 @@ export class Stage {
     return new Promise((resolve) => this.waiting.push(resolve));
   }
 
-  /** Compile what draws an object, where the browser can without anyone waiting. */
-  async prepare(object: Object3D): Promise<void> {
-    await this.renderer.compileAsync(object, this.camera, this.scene);
+  /** Have all that draws an object compiled before it is waited for. */
+  warmUp(object: Object3D): void {
+    this.scene.add(object);
+    this.renderNow();
+    this.renderNow(); // by way of the backdrop
+    this.scene.remove(object);
+    this.invalidate();
   }
 
   add(object: Object3D): void {

@@ -1,5 +1,5 @@
 // The mesh on the stage, with all that is drawn on it.
-import { Vector3 } from "three";
+import { Mesh, PlaneGeometry, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
 import type { MeshDocument, Outline, Point } from "../api/types";
 import { loadMesh, type LoadedMesh } from "../mesh/loader";
@@ -11,7 +11,7 @@ import { Patch } from "./patch";
 import { RouteLine } from "./route";
 import { showScaleBar } from "./scalebar";
 import type { Stage } from "./scene";
-import { Surface } from "./surface";
+import { Surface, surfacePaint } from "./surface";
 
 const SOURCE: Rgb = [0.09, 0.13, 0.24];
 const TARGET: Rgb = [0.9, 0, 0.36];
@@ -24,6 +24,7 @@ export class Shown {
   readonly faults: Patch;
   mesh: LoadedMesh | null = null;
   surface: Surface | null = null;
+  private readonly paint = surfacePaint();
   private tree: MeshBVH | null = null;
   private readonly points: Markers;
   private readonly faultPoints: Markers;
@@ -36,6 +37,7 @@ export class Shown {
     this.route = new RouteLine(stage);
     this.points = new Markers(stage);
     this.faultPoints = new Markers(stage);
+    this.warmUp();
     stage.onFrame = () => showScaleBar(stage, this.mesh?.frame.radius ?? null);
   }
 
@@ -43,12 +45,19 @@ export class Shown {
     const mesh = await loadMesh(document, signal);
     this.close();
     this.mesh = mesh;
-    this.surface = new Surface(mesh);
-    this.surface.colour(null, 1);
-    await this.stage.prepare(this.surface.object);
+    this.surface = new Surface(mesh, this.paint);
     this.stage.add(this.surface.object);
     await this.stage.drawn();
     this.tree = await mesh.tree;
+  }
+
+  /** Draw one of each once, of no extent, so that later none waits for its shader. */
+  private warmUp(): void {
+    this.points.show([{ position: [0, 0, 0], fill: SOURCE, size: 0 }]);
+    this.route.show([[0, 0, 0], [0, 0, 0]]);
+    this.stage.warmUp(new Mesh(new PlaneGeometry(0, 0), this.paint));
+    this.points.show([]);
+    this.route.show([]);
   }
 
   close(): void {

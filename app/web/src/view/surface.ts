@@ -69,39 +69,46 @@ const FRAGMENT = /* glsl */ `
     gl_FragColor = vec4(colour, 1.0);
   }`;
 
+/** What all surfaces are painted with: made once, since a shader takes long to compile. */
+export function surfacePaint(): ShaderMaterial {
+  return new ShaderMaterial({
+    uniforms: {
+      ramp: { value: rampTexture() },
+      largest: { value: 1 },
+      spacing: { value: 0 },
+      tinted: { value: 0 },
+      clay: { value: new Color().setRGB(0.72, 0.74, 0.78) },
+    },
+    vertexShader: VERTEX,
+    fragmentShader: FRAGMENT,
+    side: DoubleSide,
+    // What lies on the surface is drawn before it.
+    polygonOffset: true,
+    polygonOffsetFactor: 1,
+    polygonOffsetUnits: 1,
+  });
+}
+
 export class Surface {
   readonly object: Mesh<BufferGeometry, ShaderMaterial>;
   private readonly values: BufferAttribute;
   private readonly tints: BufferAttribute;
   private wires: LineSegments<BufferGeometry, LineBasicMaterial> | undefined;
 
-  constructor(private readonly mesh: LoadedMesh) {
+  constructor(
+    private readonly mesh: LoadedMesh,
+    private readonly paint: ShaderMaterial,
+  ) {
     const count = mesh.geometry.getAttribute("position").count;
     this.values = new BufferAttribute(new Float32Array(count).fill(-1), 1);
     this.tints = new BufferAttribute(new Float32Array(3 * count), 3);
     mesh.geometry.setAttribute("value", this.values);
     mesh.geometry.setAttribute("tint", this.tints);
     mesh.geometry.computeBoundingSphere();
-    const uniforms = {
-      ramp: { value: rampTexture() },
-      largest: { value: 1 },
-      spacing: { value: 0 },
-      tinted: { value: 0 },
-      clay: { value: new Color().setRGB(0.72, 0.74, 0.78) },
-    };
-    this.object = new Mesh(
-      mesh.geometry,
-      new ShaderMaterial({
-        uniforms,
-        vertexShader: VERTEX,
-        fragmentShader: FRAGMENT,
-        side: DoubleSide,
-        // What lies on the surface is drawn before it.
-        polygonOffset: true,
-        polygonOffsetFactor: 1,
-        polygonOffsetUnits: 1,
-      }),
-    );
+    this.object = new Mesh(mesh.geometry, paint);
+    this.colour(null, 1);
+    this.divide(null);
+    this.stripe(0);
   }
 
   /** Colour by values at vertices, of which those that are not finite are grey; null: by none. */
@@ -151,12 +158,10 @@ export class Surface {
   dispose(): void {
     this.wires?.geometry.dispose();
     this.wires?.material.dispose();
-    (this.uniform("ramp").value as DataTexture).dispose();
-    this.object.material.dispose();
   }
 
   private uniform(name: string): { value: unknown } {
-    return this.object.material.uniforms[name]!;
+    return this.paint.uniforms[name]!;
   }
 }
 
