@@ -38,7 +38,8 @@ def create_app(settings: Settings) -> FastAPI:
     app.include_router(meshes.router, prefix="/v1", max_body_size=settings.max_upload_bytes)
     app.include_router(jobs.router, prefix="/v1", max_body_size=settings.max_query_bytes)
     app.include_router(queries.router, prefix="/v1", max_body_size=settings.max_query_bytes)
-    app.mount(page.ASSETS, page.Assets())
+    if page.is_built():
+        app.mount(page.ASSETS, page.Assets())
     return app
 
 

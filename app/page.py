@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from starlette.datastructures import Headers
-from starlette.responses import FileResponse, Response
+from starlette.responses import Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import Scope
 
@@ -24,13 +24,13 @@ _POLICY = "; ".join(
         "frame-ancestors 'none'",
     )
 )
-_HEADERS = {
+_SAFE = {
     "Content-Security-Policy": _POLICY,
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
-    "Cache-Control": "no-cache",
-    "Vary": "Accept",
 }
+_INDEX = {**_SAFE, "Cache-Control": "no-cache", "Vary": "Accept"}
+_ASSET = {**_SAFE, "Cache-Control": "public, max-age=31536000, immutable"}
 
 
 def is_built() -> bool:
@@ -43,20 +43,22 @@ def wants_page(headers: Headers) -> bool:
     return "text/html" in headers.get("accept", "")
 
 
-def page_response() -> Response:
-    """Return the page."""
-    return FileResponse(DIST / "index.html", headers=_HEADERS, media_type="text/html")
+def page_response(scope: Scope) -> Response:
+    """Return the page, or that it has not changed."""
+    path = DIST / "index.html"
+    response = StaticFiles(directory=DIST).file_response(path, path.stat(), scope)
+    response.headers.update(_INDEX)
+    return response
 
 
 class Assets(StaticFiles):
     """Scripts, styles and images of the page, whose names are hashes of their content."""
 
     def __init__(self) -> None:
-        super().__init__(directory=DIST / "assets", check_dir=False)
+        super().__init__(directory=DIST / "assets")
 
     async def get_response(self, path: str, scope: Scope) -> Response:
         """Return a file that may be kept for good."""
         response = await super().get_response(path, scope)
-        response.headers["Cache-Control"] = "public, max-age=31536000, immutable"
-        response.headers["X-Content-Type-Options"] = "nosniff"
+        response.headers.update(_ASSET)
         return response

@@ -42,7 +42,7 @@ _LIMITS = (
 async def get_index(request: Request, response: Response) -> Response | Index:
     """Return the addresses to begin with; to a browser, the page."""
     if page.is_built() and page.wants_page(request.headers):
-        return page.page_response()
+        return page.page_response(request.scope)
     response.headers["Vary"] = "Accept"
     links = {"about": "/v1", "meshes": "/v1/meshes", "openapi": "/openapi.json"}
     shown = "for browsers" if page.is_built() else "left out when this package was built"
