@@ -457,7 +457,7 @@ def test_downloads(view: View, knot: str, tmp_path: Path) -> None:
 
 
 def test_copied_programs_run(view: View, knot: str) -> None:
-    view.open(f"/?mesh={knot}&source=v0&target=v1000")
+    view.open(f"/?mesh={knot}&source=v4000&source=v0&target=v1000")
     length = length_of(view)
     view.page.click("#copy-curl")
     command = view.page.evaluate("navigator.clipboard.readText()")

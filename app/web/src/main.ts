@@ -33,6 +33,7 @@ const pointer = new Pointer(shown, store, () => controls.tool);
 listenToKeys(store, status, shown, pointer);
 drawRamp();
 take.largest = () => fields.of(store.state)?.largest ?? 0;
+take.nearest = () => routes.source;
 controls.usualSpacing = () => Number(((take.largest() || 1) / 20).toPrecision(1));
 stage.onMove = (view) => store.update({ view });
 setUpAppearance(() => void showWires(store.state));

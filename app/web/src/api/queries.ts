@@ -84,10 +84,10 @@ export async function askRoute(
   return response.json() as Promise<Outline>;
 }
 
-export async function nearestSource(
+async function nearestSource(
   mesh: string,
   { sources, target, waypoints, barriers }: RouteQuestion,
-  signal?: AbortSignal,
+  signal: AbortSignal,
 ): Promise<number> {
   if (sources.length === 1) return 0;
   const first = waypoints[0] ?? target;

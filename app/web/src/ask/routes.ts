@@ -1,7 +1,7 @@
 // The shortest path to the target, which follows the pointer; and how it was searched for.
 import { Latest } from "../api/latest";
 import { askRoute, type RouteQuestion } from "../api/queries";
-import type { Outline, Step } from "../api/types";
+import type { Outline, Point, Step } from "../api/types";
 import { byId, count, duration, written } from "../dom";
 import { writePoint } from "../state/point";
 import type { State } from "../state/state";
@@ -61,6 +61,13 @@ export class Routes {
       byId("readout").hidden = true;
       this.draw();
     }
+  }
+
+  /** Where the path that is known begins. */
+  get source(): Point | null {
+    if (!this.outline) return null;
+    const { vertex, face, barycentric } = this.outline.source;
+    return vertex != null ? { vertex } : { face: face!, barycentric: barycentric! };
   }
 
   /** Draw the path that is known; a mesh that was just loaded shows none yet. */

@@ -1,7 +1,6 @@
 // What can be taken away: addresses, commands, files, a picture.
 import { authorization, post } from "../api/http";
-import { nearestSource } from "../api/queries";
-import type { About } from "../api/types";
+import type { About, Point } from "../api/types";
 import { questionOf } from "../ask/fields";
 import { writeState } from "../state/permalink";
 import type { State, Store } from "../state/state";
@@ -29,8 +28,8 @@ export class Take {
     const hasKey = (): boolean => "Authorization" in authorization();
     const { origin } = location;
     onCopy("copy-link", "The link", () => origin + writeState({ ...store.state, view: stage.view }));
-    onCopy("copy-curl", "The command", () => curlOf(store.state, origin, hasKey()));
-    onCopy("copy-python", "The program", () => pythonOf(store.state, origin, hasKey()));
+    onCopy("copy-curl", "The command", () => curlOf(store.state, this.source(), origin, hasKey()));
+    onCopy("copy-python", "The program", () => pythonOf(store.state, this.source(), origin, hasKey()));
     byId("picture").addEventListener("click", () => this.savePicture());
   }
 
@@ -72,21 +71,17 @@ export class Take {
     const stop = new AbortController();
     this.status.run("busy", `Fetching ${what}…`, stop, async () => {
       const { mesh } = this.store.state;
-      const body = await this.bodyOf(what, stop.signal);
+      const body = this.bodyOf(what);
       const path = `/v1/meshes/${mesh}/${what}?format=${format}`;
       const response = await post(path, body, {}, stop.signal);
       download(await response.blob(), `${what}.${format}`);
     });
   }
 
-  private async bodyOf(what: What, signal: AbortSignal): Promise<unknown> {
+  private bodyOf(what: What): unknown {
     const { state } = this.store;
-    const { mesh, sources, target, waypoints, barriers, lines } = state;
-    if (what === "path") {
-      const question = { sources, target: target!, waypoints, barriers, explain: false };
-      const source = sources[await nearestSource(mesh!, question, signal)];
-      return { source, target, waypoints, barriers };
-    }
+    const { target, waypoints, barriers, lines } = state;
+    if (what === "path") return { source: this.source(), target, waypoints, barriers };
     const question = questionOf(state, state.method);
     if (what === "distances" || lines === null) return question;
     return { ...question, ...("count" in lines ? { count: lines.count } : { levels: this.levels(lines.spacing) }) };
@@ -94,6 +89,13 @@ export class Take {
 
   /** The largest distance that is drawn. */
   largest: () => number = () => 0;
+
+  /** Where the path begins that is drawn: of several sources at the nearest. */
+  nearest: () => Point | null = () => null;
+
+  private source(): Point {
+    return this.nearest() ?? this.store.state.sources[0]!;
+  }
 
   private levels(spacing: number): number[] {
     return Array.from({ length: Math.floor(this.largest() / spacing) }, (_, i) => (i + 1) * spacing);
