@@ -59,7 +59,6 @@ _FOLLOW = """async places => {
         canvas.dispatchEvent(new PointerEvent('pointermove', {
             clientX, clientY, altKey: true, pointerId: 1, bubbles: true
         }));
-        for (let i = 0; i < 2; i++) await frame();  // it is picked in one, asked for by the next
         while (root.dataset.state !== 'ready') await frame();
         answered += readout.dataset.target !== before;
     }

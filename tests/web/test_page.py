@@ -40,12 +40,12 @@ def angle_at(view: View, away: float) -> float:
     return math.asin(distance * math.sin(ray) / radius) - ray
 
 
-def ramp_at(view: View, share: float) -> np.ndarray:
+def ramp_at(view: View, share: float, pixels: np.ndarray) -> np.ndarray:
     """Return the colour that the legend has for a share of the largest distance."""
     box = view.page.locator("#ramp").bounding_box()
     assert box is not None
     x, y = box["x"] + share * (box["width"] - 1), box["y"] + box["height"] / 2
-    return view.pixels()[round(y), round(x)].astype(float)
+    return pixels[round(y), round(x)].astype(float)
 
 
 def is_shade_of(seen: np.ndarray, colour: np.ndarray) -> bool:
@@ -172,10 +172,23 @@ def test_colours_are_those_of_the_distance(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}")
     view.click(0, 0)
 
+    pixels = view.pixels()
     for away in [(40, 0), (-90, 0), (0, 110), (100, -100), (0, -160)]:
         share = angle_at(view, math.hypot(*away)) / math.pi
-        assert is_shade_of(view.colour(*away), ramp_at(view, share)), away
-        assert not is_shade_of(view.colour(*away), ramp_at(view, share + 0.3)), away
+        colour = view.colour(*away, pixels)
+        assert is_shade_of(colour, ramp_at(view, share, pixels)), away
+        assert not is_shade_of(colour, ramp_at(view, share + 0.3, pixels)), away
+
+
+def test_the_ramp_grows_lighter_evenly(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&source=v0&{PLAIN}")
+    pixels = view.pixels()
+    linear = np.array([ramp_at(view, t, pixels) / 255 for t in np.linspace(0.01, 0.99, 25)]) ** 2.2
+    luminance = linear @ [0.2126, 0.7152, 0.0722]
+    steps = np.diff(np.cbrt(luminance))
+
+    assert (steps > 0).all()
+    assert steps.max() < 2.5 * steps.min()
 
 
 def test_the_path_follows_the_pointer(view: View, sphere: str) -> None:
@@ -252,7 +265,7 @@ def test_waypoints_and_barriers(view: View, sphere: str) -> None:
     assert len(seen(view, BARRIER, 20)) == 0
 
     view.page.click("#tools >> text=Barrier")
-    view.drag((0, -60), (0, 60), steps=12)
+    view.drag((0, -60), (0, 60), steps=2)
     wall = seen(view, BARRIER, 20)
     assert wall[:, 1].min() < -50 < 50 < wall[:, 1].max()
     around = length_of(view)

@@ -64,10 +64,13 @@ class View:
         image = Image.open(BytesIO(self.page.screenshot())).convert("RGB")
         return np.asarray(image, np.int64)
 
-    def colour(self, x: float = 0, y: float = 0) -> NDArray[np.float64]:
+    def colour(
+        self, x: float = 0, y: float = 0, pixels: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float64]:
         """Return the median colour around a place beside the middle of the mesh."""
         column, row = (round(a + b) for a, b in zip(self.centre, (x, y), strict=True))
-        patch = self.pixels()[row - 2 : row + 3, column - 2 : column + 3]
+        image = self.pixels() if pixels is None else pixels
+        patch = image[row - 2 : row + 3, column - 2 : column + 3]
         return np.asarray(np.median(patch.reshape(-1, 3), axis=0))
 
     def text(self, selector: str) -> str:

@@ -22,8 +22,8 @@ export class Pointer {
   private drag: ((event: Place) => void) | null = null;
   private painted: Set<number> | null = null;
   private fingers = 0;
+  /** Where the brush was last. */
   private last: Place | null = null;
-  private due = 0;
 
   constructor(
     private readonly shown: Shown,
@@ -84,13 +84,8 @@ export class Pointer {
   }
 
   private move(event: PointerEvent): void {
-    if (!this.start || !this.drag || !this.hasMoved(event)) return;
-    // Once a frame: pointers report more often than anyone sees.
-    this.last = event;
-    this.due ||= requestAnimationFrame(() => {
-      this.due = 0;
-      if (this.drag && this.last) this.drag(this.last);
-    });
+    // Browsers report moves once a frame.
+    if (this.start && this.drag && this.hasMoved(event)) this.drag(event);
   }
 
   private up(event: PointerEvent): void {
@@ -118,8 +113,6 @@ export class Pointer {
   private end(): void {
     this.fingers = Math.max(0, this.fingers - 1);
     this.start = this.drag = this.painted = this.last = null;
-    cancelAnimationFrame(this.due);
-    this.due = 0;
     this.shown.stage.controls.enabled = true;
   }
 
@@ -136,6 +129,7 @@ export class Pointer {
         if (point) this.painted![erases ? "delete" : "add"](point.face);
       }
     }
+    this.last = place;
     this.shown.barriers.show(this.shown.mesh, this.painted!);
   }
 
