@@ -8,16 +8,17 @@ from app.allowances import Allowances
 from app.api_keys import name_of_secret
 from app.callers import Caller, caller_at
 from app.errors import ProblemError, refuse
+from app.page import ASSETS
 from app.settings import Settings
 
 _OPEN = frozenset({"/", "/livez", "/readyz", "/openapi.json"})
-_OPEN_FOLDER = "/problems/"
+_OPEN_FOLDERS = ("/problems/", f"{ASSETS}/")
 _BEARER = re.compile(rb"bearer +([A-Za-z0-9._~+/-]+=*)", re.IGNORECASE)
 
 
 def is_open(path: str) -> bool:
     """Whether ``path`` needs no key and counts for no limit; all else does, if it exists or not."""
-    return path in _OPEN or path.startswith(_OPEN_FOLDER)
+    return path in _OPEN or path.startswith(_OPEN_FOLDERS)
 
 
 class AdmissionMiddleware:

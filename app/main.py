@@ -8,7 +8,7 @@ from anyio import CapacityLimiter
 from fastapi import FastAPI
 from starlette.middleware.cors import CORSMiddleware
 
-from app import __version__, handlers
+from app import __version__, handlers, page
 from app.admission import AdmissionMiddleware
 from app.body_deadline import BodyDeadlineMiddleware
 from app.documentation import complete
@@ -57,6 +57,8 @@ def create_app(settings: Settings) -> FastAPI:
     app.include_router(meshes.router, prefix="/v1", max_body_size=settings.max_upload_bytes)
     app.include_router(jobs.router, prefix="/v1", max_body_size=settings.max_query_bytes)
     app.include_router(queries.router, prefix="/v1", max_body_size=settings.max_query_bytes)
+    if page.is_built():
+        app.mount(page.ASSETS, page.Assets())
     return app
 
 

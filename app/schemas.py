@@ -803,6 +803,7 @@ class Index(BaseModel):
 
     service: str
     version: str
+    page: str = Field(description="Whether this address has a page to show to browsers")
     links: dict[str, str]
 
 

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from benchmarks import approximate, exact, load, matrix, path, service, topology
+from benchmarks import approximate, exact, load, matrix, page, path, service, topology
 from benchmarks.inputs import Inputs
 from benchmarks.tables import keep
 
@@ -20,6 +20,7 @@ BENCHMARKS = {
     "service": service.run,
     "load": load.run,
     "large-answers": service.run_large,
+    "page": page.run,
 }
 ROOT = Path(__file__).parents[1]
 

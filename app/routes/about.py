@@ -5,7 +5,7 @@ from typing import get_args
 from fastapi import APIRouter, Request, Response
 from starlette.responses import PlainTextResponse
 
-from app import __version__
+from app import __version__, page
 from app.dependencies import ServiceDep
 from app.encoding import FORMATS
 from app.errors import CODES, refuse
@@ -38,11 +38,21 @@ _LIMITS = (
 )
 
 
-@router.get("/", operation_id="getIndex", summary="Where to find what", response_model=Index)
-async def get_index() -> Index:
-    """Return the addresses to begin with."""
+@router.get(
+    "/",
+    operation_id="getIndex",
+    summary="Where to find what",
+    response_model=Index,
+    responses={200: {"content": {"text/html": {}}, "description": "The page, for browsers"}},
+)
+async def get_index(request: Request, response: Response) -> Response | Index:
+    """Return the addresses to begin with; to a browser, the page."""
+    if page.is_built() and page.wants_page(request.headers):
+        return page.page_response(request.scope)
+    response.headers["Vary"] = "Accept"
     links = {"about": "/v1", "meshes": "/v1/meshes", "openapi": "/openapi.json"}
-    return Index(service="geodesic", version=__version__, links=links)
+    shown = "for browsers" if page.is_built() else "left out when this package was built"
+    return Index(service="geodesic", version=__version__, page=shown, links=links)
 
 
 @router.get("/livez", operation_id="getLiveness", summary="Is the process alive?")

@@ -1,0 +1,39 @@
+// Server-sent events by fetch, since EventSource cannot send a key.
+import { call } from "./http";
+
+interface Event {
+  id: string;
+  data: string;
+}
+
+/** Yield the events of a stream until it ends. */
+export async function* events(
+  path: string,
+  lastId: string,
+  signal: AbortSignal,
+): AsyncGenerator<Event> {
+  const headers = { Accept: "text/event-stream", ...(lastId ? { "Last-Event-ID": lastId } : {}) };
+  const response = await call(path, { headers, signal });
+  const reader = response.body!.pipeThrough(new TextDecoderStream()).getReader();
+  let rest = "";
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) return;
+    const blocks = (rest + value).replaceAll("\r\n", "\n").split("\n\n");
+    rest = blocks.pop()!;
+    for (const block of blocks) {
+      const event = parse(block);
+      if (event.data) yield event;
+    }
+  }
+}
+
+function parse(block: string): Event {
+  const event = { id: "", data: "" };
+  for (const line of block.split("\n")) {
+    const [, name, value] = /^(id|data): ?(.*)$/.exec(line) ?? [];
+    if (name === "id") event.id = value!;
+    if (name === "data") event.data += value!;
+  }
+  return event;
+}

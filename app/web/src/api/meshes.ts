@@ -1,0 +1,44 @@
+// Meshes of the store: listed, made, uploaded.
+import { authorization, call, getJson, refusal, Refusal } from "./http";
+import type { MeshDocument, MeshList } from "./types";
+
+export function listMeshes(): Promise<MeshList> {
+  return getJson("/v1/meshes?limit=100");
+}
+
+export function getMesh(id: string): Promise<MeshDocument> {
+  return getJson(`/v1/meshes/${encodeURIComponent(id)}`);
+}
+
+export async function makeSample(name: string, faces: number): Promise<MeshDocument> {
+  const parameters = new URLSearchParams({ sample: name, faces: String(faces) });
+  return (await call(`/v1/meshes?${parameters}`, { method: "POST" })).json() as Promise<MeshDocument>;
+}
+
+/** Upload a file. By XMLHttpRequest, since fetch does not tell how much of a body it has sent. */
+export function uploadMesh(
+  file: File,
+  onProgress: (share: number) => void,
+  signal: AbortSignal,
+): Promise<MeshDocument> {
+  const extension = file.name.split(".").pop()?.toLowerCase() ?? "";
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    const format = extension === "json" ? "" : `?${new URLSearchParams({ format: extension })}`;
+    request.open("POST", `/v1/meshes${format}`);
+    if (extension === "json") request.setRequestHeader("Content-Type", "application/json");
+    for (const [name, value] of Object.entries(authorization())) {
+      request.setRequestHeader(name, value);
+    }
+    request.upload.onprogress = (event) => onProgress(event.loaded / event.total);
+    request.onload = () => {
+      if (request.status < 300) resolve(JSON.parse(request.responseText) as MeshDocument);
+      else reject(refusal(request.status, request.responseText, request.getResponseHeader("X-Request-ID") ?? ""));
+    };
+    request.onerror = () =>
+      reject(new Refusal({ detail: "The upload broke off.", code: "unknown", status: 0, request_id: "" }));
+    request.onabort = () => reject(new DOMException("The upload was cancelled.", "AbortError"));
+    signal.addEventListener("abort", () => request.abort());
+    request.send(file);
+  });
+}

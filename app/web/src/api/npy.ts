@@ -1,0 +1,34 @@
+// numpy's own file format: a header of text, then the numbers as they lie in memory.
+
+export interface NpyArray {
+  data: Float64Array | Float32Array | Int32Array | Uint32Array | BigInt64Array;
+  shape: number[];
+}
+
+const KINDS = {
+  "<f8": Float64Array,
+  "<f4": Float32Array,
+  "<i4": Int32Array,
+  "<u4": Uint32Array,
+  "<i8": BigInt64Array,
+} as const;
+
+export function parseNpy(buffer: ArrayBuffer): NpyArray {
+  const view = new DataView(buffer);
+  const isLong = view.getUint8(6) > 1; // version 2 has a header of more than 64 kB
+  const start = isLong ? 12 : 10;
+  const length = isLong ? view.getUint32(8, true) : view.getUint16(8, true);
+  const header = new TextDecoder().decode(new Uint8Array(buffer, start, length));
+  const kind = /'descr':\s*'([^']+)'/.exec(header)?.[1];
+  const shape = /'shape':\s*\(([^)]*)\)/.exec(header)?.[1];
+  if (kind === undefined || shape === undefined || !(kind in KINDS) || header.includes("True")) {
+    throw new Error(`an array that this page cannot read: ${header.trim()}`);
+  }
+  const data = new KINDS[kind as keyof typeof KINDS](buffer, start + length);
+  return { data, shape: shape.split(",").filter((part) => part.trim()).map(Number) };
+}
+
+/** Return the numbers as indices; the service numbers in 64 bits, and has no mesh that needs them. */
+export function toIndices(array: NpyArray): Uint32Array<ArrayBuffer> {
+  return Uint32Array.from(array.data as ArrayLike<number | bigint>, Number);
+}

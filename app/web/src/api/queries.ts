@@ -1,0 +1,125 @@
+// The questions that the page asks of a mesh.
+import { answerOfJob } from "./jobs";
+import { getJson, post } from "./http";
+import { parseNpy } from "./npy";
+import type {
+  About,
+  DistancesAnswer,
+  DistancesRequest,
+  ErrorBound,
+  Estimate,
+  LocateAnswer,
+  Outline,
+  Point,
+  Unreachable,
+} from "./types";
+
+const NPY = "application/x-npy";
+/** Queries that are likely to take longer become jobs, which tell their progress. */
+const JOB_FROM_S = 0.5;
+
+export type Question = Partial<DistancesRequest> & Pick<DistancesRequest, "sources">;
+
+export interface Field {
+  distances: Float64Array;
+  largest: number;
+  bound: ErrorBound;
+  unreachable: Unreachable;
+  /** Seconds of computing, by the service's own clock; null where the answer was kept. */
+  seconds: number | null;
+}
+
+export async function askDistances(
+  mesh: string,
+  question: Question,
+  onProgress: (share: number) => void,
+  signal: AbortSignal,
+): Promise<Field> {
+  const path = `/v1/meshes/${mesh}/distances`;
+  const estimated = await post(`${path}?estimate=true`, question, { Accept: NPY }, signal);
+  const { seconds } = (await estimated.json()) as Estimate;
+  const response =
+    seconds > JOB_FROM_S
+      ? await answerOfJob(path, question, NPY, onProgress, signal)
+      : await post(path, question, { Accept: NPY }, signal);
+  const distances = parseNpy(await response.arrayBuffer()).data as Float64Array;
+  return {
+    distances,
+    largest: largestOf(distances),
+    bound: told(response, "Geodesic-Error-Bound"),
+    unreachable: told(response, "Geodesic-Unreachable"),
+    seconds: secondsOf(response),
+  };
+}
+
+/** Return the index of the nearest source of each vertex, -1 where there is none. */
+export async function askTerritories(
+  mesh: string,
+  question: Question,
+  signal: AbortSignal,
+): Promise<Int32Array> {
+  const body = { ...question, include: ["nearest_source"] };
+  const response = await post(`/v1/meshes/${mesh}/distances`, body, {}, signal);
+  const { nearest_source } = (await response.json()) as DistancesAnswer;
+  return Int32Array.from(nearest_source!, (source) => source ?? -1);
+}
+
+export interface RouteQuestion {
+  sources: Point[];
+  target: Point;
+  waypoints: Point[];
+  barriers: number[];
+  explain: boolean;
+}
+
+/** Return the shortest path; from several sources that from the nearest one. */
+export async function askRoute(
+  mesh: string,
+  question: RouteQuestion,
+  signal: AbortSignal,
+): Promise<Outline> {
+  const { sources, ...rest } = question;
+  const source = sources[await nearestSource(mesh, question, signal)]!;
+  const response = await post(`/v1/meshes/${mesh}/path`, { source, ...rest }, {}, signal);
+  return response.json() as Promise<Outline>;
+}
+
+async function nearestSource(
+  mesh: string,
+  { sources, target, waypoints, barriers }: RouteQuestion,
+  signal: AbortSignal,
+): Promise<number> {
+  if (sources.length === 1) return 0;
+  const first = waypoints[0] ?? target;
+  const body = { sources, targets: [first], barriers, include: ["nearest_source"] };
+  const response = await post(`/v1/meshes/${mesh}/distances`, body, {}, signal);
+  return ((await response.json()) as DistancesAnswer).nearest_source?.[0] ?? 0;
+}
+
+/** Return the point of the surface that is nearest to a position. */
+export async function locate(mesh: string, position: [number, number, number]): Promise<Point> {
+  const response = await post(`/v1/meshes/${mesh}/locate`, { points: [position] });
+  const { vertex, face, barycentric } = ((await response.json()) as LocateAnswer).points[0]!;
+  return vertex != null ? { vertex } : { face: face!, barycentric: barycentric! };
+}
+
+export function getAbout(): Promise<About> {
+  return getJson("/v1");
+}
+
+function told<T>(response: Response, header: string): T {
+  return JSON.parse(response.headers.get(header)!) as T;
+}
+
+function secondsOf(response: Response): number | null {
+  const phase = /compute;dur=([\d.]+)/.exec(response.headers.get("Server-Timing") ?? "");
+  return phase ? Number(phase[1]) / 1000 : null;
+}
+
+function largestOf(distances: Float64Array): number {
+  let largest = 0;
+  for (const distance of distances) {
+    if (distance > largest && distance < Infinity) largest = distance;
+  }
+  return largest;
+}

@@ -1,0 +1,139 @@
+// The shortest path to the target, which follows the pointer; and how it was searched for.
+import { Latest } from "../api/latest";
+import { askRoute, type RouteQuestion } from "../api/queries";
+import type { Outline, Point, Step } from "../api/types";
+import { byId, count, duration, written } from "../dom";
+import { writePoint } from "../state/point";
+import type { State } from "../state/state";
+import type { Status } from "../status";
+import type { Shown } from "../view/shown";
+
+type Asked = RouteQuestion & { mesh: string };
+
+const WORDS: Record<Step["name"], string> = {
+  dijkstra: "Along edges: a first bound",
+  shorten: "The same, shortened across faces",
+  approximate: "An approximate sweep within that bound",
+  backtrace: "Traced back: a tighter bound",
+  exact: "The exact sweep, within all bounds",
+  path: "The path, traced back",
+};
+
+export class Routes {
+  outline: Outline | null = null;
+  private asked = "";
+  private steps: Step[] = [];
+  private question: Asked | null = null;
+  private readonly latest: Latest<Asked>;
+
+  constructor(
+    private readonly status: Status,
+    private readonly shown: Shown,
+  ) {
+    this.latest = new Latest<Asked>(
+      ({ mesh, ...question }, stop) =>
+        status.during("busy", "Searching the path…", stop, async () =>
+          this.show(await askRoute(mesh, question, stop.signal), question),
+        ),
+      (error) => {
+        this.asked = "";
+        status.fail(error);
+      },
+    );
+    byId("explain-start").addEventListener("click", () => this.explain());
+    byId("explain-stop").addEventListener("click", () => this.endSteps());
+    byId("step").addEventListener("input", () => this.showStep());
+  }
+
+  /** Ask for the path that ``state`` has. */
+  follow({ mesh, sources, target, waypoints, barriers }: State): void {
+    const asked = JSON.stringify([mesh, sources, target, waypoints, barriers]);
+    if (asked === this.asked) return;
+    this.asked = asked;
+    this.endSteps();
+    const isAsked = mesh !== null && target !== null && sources.length > 0;
+    this.question = isAsked ? { mesh, sources, target, waypoints, barriers, explain: false } : null;
+    byId("explain-start", HTMLButtonElement).disabled = !isAsked;
+    if (this.question) this.latest.ask(this.question);
+    else {
+      this.latest.cancel();
+      this.outline = null;
+      byId("readout").hidden = true;
+      this.draw();
+    }
+  }
+
+  /** Where the path that is known begins. */
+  get source(): Point | null {
+    if (!this.outline) return null;
+    const { vertex, face, barycentric } = this.outline.source;
+    return vertex != null ? { vertex } : { face: face!, barycentric: barycentric! };
+  }
+
+  /** Draw the path that is known; a mesh that was just loaded shows none yet. */
+  draw(): void {
+    this.shown.showRoute(this.outline);
+  }
+
+  private show(outline: Outline, question: RouteQuestion): void {
+    if (!this.question) return;
+    this.outline = outline;
+    this.draw();
+    const readout = byId("readout");
+    readout.hidden = false;
+    readout.dataset.target = writePoint(question.target);
+    const { length } = outline;
+    byId("length").textContent = length == null ? "No path" : written(length, 6);
+    byId("length-note").textContent =
+      length == null
+        ? reason(outline)
+        : `mesh units, exact${question.waypoints.length > 0 ? `, via ${question.waypoints.length}` : ""}`;
+  }
+
+  private explain(): void {
+    const asked = this.question;
+    if (!asked) return;
+    const { mesh, ...question } = asked;
+    const stop = new AbortController();
+    this.status.run("busy", "Searching step by step…", stop, async () => {
+      const outline = await askRoute(mesh, { ...question, explain: true }, stop.signal);
+      if (asked !== this.question) return;
+      this.steps = outline.steps ?? [];
+      byId("explain-start").hidden = true;
+      byId("steps").hidden = false;
+      const slider = byId("step", HTMLInputElement);
+      slider.max = String(this.steps.length - 1);
+      slider.value = "0";
+      this.showStep();
+      slider.focus();
+    });
+  }
+
+  private showStep(): void {
+    const number = byId("step", HTMLInputElement).valueAsNumber;
+    const step = this.steps[number];
+    if (!step) return;
+    // A step that visits no face works in the region of the one before.
+    const region = this.steps.slice(0, number + 1).findLast(({ faces }) => faces.length > 0);
+    this.shown.region.show(this.shown.mesh, region?.faces ?? []);
+    const legs = this.steps.at(-1)!.leg + 1;
+    const leg = legs > 1 ? ` of leg ${step.leg + 1}` : "";
+    byId("step-words").textContent =
+      `${number + 1} of ${this.steps.length}${leg}. ${WORDS[step.name]}. ` +
+      `No longer than ${written(step.bound, 6)}; ${count(step.faces.length, "face")}, ` +
+      `${count(step.windows, "window")}, ${duration(step.seconds)}.`;
+  }
+
+  private endSteps(): void {
+    if (byId("steps").hidden) return;
+    byId("steps").hidden = true;
+    byId("explain-start").hidden = false;
+    this.shown.region.show(null, []);
+  }
+}
+
+function reason({ reason: code }: Outline): string {
+  return code === "disconnected"
+    ? "source and target are not connected"
+    : "the target is beyond the largest distance";
+}

@@ -1,0 +1,117 @@
+// The page: what is asked for is in the state, and everything that is shown follows from it.
+import { getMesh } from "./api/meshes";
+import { getAbout } from "./api/queries";
+import { Fields } from "./ask/fields";
+import { Routes } from "./ask/routes";
+import { dismissHint, isDark, setUpAppearance, showHint } from "./panel/appearance";
+import { Controls, resolved } from "./panel/controls";
+import { byId } from "./dom";
+import { listenToKeys } from "./panel/keys";
+import { Meshes } from "./panel/meshes";
+import { Pointer } from "./panel/pointer";
+import { showReport } from "./panel/report";
+import { Take } from "./panel/take";
+import { readState, writeState } from "./state/permalink";
+import { Store, type State } from "./state/state";
+import { Status } from "./status";
+import { drawRamp } from "./view/legend";
+import { Stage } from "./view/scene";
+import { Shown } from "./view/shown";
+
+const ADDRESS_DELAY_MS = 250; // browsers refuse addresses that change a hundred times in half a minute
+
+const stage = new Stage(byId("canvas", HTMLCanvasElement));
+const shown = new Shown(stage);
+const status = new Status(() => stage.drawn());
+const store = new Store();
+const fields = new Fields(status, shown);
+const routes = new Routes(status, shown);
+const meshes = new Meshes(store, status);
+const controls = new Controls(store, status, shown);
+const take = new Take(store, status, stage);
+const pointer = new Pointer(shown, store, () => controls.tool);
+listenToKeys(store, status, shown, pointer);
+drawRamp();
+take.largest = () => fields.of(store.state)?.largest ?? 0;
+take.nearest = () => routes.source;
+controls.usualSpacing = () => Number(((take.largest() || 1) / 20).toPrecision(1));
+stage.onMove = (view) => store.update({ view });
+setUpAppearance(() => void showWires(store.state));
+
+controls.show(store.state);
+
+let opening = new AbortController();
+
+store.listen((state, before) => {
+  if (state.mesh !== before.mesh) open(state);
+  controls.show(state);
+  take.show(state);
+  fields.follow(state);
+  routes.follow(state);
+  if (state.lines !== before.lines) fields.stripe(state);
+  if (state.wireframe !== before.wireframe) void showWires(state);
+  if (state.sources.length > 0) dismissHint();
+  if (shown.mesh) shown.showPoints(state);
+  if (state.barriers !== before.barriers) shown.barriers.show(shown.mesh, state.barriers);
+  writeAddress();
+});
+
+/** Load the mesh that is asked for, and draw on it what is known by then. */
+function open(state: State): void {
+  opening.abort();
+  meshes.showChosen();
+  byId("welcome").hidden = true;
+  shown.close();
+  showReport(null, shown);
+  const stop = (opening = new AbortController());
+  status.run("loading", "Loading the mesh…", stop, async () => {
+    const document = await getMesh(state.mesh!);
+    await shown.open(document, stop.signal);
+    stop.signal.throwIfAborted();
+    const now = store.state;
+    stage.look(now.view ?? shown.viewOf(now));
+    showReport(document, shown);
+    if (now.sources.length === 0) showHint();
+    shown.showPoints(now);
+    shown.barriers.show(shown.mesh, now.barriers);
+    fields.paint(now);
+    routes.draw();
+    await showWires(now);
+  });
+}
+
+async function showWires({ wireframe }: State): Promise<void> {
+  await shown.surface?.setWireframe(wireframe, isDark() ? [1, 1, 1] : [0.05, 0.07, 0.12]);
+  stage.invalidate();
+}
+
+let isAddressDue = false;
+function writeAddress(): void {
+  if (isAddressDue) return;
+  isAddressDue = true;
+  setTimeout(() => {
+    isAddressDue = false;
+    history.replaceState(null, "", writeState(store.state));
+  }, ADDRESS_DELAY_MS);
+}
+
+/** Do what the address asks for. */
+function begin(): void {
+  status.run("loading", "Loading…", new AbortController(), async () => {
+    const about = await getAbout();
+    meshes.offer(about.samples);
+    take.offer(about);
+    void meshes.list().catch((error: unknown) => status.fail(error));
+    const asked = readState(location.search);
+    byId("welcome").hidden = asked.mesh !== null;
+    if (asked.mesh === null) return;
+    const points = [asked.sources, asked.target ? [asked.target] : [], asked.waypoints];
+    const [sources, targets, waypoints] = await Promise.all(
+      points.map((each) => resolved(asked.mesh!, each)),
+    );
+    store.update({ ...asked, sources: sources!, target: targets![0] ?? null, waypoints: waypoints! });
+  });
+}
+
+status.onKey = begin;
+begin();

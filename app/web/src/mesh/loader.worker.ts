@@ -1,0 +1,102 @@
+// Off the main thread: arrays are fetched, normals computed, the tree for picking built.
+import { BufferAttribute, BufferGeometry } from "three";
+import { MeshBVH } from "three-mesh-bvh";
+import { parseNpy, toIndices } from "../api/npy";
+import type { LoaderAnswer, LoaderQuestion } from "./loader";
+
+let faces = new Uint32Array(0);
+
+self.onmessage = async ({ data }: MessageEvent<LoaderQuestion>) => {
+  try {
+    if (data.ask === "mesh") await load(data);
+    else sendEdges();
+  } catch (error) {
+    send({ tell: "failure", message: error instanceof Error ? error.message : String(error) });
+  }
+};
+
+async function load({ vertices, faces: facesUrl, headers }: LoaderQuestion & { ask: "mesh" }): Promise<void> {
+  const [points, corners] = await Promise.all([array(vertices, headers), array(facesUrl, headers)]);
+  const doubles = Float64Array.from(points.data as Float64Array);
+  faces = toIndices(corners);
+  const frame = frameOf(doubles);
+  const positions = new Float32Array(doubles.length);
+  for (let i = 0; i < doubles.length; i++) {
+    positions[i] = (doubles[i]! - frame.centre[i % 3]!) / frame.radius;
+  }
+  const normals = normalsOf(positions, faces);
+  send({ tell: "shape", frame, vertices: doubles, positions, normals, faces }, []);
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(positions, 3));
+  geometry.setIndex(new BufferAttribute(faces, 1));
+  // Indirect: the faces keep their order, and so their numbers.
+  const tree = MeshBVH.serialize(new MeshBVH(geometry, { indirect: true }), { cloneBuffers: false });
+  send({ tell: "tree", roots: tree.roots as ArrayBuffer[], order: tree.indirectBuffer! });
+}
+
+async function array(url: string, headers: Record<string, string>): ReturnType<typeof parseNpyOf> {
+  return parseNpyOf(await fetch(url, { headers }));
+}
+
+async function parseNpyOf(response: Response): Promise<ReturnType<typeof parseNpy>> {
+  if (!response.ok) throw new Error(`the service answered ${response.status} for ${response.url}`);
+  return parseNpy(await response.arrayBuffer());
+}
+
+function frameOf(points: Float64Array): { centre: [number, number, number]; radius: number } {
+  const low = [Infinity, Infinity, Infinity];
+  const high = [-Infinity, -Infinity, -Infinity];
+  for (let i = 0; i < points.length; i++) {
+    low[i % 3] = Math.min(low[i % 3]!, points[i]!);
+    high[i % 3] = Math.max(high[i % 3]!, points[i]!);
+  }
+  const centre = low.map((x, i) => (x + high[i]!) / 2) as [number, number, number];
+  const radius = Math.hypot(...low.map((x, i) => (high[i]! - x) / 2)) || 1;
+  return { centre, radius };
+}
+
+/** Normals at vertices, each face counting by its area; outwards on the whole, however faces are wound. */
+function normalsOf(p: Float32Array, corners: Uint32Array): Float32Array<ArrayBuffer> {
+  const normals = new Float32Array(p.length);
+  for (let f = 0; f < corners.length; f += 3) {
+    const [a, b, c] = [3 * corners[f]!, 3 * corners[f + 1]!, 3 * corners[f + 2]!];
+    const [ux, uy, uz] = [p[b]! - p[a]!, p[b + 1]! - p[a + 1]!, p[b + 2]! - p[a + 2]!];
+    const [vx, vy, vz] = [p[c]! - p[a]!, p[c + 1]! - p[a + 1]!, p[c + 2]! - p[a + 2]!];
+    const [nx, ny, nz] = [uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx];
+    for (const corner of [a, b, c]) {
+      normals[corner]! += nx;
+      normals[corner + 1]! += ny;
+      normals[corner + 2]! += nz;
+    }
+  }
+  const outwards = normals.reduce((sum, x, i) => sum + x * p[i]!, 0) < 0 ? -1 : 1;
+  for (let i = 0; i < normals.length; i += 3) {
+    const length = outwards * Math.hypot(normals[i]!, normals[i + 1]!, normals[i + 2]!) || 1;
+    normals[i]! /= length;
+    normals[i + 1]! /= length;
+    normals[i + 2]! /= length;
+  }
+  return normals;
+}
+
+/** Send each edge once, as pairs of vertices. */
+function sendEdges(): void {
+  const keys = new Float64Array(faces.length);
+  for (let i = 0; i < faces.length; i++) {
+    const [a, b] = [faces[i]!, faces[i % 3 === 2 ? i - 2 : i + 1]!];
+    keys[i] = Math.min(a, b) * 2 ** 26 + Math.max(a, b);
+  }
+  keys.sort();
+  const edges = new Uint32Array(2 * keys.length);
+  let count = 0;
+  for (let i = 0; i < keys.length; i++) {
+    if (i > 0 && keys[i] === keys[i - 1]) continue;
+    edges[count++] = Math.floor(keys[i]! / 2 ** 26);
+    edges[count++] = keys[i]! % 2 ** 26;
+  }
+  send({ tell: "edges", edges: edges.slice(0, count) });
+}
+
+function send(answer: LoaderAnswer, transfer: Transferable[] = []): void {
+  self.postMessage(answer, { transfer });
+}

@@ -1,0 +1,41 @@
+// From a place on the screen to a point of the surface.
+import { DoubleSide, Ray, Vector3, type Camera } from "three";
+import type { MeshBVH } from "three-mesh-bvh";
+import type { Point } from "../api/types";
+import type { LoadedMesh } from "./loader";
+
+export type FacePoint = Extract<Point, { face: number }>;
+
+/** Return the point of the surface under ``x``, ``y`` (-1 to 1, y upwards), or null beside it. */
+export function pick(mesh: LoadedMesh, tree: MeshBVH, camera: Camera, x: number, y: number): FacePoint | null {
+  const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
+  const direction = new Vector3(x, y, 0.5).unproject(camera).sub(origin).normalize();
+  const hit = tree.raycastFirst(new Ray(origin, direction), DoubleSide);
+  if (hit?.faceIndex == null) return null;
+  const [a, b, c] = mesh.corners(hit.faceIndex).map((v) => new Vector3(...mesh.drawn(mesh.vertex(v))));
+  return { face: hit.faceIndex, barycentric: weights(a!, b!, c!, hit.point) };
+}
+
+/** Weights of the corners, each 0 or more, 1 in all. */
+function weights(a: Vector3, b: Vector3, c: Vector3, point: Vector3): [number, number, number] {
+  const area = (p: Vector3, q: Vector3): number => {
+    const normal = b.clone().sub(a).cross(c.clone().sub(a));
+    return p.clone().sub(point).cross(q.clone().sub(point)).dot(normal);
+  };
+  const parts = [area(b, c), area(c, a), area(a, b)].map((part) => Math.max(part, 0));
+  const sum = parts[0]! + parts[1]! + parts[2]!;
+  return sum > 0 ? (parts.map((part) => part / sum) as [number, number, number]) : [1, 0, 0];
+}
+
+/** Where a point is, in mesh units. */
+export function positionOf(mesh: LoadedMesh, point: Point): [number, number, number] {
+  if ("vertex" in point) return mesh.vertex(point.vertex);
+  const [vertices, shares] =
+    "edge" in point
+      ? [point.edge, [1 - point.t, point.t]]
+      : [mesh.corners(point.face), point.barycentric];
+  const corners = vertices.map((vertex) => mesh.vertex(vertex));
+  return [0, 1, 2].map((axis) =>
+    corners.reduce((sum, corner, i) => sum + shares[i]! * corner[axis]!, 0),
+  ) as [number, number, number];
+}

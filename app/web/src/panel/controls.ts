@@ -1,0 +1,127 @@
+// Fields and switches: they show the state, and change it.
+import { locate } from "../api/queries";
+import type { Method, Point } from "../api/types";
+import { parsePoints, writePoint, type WrittenPoint } from "../state/point";
+import { readState, writeRanges } from "../state/permalink";
+import { INITIAL, type Lines, type Shade, type State, type Store } from "../state/state";
+import type { Status } from "../status";
+import type { Shown } from "../view/shown";
+import { byId } from "../dom";
+import type { Tool } from "./pointer";
+
+export class Controls {
+  constructor(
+    private readonly store: Store,
+    private readonly status: Status,
+    shown: Shown,
+  ) {
+    byId("points").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.readPoints();
+    });
+    byId("points").addEventListener("change", () => this.readPoints());
+    byId("clear").addEventListener("click", () => {
+      store.update({ sources: [], target: null, waypoints: [], barriers: [], maxDistance: null });
+    });
+    onChoice("methods", (method) => store.update({ method: method as Method }));
+    onChoice("shades", (shade) => store.update({ shade: shade as Shade }));
+    const slider = byId("error-slider", HTMLInputElement);
+    slider.addEventListener("input", () => showError(errorOf(slider)));
+    slider.addEventListener("change", () =>
+      store.update({ error: errorOf(slider), method: "approximate" }),
+    );
+    byId("lines").addEventListener("change", () => this.readLines(true));
+    byId("lines-value").addEventListener("change", () => this.readLines(false));
+    byId("wireframe").addEventListener("change", () =>
+      store.update({ wireframe: byId("wireframe", HTMLInputElement).checked }),
+    );
+    byId("fit").addEventListener("click", () => {
+      shown.stage.look(null);
+      store.update({ view: null });
+    });
+  }
+
+  get tool(): Tool {
+    return document.querySelector<HTMLInputElement>("#tools input:checked")!.value as Tool;
+  }
+
+  /** Show what ``state`` is. */
+  show(state: State): void {
+    setValue("sources", state.sources.map(writePoint).join(" "));
+    setValue("target", state.target ? writePoint(state.target) : "");
+    setValue("waypoints", state.waypoints.map(writePoint).join(" "));
+    setValue("barriers", writeRanges(state.barriers));
+    setValue("max-distance", state.maxDistance === null ? "" : String(state.maxDistance));
+    choose("methods", state.method);
+    choose("shades", state.shade);
+    setValue("error-slider", String(Math.log10(state.error)));
+    showError(state.error);
+    const { lines } = state;
+    byId("lines", HTMLSelectElement).value = lines === null ? "none" : "count" in lines ? "count" : "spacing";
+    byId("lines-value").hidden = lines === null;
+    setValue("lines-value", lines === null ? "" : String("count" in lines ? lines.count : lines.spacing));
+    byId("wireframe", HTMLInputElement).checked = state.wireframe;
+  }
+
+  private readPoints(): void {
+    const { mesh } = this.store.state;
+    if (mesh === null) return;
+    const text = (id: string): string => byId(id, HTMLInputElement).value.trim();
+    this.status.run("busy", "Looking points up…", new AbortController(), async () => {
+      const [sources, targets, waypoints] = await Promise.all(
+        ["sources", "target", "waypoints"].map((id) => resolved(mesh, parsePoints(text(id)))),
+      );
+      const written = new URLSearchParams({ barriers: text("barriers"), max_distance: text("max-distance") });
+      const { barriers, maxDistance } = readState(written.toString());
+      this.store.update({
+        sources: sources!,
+        target: targets![0] ?? null,
+        waypoints: waypoints!,
+        barriers,
+        maxDistance,
+      });
+    });
+  }
+
+  private readLines(isOtherKind: boolean): void {
+    const kind = byId("lines", HTMLSelectElement).value;
+    const value = byId("lines-value", HTMLInputElement).valueAsNumber;
+    let lines: Lines = null;
+    if (kind === "count") lines = isOtherKind ? INITIAL.lines : { count: Math.max(1, Math.round(value) || 1) };
+    if (kind === "spacing") lines = { spacing: isOtherKind || !(value > 0) ? this.usualSpacing() : value };
+    this.store.update({ lines });
+  }
+
+  /** Return the spacing that is drawn, or a round one, to begin with. */
+  usualSpacing: () => number = () => 1;
+}
+
+/** Return points as the page keeps them: positions become points of the surface. */
+export function resolved(mesh: string, points: WrittenPoint[]): Promise<Point[]> {
+  return Promise.all(
+    points.map((point) => ("position" in point ? locate(mesh, point.position) : point)),
+  );
+}
+
+function errorOf(slider: HTMLInputElement): number {
+  return Number((10 ** slider.valueAsNumber).toPrecision(2));
+}
+
+function showError(error: number): void {
+  const words = `${Number((100 * error).toPrecision(2))} %`;
+  byId("error-value").textContent = words;
+  byId("error-slider").setAttribute("aria-valuetext", words);
+}
+
+function onChoice(id: string, choose: (value: string) => void): void {
+  byId(id).addEventListener("change", (event) => choose((event.target as HTMLInputElement).value));
+}
+
+function choose(id: string, value: string): void {
+  document.querySelector<HTMLInputElement>(`#${id} input[value="${value}"]`)!.checked = true;
+}
+
+function setValue(id: string, value: string): void {
+  const field = byId(id, HTMLInputElement);
+  if (field !== document.activeElement || field.type !== "text") field.value = value;
+}

@@ -1,0 +1,103 @@
+// Where a mesh comes from: a file, a sample, the store.
+import { listMeshes, makeSample, uploadMesh } from "../api/meshes";
+import type { MeshDocument } from "../api/types";
+import { WITHOUT_POINTS, type Store } from "../state/state";
+import type { Status } from "../status";
+import { button, byId, count } from "../dom";
+
+const SAMPLES = [
+  ["knot", "Knot", 30_000],
+  ["sphere", "Sphere", 20_000],
+  ["terrain", "Terrain", 40_000],
+  ["obstacles", "Obstacles", 20_000],
+] as const;
+
+export class Meshes {
+  private readonly names = new Map<string, string>();
+
+  constructor(
+    private readonly store: Store,
+    private readonly status: Status,
+  ) {
+    for (const place of ["samples", "welcome-samples"]) {
+      const buttons = SAMPLES.map(([name, title, faces]) => {
+        const choice = button(title, () => this.take(`Making ${title}…`, title, () => makeSample(name, faces)));
+        choice.dataset.sample = name;
+        return choice;
+      });
+      byId(place).append(...buttons);
+    }
+    const file = byId("file", HTMLInputElement);
+    for (const id of ["pick", "welcome-pick"]) byId(id).addEventListener("click", () => file.click());
+    file.addEventListener("change", () => {
+      if (file.files?.[0]) this.upload(file.files[0]);
+      file.value = "";
+    });
+    byId("meshes").addEventListener("change", () => {
+      const id = byId("meshes", HTMLSelectElement).value;
+      if (id) store.update({ ...WITHOUT_POINTS, mesh: id });
+    });
+    this.acceptDrops();
+  }
+
+  /** Leave out the samples that this service does not make. */
+  offer(samples: readonly string[]): void {
+    for (const choice of document.querySelectorAll<HTMLButtonElement>("[data-sample]")) {
+      choice.hidden = !samples.includes(choice.dataset.sample!);
+    }
+  }
+
+  /** List what is in the store, and which of it is shown. */
+  async list(): Promise<void> {
+    const { meshes } = await listMeshes();
+    const select = byId("meshes", HTMLSelectElement);
+    const options = meshes.map((mesh) => new Option(this.nameOf(mesh), mesh.id));
+    select.replaceChildren(new Option(meshes.length > 0 ? "In the store…" : "The store is empty", ""), ...options);
+    this.showChosen();
+  }
+
+  showChosen(): void {
+    byId("meshes", HTMLSelectElement).value = this.store.state.mesh ?? "";
+  }
+
+  private nameOf({ id, faces }: MeshDocument): string {
+    return `${this.names.get(id) ?? id.slice(0, 8)}, ${count(faces, "face")}`;
+  }
+
+  private upload(file: File): void {
+    this.take(`Uploading ${file.name}…`, file.name, (onProgress, signal) =>
+      uploadMesh(file, onProgress, signal),
+    );
+  }
+
+  private take(
+    words: string,
+    name: string,
+    make: (onProgress: (share: number) => void, signal: AbortSignal) => Promise<MeshDocument>,
+  ): void {
+    const stop = new AbortController();
+    this.status.run("loading", words, stop, async (onProgress) => {
+      const mesh = await make(onProgress, stop.signal);
+      this.names.set(mesh.id, name);
+      this.store.update({ ...WITHOUT_POINTS, mesh: mesh.id });
+      await this.list();
+    });
+  }
+
+  private acceptDrops(): void {
+    const { classList } = document.body;
+    document.addEventListener("dragover", (event) => {
+      event.preventDefault();
+      classList.add("dropping");
+    });
+    document.addEventListener("dragleave", (event) => {
+      if (event.relatedTarget === null) classList.remove("dropping");
+    });
+    document.addEventListener("drop", (event) => {
+      event.preventDefault();
+      classList.remove("dropping");
+      const file = event.dataTransfer?.files[0];
+      if (file) this.upload(file);
+    });
+  }
+}

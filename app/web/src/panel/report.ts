@@ -1,0 +1,83 @@
+// What was found in a mesh, in words; what is at fault is marked on it.
+import type { MeshDocument } from "../api/types";
+import { positionOf } from "../mesh/picking";
+import type { Shown } from "../view/shown";
+import { button, byId, count, written } from "../dom";
+
+type Found = MeshDocument["degenerate_faces"];
+type Kind = "face" | "vertex" | "edge";
+
+export function showReport(document_: MeshDocument | null, shown: Shown): void {
+  const report = byId("report");
+  report.replaceChildren();
+  if (!document_) return;
+  const words = document.createElement("p");
+  words.textContent = describe(document_);
+  const list = document.createElement("ul");
+  for (const [found, noun, plural, kind] of faultsOf(document_)) {
+    if (found.count > 0) list.append(row(count(found.count, noun, plural), found, kind, shown));
+  }
+  for (const warning of document_.warnings) {
+    const line = document.createElement("li");
+    line.className = "warning";
+    line.textContent = warning;
+    list.append(line);
+  }
+  report.append(words, list);
+}
+
+function describe(mesh: MeshDocument): string {
+  const [low, high] = mesh.bounds;
+  const size = high.map((x, i) => written(x - low[i]!, 3)).join(" × ");
+  const parts = mesh.components === 1 ? "one piece" : count(mesh.components, "piece");
+  const rim =
+    mesh.boundary_loops === 0 ? "closed" : `with ${count(mesh.boundary_loops, "boundary", "boundaries")}`;
+  return (
+    `${count(mesh.vertices, "vertex", "vertices")}, ${count(mesh.faces, "face")}; ${parts}, ${rim}. ` +
+    `${size} mesh units, edges of ${written(mesh.mean_edge_length, 3)} on average.`
+  );
+}
+
+function faultsOf(mesh: MeshDocument): [Found, string, string, Kind][] {
+  return [
+    [mesh.non_manifold_edges, "edge of three or more faces", "edges of three or more faces", "edge"],
+    [mesh.misoriented_edges, "edge where winding flips", "edges where winding flips", "edge"],
+    [mesh.degenerate_faces, "face without area", "faces without area", "face"],
+    [mesh.repeated_vertex_faces, "face that repeats a vertex", "faces that repeat a vertex", "face"],
+    [mesh.duplicate_faces, "face twice", "faces twice", "face"],
+    [mesh.collapsed_faces, "collapsed face", "collapsed faces", "face"],
+    [mesh.zero_length_edges, "edge of no length", "edges of no length", "edge"],
+    [mesh.bow_tie_vertices, "vertex of several fans", "vertices of several fans", "vertex"],
+    [mesh.isolated_vertices, "vertex of no face", "vertices of no face", "vertex"],
+    [mesh.duplicate_vertices, "vertex twice", "vertices twice", "vertex"],
+  ];
+}
+
+function row(words: string, found: Found, kind: Kind, shown: Shown): HTMLLIElement {
+  const line = document.createElement("li");
+  const text = document.createElement("span");
+  text.textContent = words;
+  const shows = button("Show", () => {
+    const isShown = shows.getAttribute("aria-pressed") === "true";
+    for (const other of byId("report").querySelectorAll("button")) other.setAttribute("aria-pressed", "false");
+    shows.setAttribute("aria-pressed", String(!isShown));
+    if (isShown) shown.showFaults([], []);
+    else mark(found.ids, kind, shown);
+  });
+  shows.setAttribute("aria-pressed", "false");
+  shows.setAttribute("aria-label", `Show ${words}`);
+  line.append(text, shows);
+  return line;
+}
+
+/** Mark the first of what was found: the report has no more than ten ids of each. */
+function mark(ids: Found["ids"], kind: Kind, shown: Shown): void {
+  const mesh = shown.mesh;
+  if (!mesh) return;
+  const points = ids.map((id) => {
+    if (Array.isArray(id)) return positionOf(mesh, { edge: id as [number, number], t: 0.5 });
+    if (kind === "vertex") return mesh.vertex(id as number);
+    return positionOf(mesh, { face: id as number, barycentric: [1 / 3, 1 / 3, 1 / 3] });
+  });
+  shown.showFaults(kind === "face" ? (ids as number[]) : [], points);
+}

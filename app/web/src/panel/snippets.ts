@@ -1,0 +1,42 @@
+// The same question for curl and for Python.
+import type { Point } from "../api/types";
+import { questionOf } from "../ask/fields";
+import type { State } from "../state/state";
+
+interface Asked {
+  path: string;
+  body: unknown;
+}
+
+/** Return what is asked last: the path where there is a target, else the distances. */
+function askedOf(state: State, source: Point): Asked {
+  const { target, waypoints, barriers } = state;
+  const mesh = `/v1/meshes/${state.mesh}`;
+  if (!target) return { path: `${mesh}/distances`, body: questionOf(state, state.method) };
+  const more = { ...(waypoints.length > 0 && { waypoints }), ...(barriers.length > 0 && { barriers }) };
+  return { path: `${mesh}/path`, body: { source, target, ...more } };
+}
+
+export function curlOf(state: State, source: Point, origin: string, hasKey: boolean): string {
+  const { path, body } = askedOf(state, source);
+  const key = hasKey ? ` -H "Authorization: Bearer $GEODESIC_KEY"` : "";
+  return `curl '${origin}${path}'${key} -H 'Content-Type: application/json' \\\n  -d '${JSON.stringify(body)}'`;
+}
+
+export function pythonOf(state: State, source: Point, origin: string, hasKey: boolean): string {
+  const { path, body } = askedOf(state, source);
+  const key = hasKey ? `, "Authorization": "Bearer " + os.environ["GEODESIC_KEY"]` : "";
+  const told = state.target ? `answer["length"], answer["points"]` : `answer["distances"]`;
+  return [
+    "import json",
+    ...(hasKey ? ["import os"] : []),
+    "from urllib.request import Request, urlopen",
+    "",
+    `body = json.loads('${JSON.stringify(body)}')`,
+    `headers = {"Content-Type": "application/json"${key}}`,
+    `request = Request("${origin}${path}", json.dumps(body).encode(), headers)`,
+    "answer = json.load(urlopen(request))",
+    `print(${told})`,
+    "",
+  ].join("\n");
+}

@@ -1,0 +1,137 @@
+// What can be taken away: addresses, commands, files, a picture.
+import { authorization, post } from "../api/http";
+import type { About, Point } from "../api/types";
+import { questionOf } from "../ask/fields";
+import { writeState } from "../state/permalink";
+import type { State, Store } from "../state/state";
+import type { Status } from "../status";
+import type { Stage } from "../view/scene";
+import { button, byId } from "../dom";
+import { curlOf, pythonOf } from "./snippets";
+
+type What = "distances" | "path" | "isolines";
+
+const FORMATS: Record<What, string[]> = {
+  distances: ["npy", "csv", "ply"],
+  path: ["obj", "svg", "csv"],
+  isolines: ["obj", "svg"],
+};
+
+export class Take {
+  private formats: string[] = [];
+
+  constructor(
+    private readonly store: Store,
+    private readonly status: Status,
+    private readonly stage: Stage,
+  ) {
+    const hasKey = (): boolean => "Authorization" in authorization();
+    const { origin } = location;
+    onCopy("copy-link", "The link", () => origin + writeState({ ...store.state, view: stage.view }));
+    onCopy("copy-curl", "The command", () => curlOf(store.state, this.source(), origin, hasKey()));
+    onCopy("copy-python", "The program", () => pythonOf(store.state, this.source(), origin, hasKey()));
+    byId("picture").addEventListener("click", () => this.savePicture());
+  }
+
+  /** Offer what the service writes, and say what it does not. */
+  offer({ answer_formats }: Pick<About, "answer_formats">): void {
+    this.formats = Object.keys(answer_formats);
+    const lacking = new Set<string>();
+    for (const what of ["distances", "path", "isolines"] as const) {
+      const offered = FORMATS[what].filter((format) => this.formats.includes(format));
+      FORMATS[what].filter((format) => !offered.includes(format)).forEach((format) => lacking.add(format));
+      byId(`download-${what}`).replaceChildren(
+        ...offered.map((format) => {
+          const choice = button(format.toUpperCase(), () => this.save(what, format));
+          choice.setAttribute("aria-label", `Download ${what} as ${format.toUpperCase()}`);
+          return choice;
+        }),
+      );
+    }
+    if (lacking.size > 0) note(`This service does not write ${[...lacking].join(", ").toUpperCase()}.`);
+    this.show(this.store.state);
+  }
+
+  /** Let be taken what there is. */
+  show(state: State): void {
+    const hasField = state.mesh !== null && state.sources.length > 0;
+    const has = {
+      distances: hasField,
+      path: hasField && state.target !== null,
+      isolines: hasField && state.lines !== null,
+    };
+    for (const [what, isThere] of Object.entries(has)) {
+      for (const choice of byId(`download-${what}`).querySelectorAll("button")) choice.disabled = !isThere;
+    }
+    for (const id of ["copy-curl", "copy-python"]) byId(id, HTMLButtonElement).disabled = !hasField;
+    byId("picture", HTMLButtonElement).disabled = state.mesh === null;
+  }
+
+  private save(what: What, format: string): void {
+    const stop = new AbortController();
+    this.status.run("busy", `Fetching ${what}…`, stop, async () => {
+      const { mesh } = this.store.state;
+      const body = this.bodyOf(what);
+      const path = `/v1/meshes/${mesh}/${what}?format=${format}`;
+      const response = await post(path, body, {}, stop.signal);
+      download(await response.blob(), `${what}.${format}`);
+    });
+  }
+
+  private bodyOf(what: What): unknown {
+    const { state } = this.store;
+    const { target, waypoints, barriers, lines } = state;
+    if (what === "path") return { source: this.source(), target, waypoints, barriers };
+    const question = questionOf(state, state.method);
+    if (what === "distances" || lines === null) return question;
+    return { ...question, ...("count" in lines ? { count: lines.count } : { levels: this.levels(lines.spacing) }) };
+  }
+
+  /** The largest distance that is drawn. */
+  largest: () => number = () => 0;
+
+  /** Where the path begins that is drawn: of several sources at the nearest. */
+  nearest: () => Point | null = () => null;
+
+  private source(): Point {
+    return this.nearest() ?? this.store.state.sources[0]!;
+  }
+
+  private levels(spacing: number): number[] {
+    return Array.from({ length: Math.floor(this.largest() / spacing) }, (_, i) => (i + 1) * spacing);
+  }
+
+  private savePicture(): void {
+    const { canvas } = this.stage;
+    this.stage.renderNow();
+    const picture = document.createElement("canvas");
+    picture.width = canvas.width;
+    picture.height = canvas.height;
+    const context = picture.getContext("2d")!;
+    context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ground");
+    context.fillRect(0, 0, picture.width, picture.height);
+    context.drawImage(canvas, 0, 0);
+    picture.toBlob((blob) => download(blob!, "geodesic.png"), "image/png");
+  }
+}
+
+function onCopy(id: string, what: string, text: () => string): void {
+  byId(id).addEventListener("click", () => {
+    navigator.clipboard.writeText(text()).then(
+      () => note(`${what} is on the clipboard.`),
+      () => note("The browser did not let this page write to the clipboard."),
+    );
+  });
+}
+
+function note(words: string): void {
+  byId("take-note").textContent = words;
+}
+
+function download(blob: Blob, name: string): void {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}

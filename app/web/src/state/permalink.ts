@@ -1,0 +1,92 @@
+// The address of the page says all that is asked for: /?mesh=ID&source=v0&target=v99
+import type { Method } from "../api/types";
+import { parsePoint, writePoint, type WrittenPoint } from "./point";
+import { INITIAL, type Lines, type Shade, type State } from "./state";
+
+export type WrittenState = Omit<State, "sources" | "target" | "waypoints"> & {
+  sources: WrittenPoint[];
+  target: WrittenPoint | null;
+  waypoints: WrittenPoint[];
+};
+
+export function writeState(state: State): string {
+  const query = new URLSearchParams();
+  if (state.mesh) query.set("mesh", state.mesh);
+  for (const source of state.sources) query.append("source", writePoint(source));
+  if (state.target) query.set("target", writePoint(state.target));
+  for (const waypoint of state.waypoints) query.append("via", writePoint(waypoint));
+  if (state.barriers.length > 0) query.set("barriers", writeRanges(state.barriers));
+  if (state.method !== INITIAL.method) query.set("method", state.method);
+  if (state.error !== INITIAL.error) query.set("error", String(state.error));
+  if (state.maxDistance !== null) query.set("max_distance", String(state.maxDistance));
+  if (state.shade !== INITIAL.shade) query.set("shade", state.shade);
+  if (writeLines(state.lines) !== writeLines(INITIAL.lines)) query.set("lines", writeLines(state.lines));
+  if (state.wireframe) query.set("wireframe", "1");
+  if (state.view) query.set("view", state.view.map((x) => Number(x.toFixed(4))).join(","));
+  // Points are easier to read without escapes, which none of these needs in a query.
+  const text = query.toString().replaceAll("%2C", ",").replaceAll("%3A", ":");
+  return text ? `/?${text}` : "/";
+}
+
+export function readState(search: string): WrittenState {
+  const query = new URLSearchParams(search);
+  const target = query.get("target");
+  const view = query.get("view")?.split(",").map(Number);
+  return {
+    mesh: query.get("mesh"),
+    sources: query.getAll("source").map(parsePoint),
+    target: target === null ? null : parsePoint(target),
+    waypoints: query.getAll("via").map(parsePoint),
+    barriers: readRanges(query.get("barriers") ?? ""),
+    method: oneOf<Method>(query.get("method"), ["exact", "approximate"]),
+    error: positive(query.get("error")) ?? INITIAL.error,
+    maxDistance: positive(query.get("max_distance")),
+    shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference"]),
+    lines: readLines(query.get("lines")),
+    wireframe: query.get("wireframe") === "1",
+    view: view?.length === 6 && view.every(Number.isFinite) ? view : null,
+  };
+}
+
+function writeLines(lines: Lines): string {
+  if (lines === null) return "none";
+  return "count" in lines ? `count:${lines.count}` : `spacing:${lines.spacing}`;
+}
+
+function readLines(text: string | null): Lines {
+  if (text === "none") return null;
+  const [kind, value] = text?.split(":") ?? [];
+  const number = positive(value ?? null);
+  if (number !== null && kind === "count") return { count: Math.round(number) };
+  if (number !== null && kind === "spacing") return { spacing: number };
+  return INITIAL.lines;
+}
+
+/** Numbers as ranges, in order: 3,7,40-59. */
+export function writeRanges(numbers: number[]): string {
+  const ranges: [number, number][] = [];
+  for (const number of numbers.toSorted((a, b) => a - b)) {
+    const last = ranges.at(-1);
+    if (last && number <= last[1] + 1) last[1] = number;
+    else ranges.push([number, number]);
+  }
+  return ranges.map(([first, last]) => (first === last ? `${first}` : `${first}-${last}`)).join(",");
+}
+
+function readRanges(text: string): number[] {
+  return text.split(",").flatMap((part) => {
+    const match = /^(\d+)(?:-(\d+))?$/.exec(part);
+    if (!match) return [];
+    const [first, last] = [Number(match[1]), Number(match[2] ?? match[1])];
+    return Array.from({ length: Math.max(0, last - first + 1) }, (_, i) => first + i);
+  });
+}
+
+function oneOf<T extends string>(text: string | null, choices: [T, ...T[]]): T {
+  return choices.find((choice) => choice === text) ?? choices[0];
+}
+
+function positive(text: string | null): number | null {
+  const number = Number(text);
+  return Number.isFinite(number) && number > 0 ? number : null;
+}

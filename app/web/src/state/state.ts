@@ -1,0 +1,67 @@
+// What the page is asked for. Everything that is drawn follows from it.
+import type { Method, Point } from "../api/types";
+
+export type Shade = "distance" | "territories" | "difference";
+export type Lines = { count: number } | { spacing: number } | null;
+
+export interface State {
+  mesh: string | null;
+  sources: Point[];
+  target: Point | null;
+  waypoints: Point[];
+  barriers: number[];
+  method: Method;
+  error: number;
+  maxDistance: number | null;
+  shade: Shade;
+  lines: Lines;
+  wireframe: boolean;
+  /** Azimuth, polar angle, distance and the point looked at, as drawn; null: the whole mesh. */
+  view: number[] | null;
+}
+
+export const INITIAL: State = {
+  mesh: null,
+  sources: [],
+  target: null,
+  waypoints: [],
+  barriers: [],
+  method: "exact",
+  error: 0.01,
+  maxDistance: null,
+  shade: "distance",
+  lines: { count: 20 },
+  wireframe: false,
+  view: null,
+};
+
+type Listener = (state: State, before: State) => void;
+
+export class Store {
+  private current = INITIAL;
+  private readonly listeners: Listener[] = [];
+
+  get state(): State {
+    return this.current;
+  }
+
+  update(change: Partial<State>): void {
+    const before = this.current;
+    this.current = { ...before, ...change };
+    for (const listener of this.listeners) listener(this.current, before);
+  }
+
+  listen(listener: Listener): void {
+    this.listeners.push(listener);
+  }
+}
+
+/** What does not outlive a mesh. */
+export const WITHOUT_POINTS = {
+  sources: [],
+  target: null,
+  waypoints: [],
+  barriers: [],
+  maxDistance: null,
+  view: null,
+} satisfies Partial<State>;

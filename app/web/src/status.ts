@@ -1,0 +1,109 @@
+// What the page is doing: loading, ready, busy or error, for the eye, for the reader, for tests.
+import { isAbort, Refusal, setKey } from "./api/http";
+import { byId } from "./dom";
+
+type Kind = "loading" | "busy";
+type Work<T> = (onProgress: (share: number) => void) => Promise<T>;
+
+interface Task {
+  kind: Kind;
+  words: string;
+  share: number | null;
+  stop: AbortController;
+}
+
+export class Status {
+  private readonly tasks = new Set<Task>();
+  private hasFailed = false;
+  /** Called with a key that was typed in. */
+  onKey: () => void = () => undefined;
+
+  constructor(private readonly drawn: () => Promise<void>) {
+    byId("cancel").addEventListener("click", () => this.cancel());
+    byId("error-close").addEventListener("click", () => this.forget());
+    byId("key-form").addEventListener("submit", (event) => {
+      event.preventDefault();
+      setKey(byId("key", HTMLInputElement).value);
+      this.forget();
+      this.onKey();
+    });
+  }
+
+  /** Do ``work`` where everyone sees it; what it fails with is thrown on. */
+  async during<T>(kind: Kind, words: string, stop: AbortController, work: Work<T>): Promise<T> {
+    const task: Task = { kind, words, share: null, stop };
+    this.tasks.add(task);
+    this.hasFailed = false;
+    this.show();
+    try {
+      return await work((share) => {
+        task.share = share;
+        this.show();
+      });
+    } finally {
+      this.tasks.delete(task);
+      this.show();
+    }
+  }
+
+  /** The same, for work of which nobody awaits the end. */
+  run(kind: Kind, words: string, stop: AbortController, work: Work<void>): void {
+    this.during(kind, words, stop, work).catch((error: unknown) => this.fail(error));
+  }
+
+  cancel(): void {
+    for (const task of this.tasks) task.stop.abort();
+  }
+
+  fail(error: unknown): void {
+    if (isAbort(error)) return;
+    this.hasFailed = true;
+    this.tell(error);
+    this.show();
+  }
+
+  private forget(): void {
+    this.hasFailed = false;
+    this.show();
+  }
+
+  private tell(error: unknown): void {
+    const problem = error instanceof Refusal ? error.problem : null;
+    const isOffline = error instanceof TypeError && /fetch/i.test(error.message);
+    byId("error-title").textContent =
+      problem?.title ?? (isOffline ? "The service does not answer" : "This did not work");
+    byId("error-detail").textContent = isOffline
+      ? "It may have been stopped, or the network be down."
+      : error instanceof Error
+        ? error.message
+        : String(error);
+    byId("error-hint").textContent = problem?.hint ?? "";
+    byId("error-request").textContent = problem?.request_id ? `Request ${problem.request_id}` : "";
+    byId("key-form").hidden = problem?.status !== 401;
+    if (!isOffline && !problem) console.error(error);
+  }
+
+  private show(): void {
+    byId("error").hidden = !this.hasFailed;
+    const task = [...this.tasks].at(-1);
+    const isLoading = [...this.tasks].some(({ kind }) => kind === "loading");
+    if (task) {
+      byId("waiting-for").textContent = task.words;
+      const progress = byId("progress", HTMLProgressElement);
+      if (task.share === null) progress.removeAttribute("value");
+      else progress.value = task.share;
+      this.state = isLoading ? "loading" : "busy";
+    } else if (this.hasFailed) {
+      this.state = "error";
+    } else {
+      void this.drawn().then(() => {
+        if (this.tasks.size === 0 && !this.hasFailed) this.state = "ready";
+      });
+    }
+  }
+
+  private set state(state: Kind | "ready" | "error") {
+    const { dataset } = document.documentElement;
+    if (dataset.state !== state) dataset.state = state;
+  }
+}

@@ -1,0 +1,69 @@
+// The mesh as an image with its depths, so that what moves over it is drawn without drawing it again.
+import {
+  AlwaysDepth,
+  Camera,
+  DepthTexture,
+  Mesh,
+  NoBlending,
+  PlaneGeometry,
+  Scene,
+  ShaderMaterial,
+  Vector2,
+  WebGLRenderTarget,
+  type WebGLRenderer,
+} from "three";
+
+const VERTEX = /* glsl */ `
+  varying vec2 place;
+  void main() {
+    place = uv;
+    gl_Position = vec4(position.xy, 0.0, 1.0);
+  }`;
+
+const FRAGMENT = /* glsl */ `
+  uniform sampler2D colours;
+  uniform sampler2D depths;
+  varying vec2 place;
+  void main() {
+    gl_FragColor = texture2D(colours, place);
+    gl_FragDepth = texture2D(depths, place).r;
+  }`;
+
+export class Backdrop {
+  private isFresh = false;
+  private readonly target = new WebGLRenderTarget(1, 1, { samples: 4, depthTexture: new DepthTexture(1, 1) });
+  private readonly screen = new Scene();
+  private readonly camera = new Camera();
+
+  constructor(private readonly renderer: WebGLRenderer) {
+    const material = new ShaderMaterial({
+      uniforms: { colours: { value: this.target.texture }, depths: { value: this.target.depthTexture } },
+      vertexShader: VERTEX,
+      fragmentShader: FRAGMENT,
+      blending: NoBlending,
+      depthFunc: AlwaysDepth,
+    });
+    const quad = new Mesh(new PlaneGeometry(2, 2), material);
+    quad.frustumCulled = false;
+    this.screen.add(quad);
+  }
+
+  /** Draw what ``scene`` looked like when it was last asked for after it had changed. */
+  draw(scene: Scene, camera: Camera): void {
+    if (!this.isFresh) {
+      const size = this.renderer.getDrawingBufferSize(new Vector2());
+      this.target.setSize(size.x, size.y);
+      this.renderer.setRenderTarget(this.target);
+      this.renderer.clear();
+      this.renderer.render(scene, camera);
+      this.renderer.setRenderTarget(null);
+      this.isFresh = true;
+    }
+    this.renderer.render(this.screen, this.camera);
+  }
+
+  /** Tell that the scene, or the camera, has changed. */
+  forget(): void {
+    this.isFresh = false;
+  }
+}

@@ -1,0 +1,49 @@
+// Colours of distances and of territories.
+
+export type Rgb = [number, number, number];
+
+const SIZE = 256;
+
+/**
+ * From dark indigo over teal to light yellow: lightness grows evenly, as eyes have it (OKLab), so
+ * that equal steps of distance look equal, and no kind of colour blindness hides the order.
+ */
+export const RAMP: readonly Rgb[] = Array.from({ length: SIZE }, (_, i) => rampAt(i / (SIZE - 1)));
+
+function rampAt(t: number): Rgb {
+  const chroma = 0.115 + 0.03 * Math.cos(2 * Math.PI * t); // as much as screens have on the way
+  return fromOklch(0.28 + 0.65 * t, chroma, ((300 - 200 * t) * Math.PI) / 180);
+}
+
+/** OKLCh to sRGB, by the matrices of its definition. */
+function fromOklch(lightness: number, chroma: number, hue: number): Rgb {
+  const [a, b] = [chroma * Math.cos(hue), chroma * Math.sin(hue)];
+  const l = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3;
+  const m = (lightness - 0.1055613458 * a - 0.0638541728 * b) ** 3;
+  const s = (lightness - 0.0894841775 * a - 1.291485548 * b) ** 3;
+  const linear = [
+    4.0767416621 * l - 3.3077115913 * m + 0.2309699292 * s,
+    -1.2684380046 * l + 2.6097574011 * m - 0.3413193965 * s,
+    -0.0041960863 * l - 0.7034186147 * m + 1.707614701 * s,
+  ];
+  return linear.map((x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055)) as Rgb;
+}
+
+/** Colours that remain apart for the colour-blind (Okabe and Ito), but for black. */
+const TERRITORIES: readonly Rgb[] = [
+  [0.902, 0.624, 0.0],
+  [0.337, 0.706, 0.914],
+  [0.0, 0.62, 0.451],
+  [0.941, 0.894, 0.259],
+  [0.0, 0.447, 0.698],
+  [0.835, 0.369, 0.0],
+  [0.8, 0.475, 0.655],
+];
+
+export function territory(index: number): Rgb {
+  return TERRITORIES[index % TERRITORIES.length]!;
+}
+
+export function css(colour: Rgb): string {
+  return `rgb(${colour.map((x) => Math.round(255 * x)).join(" ")})`;
+}

@@ -1,0 +1,44 @@
+// What the colours mean.
+import { css, RAMP, territory } from "./colours";
+import { byId, written } from "../dom";
+
+export function drawRamp(): void {
+  const strip = byId("ramp", HTMLCanvasElement);
+  strip.width = RAMP.length;
+  strip.height = 1;
+  const context = strip.getContext("2d")!;
+  RAMP.forEach((colour, i) => {
+    context.fillStyle = css(colour);
+    context.fillRect(i, 0, 1, 1);
+  });
+}
+
+export function hideLegend(): void {
+  byId("legend").hidden = true;
+}
+
+/** Show the scale from 0 to ``largest``. */
+export function showScale(title: string, largest: number): void {
+  byId("legend").hidden = false;
+  byId("legend-title").textContent = title;
+  byId("territories").replaceChildren();
+  byId("scale").hidden = false;
+  [0, 0.5, 1].forEach((share, i) => (byId(`tick-${i}`).textContent = written(share * largest, 3)));
+}
+
+/** Show whose territory has which colour. */
+export function showTerritories(sources: string[]): void {
+  byId("legend").hidden = false;
+  byId("legend-title").textContent = "Nearest source";
+  byId("scale").hidden = true;
+  byId("territories").replaceChildren(
+    ...sources.map((name, i) => {
+      const row = document.createElement("li");
+      const dot = document.createElement("span");
+      dot.className = "dot";
+      dot.style.background = css(territory(i));
+      row.append(dot, name);
+      return row;
+    }),
+  );
+}

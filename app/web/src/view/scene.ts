@@ -1,0 +1,183 @@
+// The canvas: a camera around what is drawn, and a frame when something has changed.
+import {
+  ColorManagement,
+  LinearSRGBColorSpace,
+  PerspectiveCamera,
+  Scene,
+  Spherical,
+  Vector3,
+  WebGLRenderer,
+  type Object3D,
+} from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import { Backdrop } from "./backdrop";
+
+ColorManagement.enabled = false; // colours are written as they are shown
+
+const AWAY = 2.9; // of the camera from the unit ball, in its radii
+
+export class Stage {
+  private readonly scene = new Scene();
+  /** What moves while the mesh stands still: drawn over it. */
+  private readonly overlay = new Scene();
+  private readonly backdrop: Backdrop;
+  readonly camera = new PerspectiveCamera(38, 1, 0.01, 50);
+  readonly controls: OrbitControls;
+  readonly renderer: WebGLRenderer;
+  onMove: (view: number[]) => void = () => undefined;
+  onFrame: () => void = () => undefined;
+  private isDue = false;
+  private isStill = false;
+  private readonly waiting: (() => void)[] = [];
+
+  constructor(readonly canvas: HTMLCanvasElement) {
+    this.renderer = new WebGLRenderer({ canvas, antialias: true, alpha: true });
+    this.renderer.outputColorSpace = LinearSRGBColorSpace;
+    this.renderer.autoClear = false;
+    this.backdrop = new Backdrop(this.renderer);
+    this.renderer.debug.checkShaderErrors = false; // asking would wait for the compiler
+    this.controls = new OrbitControls(this.camera, canvas);
+    this.controls.zoomToCursor = true;
+    this.controls.rotateSpeed = 0.9;
+    this.controls.addEventListener("change", () => this.invalidate());
+    let before: number[] = [];
+    this.controls.addEventListener("start", () => (before = this.view));
+    this.controls.addEventListener("end", () => {
+      if (this.view.some((x, i) => Math.abs(x - before[i]!) > 1e-4)) this.onMove(this.view);
+    });
+    this.look(null);
+    new ResizeObserver(() => this.resize()).observe(canvas);
+    this.resize();
+  }
+
+  /** Draw a frame soon. */
+  invalidate(): void {
+    this.isStill = false;
+    this.backdrop.forget();
+    this.schedule();
+  }
+
+  /** Draw a frame soon, in which only the overlay is another. */
+  invalidateOverlay(): void {
+    this.schedule();
+  }
+
+  private schedule(): void {
+    if (this.isDue) return;
+    this.isDue = true;
+    requestAnimationFrame(() => this.render());
+  }
+
+  /** Wait until what is there now has been drawn. */
+  drawn(): Promise<void> {
+    this.schedule();
+    return new Promise((resolve) => this.waiting.push(resolve));
+  }
+
+  /** Have all that draws an object compiled before it is waited for. */
+  warmUp(object: Object3D): void {
+    this.scene.add(object);
+    this.renderNow();
+    this.renderNow(); // by way of the backdrop
+    this.scene.remove(object);
+    this.invalidate();
+  }
+
+  add(object: Object3D): void {
+    this.scene.add(object);
+    this.invalidate();
+  }
+
+  addOverlay(object: Object3D): void {
+    this.overlay.add(object);
+    this.invalidateOverlay();
+  }
+
+  remove(object: Object3D): void {
+    this.scene.remove(object);
+    this.invalidate();
+  }
+
+  /** Azimuth, polar angle and distance of the camera, and the point that it looks at. */
+  get view(): number[] {
+    const { target } = this.controls;
+    const away = new Spherical().setFromVector3(this.camera.position.clone().sub(target));
+    return [away.theta, away.phi, away.radius, target.x, target.y, target.z];
+  }
+
+  /** Look as ``view`` says; null: at all of it. */
+  look(view: number[] | null): void {
+    const [theta, phi, radius, x, y, z] = view ?? this.viewFrom(new Vector3(0.5, 0.35, 0.8));
+    this.controls.target.set(x!, y!, z!);
+    this.camera.position.setFromSpherical(new Spherical(radius, phi, theta)).add(this.controls.target);
+    this.controls.update();
+    this.camera.updateMatrixWorld(); // what is picked before the next frame is picked from here
+    this.invalidate();
+  }
+
+  /** Return the view of all of it, from a direction; not quite from above, where up is nowhere. */
+  viewFrom(direction: Vector3): number[] {
+    const { theta, phi } = new Spherical().setFromVector3(direction);
+    const away = AWAY / Math.min(1, this.canvas.clientWidth / this.canvas.clientHeight);
+    return [theta, Math.min(Math.max(phi, 0.4), Math.PI - 0.4), away, 0, 0, 0];
+  }
+
+  /** Turn by angles, and come nearer by a factor, as keys ask for. */
+  turn(azimuth: number, polar: number, nearer = 1): void {
+    const [theta, phi, radius, ...target] = this.view as [number, number, number, ...number[]];
+    const tilt = Math.min(Math.max(phi + polar, 0.02), Math.PI - 0.02);
+    this.look([theta + azimuth, tilt, radius / nearer, ...target]);
+    this.onMove(this.view);
+  }
+
+  /** Return a place on the canvas (-1 to 1, y upwards) of a pointer. */
+  toDevice(event: { clientX: number; clientY: number }): [number, number] {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    return [(2 * (event.clientX - left)) / width - 1, 1 - (2 * (event.clientY - top)) / height];
+  }
+
+  /** Return where a drawn position is on the page, in pixels. */
+  toPage(position: Vector3): [number, number] {
+    const { left, top, width, height } = this.canvas.getBoundingClientRect();
+    const { x, y } = position.clone().project(this.camera);
+    return [left + ((x + 1) / 2) * width, top + ((1 - y) / 2) * height];
+  }
+
+  /** Pixels that a drawn length takes at the point looked at. */
+  get pixelsPerUnit(): number {
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const height = 2 * distance * Math.tan((this.camera.fov * Math.PI) / 360);
+    return this.canvas.clientHeight / height;
+  }
+
+  private resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (width === 0 || height === 0) return;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.invalidate();
+  }
+
+  /** Draw now, so that the canvas can be read before the browser shows it. */
+  renderNow(): void {
+    this.renderer.clear();
+    if (this.isStill) this.backdrop.draw(this.scene, this.camera);
+    else this.renderer.render(this.scene, this.camera);
+    this.isStill = true;
+    this.renderer.render(this.overlay, this.camera);
+  }
+
+  private render(): void {
+    this.isDue = false;
+    // The unit ball has all of the range of depths.
+    const away = this.camera.position.length();
+    this.camera.near = Math.max(0.01, away - 1.2);
+    this.camera.far = away + 1.2;
+    this.camera.updateProjectionMatrix();
+    this.onFrame();
+    this.renderNow();
+    for (const resolve of this.waiting.splice(0)) resolve();
+  }
+}

@@ -1,0 +1,117 @@
+// The mesh on the stage, with all that is drawn on it.
+import { Mesh, PlaneGeometry, Vector3 } from "three";
+import type { MeshBVH } from "three-mesh-bvh";
+import type { MeshDocument, Outline, Point } from "../api/types";
+import { loadMesh, type LoadedMesh } from "../mesh/loader";
+import { pick, positionOf, type FacePoint } from "../mesh/picking";
+import type { State } from "../state/state";
+import { territory, type Rgb } from "./colours";
+import { Markers, type Mark } from "./markers";
+import { Patch } from "./patch";
+import { RouteLine } from "./route";
+import { showScaleBar } from "./scalebar";
+import type { Stage } from "./scene";
+import { Surface, surfacePaint } from "./surface";
+
+const SOURCE: Rgb = [0.09, 0.13, 0.24];
+const TARGET: Rgb = [0.9, 0, 0.36];
+const WAYPOINT: Rgb = [0.96, 0.62, 0.04];
+const FAULT: Rgb = [0.85, 0.1, 0.1];
+
+export class Shown {
+  readonly barriers: Patch;
+  readonly region: Patch;
+  readonly faults: Patch;
+  mesh: LoadedMesh | null = null;
+  surface: Surface | null = null;
+  private readonly paint = surfacePaint();
+  private tree: MeshBVH | null = null;
+  private readonly points: Markers;
+  private readonly faultPoints: Markers;
+  private readonly route: RouteLine;
+
+  constructor(readonly stage: Stage) {
+    this.barriers = new Patch(stage, 0x15181f, 0.82);
+    this.region = new Patch(stage, 0xff8a1f, 0.6);
+    this.faults = new Patch(stage, 0xd9121f, 0.9);
+    this.route = new RouteLine(stage);
+    this.points = new Markers(stage);
+    this.faultPoints = new Markers(stage);
+    this.warmUp();
+    stage.onFrame = () => showScaleBar(stage, this.mesh?.frame.radius ?? null);
+  }
+
+  async open(document: MeshDocument, signal: AbortSignal): Promise<void> {
+    const mesh = await loadMesh(document, signal);
+    this.close();
+    this.mesh = mesh;
+    this.surface = new Surface(mesh, this.paint);
+    this.stage.add(this.surface.object);
+    await this.stage.drawn();
+    this.tree = await mesh.tree;
+  }
+
+  /** Draw one of each once, of no extent, so that later none waits for its shader. */
+  private warmUp(): void {
+    this.points.show([{ position: [0, 0, 0], fill: SOURCE, size: 0 }]);
+    this.route.show([[0, 0, 0], [0, 0, 0]]);
+    this.stage.warmUp(new Mesh(new PlaneGeometry(0, 0), this.paint));
+    this.points.show([]);
+    this.route.show([]);
+  }
+
+  close(): void {
+    if (!this.mesh || !this.surface) return;
+    this.stage.remove(this.surface.object);
+    this.surface.dispose();
+    this.mesh.dispose();
+    this.mesh = this.surface = this.tree = null;
+    for (const patch of [this.barriers, this.region, this.faults]) patch.show(null, []);
+    this.points.show([]);
+    this.faultPoints.show([]);
+    this.route.show([]);
+  }
+
+  /** Return the point of the surface under a place of the canvas, or null where there is none. */
+  pick(x: number, y: number): FacePoint | null {
+    return this.mesh && this.tree ? pick(this.mesh, this.tree, this.stage.camera, x, y) : null;
+  }
+
+  /** Return the view in which points are seen; null where there are none. */
+  viewOf({ sources, target }: State): number[] | null {
+    const mesh = this.mesh;
+    const points = target ? [...sources, target] : sources;
+    if (!mesh || points.length === 0) return null;
+    const normals = mesh.geometry.getAttribute("normal");
+    const direction = new Vector3();
+    for (const point of points) {
+      const corner = "vertex" in point ? point.vertex : "edge" in point ? point.edge[0] : mesh.corners(point.face)[0];
+      direction.add(new Vector3().fromBufferAttribute(normals, corner));
+    }
+    return this.stage.viewFrom(direction);
+  }
+
+  showPoints({ sources, target, waypoints, shade }: State): void {
+    const fill = (i: number): Rgb => (shade === "territories" ? territory(i) : SOURCE);
+    this.points.show([
+      ...sources.map((source, i) => this.mark(source, fill(i), 17)),
+      ...waypoints.map((waypoint) => this.mark(waypoint, WAYPOINT, 14)),
+      ...(target ? [this.mark(target, TARGET, 17)] : []),
+    ]);
+  }
+
+  showRoute(outline: Outline | null): void {
+    const points = this.mesh ? (outline?.points ?? []) : [];
+    this.route.show(points.map((point) => this.mesh!.drawn(point)));
+  }
+
+  showFaults(faces: number[], points: [number, number, number][]): void {
+    this.faults.show(this.mesh, faces);
+    const marks = points.map((point) => ({ position: this.mesh!.drawn(point), fill: FAULT, size: 13 }));
+    this.faultPoints.show(marks);
+  }
+
+  private mark(point: Point, fill: Rgb, size: number): Mark {
+    return { position: this.mesh!.drawn(positionOf(this.mesh!, point)), fill, size };
+  }
+}

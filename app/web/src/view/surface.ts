@@ -1,0 +1,176 @@
+// The mesh as it is drawn: distance as colour, with isolines as stripes.
+import {
+  BufferAttribute,
+  Color,
+  DataTexture,
+  DoubleSide,
+  LineBasicMaterial,
+  LineSegments,
+  BufferGeometry,
+  LinearFilter,
+  Mesh,
+  RGBAFormat,
+  ShaderMaterial,
+} from "three";
+import type { LoadedMesh } from "../mesh/loader";
+import { RAMP, territory, type Rgb } from "./colours";
+
+const VERTEX = /* glsl */ `
+  attribute float value;
+  attribute vec3 tint;
+  varying float v_value;
+  varying vec3 v_tint;
+  varying vec3 v_normal;
+  varying vec3 v_eye;
+  void main() {
+    v_value = value;
+    v_tint = tint;
+    v_normal = normalMatrix * normal;
+    vec4 eye = modelViewMatrix * vec4(position, 1.0);
+    v_eye = eye.xyz;
+    gl_Position = projectionMatrix * eye;
+  }`;
+
+// Values below 0 are none: such a vertex draws a face that is not reached as a whole into grey.
+const FRAGMENT = /* glsl */ `
+  uniform sampler2D ramp;
+  uniform float largest;
+  uniform float spacing;
+  uniform float tinted;
+  uniform vec3 clay;
+  varying float v_value;
+  varying vec3 v_tint;
+  varying vec3 v_normal;
+  varying vec3 v_eye;
+  void main() {
+    vec3 colour = clay;
+    if (v_value >= 0.0) {
+      float share = clamp(v_value / largest, 0.0, 1.0);
+      colour = texture2D(ramp, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
+      colour = mix(colour, v_tint * (1.06 - 0.36 * share), tinted);
+      if (spacing > 0.0) {
+        float level = v_value / spacing;
+        float width = fwidth(level);
+        float away = abs(fract(level - 0.5) - 0.5) / max(width, 1e-6);
+        float line = (1.0 - smoothstep(0.4, 1.4, away)) * (1.0 - smoothstep(0.25, 0.7, width));
+        line *= step(0.5, level);
+        colour = mix(colour, share > 0.45 ? colour * 0.35 : colour + vec3(0.42), line * 0.85);
+      }
+    }
+    vec3 normal = normalize(v_normal);
+    vec3 eye = normalize(-v_eye);
+    if (dot(normal, eye) < 0.0) normal = -normal; // from behind, or of a mesh wound the other way
+    float key = max(dot(normal, normalize(vec3(0.35, 0.6, 0.9))), 0.0);
+    float sky = 0.5 + 0.5 * normal.y;
+    float gloss = pow(max(dot(normal, normalize(eye + vec3(0.35, 0.6, 0.9))), 0.0), 48.0);
+    float edge = pow(1.0 - max(dot(normal, eye), 0.0), 4.0);
+    colour *= 0.50 + 0.14 * sky + 0.44 * key;
+    colour += 0.10 * gloss + 0.06 * edge;
+    gl_FragColor = vec4(colour, 1.0);
+  }`;
+
+/** What all surfaces are painted with: made once, since a shader takes long to compile. */
+export function surfacePaint(): ShaderMaterial {
+  return new ShaderMaterial({
+    uniforms: {
+      ramp: { value: rampTexture() },
+      largest: { value: 1 },
+      spacing: { value: 0 },
+      tinted: { value: 0 },
+      clay: { value: new Color().setRGB(0.72, 0.74, 0.78) },
+    },
+    vertexShader: VERTEX,
+    fragmentShader: FRAGMENT,
+    side: DoubleSide,
+    // What lies on the surface is drawn before it.
+    polygonOffset: true,
+    polygonOffsetFactor: 1,
+    polygonOffsetUnits: 1,
+  });
+}
+
+export class Surface {
+  readonly object: Mesh<BufferGeometry, ShaderMaterial>;
+  private readonly values: BufferAttribute;
+  private readonly tints: BufferAttribute;
+  private wires: LineSegments<BufferGeometry, LineBasicMaterial> | undefined;
+
+  constructor(
+    private readonly mesh: LoadedMesh,
+    private readonly paint: ShaderMaterial,
+  ) {
+    const count = mesh.geometry.getAttribute("position").count;
+    this.values = new BufferAttribute(new Float32Array(count).fill(-1), 1);
+    this.tints = new BufferAttribute(new Float32Array(3 * count), 3);
+    mesh.geometry.setAttribute("value", this.values);
+    mesh.geometry.setAttribute("tint", this.tints);
+    mesh.geometry.computeBoundingSphere();
+    this.object = new Mesh(mesh.geometry, paint);
+    this.colour(null, 1);
+    this.divide(null);
+    this.stripe(0);
+  }
+
+  /** Colour by values at vertices, of which those that are not finite are grey; null: by none. */
+  colour(values: ArrayLike<number> | null, largest: number): void {
+    const array = this.values.array;
+    for (let i = 0; i < array.length; i++) {
+      const value = values ? values[i]! : -1;
+      array[i] = value >= 0 && value < Infinity ? value : -1e9;
+    }
+    this.values.needsUpdate = true;
+    this.uniform("largest").value = largest || 1;
+  }
+
+  /** Colour by the nearest source of each vertex; null: by value alone. */
+  divide(nearest: Int32Array | null): void {
+    this.uniform("tinted").value = nearest ? 1 : 0;
+    if (!nearest) return;
+    const array = this.tints.array;
+    for (let i = 0; i < nearest.length; i++) {
+      if (nearest[i]! >= 0) array.set(territory(nearest[i]!), 3 * i);
+    }
+    this.tints.needsUpdate = true;
+  }
+
+  /** Draw isolines so far apart; 0: none. */
+  stripe(spacing: number): void {
+    this.uniform("spacing").value = spacing;
+  }
+
+  async setWireframe(shown: boolean, colour: Rgb): Promise<void> {
+    if (shown && !this.wires) {
+      const edges = await this.mesh.allEdges();
+      if (this.wires) return;
+      const geometry = new BufferGeometry();
+      geometry.setAttribute("position", this.mesh.geometry.getAttribute("position"));
+      geometry.setIndex(new BufferAttribute(edges, 1));
+      const material = new LineBasicMaterial({ transparent: true, opacity: 0.35 });
+      this.wires = new LineSegments(geometry, material);
+      this.object.add(this.wires);
+    }
+    if (this.wires) {
+      this.wires.visible = shown;
+      this.wires.material.color.setRGB(...colour);
+    }
+  }
+
+  dispose(): void {
+    this.wires?.geometry.dispose();
+    this.wires?.material.dispose();
+  }
+
+  private uniform(name: string): { value: unknown } {
+    return this.paint.uniforms[name]!;
+  }
+}
+
+function rampTexture(): DataTexture {
+  const pixels = Uint8Array.from(
+    RAMP.flatMap((colour) => [...colour.map((x) => Math.round(255 * x)), 255]),
+  );
+  const texture = new DataTexture(pixels, RAMP.length, 1, RGBAFormat);
+  texture.minFilter = texture.magFilter = LinearFilter;
+  texture.needsUpdate = true;
+  return texture;
+}

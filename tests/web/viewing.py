@@ -1,0 +1,77 @@
+"""The page as someone sees it and uses it."""
+
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+from playwright.sync_api import Page
+
+Pixel = tuple[float, float]
+
+
+class View:
+    """A page, what it wrote to the console, and what is to be seen on it."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.errors: list[str] = []
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+
+    def open(self, address: str = "/") -> None:
+        self.page.goto(address)
+        self.wait()
+
+    def wait(self, state: str = "ready") -> None:
+        """Wait until the page is in a state, for so long that it is there to stay."""
+        there = self.page.locator(f"html[data-state={state}]")
+        while True:
+            there.wait_for()
+            self.page.wait_for_timeout(50)
+            if there.count():
+                return
+
+    @property
+    def centre(self) -> Pixel:
+        box = self.page.locator("#canvas").bounding_box()
+        assert box is not None
+        return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def click(self, x: float = 0, y: float = 0, *modifiers: Any) -> None:
+        """Click beside the middle of the mesh, so many pixels to the right and down."""
+        centre = self.centre
+        for key in modifiers:
+            self.page.keyboard.down(key)
+        self.page.mouse.click(centre[0] + x, centre[1] + y)
+        for key in modifiers:
+            self.page.keyboard.up(key)
+        self.wait()
+
+    def drag(self, *places: Pixel, steps: int = 4) -> None:
+        """Press at the first of some places beside the middle, move to the others, let go."""
+        x, y = self.centre
+        mouse = self.page.mouse
+        mouse.move(x + places[0][0], y + places[0][1])
+        mouse.down()
+        for place in places[1:]:
+            mouse.move(x + place[0], y + place[1], steps=steps)
+        mouse.up()
+        self.wait()
+
+    def pixels(self) -> NDArray[np.int64]:
+        """Return what is on the screen, (H, W, 3)."""
+        image = Image.open(BytesIO(self.page.screenshot())).convert("RGB")
+        return np.asarray(image, np.int64)
+
+    def colour(
+        self, x: float = 0, y: float = 0, pixels: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float64]:
+        """Return the median colour around a place beside the middle of the mesh."""
+        column, row = (round(a + b) for a, b in zip(self.centre, (x, y), strict=True))
+        image = self.pixels() if pixels is None else pixels
+        patch = image[row - 2 : row + 3, column - 2 : column + 3]
+        return np.asarray(np.median(patch.reshape(-1, 3), axis=0))
+
+    def text(self, selector: str) -> str:
+        return self.page.inner_text(selector)
