@@ -32,6 +32,9 @@ const FRAGMENT = /* glsl */ `
     gl_FragColor = vec4(colour, opacity * smoothstep(0.0, ratio, rim));
   }`;
 
+/** A target that is dragged is drawn together with the path to it, where that comes soon. */
+const PATIENCE_MS = 40;
+
 export interface Mark {
   position: [number, number, number];
   fill: Rgb;
@@ -62,7 +65,7 @@ export class Markers {
       points.visible = marks.length > 0;
       points.material.uniforms.ratio!.value = ratio;
     }
-    this.stage.invalidateOverlay();
+    this.stage.invalidateOverlay(PATIENCE_MS);
   }
 
   private points(opacity: number, depthTest: boolean, order: number): Points<BufferGeometry, ShaderMaterial> {

@@ -27,6 +27,7 @@ export class Stage {
   onMove: (view: number[]) => void = () => undefined;
   onFrame: () => void = () => undefined;
   private isDue = false;
+  private patient = 0;
   private isStill = false;
   private readonly waiting: (() => void)[] = [];
 
@@ -57,9 +58,10 @@ export class Stage {
     this.schedule();
   }
 
-  /** Draw a frame soon, in which only the overlay is another. */
-  invalidateOverlay(): void {
-    this.schedule();
+  /** Draw a frame soon, in which only the overlay is another; it may wait some ms for more to draw. */
+  invalidateOverlay(patience = 0): void {
+    if (patience === 0) this.schedule();
+    else this.patient ||= setTimeout(() => this.schedule(), patience);
   }
 
   private schedule(): void {
@@ -171,6 +173,8 @@ export class Stage {
 
   private render(): void {
     this.isDue = false;
+    clearTimeout(this.patient);
+    this.patient = 0;
     // The unit ball has all of the range of depths.
     const away = this.camera.position.length();
     this.camera.near = Math.max(0.01, away - 1.2);
