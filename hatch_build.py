@@ -46,7 +46,11 @@ def build(root: Path) -> None:
 
     web = root / "app" / "web"
     programs = Path(executable.ROOT_DIR) / ("" if os.name == "nt" else "bin")
-    environment = os.environ | {"PATH": f"{programs}{os.pathsep}{os.environ.get('PATH', '')}"}
+    environment = os.environ | {
+        "PATH": f"{programs}{os.pathsep}{os.environ.get('PATH', '')}",
+        # Behind a proxy that signs for others, as companies have: Node knows its own list only.
+        "NODE_OPTIONS": f"{os.environ.get('NODE_OPTIONS', '')} --use-system-ca".strip(),
+    }
     for arguments in (["ci", "--no-audit", "--no-fund"], ["run", "build"]):
         executable.npm(
             arguments, return_completed_process=True, cwd=web, env=environment, check=True
