@@ -109,13 +109,15 @@ def approximate_distance(
 
     Parameters
     ----------
-    mesh, sources, max_distance, targets, barriers
+    mesh, sources
         As in `exact_distance`.
     relative_error
         Share of the exact distance by which a distance may fall short: above 0 and below 1. None
         for no such bound, if there is an absolute one.
     absolute_error
         The same in mesh units. Where both are given, both hold.
+    max_distance, targets, barriers
+        As in `exact_distance`.
     keep_windows
         Keep what `DistanceField.path_to` and `DistanceField.gradient` need, at most about as much
         as the mesh's own arrays. Else the first of them runs the sweep again.

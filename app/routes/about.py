@@ -43,7 +43,13 @@ _LIMITS = (
     operation_id="getIndex",
     summary="Where to find what",
     response_model=Index,
-    responses={200: {"content": {"text/html": {}}, "description": "The page, for browsers"}},
+    responses={
+        200: {
+            "content": {"text/html": {}},
+            "description": "Addresses; for browsers the page",
+            "headers": documented("Vary"),
+        }
+    },
 )
 async def get_index(request: Request, response: Response) -> Response | Index:
     """Return the addresses to begin with; to a browser, the page."""
