@@ -5,8 +5,9 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
+from app.engine import Told
+
 T = TypeVar("T")
-Told = Callable[[float], None]
 
 
 @dataclass(eq=False)

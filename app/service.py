@@ -23,9 +23,10 @@ from app.engine import (
     MeshOrigin,
     Order,
     Storing,
+    Told,
 )
 from app.errors import ProblemError, refuse
-from app.flights import Flights, Told
+from app.flights import Flights
 from app.jobs import Errand, Job, JobBook, Jobs, require_whole
 from app.mesh_books import MeshBooks
 from app.mesh_store import PUBLIC_ARRAYS, MeshStore

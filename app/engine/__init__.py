@@ -3,7 +3,7 @@
 ``Engine`` is what the service sees; ``LocalEngine`` keeps worker processes on this machine.
 """
 
-from app.engine.interface import Engine, Load
+from app.engine.interface import Engine, Load, Told
 from app.engine.local import LocalEngine
 from app.engine.work import (
     Answering,
@@ -29,5 +29,6 @@ __all__ = [
     "MeshOrigin",
     "Order",
     "Storing",
+    "Told",
     "Work",
 ]

@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime, timedelta
 
+from app.engine import Told
 from app.errors import Fault, Problem, problem_of, refuse
 from app.jobs.book import JobBook
 from app.jobs.record import Errand, Job
@@ -15,7 +16,7 @@ from app.settings import variable_of
 
 logger = logging.getLogger(__name__)
 
-Solve = Callable[[Callable[[float], None]], Awaitable[Result]]
+Solve = Callable[[Told], Awaitable[Result]]
 """Does what a job is for, telling which share is done"""
 
 _SWEEP_S = 60.0

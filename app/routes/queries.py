@@ -148,11 +148,12 @@ class Asked:
             return estimate_response(self.mesh_id, estimate, form.media_type, seconds)
         if self.is_async:
             return accepted_response(await service.submit(query, form, asker, self.key))
-        unchanged = not_modified(request, etag_of(result_key(query, form)), CACHED)
-        if unchanged is not None:
-            return unchanged
-        answered = await while_connected(request, service.answer(query, form, asker))
         is_cacheable = request.method == "GET" and query.is_repeatable
+        if is_cacheable:
+            unchanged = not_modified(request, etag_of(result_key(query, form)), CACHED)
+            if unchanged is not None:
+                return unchanged
+        answered = await while_connected(request, service.answer(query, form, asker))
         caching = CACHED if is_cacheable else UNSTORED
         return result_response(request, answered, form.media_type, service.results, caching)
 

@@ -5,7 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from app.flights import Flights, Told
+from app.engine import Told
+from app.flights import Flights
 
 
 class Work:
