@@ -3,11 +3,10 @@
 import logging
 import os
 import threading
-from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from ctypes import c_double, c_longlong
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from gc import freeze
 from multiprocessing import connection, parent_process
 from pathlib import Path
@@ -34,6 +33,7 @@ from app.engine.work import (
 )
 from app.errors import problem_of
 from app.json_mesh import read_json_mesh
+from app.kept import Kept
 from app.mesh_store import MeshStore, OpenMesh
 from app.queries import Fields, Grant, Query, code_version, estimate
 from app.queries.refusals import refuse_large_json
@@ -62,12 +62,13 @@ class Worker:
     config: WorkerConfig
     stop_number: c_longlong
     progress: c_double
-    meshes: OrderedDict[tuple[str, bytes], OpenMesh] = field(default_factory=OrderedDict)
-    """By id and barriers, the one that was used last at the end"""
 
     def __post_init__(self) -> None:
         self.settings = self.config.settings
         self.store = MeshStore(self.settings.store)
+        self.meshes: Kept[tuple[str, bytes], OpenMesh]
+        """By id and barriers"""
+        self.meshes = Kept(self.settings.worker_mesh_bytes, lambda opened: opened.nbytes)
         self.fields = Fields(self.settings.worker_field_bytes)
 
     def do(self, number: int, work: Work) -> Done:
@@ -139,22 +140,16 @@ class Worker:
         return opened
 
     def _keep(self, name: tuple[str, bytes], open_mesh: Callable[[], OpenMesh]) -> OpenMesh:
-        if name not in self.meshes:
-            self.meshes[name] = open_mesh()
-        self.meshes.move_to_end(name)
-        while len(self.meshes) > 1 and self._open_bytes() > self.settings.worker_mesh_bytes:
-            unused, _ = self.meshes.popitem(last=False)
+        opened = self.meshes.find(name, open_mesh)
+        for unused in self.meshes.surplus(least=1):
             self.fields.forget(unused)
-        return self.meshes[name]
+        return opened
 
     def forget_all(self) -> None:
         """Give back all memory that is only kept."""
-        for name in self.meshes:
+        for name in list(self.meshes):
             self.fields.forget(name)
-        self.meshes.clear()
-
-    def _open_bytes(self) -> int:
-        return sum(opened.nbytes for opened in self.meshes.values())
+            self.meshes.drop(name)
 
 
 class Clock:
