@@ -27,11 +27,8 @@ REVALIDATED = {"Cache-Control": "private, no-cache"}
 
 OF_FILES = ("Accept-Ranges", "Cache-Control", "ETag", "Last-Modified")
 """The headers of answers that are files of the store."""
-ENDS = (
-    "mesh_not_found",
-    "result_too_large",
+OF_WORK = (
     "invalid_request",
-    "invalid_point",
     "limit_exceeded",
     "memory_limit",
     "worker_died",
@@ -42,6 +39,8 @@ ENDS = (
     "deadline_exceeded",
     "storage_full",
 )
+"""The problems that all can meet that a worker does."""
+ENDS = ("mesh_not_found", "result_too_large", "invalid_point", *OF_WORK)
 """The problems that a query can meet when its body is right, at once or as a job."""
 
 
