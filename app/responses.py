@@ -148,16 +148,14 @@ def result_response(
     store: ResultStore,
     headers: Mapping[str, str],
 ) -> Response:
-    """Return a result of the store: from memory where it is there, else its file."""
-    result = answered.result
+    """Return a result of the store: from memory where it is there; else its file, or a range."""
+    result, written = answered.result, answered.result.written
     own = {"ETag": etag_of(result.key), **server_timing(answered.seconds)}
-    headers = {"Accept-Ranges": "bytes", **result.headers, **own, **headers}
-    if result.body is None or "range" in request.headers:
+    headers = {"Accept-Ranges": "bytes", **written.seal.headers, **own, **headers}
+    if written.body is None or "range" in request.headers:
         return _ResultFileResponse(result, media_type, store, headers)
     store.give_back(result)
-    return Response(
-        result.body, headers={**headers, "Accept-Ranges": "bytes"}, media_type=media_type
-    )
+    return Response(written.body, headers=headers, media_type=media_type)
 
 
 class _ResultFileResponse(StoredFileResponse):

@@ -1,7 +1,8 @@
-"""Finished answers as files, written by workers and sent by the API process.
+"""Finished answers: files, written by workers and sent by the API; and small ones, in memory.
 
 ``results/{mesh id}/{key}.body`` is what goes out; ``{key}.json`` beside it, written last, says that
-it is complete: its headers, its size and its checksum.
+it is complete: its headers, its size and its checksum. What is small and was found at once has no
+files: two of them took half as long as all else that its worker did.
 """
 
 import os
@@ -10,6 +11,7 @@ import zlib
 from collections import Counter, OrderedDict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 from anyio import to_thread
@@ -23,7 +25,7 @@ _SMALL = 2**16
 
 
 class Seal(BaseModel):
-    """What is known of an answer that is complete on disk."""
+    """What is known of an answer that is complete."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -36,22 +38,22 @@ class Seal(BaseModel):
 
 @dataclass(frozen=True)
 class Written:
-    """An answer that has just been written."""
+    """An answer that is complete."""
 
     seal: Seal
     body: bytes | None
     """All of it, where it is small"""
+    has_files: bool
 
 
 @dataclass(frozen=True)
 class Result:
-    """An answer that is complete on disk."""
+    """An answer that was taken from the store."""
 
     name: str
     path: Path
-    headers: Mapping[str, str]
-    body: bytes | None
-    """All of it, where that is in memory"""
+    """Of its body, where it has files"""
+    written: Written
     is_kept: bool = True
     """Whether it stays when it has been sent."""
 
@@ -62,34 +64,53 @@ class Result:
 
 
 def write_result(
-    root: Path, name: str, parts: Iterable[Buffer], headers: Mapping[str, str], code: str
+    root: Path,
+    name: str,
+    parts: Iterable[Buffer],
+    headers: Mapping[str, str],
+    code: str,
+    *,
+    is_cheap: bool,
 ) -> Written:
-    """Write the result ``name`` under ``root``, body first and seal last, each atomically.
+    """Write the result ``name`` under ``root``; one that is small as well as ``is_cheap`` is not.
 
     The parts are written as they are made, so that they need not be in memory together.
     """
+    rest = iter(parts)
+    body = b""
+    for part in rest:
+        body += part
+        if len(body) > _SMALL:
+            return _write(root, name, chain([body], rest), headers, code)
+    if is_cheap:
+        seal = Seal(headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code)
+        return Written(seal, body, has_files=False)
+    return replace(_write(root, name, [body], headers, code), body=body)
+
+
+def _write(
+    root: Path, name: str, parts: Iterable[Buffer], headers: Mapping[str, str], code: str
+) -> Written:
+    """Write the files of a result, body first and seal last, each atomically."""
     size = checksum = 0
-    small: list[Buffer] = []
 
     def noted() -> Iterator[Buffer]:
         nonlocal size, checksum
         for part in parts:
             size += len(part)
             checksum = zlib.crc32(part, checksum)
-            if size <= _SMALL:
-                small.append(part)
             yield part
 
     _write_atomically(_body(root, name), noted())
     seal = Seal(headers=dict(headers), size=size, crc32=checksum, code=code)
     _write_atomically(_seal(root, name), [seal.model_dump_json().encode()])
-    return Written(seal, b"".join(small) if size <= _SMALL else None)
+    return Written(seal, None, has_files=True)
 
 
 class ResultStore:
     """The results under ``root``, at most ``capacity`` bytes; the least recently used go first.
 
-    Of those, small ones are in memory as well, up to ``memory`` bytes.
+    Small ones are in memory, up to ``memory`` bytes: all those that have no files, and some others.
     One process keeps the books. A result taken is not removed before it is given back, one that is
     held not before it is released.
     """
@@ -121,16 +142,16 @@ class ResultStore:
 
     @property
     def nbytes(self) -> int:
-        """Size of all results."""
+        """Size of all files of results."""
         return self._total
 
     async def find(self, name: str) -> Result | None:
         """Take the result ``name``, if it is there and whole."""
-        if name not in self._sizes:
-            return None
         if name in self._small:
             self._small.move_to_end(name)
             return self._take(name, self._small[name])
+        if name not in self._sizes:
+            return None
         self._taken[name] += 1  # held while it is read, off the event loop
         try:
             written = await to_thread.run_sync(_read, self._root, name)
@@ -156,6 +177,27 @@ class ResultStore:
             self._remove(result.name)
         self._evict()
 
+    async def with_files(self, result: Result) -> Result:
+        """Return a result that was taken, with files: written now, where it had none.
+
+        It is given back where that fails.
+        """
+        written = result.written
+        if written.has_files:
+            return result
+        assert written.body is not None, "what has no files is in memory"  # noqa: S101
+        seal, body = written.seal, [written.body]
+        try:
+            await to_thread.run_sync(_write, self._root, result.name, body, seal.headers, seal.code)
+        except BaseException:
+            self.give_back(result)
+            raise
+        self._count(result.name, seal.size)
+        filed = replace(written, has_files=True)
+        if result.name in self._small:
+            self._small[result.name] = filed
+        return replace(result, written=filed)
+
     def has_room_to_hold(self, name: str) -> bool:
         """Tell whether all that is held would fit with the result ``name``."""
         return sum(self._sizes.get(held, 0) for held in {*self._held, name}) <= self._capacity
@@ -171,14 +213,16 @@ class ResultStore:
 
     def forget_mesh(self, mesh_id: str) -> None:
         """Remove all results of a mesh that are neither held nor just being sent."""
-        for name in [name for name in self._sizes if name.startswith(f"{mesh_id}/")]:
+        names = {*self._sizes, *self._small}
+        for name in [name for name in names if name.startswith(f"{mesh_id}/")]:
             if self._is_free(name):
                 self._remove(name)
 
     def _take(self, name: str, written: Written) -> Result:
-        self._count(name, written.seal.size)
+        if written.has_files:
+            self._count(name, written.seal.size)
         self._taken[name] += 1
-        return Result(name, _body(self._root, name), written.seal.headers, written.body)
+        return Result(name, _body(self._root, name), written)
 
     def _count(self, name: str, size: int) -> None:
         self._total += size - self._sizes.pop(name, 0)
@@ -277,4 +321,4 @@ def _read(root: Path, name: str) -> Written | None:
         return None
     if (size, checksum) != (seal.size, seal.crc32):
         return None
-    return Written(seal, b"".join(small) if size <= _SMALL else None)
+    return Written(seal, b"".join(small) if size <= _SMALL else None, has_files=True)

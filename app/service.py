@@ -4,7 +4,7 @@ import asyncio
 from collections import Counter, defaultdict
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from gc import collect, freeze
 from pathlib import Path
@@ -162,10 +162,15 @@ class Service:
         await self.mesh_books.delete(mesh_id)
         self.results.forget_mesh(mesh_id)
 
-    async def answer(self, query: Query[Any], form: Form, asker: Asker) -> Answered:
+    async def answer(
+        self, query: Query[Any], form: Form, asker: Asker, *, as_file: bool
+    ) -> Answered:
         """Answer ``query``: from a kept result, or by a worker."""
         async with self.within(asker.deadline_s):
-            return await self._answer(query, form, asker.caller.name, _nobody)
+            answered = await self._answer(query, form, asker.caller.name, _nobody)
+            if as_file:
+                return replace(answered, result=await self.results.with_files(answered.result))
+            return answered
 
     async def estimate(
         self, query: Query[Any], form: Form, asker: Asker

@@ -95,7 +95,7 @@ class Settings(BaseSettings):
     results_bytes: PositiveInt = 4 * GIB
     """Size of the finished results that the store keeps."""
     results_memory_bytes: PositiveInt = 256 * MIB
-    """Size of those among them that are kept in memory as well: small ones."""
+    """Size of the small ones in memory: some of them, and all that have no files."""
     max_upload_bytes: PositiveInt = 512 * MIB
     """Largest body of an upload."""
     max_query_bytes: PositiveInt = Field(default_factory=_query_bytes)

@@ -45,7 +45,7 @@ def original(tmp_path_factory: pytest.TempPathFactory) -> Left:
     keys = ",".join(f"{name}:{secret}" for name, secret in KEYS.items())
     with serving(root, api_keys=keys) as client:
         client.headers.update(ALICE)
-        ids = [upload_sample(client, "plane", faces) for faces in (50, 200)]
+        ids = [upload_sample(client, "plane", faces) for faces in (45_000, 200)]
         for vertex in range(3):
             body = {"sources": [{"vertex": vertex}]}
             assert client.post(f"/v1/meshes/{ids[0]}/distances", json=body).status_code == 200
@@ -80,7 +80,7 @@ def test_ls(run: Run, left: Left) -> None:  # noqa: F811
     assert (ran.code, ran.err) == (0, "")
     rows = [row.split() for row in ran.out.splitlines()]
     assert rows[0] == ["id", "faces", "bytes", "created", "last", "used", "owner"]
-    assert [row[:2] for row in rows[1:3]] == [[left.ids[1], "200"], [left.ids[0], "50"]]
+    assert [row[:2] for row in rows[1:3]] == [[left.ids[1], "200"], [left.ids[0], "45000"]]
     assert [row[-2:] for row in rows[1:3]] == [
         [f"1970-01-01T00:00:0{number}+00:00", "alice"] for number in range(2)
     ]
@@ -101,7 +101,7 @@ def test_ls_as_json(run: Run, left: Left, monkeypatch: pytest.MonkeyPatch) -> No
     meshes = {mesh["id"]: mesh for mesh in found["meshes"]}
     assert meshes.keys() == set(left.ids)
     healthy, damaged = (meshes[mesh_id] for mesh_id in left.ids)
-    assert (healthy["faces"], healthy["owner"]) == (50, "alice")
+    assert (healthy["faces"], healthy["owner"]) == (45_000, "alice")
     assert datetime.fromisoformat(healthy["created"]) <= datetime.now(UTC)
     assert (damaged["faces"], damaged["owner"]) == (None, None)
     (job,) = found["jobs"]

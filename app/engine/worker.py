@@ -35,7 +35,7 @@ from app.errors import problem_of
 from app.json_mesh import read_json_mesh
 from app.kept import Kept
 from app.mesh_store import MeshStore, OpenMesh
-from app.queries import Fields, Grant, Query, code_version, estimate
+from app.queries import SMALL_SECONDS, Fields, Grant, Query, code_version, estimate
 from app.queries.refusals import refuse_large_json
 from app.result_store import write_result
 from app.settings import Settings, variable_of
@@ -117,6 +117,7 @@ class Worker:
                 encoded.parts,
                 encoded.headers,
                 code_version(),
+                is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
             )
         return Done(clock.seconds, answer=written)
 

@@ -199,7 +199,7 @@ class Jobs:
 
     async def _run(self, live: _Live, solve: Solve) -> None:
         try:
-            result = await solve(live.tell)
+            result = await self._results.with_files(await solve(live.tell))
         except Exception as error:
             problem = problem_of(error)
             if problem.code == "internal_error":

@@ -14,10 +14,11 @@ from app.queries.matrix import MatrixQuery
 from app.queries.nearest import NearestQuery
 from app.queries.path import PathQuery, naming_parameters, written_request
 from app.queries.paths import PathsQuery
-from app.queries.query import Grant, Query, code_version, fingerprint, result_key
+from app.queries.query import SMALL_SECONDS, Grant, Query, code_version, fingerprint, result_key
 from app.queries.refusals import MeshSize
 
 __all__ = [
+    "SMALL_SECONDS",
     "DistancesQuery",
     "Estimate",
     "Fields",

@@ -14,6 +14,8 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 
+from app.dependencies import require_json
+
 LARGE = 2**16
 """Bytes of a body from which on it is worth a thread: they take some milliseconds."""
 
@@ -33,6 +35,7 @@ class QueryRoute(APIRoute):
         assert issubclass(model, BaseModel), "the body of a query is a model"  # noqa: S101
 
         async def handle_query(request: Request) -> Response:
+            require_json(request)
             return await handle(_QueryRequest(request, model))
 
         return handle_query

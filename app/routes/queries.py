@@ -8,10 +8,9 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
 from app.dependencies import (
     AskerDep,
-    ServiceDep,
     form_of,
     prefers_async,
-    require_json,
+    service_of,
     while_connected,
 )
 from app.encoding import CSV, GEOJSON, JSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
@@ -64,7 +63,7 @@ from app.schemas import (
     PathsAnswer,
     PathsRequest,
 )
-from app.service import Asker, Service
+from app.service import Asker
 
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"], route_class=QueryRoute)
 
@@ -113,7 +112,6 @@ def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[s
         "summary": summary,
         "response_class": Response,
         "responses": {**answers, **problems(*_BODY_CODES)},
-        "dependencies": [Depends(require_json)],
     }
 
 
@@ -123,7 +121,6 @@ class Asked:
 
     mesh_id: str
     request: Request
-    service: Service
     asker: Asker
     is_async: bool
     key: str | None
@@ -132,7 +129,8 @@ class Asked:
         self, kind: type[ValidQuery[Any]], body: Any, parameters: AnswerParameters
     ) -> Response:
         """Answer the query of a kind that a body asks, or tell what that would take."""
-        service, request, asker = self.service, self.request, self.asker
+        request, asker = self.request, self.asker
+        service = service_of(request)
         size = service.size(self.mesh_id)
 
         def ask() -> ValidQuery[Any]:
@@ -153,7 +151,8 @@ class Asked:
             unchanged = not_modified(request, etag_of(result_key(query, form)), CACHED)
             if unchanged is not None:
                 return unchanged
-        answered = await while_connected(request, service.answer(query, form, asker))
+        answering = service.answer(query, form, asker, as_file="range" in request.headers)
+        answered = await while_connected(request, answering)
         caching = CACHED if is_cacheable else UNSTORED
         return result_response(request, answered, form.media_type, service.results, caching)
 
@@ -161,9 +160,11 @@ class Asked:
 async def get_asked(
     mesh_id: str,
     request: Request,
-    service: ServiceDep,
     asker: AskerDep,
-    is_async: Annotated[bool, Depends(prefers_async)],
+    prefer: Annotated[
+        str | None,
+        Header(description="`respond-async`: answer at once with a job, RFC 7240"),
+    ] = None,
     idempotency_key: Annotated[
         str | None,
         Header(
@@ -174,7 +175,7 @@ async def get_asked(
     ] = None,
 ) -> Asked:
     """Return what a request for a query says beside the query."""
-    return Asked(mesh_id, request, service, asker, is_async, idempotency_key)
+    return Asked(mesh_id, request, asker, prefers_async(prefer), idempotency_key)
 
 
 AskedDep = Annotated[Asked, Depends(get_asked)]

@@ -260,6 +260,23 @@ def test_small_work_does_not_wait_behind_long_work(
     assert not any(future.done() for future in [*running, waiting])
 
 
+def test_the_last_idle_worker_is_kept_for_long_work(
+    two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
+) -> None:
+    assert ask(two, small).status_code == 200
+    engine = engine_of(two)
+    for slot in engine._slots:
+        slot.topics.clear()
+    running = threads.submit(ask, two, slow, **{"X-Timeout-Ms": "2000"})
+    wait_until_busy(two, 1)
+
+    asked = [threads.submit(ask, two, small) for _ in range(3)]
+
+    assert [future.result().status_code for future in asked] == [200] * 3
+    assert [slot is engine._small for slot in engine._slots if small in slot.topics] == [True]
+    assert not running.done()
+
+
 def test_what_proves_not_to_be_small_begins_anew_elsewhere(
     two: TestClient, slow: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -96,7 +96,7 @@ def test_labels_are_bounded(watched: TestClient) -> None:
 
 
 def test_answers_kept_and_solved(watched: TestClient) -> None:
-    mesh_id = upload_sample(watched, "plane", 300)
+    mesh_id = upload_sample(watched, "plane", 45_000)
     before = scrape(watched)
     for _ in range(3):
         assert distances(watched, mesh_id).status_code == 200

@@ -56,8 +56,8 @@ USED_BELOW = {"results_bytes"}
 
 
 def test_results_bytes(tmp_path: Path) -> None:
-    with serving(tmp_path, results_bytes=5000) as client:
-        mesh_id = upload_sample(client, "plane", 50)
+    with serving(tmp_path, results_bytes=300_000) as client:
+        mesh_id = upload_sample(client, "plane", 45_000)
         timings = []
         for vertex in (0, 0, 1, 2, 3, 4, 5, 6, 0):
             answer = distances(client, mesh_id, sources=[{"vertex": vertex}])

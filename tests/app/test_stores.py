@@ -134,9 +134,13 @@ def results(tmp_path: Path) -> ResultStore:
     return store
 
 
-def put(results: ResultStore, root: Path, name: str, size: int = 40) -> None:
-    written = write_result(root / "results", name, [b"x" * size], {"A": "b"}, "code")
-    results.give_back(results.take_new(name, written))
+def write(root: Path, name: str, size: int = 40, *, is_cheap: bool = False):
+    parts = [b"x" * size]
+    return write_result(root / "results", name, parts, {"A": "b"}, "code", is_cheap=is_cheap)
+
+
+def put(results: ResultStore, root: Path, name: str, size: int = 40, **how: bool) -> None:
+    results.give_back(results.take_new(name, write(root, name, size, **how)))
 
 
 def find(results: ResultStore, name: str):
@@ -153,7 +157,7 @@ def test_a_result_comes_back(results: ResultStore, tmp_path: Path) -> None:
 
     assert found is not None
     assert found.path.read_bytes() == b"x" * 40
-    assert found.headers == {"A": "b"}
+    assert found.written.seal.headers == {"A": "b"}
     assert found.key == "a"
 
 
@@ -168,8 +172,7 @@ def test_the_least_recently_used_go_first(results: ResultStore, tmp_path: Path) 
 
 
 def test_what_is_being_sent_stays(results: ResultStore, tmp_path: Path) -> None:
-    written = write_result(tmp_path / "results", "m/a", [b"x" * 90], {}, "code")
-    sent = results.take_new("m/a", written)
+    sent = results.take_new("m/a", write(tmp_path, "m/a", 90))
     put(results, tmp_path, "m/b")
 
     assert sent.path.exists()
@@ -226,10 +229,10 @@ def test_small_results_are_in_memory_as_far_as_they_fit(tmp_path: Path) -> None:
         put(results, tmp_path, f"m/{key}")
     put(results, tmp_path, "m/large", 2**17)
 
-    found = {key: find(results, f"m/{key}").body for key in ("c", "b", "large", "a")}
+    found = {key: find(results, f"m/{key}").written.body for key in ("c", "b", "large", "a")}
     assert found == {"c": b"x" * 40, "b": b"x" * 40, "large": None, "a": b"x" * 40}
     damage(tmp_path / "results" / "m" / "a.body")
-    assert find(results, "m/a").body == b"x" * 40, "read a moment ago"
+    assert find(results, "m/a").written.body == b"x" * 40, "read a moment ago"
     results.forget_mesh("m")
     assert find(results, "m/a") is None
 
@@ -238,9 +241,7 @@ def test_what_is_held_stays_until_it_is_released(results: ResultStore, tmp_path:
     put(results, tmp_path, "m/a")
     results.hold("m/a")
     assert results.has_room_to_hold("m/a")
-    other = results.take_new(
-        "m/b", write_result(tmp_path / "results", "m/b", [b"x" * 61], {}, "code")
-    )
+    other = results.take_new("m/b", write(tmp_path, "m/b", 61))
     assert not results.has_room_to_hold("m/b")
     results.give_back(other)
     results.forget_mesh("m")
@@ -254,6 +255,55 @@ def test_what_is_held_stays_until_it_is_released(results: ResultStore, tmp_path:
 
 @pytest.mark.usefixtures("results")
 def test_a_failed_result_leaves_nothing(tmp_path: Path) -> None:
+    parts: list = [b"x" * 2**17, None]
     with pytest.raises(TypeError):
-        write_result(tmp_path / "results", "m/a", [b"x", None], {}, "code")  # type: ignore[list-item]
+        write_result(tmp_path / "results", "m/a", parts, {}, "code", is_cheap=False)
     assert not list((tmp_path / "results").glob("m/*"))
+
+
+@pytest.fixture
+def roomy(tmp_path: Path) -> ResultStore:
+    store = ResultStore(tmp_path / "results", 10**6, memory=100)
+    store.prepare()
+    return store
+
+
+def test_what_is_small_and_found_at_once_has_no_files(roomy: ResultStore, tmp_path: Path) -> None:
+    put(roomy, tmp_path, "m/small", is_cheap=True)
+    put(roomy, tmp_path, "m/large", 2**17, is_cheap=True)
+
+    assert find(roomy, "m/small").written.body == b"x" * 40
+    assert roomy.nbytes == 2**17
+    names = sorted(path.name for path in (tmp_path / "results").glob("m/*"))
+    assert names == ["large.body", "large.json"]
+    for key in "ab":
+        put(roomy, tmp_path, f"m/{key}", is_cheap=True)
+    assert find(roomy, "m/small") is None, "memory is bounded, too"
+    roomy.forget_mesh("m")
+    assert find(roomy, "m/a") is None
+
+
+@pytest.mark.parametrize("is_kept", [True, False])
+def test_files_come_when_they_are_needed(roomy: ResultStore, tmp_path: Path, is_kept: bool) -> None:
+    written = write(tmp_path, "m/a", is_cheap=True)
+    taken = roomy.take_new("m/a", written, is_kept=is_kept)
+
+    filed = anyio.run(roomy.with_files, taken)
+    roomy.hold("m/a")
+    roomy.give_back(filed)
+
+    assert filed.path.read_bytes() == b"x" * 40
+    assert filed.written.seal == taken.written.seal
+    assert anyio.run(roomy.with_files, filed) is filed
+    restarted = ResultStore(tmp_path / "results", 10**6, memory=0)
+    restarted.prepare()
+    assert find(restarted, "m/a").written.body == b"x" * 40
+
+
+def test_what_gets_no_files_is_given_back(roomy: ResultStore, tmp_path: Path) -> None:
+    taken = roomy.take_new("m/a", write(tmp_path, "m/a", is_cheap=True))
+    (tmp_path / "results" / "m").write_bytes(b"in the way")
+
+    with pytest.raises(FileExistsError):
+        anyio.run(roomy.with_files, taken)
+    assert not roomy._taken
