@@ -28,7 +28,7 @@ from geodesic_core.once import Once
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, traced_path
 from geodesic_core.run import Control
 from geodesic_core.surface_point import Point, SurfacePoint
-from geodesic_core.tolerances import LEVEL, PATH_LENGTH
+from geodesic_core.tolerances import FOOT, LEVEL, PATH_LENGTH
 from geodesic_core.whole_sweep import WholeSweep
 
 
@@ -336,14 +336,16 @@ class DistanceField:
         start = self.sources[winners.nearest[node]].start_distance
         excess = start + path.length - distance
         exact = self.error_bound == EXACT
-        if excess < -PATH_LENGTH * distance or (exact and excess > PATH_LENGTH * distance):
+        rounding = FOOT * self.mesh.diagonal
+        most = PATH_LENGTH * distance + rounding
+        if excess < -most or (exact and excess > most):
             raise InternalError(
                 f"the path to {place} has length {path.length}, but the field says "
                 f"{distance - start}; please report this mesh"
             )
         if exact:
             return path
-        share = max(excess, 0.0) / distance if distance > 0.0 else 0.0
+        share = max(excess, 0.0) / distance if distance > rounding else 0.0
         return replace(path, error_bound=ErrorBound("relative", share, "guaranteed"))
 
     def _node(self, place: SurfacePoint) -> int | None:

@@ -98,6 +98,12 @@ PATH_LENGTH = 1e-9
 Measured: 1e-12 and less. A path that is not the one the field promises is never handed out.
 """
 
+FOOT = 1e-14
+"""Share of the bounding box's diagonal by which such a length may differ anyway: rounding.
+
+The foot of a perpendicular on a curve is rounded as a position, however near it is to the target.
+"""
+
 LOCAL_SHARE = 0.05
 """Share of the error granted that a single merge of windows may use up (section 4.1).
 

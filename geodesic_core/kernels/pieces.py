@@ -90,14 +90,17 @@ def emit_strip(
 def reach_corner(
     wave: Any, node: int, h: int, px: float, py: float, dx: float, dy: float, reach: float
 ) -> None:
-    """Offer the apex of h the perpendicular to the piece from p on, if its foot is on it."""
+    """Offer the apex of h the perpendicular to the piece from p on, if its foot is on it.
+
+    In a face of no area the apex may lie on the piece itself, and not be an end of it.
+    """
     row = ROW * h
     x = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT] - px
     y = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT] - py
     height = y * dx - x * dy
-    if height == 0.0 or not 0.0 <= x * dx + y * dy <= reach:
+    if not 0.0 <= x * dx + y * dy <= reach:
         return
-    sx, sy = (dy, -dx) if height > 0.0 else (-dy, dx)  # against the ray to the apex
+    sx, sy = (dy, -dx) if height >= 0.0 else (-dy, dx)  # against the ray to the apex
     distance = wave.distance[node] + abs(height)
     apex = wave.links[row + APEX]
     if merging(wave):

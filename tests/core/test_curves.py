@@ -291,6 +291,16 @@ def test_a_curve_along_edges_is_all_the_points_of_the_edges():
     np.testing.assert_allclose(field.distances[rest], edge * math.sqrt(3) / 2, rtol=1e-12)
 
 
+@pytest.mark.parametrize("solve", [gc.exact_distance, gc.approximate_distance])
+def test_a_curve_reaches_the_vertex_of_a_face_without_area_that_lies_on_it(solve):
+    places = np.array([[2.0, 0.0, 0.0], [1.0, 2.0, 2.0], [1.0, 1.0, 1.0], [0.0, 2.0, 2.0]])
+    mesh = gc.TriangleMesh(places, [[0, 2, 3], [3, 1, 2]])  # vertex 2 halves the edge of 0 and 3
+    field = solve(mesh, gc.Curve([3, 0]))
+    np.testing.assert_allclose(field.distances, [0.0, math.sqrt(2 / 3), 0.0, 0.0], rtol=EXACT)
+    assert field.path_to(2).length <= 1e-15
+    assert field.path_to(1).length == pytest.approx(field.distances[1], rel=EXACT)
+
+
 def test_a_curve_of_one_point_is_that_point():
     mesh = mesh_of(zoo.SMALL["octahedron"])
     point = gc.SurfacePoint.face(3, (0.2, 0.3, 0.5))
