@@ -77,11 +77,12 @@ def write_result(
     The parts are written as they are made, so that they need not be in memory together.
     """
     rest = iter(parts)
-    body = b""
+    first: list[Buffer] = []
     for part in rest:
-        body += part
-        if len(body) > _SMALL:
-            return _write(root, name, chain([body], rest), headers, code)
+        first.append(part)
+        if sum(map(len, first)) > _SMALL:
+            return _write(root, name, chain(first, rest), headers, code)
+    body = b"".join(first)
     if is_cheap:
         seal = Seal(headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code)
         return Written(seal, body, has_files=False)
