@@ -9,7 +9,7 @@ from geodesic_core.kernels.wavefront import FROM, NODE, VIA
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nodes import Nodes
 from geodesic_core.path import EXACT, traced_path
-from geodesic_core.tolerances import SAME_PLACE
+from geodesic_core.tolerances import FOOT, SAME_PLACE
 
 
 def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> Floats:
@@ -21,13 +21,15 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
     topology = mesh.topology
     gradient = np.full(mesh.vertices.shape, np.nan)
     via = winners.winner_ints[: len(gradient), VIA]
+    is_strip = _is_strip(winners)
     reached = np.flatnonzero((via >= 0) & np.isfinite(winners.distance[: len(gradient)]))
+    reached = reached[~_lies_on_curve(mesh, winners, is_strip)[reached]]
     via = via[reached]
     geometry, positions = topology.geometry[via], topology.positions
     tail, head, apex = (positions[topology.links[via, k]] for k in (TAIL, HEAD, APEX))
     reach = geometry[:, LENGTH_LEFT]
     away = np.column_stack([geometry[:, COS_LEFT] * reach, geometry[:, SIN_LEFT] * reach])
-    away[_is_strip(winners)[reached]] = 0.0  # a direction is all that there is of a strip's
+    away[is_strip[reached]] = 0.0  # a direction is all that there is of a strip's
     away -= winners.winner[reached]
     along = _unit(head - tail)
     across = apex - tail
@@ -47,6 +49,16 @@ def _is_strip(winners: Winners) -> Flags:
         return np.zeros(len(winners.distance), np.bool_)
     is_strip: Flags = winners.winner_ints[:, FROM] >= winners.piece_ints[0, NODE]
     return is_strip
+
+
+def _lies_on_curve(mesh: TriangleMesh, winners: Winners, is_strip: Flags) -> Flags:
+    """Tell which nodes lie on the piece that reaches them, as vertices of faces of no area may."""
+    lies = np.zeros_like(is_strip)
+    nodes = np.flatnonzero(is_strip)
+    pieces = winners.winner_ints[nodes, FROM]
+    away = winners.distance[nodes] - winners.distance[pieces]
+    lies[nodes] = away <= FOOT * mesh.diagonal
+    return lies
 
 
 def _unit(vectors: Floats) -> Floats:

@@ -299,6 +299,7 @@ def test_a_curve_reaches_the_vertex_of_a_face_without_area_that_lies_on_it(solve
     np.testing.assert_allclose(field.distances, [0.0, math.sqrt(2 / 3), 0.0, 0.0], rtol=EXACT)
     assert field.path_to(2).length <= 1e-15
     assert field.path_to(1).length == pytest.approx(field.distances[1], rel=EXACT)
+    assert np.isnan(field.gradient).all(axis=1).tolist() == [True, False, True, True]
 
 
 def test_a_curve_of_one_point_is_that_point():

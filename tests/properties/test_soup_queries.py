@@ -127,6 +127,28 @@ def test_curves_are_as_near_as_the_nearest_of_their_points(seed):
 
 
 @given(seeds)
+def test_curves_are_approximated_within_the_error(seed):
+    mesh, rng = soup(seed)
+    for point in points_on(mesh, rng, 2) if mesh else []:
+        curve = gc.Curve([point, int(rng.choice(mesh.faces[point.face_index]))])
+        exact = gc.exact_distance(mesh, curve, deadline_s=DEADLINE)
+        near = gc.approximate_distance(mesh, curve, 0.01, deadline_s=DEADLINE)
+        reached, slack = np.isfinite(exact.distances), close_to(mesh)["atol"]
+        np.testing.assert_array_equal(np.isfinite(near.distances), reached)
+        most = exact.distances[reached] * (1 + 1e-9) + slack
+        assert (near.distances[reached] <= most).all()
+        assert (near.distances[reached] >= 0.99 * exact.distances[reached] - slack).all()
+        for target in np.flatnonzero(reached).tolist():
+            assert near.path_to(target).length <= 1.01 * exact.distances[target] + slack
+        for place in points_on(mesh, rng, 3):
+            ends = [field.distance_at(place, deadline_s=DEADLINE) for field in (exact, near)]
+            np.testing.assert_allclose(*ends, **close_to(mesh))
+        length = np.linalg.norm(exact.gradient, axis=1)
+        np.testing.assert_allclose(length[~np.isnan(length)], 1.0, rtol=1e-9)
+        assert np.isnan(length[~reached]).all()
+
+
+@given(seeds)
 def test_matrices_and_the_nearest_are_those_of_the_fields(seed):
     mesh, rng = soup(seed)
     points = points_on(mesh, rng) if mesh else []
