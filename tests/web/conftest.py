@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import httpx2
@@ -43,14 +44,20 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture(scope="session")
 def service(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:  # noqa: ARG001
     """The address of a service of its own; only where there is a browser to go there."""
+    with serving(tmp_path_factory.mktemp("store")) as address:
+        yield address
+
+
+@contextmanager
+def serving(store: Path, **settings: str) -> Iterator[str]:
+    """Serve, and give the address."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
-    store = str(tmp_path_factory.mktemp("store"))
-    environment = os.environ | {"GEODESIC_STORE": store, "GEODESIC_WORKERS": "1"}
+    environment = {"GEODESIC_STORE": str(store), "GEODESIC_WORKERS": "1", **settings}
     process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
         [sys.executable, "-c", SERVE, "serve", "--port", str(port)],
-        env=environment,
+        env=os.environ | environment,
         cwd=Path(__file__).parents[2],
     )
     address = f"http://127.0.0.1:{port}"

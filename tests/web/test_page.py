@@ -11,33 +11,11 @@ import httpx2
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Route
 
-from .viewing import View
+from .viewing import PLAIN, View, angle_at, length_of, query_of
 
-PLAIN = "lines=none&view=0.6,1.2,2.9,0,0,0"
 PATH = np.array([230, 0, 92])
 BARRIER = np.array([30, 33, 40])
-
-
-def query_of(view: View) -> dict[str, list[str]]:
-    """Return the parameters of the address that the page has written."""
-    view.page.wait_for_timeout(300)
-    search: dict[str, list[str]] = view.page.evaluate(
-        "() => { const q = new URLSearchParams(location.search); const r = {};"
-        "for (const k of q.keys()) r[k] = q.getAll(k); return r; }"
-    )
-    return search
-
-
-def angle_at(view: View, away: float) -> float:
-    """Return the angle from the middle of a unit sphere to what is drawn so many pixels away."""
-    box = view.page.locator("#canvas").bounding_box()
-    assert box is not None
-    slope = away / (box["height"] / 2) * math.tan(math.radians(38 / 2))
-    distance, radius = 2.9, 1 / math.sqrt(3)  # of a sphere whose bounding box's diagonal is 2
-    ray = math.atan(slope)
-    return math.asin(distance * math.sin(ray) / radius) - ray
 
 
 def ramp_at(view: View, share: float, pixels: np.ndarray) -> np.ndarray:
@@ -59,10 +37,6 @@ def seen(view: View, colour: np.ndarray, within: int = 12) -> np.ndarray:
     rows, columns = np.nonzero(np.abs(view.pixels() - colour).max(axis=2) <= within)
     places = np.column_stack([columns, rows]) - view.centre
     return places[np.hypot(*places.T) < 240]  # beyond is text
-
-
-def length_of(view: View) -> float:
-    return float(view.text("#length"))
 
 
 # Load
@@ -88,29 +62,84 @@ def test_a_sample_is_loaded_and_a_click_colours_it(view: View) -> None:
 
 def test_a_file_is_dropped(view: View, wedge: str) -> None:
     view.open()
-    view.page.evaluate(
-        """text => {
-            const files = new DataTransfer();
-            files.items.add(new File([text], "wedge.obj"));
-            document.dispatchEvent(new DragEvent("dragover", {dataTransfer: files}));
-            document.dispatchEvent(new DragEvent("drop", {dataTransfer: files}));
-        }""",
-        wedge,
-    )
-    view.wait("loading")
+    with view.page.expect_response("**/v1/meshes?format=obj"):
+        view.page.evaluate(
+            """text => {
+                const files = new DataTransfer();
+                files.items.add(new File([text], "wedge.obj"));
+                document.dispatchEvent(new DragEvent("dragover", {dataTransfer: files}));
+                document.dispatchEvent(new DragEvent("drop", {dataTransfer: files}));
+            }""",
+            wedge,
+        )
     view.wait()
 
     assert "5 vertices, 3 faces" in view.text("#report")
     assert "wedge.obj" in view.text("#meshes option:checked")
 
 
-def test_faults_are_marked(view: View, wedge: str) -> None:
+WATCH_PROGRESS = """
+    window.told = [];
+    addEventListener('DOMContentLoaded', () => {
+        const bar = document.getElementById('progress');
+        const words = document.getElementById('waiting-for');
+        new MutationObserver(() => window.told.push({
+            share: bar.hasAttribute('value') ? bar.value : null,
+            words: words.textContent,
+            state: document.documentElement.dataset.state,
+            isSeen: getComputedStyle(bar).visibility === 'visible',
+        })).observe(bar, {attributeFilter: ['value']});
+    });
+"""
+
+
+def test_an_upload_shows_its_progress(view: View, wedge: str) -> None:
+    file = wedge + "\n" + "# as large as files are\n" * 30_000
+    view.page.add_init_script(WATCH_PROGRESS)
     view.open()
+    view.throttle_uploads(500_000)
+    view.upload("wedge.obj", file)
+
+    told = view.page.evaluate("window.told")
+    assert {(each["words"], each["state"]) for each in told} == {
+        ("Uploading wedge.obj…", "loading")
+    }
+    *shares, last = [each["share"] for each in told]
+    assert len(shares) > 2
+    assert shares == sorted(shares)
+    assert 0 < shares[0] < 0.5 < shares[-1] < 1
+    assert told[-1]["isSeen"]
+    assert last is None, "how much of it the service has read, nobody knows"
+    assert "5 vertices, 3 faces" in view.text("#report")
+
+
+def test_an_upload_can_be_cancelled(view: View, wedge: str) -> None:
+    view.open()
+    view.throttle_uploads(20_000)
+    file = wedge + "\n" + "# never sent\n" * 50_000
     view.page.set_input_files(
-        "#file", {"name": "wedge.obj", "mimeType": "", "buffer": wedge.encode()}
+        "#file", {"name": "wedge.obj", "mimeType": "", "buffer": file.encode()}
     )
     view.wait("loading")
+    with view.page.expect_event("requestfailed"):
+        view.page.click("#cancel")
     view.wait()
+
+    assert not view.page.is_visible("#error")
+    assert view.text("#report") == ""
+
+
+def test_an_empty_file(view: View) -> None:
+    view.open()
+    view.page.set_input_files("#file", {"name": "empty.obj", "mimeType": "", "buffer": b""})
+    view.wait("error")
+
+    assert view.text("#error-request").startswith("Request ")
+
+
+def test_faults_are_marked(view: View, wedge: str) -> None:
+    view.open()
+    view.upload("wedge.obj", wedge)
     red = np.array([217, 26, 26])
     assert len(seen(view, red)) == 0
 
@@ -137,32 +166,6 @@ def test_a_refused_file_is_told_in_the_service_s_words(view: View) -> None:
     assert problem["request_id"] in view.text("#error-request")
     view.page.click("#error-close")
     view.wait()
-
-
-def test_a_key_is_asked_for_and_sent(view: View) -> None:
-    sent: list[str | None] = []
-
-    def refuse_without_key(route: Route) -> None:
-        sent.append(route.request.headers.get("authorization"))
-        if sent[-1] == "Bearer letmein-letmein":
-            route.continue_()
-            return
-        problem = {"title": "Unauthorized", "detail": "no key", "status": 401, "request_id": "r1"}
-        route.fulfill(status=401, json=problem, content_type="application/problem+json")
-
-    view.page.route("**/v1**", refuse_without_key)
-    view.page.goto("/")
-    view.wait("error")
-    assert sent[-1] is None
-
-    view.page.fill("#key", "letmein-letmein")
-    view.page.press("#key", "Enter")
-    view.wait()
-    view.page.click("#samples [data-sample=sphere]")
-    view.wait()
-
-    assert "one piece, closed" in view.text("#report")
-    assert set(sent[sent.index("Bearer letmein-letmein") :]) == {"Bearer letmein-letmein"}
 
 
 # Ask
@@ -509,16 +512,6 @@ def test_by_keyboard_alone(view: View, sphere: str) -> None:
     assert "lines" not in query_of(view), "as many as at first"
     keys.press("f")
     assert "view" not in query_of(view)
-
-
-def test_a_tap(view: View, sphere: str) -> None:
-    view.page.set_viewport_size({"width": 390, "height": 780})
-    view.open(f"/?mesh={sphere}&lines=none")
-    view.page.touchscreen.tap(*view.centre)
-    view.wait()
-
-    assert query_of(view)["source"][0].startswith("f")
-    assert not view.page.is_visible("#folded")
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])

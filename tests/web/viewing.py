@@ -1,14 +1,17 @@
 """The page as someone sees it and uses it."""
 
+import math
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import Page
+from playwright.sync_api import FilePayload, Page
 
 Pixel = tuple[float, float]
+
+PLAIN = "lines=none&view=0.6,1.2,2.9,0,0,0"
 
 
 class View:
@@ -17,6 +20,8 @@ class View:
     def __init__(self, page: Page) -> None:
         self.page = page
         self.errors: list[str] = []
+        self._devtools = page.context.new_cdp_session(page)  # for what Playwright has no words
+        self._fingers = 0
         page.on("pageerror", lambda error: self.errors.append(str(error)))
 
     def open(self, address: str = "/") -> None:
@@ -31,6 +36,13 @@ class View:
             self.page.wait_for_timeout(50)
             if there.count():
                 return
+
+    def upload(self, name: str, text: str) -> None:
+        """Choose a file, and wait until its mesh is shown."""
+        file = FilePayload(name=name, mimeType="", buffer=text.encode())
+        with self.page.expect_response("**/v1/meshes?format=*"):
+            self.page.set_input_files("#file", file)
+        self.wait()
 
     @property
     def centre(self) -> Pixel:
@@ -59,6 +71,24 @@ class View:
         mouse.up()
         self.wait()
 
+    def touch(self, *places: Pixel) -> None:
+        """Have fingers at places beside the middle, and nowhere else; the first stays the first."""
+        x, y = self.centre
+        points = [{"x": x + a, "y": y + b, "id": finger} for finger, (a, b) in enumerate(places)]
+        kind = "touchEnd"
+        if points:
+            kind = "touchStart" if len(points) > self._fingers else "touchMove"
+        self._devtools.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
+        self._fingers = len(points)
+
+    def throttle_uploads(self, rate: int) -> None:
+        """Send no more than so many bytes a second."""
+        network = {"offline": False, "latency": 0, "downloadThroughput": -1}
+        self._devtools.send("Network.enable")
+        self._devtools.send(
+            "Network.emulateNetworkConditions", network | {"uploadThroughput": rate}
+        )
+
     def pixels(self) -> NDArray[np.int64]:
         """Return what is on the screen, (H, W, 3)."""
         image = Image.open(BytesIO(self.page.screenshot())).convert("RGB")
@@ -75,3 +105,27 @@ class View:
 
     def text(self, selector: str) -> str:
         return self.page.inner_text(selector)
+
+
+def query_of(view: View) -> dict[str, list[str]]:
+    """Return the parameters of the address that the page has written."""
+    view.page.wait_for_timeout(300)
+    search: dict[str, list[str]] = view.page.evaluate(
+        "() => { const q = new URLSearchParams(location.search); const r = {};"
+        "for (const k of q.keys()) r[k] = q.getAll(k); return r; }"
+    )
+    return search
+
+
+def angle_at(view: View, away: float) -> float:
+    """Return the angle from the middle of a unit sphere to what is drawn so many pixels away."""
+    box = view.page.locator("#canvas").bounding_box()
+    assert box is not None
+    slope = away / (box["height"] / 2) * math.tan(math.radians(38 / 2))
+    distance, radius = 2.9, 1 / math.sqrt(3)  # of a sphere whose bounding box's diagonal is 2
+    ray = math.atan(slope)
+    return math.asin(distance * math.sin(ray) / radius) - ray
+
+
+def length_of(view: View) -> float:
+    return float(view.text("#length"))

@@ -89,10 +89,12 @@ let isAddressDue = false;
 function writeAddress(): void {
   if (isAddressDue) return;
   isAddressDue = true;
-  setTimeout(() => {
-    isAddressDue = false;
-    history.replaceState(null, "", writeState(store.state));
-  }, ADDRESS_DELAY_MS);
+  setTimeout(setAddress, ADDRESS_DELAY_MS);
+}
+
+function setAddress(): void {
+  isAddressDue = false;
+  history.replaceState(null, "", writeState(store.state));
 }
 
 /** Do what the address asks for. */
@@ -109,9 +111,14 @@ function begin(): void {
     const [sources, targets, waypoints] = await Promise.all(
       points.map((each) => resolved(asked.mesh!, each)),
     );
+    const isKnown = asked.mesh === store.state.mesh;
     store.update({ ...asked, sources: sources!, target: targets![0] ?? null, waypoints: waypoints! });
+    if (isKnown) open(store.state); // a refused key may have kept it from being loaded
   });
 }
 
-status.onKey = begin;
+status.onKey = () => {
+  if (isAddressDue) setAddress();
+  begin();
+};
 begin();

@@ -1,9 +1,13 @@
 // What the page is doing: loading, ready, busy or error, for the eye, for the reader, for tests.
-import { isAbort, Refusal, setKey } from "./api/http";
+import { isAbort, setKey } from "./api/http";
+import { Refusal } from "./api/refusal";
 import { byId } from "./dom";
 
 type Kind = "loading" | "busy";
-type Work<T> = (onProgress: (share: number) => void) => Promise<T>;
+type Work<T> = (onProgress: OnProgress) => Promise<T>;
+
+/** Tells how much is done; null: something is, and nobody knows how much. */
+export type OnProgress = (share: number | null) => void;
 
 interface Task {
   kind: Kind;
@@ -60,6 +64,10 @@ export class Status {
     this.hasFailed = true;
     this.tell(error);
     this.show();
+    if (byId("key-form").hidden) return;
+    const field = byId("key", HTMLInputElement);
+    field.focus();
+    field.select();
   }
 
   private forget(): void {

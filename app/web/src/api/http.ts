@@ -1,11 +1,5 @@
 // Every request goes through here: the key is added, and a refusal becomes an exception.
-import type { Problem } from "./types";
-
-export class Refusal extends Error {
-  constructor(readonly problem: Pick<Problem, "detail" | "code" | "status" | "request_id"> & Partial<Problem>) {
-    super(problem.detail);
-  }
-}
+import { refusalOf } from "./refusal";
 
 const PLACE = "geodesic-key";
 let key = sessionStorage.getItem(PLACE) ?? "";
@@ -43,21 +37,6 @@ export function post(
     body: JSON.stringify(body),
     ...(signal ? { signal } : {}),
   });
-}
-
-async function refusalOf(response: Response): Promise<Refusal> {
-  const text = await response.text();
-  return refusal(response.status, text, response.headers.get("X-Request-ID") ?? "");
-}
-
-/** Make an exception of a refusal; what is no problem document, a proxy's page, is told by its status. */
-export function refusal(status: number, text: string, requestId: string): Refusal {
-  try {
-    return new Refusal(JSON.parse(text) as Problem);
-  } catch {
-    const detail = `The service answered ${status} without saying why.`;
-    return new Refusal({ detail, code: "unknown", status, request_id: requestId });
-  }
 }
 
 export function isAbort(error: unknown): boolean {

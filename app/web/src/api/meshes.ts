@@ -1,5 +1,6 @@
 // Meshes of the store: listed, made, uploaded.
-import { authorization, call, getJson, refusal, Refusal } from "./http";
+import { authorization, call, getJson } from "./http";
+import { refusal, Refusal } from "./refusal";
 import type { MeshDocument, MeshList } from "./types";
 
 export function listMeshes(): Promise<MeshList> {
@@ -18,7 +19,7 @@ export async function makeSample(name: string, faces: number): Promise<MeshDocum
 /** Upload a file. By XMLHttpRequest, since fetch does not tell how much of a body it has sent. */
 export function uploadMesh(
   file: File,
-  onProgress: (share: number) => void,
+  onProgress: (share: number | null) => void,
   signal: AbortSignal,
 ): Promise<MeshDocument> {
   const extension = file.name.split(".").pop()?.toLowerCase() ?? "";
@@ -30,7 +31,7 @@ export function uploadMesh(
     for (const [name, value] of Object.entries(authorization())) {
       request.setRequestHeader(name, value);
     }
-    request.upload.onprogress = (event) => onProgress(event.loaded / event.total);
+    request.upload.onprogress = ({ loaded, total }) => onProgress(loaded < total ? loaded / total : null);
     request.onload = () => {
       if (request.status < 300) resolve(JSON.parse(request.responseText) as MeshDocument);
       else reject(refusal(request.status, request.responseText, request.getResponseHeader("X-Request-ID") ?? ""));

@@ -2,6 +2,7 @@
 import { BufferAttribute, BufferGeometry } from "three";
 import { MeshBVH } from "three-mesh-bvh";
 import { authorization } from "../api/http";
+import { Refusal } from "../api/refusal";
 import type { MeshDocument } from "../api/types";
 
 type Triple = [number, number, number];
@@ -27,6 +28,7 @@ export type LoaderAnswer =
     }
   | { tell: "tree"; roots: ArrayBuffer[]; order: Uint32Array | Uint16Array }
   | { tell: "edges"; edges: Uint32Array<ArrayBuffer> }
+  | { tell: "refusal"; problem: Refusal["problem"] }
   | { tell: "failure"; message: string };
 
 type Told<K> = Extract<LoaderAnswer, { tell: K }>;
@@ -111,9 +113,10 @@ class Answering {
   next<K extends LoaderAnswer["tell"]>(tell: K): Promise<Told<K>> {
     return new Promise((resolve, reject) => {
       const listen = ({ data }: MessageEvent<LoaderAnswer>): void => {
-        if (data.tell !== tell && data.tell !== "failure") return;
+        if (![tell, "refusal", "failure"].includes(data.tell)) return;
         this.worker.removeEventListener("message", listen as EventListener);
-        if (data.tell === "failure") reject(new Error(data.message));
+        if (data.tell === "refusal") reject(new Refusal(data.problem));
+        else if (data.tell === "failure") reject(new Error(data.message));
         else resolve(data as Told<K>);
       };
       this.worker.addEventListener("message", listen as EventListener);

@@ -2,6 +2,7 @@
 import { BufferAttribute, BufferGeometry } from "three";
 import { MeshBVH } from "three-mesh-bvh";
 import { parseNpy, toIndices } from "../api/npy";
+import { Refusal, refusalOf } from "../api/refusal";
 import type { LoaderAnswer, LoaderQuestion } from "./loader";
 
 let faces = new Uint32Array(0);
@@ -11,7 +12,8 @@ self.onmessage = async ({ data }: MessageEvent<LoaderQuestion>) => {
     if (data.ask === "mesh") await load(data);
     else sendEdges();
   } catch (error) {
-    send({ tell: "failure", message: error instanceof Error ? error.message : String(error) });
+    if (error instanceof Refusal) send({ tell: "refusal", problem: error.problem });
+    else send({ tell: "failure", message: error instanceof Error ? error.message : String(error) });
   }
 };
 
@@ -34,12 +36,9 @@ async function load({ vertices, faces: facesUrl, headers }: LoaderQuestion & { a
   send({ tell: "tree", roots: tree.roots as ArrayBuffer[], order: tree.indirectBuffer! });
 }
 
-async function array(url: string, headers: Record<string, string>): ReturnType<typeof parseNpyOf> {
-  return parseNpyOf(await fetch(url, { headers }));
-}
-
-async function parseNpyOf(response: Response): Promise<ReturnType<typeof parseNpy>> {
-  if (!response.ok) throw new Error(`the service answered ${response.status} for ${response.url}`);
+async function array(url: string, headers: Record<string, string>): Promise<ReturnType<typeof parseNpy>> {
+  const response = await fetch(url, { headers });
+  if (!response.ok) throw await refusalOf(response);
   return parseNpy(await response.arrayBuffer());
 }
 

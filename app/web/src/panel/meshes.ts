@@ -2,7 +2,7 @@
 import { listMeshes, makeSample, uploadMesh } from "../api/meshes";
 import type { MeshDocument } from "../api/types";
 import { WITHOUT_POINTS, type Store } from "../state/state";
-import type { Status } from "../status";
+import type { OnProgress, Status } from "../status";
 import { button, byId, count } from "../dom";
 
 const SAMPLES = [
@@ -57,7 +57,9 @@ export class Meshes {
   }
 
   showChosen(): void {
-    byId("meshes", HTMLSelectElement).value = this.store.state.mesh ?? "";
+    const select = byId("meshes", HTMLSelectElement);
+    select.value = this.store.state.mesh ?? "";
+    if (select.selectedIndex < 0) select.value = ""; // not all are listed
   }
 
   private nameOf({ id, faces }: MeshDocument): string {
@@ -73,7 +75,7 @@ export class Meshes {
   private take(
     words: string,
     name: string,
-    make: (onProgress: (share: number) => void, signal: AbortSignal) => Promise<MeshDocument>,
+    make: (onProgress: OnProgress, signal: AbortSignal) => Promise<MeshDocument>,
   ): void {
     const stop = new AbortController();
     this.status.run("loading", words, stop, async (onProgress) => {

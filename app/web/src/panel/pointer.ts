@@ -3,13 +3,14 @@ import { Vector3 } from "three";
 import type { Point } from "../api/types";
 import { positionOf, type FacePoint } from "../mesh/picking";
 import { rounded } from "../state/point";
-import type { Store } from "../state/state";
+import type { State, Store } from "../state/state";
 import type { Shown } from "../view/shown";
 
 export type Tool = "source" | "target" | "waypoint" | "barrier";
 
-const STILL_PX = 5;
-const NEAR_PX = 16;
+/** How far a click may stray, and from how far a point is taken hold of, in pixels; fingers are broad. */
+const REACH = { still: 5, near: 16 };
+const REACH_OF_FINGERS = { still: 10, near: 28 };
 /** Where a brush touches the mesh, in pixels from the pointer. */
 const BRUSH = [-9, -6, -3, 0, 3, 6, 9].flatMap((x) =>
   [-9, -6, -3, 0, 3, 6, 9].filter((y) => Math.hypot(x, y) < 10).map((y) => [x, y] as const),
@@ -19,6 +20,8 @@ type Place = { clientX: number; clientY: number };
 
 export class Pointer {
   private start: PointerEvent | null = null;
+  /** What a drag has changed, as it was. */
+  private before: Pick<State, "target" | "waypoints"> | null = null;
   private drag: ((event: Place) => void) | null = null;
   private painted: Set<number> | null = null;
   private fingers = 0;
@@ -35,21 +38,22 @@ export class Pointer {
     canvas.addEventListener("pointerdown", (event) => this.down(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.move(event), { capture: true });
     canvas.addEventListener("pointerup", (event) => this.up(event), { capture: true });
-    canvas.addEventListener("pointercancel", () => this.end(), { capture: true });
+    canvas.addEventListener("pointercancel", () => this.cancel(), { capture: true });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   }
 
   private down(event: PointerEvent): void {
     this.fingers += 1;
     if (event.button !== 0 || this.fingers > 1) {
-      this.start = null;
+      this.abandon(); // two fingers move the mesh, whatever the first began
       return;
     }
+    const { target, waypoints } = this.store.state;
     this.start = event;
+    this.before = { target, waypoints };
     this.drag = this.dragFrom(event);
     if (this.drag) {
-      this.shown.stage.controls.enabled = false;
-      this.shown.stage.canvas.setPointerCapture(event.pointerId);
+      this.shown.stage.turnsByDrag = false;
       if (this.painted) this.drag(event);
     }
   }
@@ -110,10 +114,27 @@ export class Pointer {
     if (tool === "waypoint") this.store.update({ waypoints: [...waypoints, point] });
   }
 
+  private cancel(): void {
+    this.abandon();
+    this.end();
+  }
+
+  /** Leave all as it was before the drag. */
+  private abandon(): void {
+    const { drag, painted, before } = this;
+    this.letGo();
+    if (painted) this.shown.barriers.show(this.shown.mesh, this.store.state.barriers);
+    else if (drag && before) this.store.update(before);
+  }
+
   private end(): void {
     this.fingers = Math.max(0, this.fingers - 1);
-    this.start = this.drag = this.painted = this.last = null;
-    this.shown.stage.controls.enabled = true;
+    this.letGo();
+  }
+
+  private letGo(): void {
+    this.start = this.before = this.drag = this.painted = this.last = null;
+    this.shown.stage.turnsByDrag = true;
   }
 
   private paint(place: Place, erases: boolean): void {
@@ -141,11 +162,15 @@ export class Pointer {
   private isNear(point: Point, event: PointerEvent): boolean {
     const { mesh, stage } = this.shown;
     const [x, y] = stage.toPage(new Vector3(...mesh!.drawn(positionOf(mesh!, point))));
-    return Math.hypot(x - event.clientX, y - event.clientY) < NEAR_PX;
+    return Math.hypot(x - event.clientX, y - event.clientY) < reachOf(event).near;
   }
 
   private hasMoved(event: PointerEvent): boolean {
     const { clientX, clientY } = this.start ?? event;
-    return Math.hypot(event.clientX - clientX, event.clientY - clientY) > STILL_PX;
+    return Math.hypot(event.clientX - clientX, event.clientY - clientY) > reachOf(event).still;
   }
+}
+
+function reachOf({ pointerType }: PointerEvent): typeof REACH {
+  return pointerType === "touch" ? REACH_OF_FINGERS : REACH;
 }

@@ -2,9 +2,11 @@
 import {
   ColorManagement,
   LinearSRGBColorSpace,
+  MOUSE,
   PerspectiveCamera,
   Scene,
   Spherical,
+  TOUCH,
   Vector3,
   WebGLRenderer,
   type Object3D,
@@ -22,7 +24,7 @@ export class Stage {
   private readonly overlay = new Scene();
   private readonly backdrop: Backdrop;
   readonly camera = new PerspectiveCamera(38, 1, 0.01, 50);
-  readonly controls: OrbitControls;
+  private readonly controls: OrbitControls;
   readonly renderer: WebGLRenderer;
   onMove: (view: number[]) => void = () => undefined;
   onFrame: () => void = () => undefined;
@@ -41,14 +43,21 @@ export class Stage {
     this.controls.zoomToCursor = true;
     this.controls.rotateSpeed = 0.9;
     this.controls.addEventListener("change", () => this.invalidate());
-    let before: number[] = [];
-    this.controls.addEventListener("start", () => (before = this.view));
+    let before: number[] | null = null;
+    this.controls.addEventListener("start", () => (before ??= this.view)); // each finger starts
     this.controls.addEventListener("end", () => {
-      if (this.view.some((x, i) => Math.abs(x - before[i]!) > 1e-4)) this.onMove(this.view);
+      if (before && this.view.some((x, i) => Math.abs(x - before![i]!) > 1e-4)) this.onMove(this.view);
+      before = null;
     });
     this.look(null);
     new ResizeObserver(() => this.resize()).observe(canvas);
     this.resize();
+  }
+
+  /** Whether one pointer that is dragged turns the mesh; two fingers move it in any case. */
+  set turnsByDrag(turns: boolean) {
+    this.controls.mouseButtons.LEFT = turns ? MOUSE.ROTATE : null;
+    this.controls.touches.ONE = turns ? TOUCH.ROTATE : null;
   }
 
   /** Draw a frame soon. */
