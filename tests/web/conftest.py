@@ -23,8 +23,9 @@ FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox
 SERVE = "from app.cli import main; main()"
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
+    """A browser of the module: its event loop would be in the way of other tests."""
     executable = next(filter(None, map(shutil.which, BROWSERS)), None)
     missing = []
     if executable is None:
@@ -41,7 +42,7 @@ def browser() -> Iterator[Browser]:
         browser.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def service(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:  # noqa: ARG001
     """The address of a service of its own; only where there is a browser to go there."""
     with serving(tmp_path_factory.mktemp("store")) as address:
@@ -88,18 +89,18 @@ def _sample(service: str, name: str, faces: int) -> str:
     return str(answer.json()["id"])
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def sphere(service: str) -> str:
     """The id of a sphere of radius 1."""
     return _sample(service, "sphere", 5000)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def knot(service: str) -> str:
     return _sample(service, "knot", 10_000)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def large(service: str) -> str:
     """The id of a mesh whose distances take seconds, as an estimate tells."""
     return _sample(service, "knot", 450_000)
