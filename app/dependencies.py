@@ -1,7 +1,7 @@
 """What handlers are given: the service, the deadline, the format, and a client that may hang up.
 
 Dependencies are coroutines, though they wait for nothing: FastAPI runs plain functions in a thread,
-each for a fifth of a millisecond. And they are few: each takes as long as half of all middleware.
+each for a fifth of a millisecond. And they are few: each took 2 % of the time of a small request.
 """
 
 import asyncio

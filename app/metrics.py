@@ -72,7 +72,8 @@ class Metrics(Collector):
         answered, took = "Queries that workers answered", "What solving them took"
         yield _counters("geodesic_solves", answered, "kind", service.solves)
         yield _counters("geodesic_solve_seconds", took, "kind", service.solve_seconds)
-        yield _gauge("geodesic_results_bytes", "Size of the kept answers", service.results.nbytes)
+        files = service.results.nbytes
+        yield _gauge("geodesic_results_bytes", "Size of the kept answers that are files", files)
         yield _gauge("geodesic_meshes", "Meshes in the store", books.count)
         yield _gauge("geodesic_meshes_bytes", "Size of the meshes in the store", books.total)
         jobs = {status: self._jobs.get(status, 0) for status in get_args(JobStatus)}

@@ -83,27 +83,28 @@ def _wait_until_ready(address: str, process: "subprocess.Popen[bytes]") -> None:
     raise AssertionError("the service did not become ready")
 
 
-def _sample(service: str, name: str, faces: int) -> str:
+def sample(service: str, name: str, faces: int, **headers: str) -> str:
+    """Have a sample made, and give its id."""
     parameters = {"sample": name, "faces": faces}
-    answer = httpx2.post(f"{service}/v1/meshes", params=parameters, timeout=120)
+    answer = httpx2.post(f"{service}/v1/meshes", params=parameters, headers=headers, timeout=120)
     return str(answer.json()["id"])
 
 
 @pytest.fixture(scope="module")
 def sphere(service: str) -> str:
     """The id of a sphere of radius 1."""
-    return _sample(service, "sphere", 5000)
+    return sample(service, "sphere", 5000)
 
 
 @pytest.fixture(scope="module")
 def knot(service: str) -> str:
-    return _sample(service, "knot", 10_000)
+    return sample(service, "knot", 10_000)
 
 
 @pytest.fixture(scope="module")
 def large(service: str) -> str:
     """The id of a mesh whose distances take seconds, as an estimate tells."""
-    return _sample(service, "knot", 450_000)
+    return sample(service, "knot", 450_000)
 
 
 @pytest.fixture

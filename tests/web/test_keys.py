@@ -6,7 +6,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, Request
 
-from .conftest import serving
+from .conftest import sample, serving
 from .viewing import PLAIN, View
 
 KEY = "of-a-page-0123456789"
@@ -20,22 +20,15 @@ def service(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Itera
         yield address
 
 
-def _sample(service: str, faces: int) -> str:
-    parameters = {"sample": "knot", "faces": faces}
-    url = f"{service}/v1/meshes"
-    answer = httpx2.post(url, params=parameters, headers=BEARER, timeout=120)
-    return str(answer.json()["id"])
-
-
 @pytest.fixture(scope="module")
 def knot(service: str) -> str:
-    return _sample(service, 10_000)
+    return sample(service, "knot", 10_000, **BEARER)
 
 
 @pytest.fixture(scope="module")
 def large(service: str) -> str:
     """The id of a mesh whose distances take seconds, as an estimate tells."""
-    return _sample(service, 450_000)
+    return sample(service, "knot", 450_000, **BEARER)
 
 
 def give_key(page: Page, key: str) -> None:
