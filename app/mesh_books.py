@@ -9,7 +9,7 @@ import asyncio
 import shutil
 import tempfile
 from collections import Counter, OrderedDict
-from collections.abc import AsyncIterator, Iterator, Sequence
+from collections.abc import AsyncIterator, Collection, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,9 +52,9 @@ class MeshBooks:
         self._sizes = OrderedDict(self._store.sizes())
 
     @property
-    def count(self) -> int:
-        """How many meshes there are."""
-        return len(self._sizes)
+    def ids(self) -> Collection[str]:
+        """Which meshes there are."""
+        return self._sizes.keys()
 
     @property
     def total(self) -> int:

@@ -74,7 +74,7 @@ class Metrics(Collector):
         yield _counters("geodesic_solve_seconds", took, "kind", service.solve_seconds)
         files = service.results.nbytes
         yield _gauge("geodesic_results_bytes", "Size of the kept answers that are files", files)
-        yield _gauge("geodesic_meshes", "Meshes in the store", books.count)
+        yield _gauge("geodesic_meshes", "Meshes in the store", len(books.ids))
         yield _gauge("geodesic_meshes_bytes", "Size of the meshes in the store", books.total)
         jobs = {status: self._jobs.get(status, 0) for status in get_args(JobStatus)}
         yield _gauges("geodesic_jobs", "Jobs that are not forgotten yet", "status", jobs)

@@ -26,6 +26,7 @@ from app.engine import (
     Told,
 )
 from app.errors import ProblemError, refuse
+from app.field_store import FieldStore
 from app.flights import Flights
 from app.jobs import Errand, Job, JobBook, Jobs, require_whole
 from app.mesh_books import MeshBooks
@@ -78,6 +79,7 @@ class Service:
             evicts=settings.store_evict == "lru",
         )
         self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
+        self.fields = FieldStore(settings.store, settings.fields_bytes)
         self.engine: Engine = LocalEngine(settings, results)
         self._job_book = settings.store / JOB_BOOK
         self.jobs = Jobs(JobBook(self._job_book), self.results, settings.job_ttl)
@@ -94,6 +96,7 @@ class Service:
         with self.owning_store():
             self.mesh_books.prepare()
             self.results.prepare()
+            self.fields.prepare(self.mesh_books.ids)
             await self.engine.start()
             # What is there by now stays. Looking through it for garbage takes 90 ms each time.
             collect()
@@ -124,7 +127,7 @@ class Service:
             assert done.mesh is not None, "this kind of work writes a mesh"  # noqa: S101
             kept = await self.mesh_books.keep(done.mesh)
         for mesh_id in kept.evicted:
-            self.results.forget_mesh(mesh_id)
+            await self._forget(mesh_id)
         return Added(_described(done.mesh.manifest), kept.is_new, done.seconds)
 
     def describe(self, mesh_id: str) -> dict[str, Any]:
@@ -160,7 +163,12 @@ class Service:
         if not caller.may_delete(self.meshes.owner(mesh_id)):
             raise refuse("forbidden", f"mesh {mesh_id} was stored with another API key")
         await self.mesh_books.delete(mesh_id)
+        await self._forget(mesh_id)
+
+    async def _forget(self, mesh_id: str) -> None:
+        """Remove what was found on a mesh that is gone."""
         self.results.forget_mesh(mesh_id)
+        await to_thread.run_sync(self.fields.forget_mesh, mesh_id)
 
     async def answer(
         self, query: Query[Any], form: Form, asker: Asker, *, as_file: bool

@@ -79,7 +79,7 @@ class Settings(BaseSettings):
     )
 
     store: Path = Path("geodesic-store")
-    """Folder of the meshes and results; created where it is not there."""
+    """Folder of meshes, results and fields; created where it is not there."""
     workers: PositiveInt = Field(default_factory=_cores)
     """Worker processes; one for each core, unless set."""
     worker_memory_bytes: int = Field(ge=LEAST_WORKER_MEMORY, default_factory=_worker_memory)
@@ -96,6 +96,8 @@ class Settings(BaseSettings):
     """Size of the finished results that the store keeps."""
     results_memory_bytes: PositiveInt = 256 * MIB
     """Size of the small ones in memory: some of them, and all that have no files."""
+    fields_bytes: PositiveInt = 4 * GIB
+    """Size of the distance fields that the store keeps: those that took more than 50 ms."""
     max_upload_bytes: PositiveInt = 512 * MIB
     """Largest body of an upload."""
     max_query_bytes: PositiveInt = Field(default_factory=_query_bytes)

@@ -7,6 +7,7 @@
         lock            held by whoever owns the store, for as long as its process lives
         meshes/         see ``mesh_store``
         results/        see ``result_store``
+        fields/         see ``field_store``
         jobs.sqlite3    see ``jobs.book``
         tmp/            what is being written
 """
@@ -26,7 +27,8 @@ LAYOUT = 5
 """Of the store that this code reads and writes. To be raised with every change of any of its files,
 the job book's tables among them."""
 
-JOB_BOOK, MESHES, RESULTS, TEMPORARY = "jobs.sqlite3", "meshes", "results", "tmp"
+JOB_BOOK, MESHES, RESULTS, FIELDS = "jobs.sqlite3", "meshes", "results", "fields"
+TEMPORARY = "tmp"
 
 _READ_AS_THEY_ARE = (4, LAYOUT)
 """Layouts that differ by this number alone: up to 4 it was in each mesh's manifest."""

@@ -1,17 +1,18 @@
 """What an operator asks of a store: what is in it, whether it is whole, and what may go."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
 from app.errors import ProblemError
+from app.field_store import code_of_field, field_files, name_of_field
 from app.jobs import Job, read_book, require_whole
 from app.mesh_store import MeshStore
 from app.result_store import read_seal, sealed_results
-from app.store import JOB_BOOK, RESULTS, TEMPORARY, StoreError
+from app.store import FIELDS, JOB_BOOK, RESULTS, TEMPORARY, StoreError
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,8 @@ class Contents:
     meshes: list[MeshEntry]
     results: int
     result_bytes: int
+    fields: int
+    field_bytes: int
     jobs: list[Job]
 
 
@@ -71,7 +74,9 @@ def contents(root: Path) -> Contents:
         )
     results = sealed_results(root / RESULTS)
     result_bytes = sum(body.stat().st_size for _, body in results.values())
-    return Contents(entries, len(results), result_bytes, read_book(root / JOB_BOOK))
+    fields = field_files(root).values()
+    jobs = read_book(root / JOB_BOOK)
+    return Contents(entries, len(results), result_bytes, len(fields), sum(fields), jobs)
 
 
 def damage(root: Path) -> Iterator[str]:
@@ -83,6 +88,9 @@ def damage(root: Path) -> Iterator[str]:
     for name, files in sealed_results(root / RESULTS).items():
         if read_seal(root / RESULTS, name) is None and files[0].exists():  # else evicted meanwhile
             yield f"result {name} is damaged: it is not what was written"
+    for path in field_files(root):
+        if code_of_field(path) is None and path.exists():
+            yield f"field {name_of_field(path)} is damaged: it is not what was written"
     try:
         require_whole(root / JOB_BOOK)
     except StoreError as error:
@@ -94,26 +102,34 @@ def leftovers(root: Path, code: str) -> Iterator[Leftover]:
 
     The answer of a job stays, unless it is damaged.
     """
-    results = root / RESULTS
     meshes = MeshStore(root).sizes()
+    sealed, fields = sealed_results(root / RESULTS), field_files(root)
     held = {job.result for job in read_book(root / JOB_BOOK)}
-    sealed = sealed_results(results)
     for name, files in sealed.items():
-        reason = None
-        seal = read_seal(results, name)
-        if seal is None:
-            reason = "damaged"
-        elif name not in held:
-            if name.partition("/")[0] not in meshes:
-                reason = "of a mesh that is gone"
-            elif seal.code != code:
-                reason = "outdated"
+        seal = read_seal(root / RESULTS, name)
+        if seal is not None and name in held:
+            continue
+        reason = _reason(name, None if seal is None else seal.code, meshes, code)
         if reason is not None:
             yield Leftover(reason, files)
-    whole = {file for files in sealed.values() for file in files}
-    for path in (*(root / TEMPORARY).glob("*"), *results.glob("*/*")):
+    for path in fields:
+        reason = _reason(name_of_field(path), code_of_field(path), meshes, code)
+        if reason is not None:
+            yield Leftover(reason, (path,))
+    whole = {*fields, *(file for files in sealed.values() for file in files)}
+    folders = (root / TEMPORARY, *(root / RESULTS).glob("*"), *(root / FIELDS).glob("*"))
+    for path in (path for folder in folders for path in folder.glob("*")):
         if path not in whole:
             yield Leftover("half-written", (path,))
+
+
+def _reason(name: str, found_by: str | None, meshes: Container[str], code: str) -> str | None:
+    """Return why a result or a field may go, if it may; what is damaged was found by no code."""
+    if found_by is None:
+        return "damaged"
+    if name.partition("/")[0] not in meshes:
+        return "of a mesh that is gone"
+    return "outdated" if found_by != code else None
 
 
 def remove(leftover: Leftover) -> None:
@@ -124,5 +140,5 @@ def remove(leftover: Leftover) -> None:
         else:
             path.unlink()
     folder = leftover.paths[0].parent
-    if folder.parent.name == RESULTS and not any(folder.iterdir()):
+    if folder.parent.name in (RESULTS, FIELDS) and not any(folder.iterdir()):
         folder.rmdir()

@@ -54,7 +54,7 @@ def _is_strip(winners: Winners) -> Flags:
 def _lies_on_curve(mesh: TriangleMesh, winners: Winners, is_strip: Flags) -> Flags:
     """Tell which nodes lie on the piece that reaches them, as vertices of faces of no area may."""
     lies = np.zeros_like(is_strip)
-    nodes = np.flatnonzero(is_strip)
+    nodes = np.flatnonzero(is_strip & np.isfinite(winners.distance))
     pieces = winners.winner_ints[nodes, FROM]
     away = winners.distance[nodes] - winners.distance[pieces]
     lies[nodes] = away <= FOOT * mesh.diagonal

@@ -4,7 +4,10 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.arrival import Arrival, arrival_at, with_target
@@ -21,15 +24,17 @@ from geodesic_core.isolines import (
 )
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept
+from geodesic_core.kernels.wavefront import exact_bounds, merging_bounds, with_strips
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest_source import NearestSource, find_nearest_source
 from geodesic_core.nodes import Nodes, component_of, disconnected
 from geodesic_core.once import Once
+from geodesic_core.packed import packed, unpacked
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, traced_path
 from geodesic_core.run import Control
 from geodesic_core.surface_point import Point, SurfacePoint
 from geodesic_core.tolerances import FOOT, LEVEL, PATH_LENGTH
-from geodesic_core.whole_sweep import WholeSweep
+from geodesic_core.whole_sweep import Found, WholeSweep
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,6 +61,14 @@ class SweepStats:
     seconds: float
     """Time of the solve, with the allocation of its state."""
 
+    @classmethod
+    def of(
+        cls, mesh: TriangleMesh, created: int, kept: int, peak: int, peak_bytes: int, seconds: float
+    ) -> Self:
+        """Return the statistics of a sweep with these counts of windows."""
+        edges = mesh.edge_count
+        return cls(created, kept, peak, created / edges, kept / edges, peak_bytes, seconds)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the statistics as what JSON can hold."""
         return asdict(self)
@@ -78,30 +91,90 @@ class DistanceField:
     stats: SweepStats
     _places: tuple[Polyline, ...]
     """The sources' points, canonical"""
+    _targets: tuple[SurfacePoint, ...]
+    """Those that the sweep was told of, canonical"""
     _sweep: WholeSweep
     """Where the values come from"""
-    _node_of: Mapping[SurfacePoint, int]
-    """The nodes of the targets that the sweep was told of"""
-    _node_distances: Floats
-    """(N,) by node"""
-    _node_nearest: Ints
-    """(N,) the same of `nearest_source`"""
-    _winners: Once[Winners]
-    """For backtracing; the sweep may not have kept what that needs."""
-    _windows: Kept | None
-    """None where they were not kept."""
-    _ways: Once[tuple[Winners, Kept]] | None
-    """Those of an exact sweep, by which any point is found; None where it is searched from."""
+    _found: Found
+
+    @classmethod
+    def from_arrays(cls, mesh: TriangleMesh, arrays: Mapping[str, NDArray[Any]]) -> "DistanceField":
+        """Return the field on ``mesh`` whose `arrays` these are; trusted, not checked.
+
+        What it answers is the same to the bit; its sources are spelled canonically.
+        """
+        places = unpacked("source", arrays)
+        targets = tuple(point for (point,) in unpacked("target", arrays))
+        starts = arrays["start_distances"]
+        sources = tuple(
+            Source(line[0] if len(line) == 1 else Curve(line), start)
+            for line, start in zip(places, starts.tolist(), strict=True)
+        )
+        limit, *errors = arrays["limits"].tolist()
+        bounds = merging_bounds(limit, *errors) if errors else exact_bounds(limit)
+        of_type, kind = arrays["promise"].tolist()
+        created, kept, peak, peak_bytes = arrays["counts"].tolist()
+        seconds = float(arrays["seconds"])
+        return field_of(
+            sources,
+            places,
+            targets,
+            WholeSweep.between(mesh, places, starts, targets, bounds),
+            ErrorBound(of_type, float(arrays["promised"]), kind),
+            Found.from_arrays(arrays),
+            SweepStats.of(mesh, created, kept, peak, peak_bytes, seconds),
+        )
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return what was asked for, and what was found, by name: what a store keeps.
+
+        All but the mesh, and what was searched for later.
+        """
+        bounds, stats, promise = self._sweep.bounds, self.stats, self.error_bound
+        errors = [bounds.relative_error, bounds.absolute_error] if bounds.merging else []
+        counts = stats.windows_created, stats.windows_kept, stats.windows_peak, stats.peak_bytes
+        return {
+            **packed("source", self._places),
+            **packed("target", [(target,) for target in self._targets]),
+            "start_distances": self._sweep.start_distances,
+            "limits": np.array([bounds.max_distance, *errors]),
+            "promise": np.array([promise.type, promise.kind]),
+            "promised": np.array(promise.value),
+            **self._found.arrays(),
+            "counts": np.array(counts, np.int64),
+            "seconds": np.array(stats.seconds),
+        }
 
     @property
     def nbytes(self) -> int:
         """Memory kept, bytes, the mesh not counted; it grows by what is found only when asked."""
-        kept: list[Any] = [self._node_distances, self.distances, self.nearest_source]
+        found, ways = self._found, self._ways
+        kept: list[Any] = [found.distance, self.distances, self.nearest_source]
         kept += self._winners.found or ()
-        ways = self._ways.found if self._ways is not None else None
-        for windows in (self._windows, ways[1] if ways is not None else None):
+        for windows in (found.windows, ways.found[1] if ways and ways.found else None):
             kept += windows or ()
         return sum(array.nbytes for array in kept)
+
+    @cached_property
+    def _node_of(self) -> Mapping[SurfacePoint, int]:
+        """The nodes of the targets."""
+        return dict(zip(self._targets, self._sweep.nodes.targets.tolist(), strict=True))
+
+    @cached_property
+    def _winners(self) -> Once[Winners]:
+        """For backtracing; the sweep may not have kept what that needs."""
+        return Once(self._sweep.find_winners, self._found.winners)
+
+    @cached_property
+    def _ways(self) -> Once[tuple[Winners, Kept]] | None:
+        """By which windows any point is found exactly; None where it is searched from."""
+        sweep, bounds, found = self._sweep, self._sweep.bounds, self._found
+        if found.winners is not None and found.windows is not None and not bounds.merging:
+            return Once(sweep.find_ways, (found.winners, found.windows))
+        if bounds.strips:  # a sweep back from a point ends at points, not on curves
+            exact = with_strips(exact_bounds(bounds.max_distance), bounds.first_piece)
+            return Once(replace(sweep, bounds=exact).find_ways)
+        return None
 
     def distance_at(
         self,
@@ -132,7 +205,7 @@ class DistanceField:
         place = self.mesh.point(point)
         node = self._node(place)
         if node is not None:
-            return float(self._node_distances[node])
+            return float(self._found.distance[node])
         if self._ways is None:
             return self._nearest_to(place, control).distance
         return self._arrival_at(place, *self._ways.get(control)).distance
@@ -161,7 +234,7 @@ class DistanceField:
         place = self.mesh.point(point)
         node = self._node(place)
         if node is not None:
-            return int(self._node_nearest[node])
+            return int(self._found.nearest[node])
         if self._ways is None:
             return self._nearest_to(place, control).source
         return self._arrival_at(place, *self._ways.get(control)).source
@@ -196,7 +269,7 @@ class DistanceField:
         place = self.mesh.point(target, "target")
         node = self._node(place)
         if node is not None:
-            if math.isinf(self._node_distances[node]):
+            if math.isinf(self._found.distance[node]):
                 raise self._no_path(place)
             return self._traced(place, self._winners.get(control), self._sweep.nodes, node)
         if self._ways is None:
@@ -305,13 +378,13 @@ class DistanceField:
         if not within:
             yield from ([] for _ in levels)
             return
-        windows = self._windows
+        windows = self._found.windows
         if windows is None:
             windows = self._windows_at(within, control.for_part(0, 2))
             control = control.for_part(1, 2)
         parts = 1 + len(levels)
         drawing = Drawing(
-            self.mesh, windows, self._node_distances, self._sweep.nodes, control.for_part(0, parts)
+            self.mesh, windows, self._found.distance, self._sweep.nodes, control.for_part(0, parts)
         )
         for i, level in enumerate(levels):
             part = control.for_part(1 + i, parts)
@@ -324,7 +397,7 @@ class DistanceField:
         """Return the windows of all faces that some levels may pass."""
         if self._sweep.bounds.merging:
             return self._sweep.find_windows(self._sweep.all_faces, control)
-        faces = crossed_faces(self.mesh, self._node_distances, self.max_distance, levels)
+        faces = crossed_faces(self.mesh, self._found.distance, self.max_distance, levels)
         return self._sweep.find_windows(faces, control)
 
     def _traced(
@@ -364,7 +437,7 @@ class DistanceField:
             self.mesh,
             starts,
             sweep.start_distances,
-            self._node_distances,
+            self._found.distance,
             sweep.bounds,
             place,
             control,
@@ -378,6 +451,32 @@ class DistanceField:
             )
         message = f"{place} is in another connected component than every source"
         return disconnected(self.mesh, message, place, *(line[0] for line in self._places))
+
+
+def field_of(
+    sources: tuple[Source, ...],
+    places: tuple[Polyline, ...],
+    targets: tuple[SurfacePoint, ...],
+    sweep: WholeSweep,
+    promise: ErrorBound,
+    found: Found,
+    stats: SweepStats,
+) -> DistanceField:
+    """Return the field of a sweep that has found what it was asked for."""
+    inner = sweep.mesh.topology.inner_vertex
+    return DistanceField(
+        mesh=sweep.mesh,
+        sources=sources,
+        max_distance=sweep.bounds.max_distance,
+        distances=found.distance[inner],
+        nearest_source=found.nearest[inner],
+        error_bound=promise,
+        stats=stats,
+        _places=places,
+        _targets=targets,
+        _sweep=sweep,
+        _found=found,
+    )
 
 
 Sources = Point | Curve | Source | Sequence[Point | Curve | Source]

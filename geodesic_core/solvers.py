@@ -14,23 +14,20 @@ from geodesic_core.arguments import as_barriers, as_limit, is_number
 from geodesic_core.arrays import Floats
 from geodesic_core.curve import Curve, Polyline, polyline_of
 from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
-from geodesic_core.kernels import kept, wavefront
-from geodesic_core.kernels.backtrace import Winners
-from geodesic_core.kernels.kept import Kept
-from geodesic_core.kernels.wavefront import Bounds, Wavefront, with_strips
+from geodesic_core.kernels import wavefront
+from geodesic_core.kernels.wavefront import Bounds, Wavefront
 from geodesic_core.matrix import Layout, find_matrix
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest import Nearest, find_nearest
-from geodesic_core.nodes import component_of, disconnected, nodes_of
-from geodesic_core.once import Once
+from geodesic_core.nodes import component_of, disconnected
 from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, joined
 from geodesic_core.path_search import PathSearch
-from geodesic_core.result import DistanceField, Source, Sources, SweepStats
+from geodesic_core.result import DistanceField, Source, Sources, SweepStats, field_of
 from geodesic_core.run import Control
 from geodesic_core.surface_point import Point, SurfacePoint
 from geodesic_core.sweeper import Sweeper
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
-from geodesic_core.whole_sweep import WholeSweep, all_winners, peak_bytes
+from geodesic_core.whole_sweep import WholeSweep, peak_bytes
 
 
 def exact_distance(
@@ -379,58 +376,19 @@ def _solve(
     """Check the arguments, sweep, and make the result, with what paths and windows need kept."""
     starts, places = _as_sources(mesh, sources)
     ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
-    nodes = nodes_of(mesh, places, ends)
     distances = np.array([start.start_distance for start in starts])
-    if nodes.pieces:
-        bounds = with_strips(bounds, nodes.first_piece)
-    sweep = WholeSweep(mesh, nodes, distances, bounds)
+    sweep = WholeSweep.between(mesh, places, distances, ends, bounds)
     wave = sweep.run(control, paths=paths, windows=sweep.all_faces if windows else None)
-    winners, inner = all_winners(wave), mesh.topology.inner_vertex
-    windows_kept = kept.kept_of(wave) if windows else None
-    return DistanceField(
-        mesh=mesh,
-        sources=starts,
-        max_distance=bounds.max_distance,
-        distances=wave.distance[inner],
-        nearest_source=winners.nearest[inner],
-        error_bound=promise,
-        stats=_stats(mesh, wave, time.perf_counter() - control.began),
-        _places=places,
-        _sweep=sweep,
-        _node_of=dict(zip(ends, nodes.targets.tolist(), strict=True)),
-        _node_distances=wave.distance,
-        _node_nearest=winners.nearest,
-        _winners=Once(sweep.find_winners, winners if paths else None),
-        _windows=windows_kept,
-        _ways=_ways_of(sweep, winners, windows_kept),
-    )
-
-
-def _ways_of(
-    sweep: WholeSweep, winners: Winners, windows: Kept | None
-) -> Once[tuple[Winners, Kept]] | None:
-    """Return by which windows any point is found exactly; None where they need not be kept."""
-    bounds = sweep.bounds
-    if windows is not None and not bounds.merging:
-        return Once(sweep.find_ways, (winners, windows))
-    if bounds.strips:  # a sweep back from a point ends at points, not on curves
-        exact = with_strips(wavefront.exact_bounds(bounds.max_distance), bounds.first_piece)
-        return Once(replace(sweep, bounds=exact).find_ways)
-    return None
+    found = sweep.found(wave, paths=paths, windows=windows)
+    stats = _stats(mesh, wave, time.perf_counter() - control.began)
+    return field_of(starts, places, ends, sweep, promise, found, stats)
 
 
 def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
-    created = int(wave.counters[wavefront.CREATED])
-    kept = int(wave.counters[wavefront.KEPT])
-    return SweepStats(
-        windows_created=created,
-        windows_kept=kept,
-        windows_peak=int(wave.counters[wavefront.PEAK]),
-        windows_per_edge_created=created / mesh.edge_count,
-        windows_per_edge_kept=kept / mesh.edge_count,
-        peak_bytes=peak_bytes(wave),
-        seconds=seconds,
+    created, kept, peak = (
+        int(wave.counters[i]) for i in (wavefront.CREATED, wavefront.KEPT, wavefront.PEAK)
     )
+    return SweepStats.of(mesh, created, kept, peak, peak_bytes(wave), seconds)
 
 
 def _as_stops(

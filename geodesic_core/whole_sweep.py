@@ -1,18 +1,53 @@
 """A sweep from some sources over all of a mesh: run once, or again for what was not kept."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from geodesic_core.arrays import Flags, Floats
+from geodesic_core.arrays import Flags, Floats, Ints
+from geodesic_core.curve import Polyline
 from geodesic_core.kernels import kept, sweep, wavefront
 from geodesic_core.kernels.backtrace import Winners
 from geodesic_core.kernels.kept import Kept
-from geodesic_core.kernels.wavefront import Bounds, Wavefront
+from geodesic_core.kernels.wavefront import Bounds, Wavefront, with_strips
 from geodesic_core.mesh import TriangleMesh
-from geodesic_core.nodes import Nodes
+from geodesic_core.nodes import Nodes, nodes_of
 from geodesic_core.run import Control, share_of_vertices, sweep_nodes, winners_of
+from geodesic_core.surface_point import SurfacePoint
+
+
+class Found(NamedTuple):
+    """What a sweep over all of a mesh has found, as far as it is kept; N as in its `Winners`."""
+
+    distance: Floats
+    """(N,) by node"""
+    nearest: Ints
+    """(N,): the index of the nearest source, by node; -1 where unreached"""
+    winners: Winners | None
+    """What paths need"""
+    windows: Kept | None
+    """Those of all faces"""
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "Found":
+        """Return what these `arrays` hold."""
+        winners = windows = None
+        if "winner" in arrays:
+            winners = Winners(**{name: arrays[name] for name in Winners._fields})
+        if "windows" in arrays:
+            windows = Kept(**{name: arrays[name] for name in Kept._fields})
+        return cls(arrays["distance"], arrays["nearest"], winners, windows)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return all arrays by name, those of winners and windows among them."""
+        arrays: dict[str, NDArray[Any]] = {"distance": self.distance, "nearest": self.nearest}
+        for group in (self.winners, self.windows):
+            arrays |= {} if group is None else group._asdict()
+        return arrays
 
 
 @dataclass(frozen=True)
@@ -23,6 +58,21 @@ class WholeSweep:
     nodes: Nodes
     start_distances: Floats
     bounds: Bounds
+
+    @classmethod
+    def between(
+        cls,
+        mesh: TriangleMesh,
+        places: Sequence[Polyline],
+        start_distances: Floats,
+        targets: Sequence[SurfacePoint],
+        bounds: Bounds,
+    ) -> "WholeSweep":
+        """Return the sweep from points and curves, which are canonical, that knows of targets."""
+        nodes = nodes_of(mesh, places, targets)
+        if nodes.pieces:
+            bounds = with_strips(bounds, nodes.first_piece)
+        return cls(mesh, nodes, start_distances, bounds)
 
     @property
     def all_faces(self) -> Flags:
@@ -54,6 +104,16 @@ class WholeSweep:
         if control.progress is not None:
             control.progress(1.0)
         return wave
+
+    def found(self, wave: Wavefront, *, paths: bool, windows: bool) -> Found:
+        """Return what a `run` has found, in memory of its own."""
+        winners = all_winners(wave)
+        return Found(
+            wave.distance,
+            winners.nearest,
+            winners if paths else None,
+            kept.kept_of(wave) if windows else None,
+        )
 
     def find_winners(self, control: Control) -> Winners:
         """Run the sweep for what paths need."""

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from app.field_store import FieldStore
+from app.queries import code_version
 from app.result_store import Seal
 from app.store import owned
 
@@ -21,7 +24,10 @@ ALICE, BOB = ({"Authorization": f"Bearer {secret}"} for secret in KEYS.values())
 
 @dataclass(frozen=True)
 class Left:
-    """A store that a service has left: two meshes, three results of one and one of the other."""
+    """A store that a service has left.
+
+    Two meshes, three results of one and one of the other, three fields of the first.
+    """
 
     root: Path
     ids: list[str]
@@ -37,6 +43,15 @@ class Left:
     def results(self, number: int) -> list[Path]:
         """Return the bodies of the results of a mesh."""
         return sorted((self.root / "results" / self.ids[number]).glob("*.body"))
+
+    def fields(self) -> list[Path]:
+        """Return the files of all fields."""
+        return sorted(self.root.glob("fields/*/*"))
+
+
+def write_field(left: Left, mesh_id: str, key: str, code: str) -> None:
+    arrays = {"distance": np.arange(1000.0)}
+    FieldStore(left.root, 10**9).write(mesh_id, key, arrays, code)
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +70,12 @@ def original(tmp_path_factory: pytest.TempPathFactory) -> Left:
             headers={**BOB, "Prefer": "respond-async"},
         ).headers["location"]
         wait_until(lambda: client.get(job, headers=BOB).json()["status"] == "successful")
-    return Left(root, ids, job.rpartition("/")[2])
+    left = Left(root, ids, job.rpartition("/")[2])
+    for path in left.fields():  # whether it took long enough
+        path.unlink()
+    for key in ("1", "2", "3"):
+        write_field(left, ids[0], key, code_version())
+    return left
 
 
 @pytest.fixture
@@ -88,6 +108,8 @@ def test_ls(run: Run, left: Left) -> None:  # noqa: F811
     assert ran.figure("meshes") == f"2, {on_disk} bytes"
     bodies = left.results(0) + left.results(1)
     assert ran.figure("results") == f"4, {sum(body.stat().st_size for body in bodies)} bytes"
+    sizes = [field.stat().st_size for field in left.fields()]
+    assert ran.figure("fields") == f"3, {sum(sizes)} bytes"
     assert ran.figure("jobs") == "1, 1 successful"
     assert left.files() == before
 
@@ -107,7 +129,7 @@ def test_ls_as_json(run: Run, left: Left, monkeypatch: pytest.MonkeyPatch) -> No
     (job,) = found["jobs"]
     assert (job["id"], job["status"], job["owner"]) == (left.job, "successful", "bob")
     assert job["mesh_id"] == left.ids[1]
-    assert found["results"]["count"] == 4
+    assert (found["results"]["count"], found["fields"]["count"]) == (4, 3)
 
 
 def test_check_names_what_is_damaged(run: Run, left: Left) -> None:  # noqa: F811
@@ -120,10 +142,11 @@ def test_check_names_what_is_damaged(run: Run, left: Left) -> None:  # noqa: F81
     (left.root / "meshes" / left.ids[1] / "manifest.json").write_bytes(b"[]")
     damage(left.results(0)[1])
     left.results(0)[2].with_suffix(".json").write_bytes(b"{")
+    left.fields()[1].write_bytes(b"PK")
     (left.root / "jobs.sqlite3").write_bytes(b"nothing" * 999)
     ran = run("store", "check", left.root)
 
-    assert (ran.code, ran.err, ran.figure("damaged")) == (1, "", "6")
+    assert (ran.code, ran.err, ran.figure("damaged")) == (1, "", "7")
     rows = ran.out.splitlines()
     for part in (
         f"mesh {left.ids[0]} is damaged: its array faces is not what was written",
@@ -131,6 +154,7 @@ def test_check_names_what_is_damaged(run: Run, left: Left) -> None:  # noqa: F81
         f"mesh {left.ids[1]} is damaged: its manifest cannot be read",
         f"result {left.ids[0]}/{left.results(0)[1].stem} is damaged",
         f"result {left.ids[0]}/{left.results(0)[2].stem} is damaged",
+        f"field {left.ids[0]}/2 is damaged",
         f"{left.root}/jobs.sqlite3 is damaged",
     ):
         assert sum(row.startswith(part) for row in rows) == 1, part
@@ -159,6 +183,10 @@ def test_prune(run: Run, left: Left) -> None:  # noqa: F811
     (left.root / "tmp" / "upload").mkdir()
     (left.root / "tmp" / "upload" / "mesh").write_bytes(b"12345")
     damage(left.root / "meshes" / left.ids[0] / "faces.npy")
+    left.fields()[1].write_bytes(b"PK")
+    write_field(left, left.ids[0], "3", "an older one")
+    write_field(left, left.ids[1], "1", code_version())
+    left.fields()[0].with_name("tmp456").write_bytes(b"1234567")
     before = left.files()
 
     tried = run("store", "prune", "--dry-run", left.root)
@@ -168,18 +196,22 @@ def test_prune(run: Run, left: Left) -> None:  # noqa: F811
     assert told["dry_run"] is True
     reasons = sorted(each["reason"] for each in told["removed"])
     assert reasons == sorted(
-        ["damaged", "outdated", "of a mesh that is gone", *3 * ["half-written"]]
+        [*2 * ["damaged", "outdated", "of a mesh that is gone"], *4 * ["half-written"]]
     )
     ran = run("store", "prune", left.root)
 
     assert (ran.code, ran.err) == (0, "")
     assert ran.figure("removed") == tried.figure("to remove")
-    assert ran.figure("removed").startswith("6, ")
+    assert ran.figure("removed").startswith("10, ")
     bodies = {"results/" + "/".join(body.parts[-2:]) for body in (kept, held)}
     assert {file for file in left.files() if file.startswith("results/")} == {
         name for body in bodies for name in (body, body.removesuffix("body") + "json")
     }
     assert not orphan.exists()
+    assert [path.relative_to(left.root / "fields") for path in left.fields()] == [
+        Path(left.ids[0]) / "1.npz"
+    ]
+    assert not (left.root / "fields" / left.ids[1]).exists()
     assert list((left.root / "tmp").iterdir()) == []
     for others in ("meshes/", "jobs"):
         assert {file for file in left.files() if file.startswith(others)} == {

@@ -30,7 +30,7 @@ _DEFAULT = Path("geodesic-store")
 
 @store.command()
 def ls(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
-    """List the meshes, and sum up results and jobs."""
+    """List the meshes, and sum up results, distance fields and jobs."""
     from app.upkeep import contents
 
     with _store_at(root):
@@ -48,6 +48,7 @@ def ls(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
     total = sum(mesh.bytes for mesh in found.meshes)
     typer.echo(f"meshes      {len(found.meshes)}, {total} bytes")
     typer.echo(f"results     {found.results}, {found.result_bytes} bytes")
+    typer.echo(f"fields      {found.fields}, {found.field_bytes} bytes")
     states = Counter(job.status for job in found.jobs)
     told = "".join(f", {count} {status}" for status, count in sorted(states.items()))
     typer.echo(f"jobs        {len(found.jobs)}{told}")
@@ -78,7 +79,7 @@ def prune(
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Remove what is half-written, and results that are damaged, outdated or of no mesh any more.
+    """Remove what is half-written; results and fields that are damaged, outdated or of no mesh.
 
     No service may run on the store. Meshes stay, and so do the answers of jobs.
     """
@@ -125,6 +126,7 @@ def _document(found: "Contents") -> dict[str, Any]:
     return {
         "meshes": [asdict(mesh) for mesh in found.meshes],
         "results": {"count": found.results, "bytes": found.result_bytes},
+        "fields": {"count": found.fields, "bytes": found.field_bytes},
         "jobs": [
             {
                 "id": job.id,

@@ -4,6 +4,7 @@ import logging
 import os
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from ctypes import c_double, c_longlong
 from dataclasses import dataclass, replace
@@ -32,6 +33,7 @@ from app.engine.work import (
     Work,
 )
 from app.errors import problem_of
+from app.field_store import FieldStore
 from app.json_mesh import read_json_mesh
 from app.kept import Kept
 from app.mesh_store import MeshStore, OpenMesh
@@ -69,7 +71,9 @@ class Worker:
         self.meshes: Kept[tuple[str, bytes], OpenMesh]
         """By id and barriers"""
         self.meshes = Kept(self.settings.worker_mesh_bytes, lambda opened: opened.nbytes)
-        self.fields = Fields(self.settings.worker_field_bytes)
+        store = FieldStore(self.settings.store, self.settings.fields_bytes)
+        self.fields = Fields(self.settings.worker_field_bytes, store, code_version())
+        self._writer = ThreadPoolExecutor(1)
 
     def do(self, number: int, work: Work) -> Done:
         """Do ``work``, unless the number of the work to stop reaches ``number``."""
@@ -82,7 +86,11 @@ class Worker:
             case Storing():
                 return self._store(work, clock)
             case Answering():
-                return self._answer(work, clock, is_to_stop)
+                try:
+                    return self._answer(work, clock, is_to_stop)
+                finally:
+                    if self.fields.has_unwritten:
+                        self._writer.submit(self.fields.write)  # while the answer is on its way
             case Estimating():
                 return self._estimate(work, clock, is_to_stop)
 
@@ -127,6 +135,10 @@ class Worker:
         with clock.phase("compute"):
             found = estimate(work.query, work.form, opened, cancel)
         return Done(clock.seconds, estimate=found)
+
+    def finish_writing(self) -> None:
+        """Wait until all fields that are to be on disk are there."""
+        self._writer.submit(lambda: None).result()
 
     def _report(self, share: float) -> None:
         self.progress.value = share

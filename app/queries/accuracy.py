@@ -69,7 +69,7 @@ def solve_field(
 
     more = isolines and request.method != "exact"
     question = tuple(sources), max_distance, beside, request.method, *errors.values(), more
-    return grant.fields.find(opened.name, question, solve)
+    return grant.fields.find(opened, question, solve)
 
 
 def topics_of(

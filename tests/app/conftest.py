@@ -13,6 +13,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
+from app.field_store import FieldStore
 from app.main import create_app
 from app.mesh_books import MeshBooks
 from app.mesh_store import MeshStore
@@ -111,13 +112,18 @@ def distances(client: TestClient, mesh_id: str, headers: Any = None, **body: Any
     return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
 
 
+def new_fields(room: int = 10**9, store: Path = Path("nowhere")) -> Fields:
+    """Return no fields yet, but those of a store, if there is one."""
+    return Fields(room, FieldStore(store, 10**9), "this code")
+
+
 def granted(
     cancel: Callable[[], bool] = lambda: False,
     memory: int = 2**40,
     fields: Fields | None = None,
 ) -> Grant:
     """Return a grant that nobody reads the progress of, by default with no field known."""
-    known = Fields(10**9) if fields is None else fields
+    known = new_fields() if fields is None else fields
     return Grant(cancel, lambda _: None, known, memory, 10**7, 10**7)
 
 

@@ -375,9 +375,9 @@ def config(store: Path, **settings: Any) -> WorkerConfig:
     return WorkerConfig(Settings(store=store, **settings), store / "results")
 
 
-def asked(mesh_id: str, *barriers: int, vertex: int = 0) -> DistancesQuery:
+def asked(mesh_id: str, *barriers: int, vertex: int = 0, **rest: Any) -> DistancesQuery:
     return DistancesQuery(
-        mesh_id, DistancesRequest(sources=[{"vertex": vertex}], barriers=list(barriers))
+        mesh_id, DistancesRequest(sources=[{"vertex": vertex}], barriers=list(barriers), **rest)
     )
 
 

@@ -15,7 +15,7 @@ from app.mesh_store import OpenMesh
 from app.queries import DistancesQuery, Fields, IsolinesQuery, PathsQuery
 from geodesic_core import whole_sweep
 
-from .conftest import granted, store_mesh
+from .conftest import granted, new_fields, store_mesh
 from .test_engine import asked, config
 
 APPROXIMATE = {"method": "approximate", "relative_error": 0.01}
@@ -53,7 +53,7 @@ TARGETS = [{"vertex": vertex} for vertex in (5, 400, 901)]
 def test_paths_after_distances_need_no_sweep(
     opened: OpenMesh, sweeps: list[int], accuracy: dict[str, Any]
 ) -> None:
-    fields = Fields(10**9)
+    fields = new_fields()
     source = {"vertex": 3}
     ask(opened, fields, DistancesQuery, sources=[source], **accuracy)
     assert len(sweeps) == 1
@@ -62,7 +62,7 @@ def test_paths_after_distances_need_no_sweep(
 
     assert len(sweeps) == 1
     assert found == ask(
-        opened, Fields(1), PathsQuery, source=source, targets=TARGETS, **accuracy
+        opened, new_fields(1), PathsQuery, source=source, targets=TARGETS, **accuracy
     ), "the same as without"
     assert len(sweeps) == 2
 
@@ -83,16 +83,16 @@ def test_an_answer_is_the_same_of_a_field_that_was_kept(
     body = orjson.loads(orjson.dumps(body))
     for target in body.get("targets", []):
         target.pop("start_distance", None)
-    fields = Fields(10**9)
+    fields = new_fields()
     ask(opened, fields, DistancesQuery, sources=SOURCES, **accuracy)
 
     first, again = (ask(opened, fields, kind, **body, **accuracy) for _ in range(2))
 
-    assert first == again == ask(opened, Fields(1), kind, **body, **accuracy)
+    assert first == again == ask(opened, new_fields(1), kind, **body, **accuracy)
 
 
 def test_what_is_asked_otherwise_is_another_field(opened: OpenMesh, sweeps: list[int]) -> None:
-    fields = Fields(10**9)
+    fields = new_fields()
     different: list[dict[str, Any]] = [
         {"sources": [{"vertex": 3}]},
         {"sources": [{"vertex": 4}]},
@@ -116,7 +116,7 @@ def test_what_is_asked_otherwise_is_another_field(opened: OpenMesh, sweeps: list
 
 
 def test_spellings_of_one_point_are_one_field(opened: OpenMesh, sweeps: list[int]) -> None:
-    fields = Fields(10**9)
+    fields = new_fields()
     mesh = opened.mesh
     face = int(np.flatnonzero((mesh.faces == 3).any(axis=1))[0])
     weights = (mesh.faces[face] == 3).astype(float).tolist()
@@ -133,7 +133,7 @@ def test_spellings_of_one_point_are_one_field(opened: OpenMesh, sweeps: list[int
 def test_fields_go_when_there_is_no_more_room(opened: OpenMesh, sweeps: list[int]) -> None:
     one = gc.exact_distance(opened.mesh, 0).nbytes
     sweeps.clear()
-    fields = Fields(2 * one)
+    fields = new_fields(2 * one)
     for vertex in (0, 1, 0, 2, 0, 1):
         ask(opened, fields, DistancesQuery, sources=[{"vertex": vertex}])
         assert fields.nbytes <= 2 * one

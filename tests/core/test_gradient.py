@@ -86,6 +86,14 @@ def test_it_is_that_of_the_path_where_the_face_has_no_area():
     np.testing.assert_allclose(gradient[1], [0, -1, 0], atol=1e-12)
 
 
+def test_it_is_nan_where_a_curve_starts_beyond_the_limit():
+    mesh = gc.TriangleMesh(*gc.samples.knot(500))
+    curve = gc.Curve(mesh.faces[100].tolist())
+    field = gc.exact_distance(mesh, [0, gc.Source(curve, 0.5)], max_distance=0.4)
+    assert np.isinf(field.distances[mesh.faces[100]]).all()
+    assert np.isnan(field.gradient[mesh.faces[100]]).all()
+
+
 def test_it_does_not_change():
     mesh = mesh_of(zoo.SMALL["octahedron"])
     field = gc.exact_distance(mesh, 0)
