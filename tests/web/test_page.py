@@ -11,6 +11,7 @@ import httpx2
 import numpy as np
 import pytest
 from PIL import Image
+from playwright.sync_api import Route
 
 from .viewing import PLAIN, View, angle_at, length_of, query_of
 
@@ -76,6 +77,32 @@ def test_a_file_is_dropped(view: View, wedge: str) -> None:
 
     assert "5 vertices, 3 faces" in view.text("#report")
     assert "wedge.obj" in view.text("#meshes option:checked")
+
+
+def test_a_long_list_of_meshes_goes_on(view: View, sphere: str, knot: str) -> None:
+    """Listed one by one, so that two are many."""
+
+    def one_at_a_time(route: Route) -> None:
+        route.continue_(url=route.request.url.replace("limit=100", "limit=1"))
+
+    view.page.route("**/v1/meshes?*", one_at_a_time)
+    view.open()
+    listed = "[...document.getElementById('meshes').options].map(option => option.value)"
+    ids = view.page.evaluate(listed)[1:]
+    assert ids[1:] == ["more"]
+    while ids[-1] == "more":
+        with view.page.expect_response("**/v1/meshes?*"):
+            view.page.select_option("#meshes", "more")
+        view.page.wait_for_function(
+            f"{listed}.length != {len(ids) + 1} || !{listed}.includes('more')"
+        )
+        ids = view.page.evaluate(listed)[1:]
+
+    assert ids == sorted(set(ids))
+    assert {sphere, knot} <= set(ids)
+    view.page.select_option("#meshes", knot)
+    view.wait()
+    assert query_of(view)["mesh"] == [knot]
 
 
 WATCH_PROGRESS = """

@@ -17,6 +17,22 @@ def test_a_tap(view: View, sphere: str) -> None:
     assert not view.page.is_visible("#folded")
 
 
+def test_a_finger_that_stays_adds_a_source(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    for place, seconds in (((-100, 0), 0.0), ((100, 0), 0.7)):
+        view.touch(place)
+        view.page.wait_for_timeout(1000 * seconds)
+        view.touch()
+        view.wait()
+    first, second = query_of(view)["source"]
+    assert first != second
+
+    view.touch((0, 100))
+    view.touch()
+    view.wait()
+    assert len(query_of(view)["source"]) == 1
+
+
 def test_a_finger_pulls_a_path(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}")
     view.touch((-100, 0))

@@ -3,8 +3,10 @@ import { authorization, call, getJson } from "./http";
 import { refusal, Refusal } from "./refusal";
 import type { MeshDocument, MeshList } from "./types";
 
-export function listMeshes(): Promise<MeshList> {
-  return getJson("/v1/meshes?limit=100");
+/** List a hundred meshes, those behind a cursor where there is one. */
+export function listMeshes(cursor: string | null): Promise<MeshList> {
+  const behind = cursor === null ? {} : { cursor };
+  return getJson(`/v1/meshes?${new URLSearchParams({ limit: "100", ...behind })}`);
 }
 
 export function getMesh(id: string): Promise<MeshDocument> {

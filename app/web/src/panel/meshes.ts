@@ -12,8 +12,12 @@ const SAMPLES = [
   ["obstacles", "Obstacles", 20_000],
 ] as const;
 
+/** What to choose to see more of the store; no mesh has this id. */
+const MORE = "more";
+
 export class Meshes {
   private readonly names = new Map<string, string>();
+  private readonly select = byId("meshes", HTMLSelectElement);
 
   constructor(
     private readonly store: Store,
@@ -33,9 +37,10 @@ export class Meshes {
       if (file.files?.[0]) this.upload(file.files[0]);
       file.value = "";
     });
-    byId("meshes").addEventListener("change", () => {
-      const id = byId("meshes", HTMLSelectElement).value;
-      if (id) store.update({ ...WITHOUT_POINTS, mesh: id });
+    this.select.addEventListener("change", () => {
+      const id = this.select.value;
+      if (id === MORE) this.listMore();
+      else if (id) store.update({ ...WITHOUT_POINTS, mesh: id });
     });
     this.acceptDrops();
   }
@@ -49,17 +54,36 @@ export class Meshes {
 
   /** List what is in the store, and which of it is shown. */
   async list(): Promise<void> {
-    const { meshes } = await listMeshes();
-    const select = byId("meshes", HTMLSelectElement);
-    const options = meshes.map((mesh) => new Option(this.nameOf(mesh), mesh.id));
-    select.replaceChildren(new Option(meshes.length > 0 ? "In the store…" : "The store is empty", ""), ...options);
+    const options = await this.listed(null);
+    const title = options.length > 0 ? "In the store…" : "The store is empty";
+    this.select.replaceChildren(new Option(title, ""), ...options);
     this.showChosen();
   }
 
   showChosen(): void {
-    const select = byId("meshes", HTMLSelectElement);
-    select.value = this.store.state.mesh ?? "";
-    if (select.selectedIndex < 0) select.value = ""; // not all are listed
+    this.select.value = this.store.state.mesh ?? "";
+    if (this.select.selectedIndex < 0) this.select.value = ""; // not all are listed
+  }
+
+  /** Go on with the list, in place of its last line, which asks for that. */
+  private listMore(): void {
+    const last = this.select.selectedOptions[0]!;
+    this.showChosen();
+    this.listed(last.dataset.cursor!).then(
+      (options) => last.replaceWith(...options),
+      (error: unknown) => this.status.fail(error),
+    );
+  }
+
+  private async listed(cursor: string | null): Promise<HTMLOptionElement[]> {
+    const { meshes, next_cursor } = await listMeshes(cursor);
+    const options = meshes.map((mesh) => new Option(this.nameOf(mesh), mesh.id));
+    if (next_cursor) {
+      const more = new Option("More…", MORE);
+      more.dataset.cursor = next_cursor;
+      options.push(more);
+    }
+    return options;
   }
 
   private nameOf({ id, faces }: MeshDocument): string {

@@ -11,6 +11,8 @@ export type Tool = "source" | "target" | "waypoint" | "barrier";
 /** How far a click may stray, and from how far a point is taken hold of, in pixels; fingers are broad. */
 const REACH = { still: 5, near: 16 };
 const REACH_OF_FINGERS = { still: 10, near: 28 };
+/** How long a finger stays that adds another source, in milliseconds. */
+const HOLD = 500;
 /** Where a brush touches the mesh, in pixels from the pointer. */
 const BRUSH = [-9, -6, -3, 0, 3, 6, 9].flatMap((x) =>
   [-9, -6, -3, 0, 3, 6, 9].filter((y) => Math.hypot(x, y) < 10).map((y) => [x, y] as const),
@@ -97,13 +99,13 @@ export class Pointer {
     const isClick = start !== null && !this.hasMoved(event);
     if (drag && !isClick) drag(event);
     if (this.painted) this.store.update({ barriers: [...this.painted] });
-    else if (isClick) this.click(event);
+    else if (isClick) this.click(event, event.shiftKey || isHeld(start, event));
     this.end();
   }
 
-  private click(event: PointerEvent): void {
+  private click(event: PointerEvent, adds: boolean): void {
     const point = this.at(event);
-    if (point) this.set(point, event.altKey ? "target" : this.tool(), event.shiftKey);
+    if (point) this.set(point, event.altKey ? "target" : this.tool(), adds);
   }
 
   /** Set what ``tool`` sets; ``adds``: another source. */
@@ -169,6 +171,10 @@ export class Pointer {
     const { clientX, clientY } = this.start ?? event;
     return Math.hypot(event.clientX - clientX, event.clientY - clientY) > reachOf(event).still;
   }
+}
+
+function isHeld(start: PointerEvent, end: PointerEvent): boolean {
+  return end.pointerType === "touch" && end.timeStamp - start.timeStamp >= HOLD;
 }
 
 function reachOf({ pointerType }: PointerEvent): typeof REACH {
