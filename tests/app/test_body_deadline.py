@@ -73,15 +73,15 @@ def app_in(store: Path, **settings: Any) -> Any:
 def test_a_body_has_to_be_there_in_time(
     tmp_path: Path, path: str, head: bytes, media_type: bytes
 ) -> None:
-    client = Dripping(app_in(tmp_path, deadline_s=0.3), path, head, content_type=media_type)
+    client = Dripping(app_in(tmp_path, deadline_s=1), path, head, content_type=media_type)
 
     status, problem, seconds = client.ask()
 
     assert (status, problem["code"]) == (504, "deadline_exceeded")
-    assert (problem["limit"], problem["setting"]) == (0.3, "GEODESIC_DEADLINE_S")
+    assert (problem["limit"], problem["setting"]) == (1, "GEODESIC_DEADLINE_S")
     assert (b"connection", b"close") in client.sent[0]["headers"]
-    assert 0.25 < seconds < 5
-    assert 0 < client.taken < 20
+    assert 0.95 < seconds < 5
+    assert 0 < client.taken < 60
     assert not any((tmp_path / "tmp").iterdir())
 
 

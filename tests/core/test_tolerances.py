@@ -374,9 +374,9 @@ def test_path_length_is_the_most_that_a_path_may_differ_from_its_field(scale, si
     field = gc.exact_distance(gc.TriangleMesh(points * scale, faces), gc.Source(0, scale))
     last = field.mesh.topology.inner_vertex[-1]
     honest = float(field.distances[-1])
-    field._node_distances[last] = honest * (1 + 0.5 * sign * PATH_LENGTH)
+    field._found.distance[last] = honest * (1 + 0.5 * sign * PATH_LENGTH)
     assert field.path_to(len(points) - 1).length == pytest.approx(honest - scale, rel=1e-14)
-    field._node_distances[last] = honest * (1 + 2.0 * sign * PATH_LENGTH)
+    field._found.distance[last] = honest * (1 + 2.0 * sign * PATH_LENGTH)
     with pytest.raises(gc.errors.InternalError, match="the field says"):
         field.path_to(len(points) - 1)
 
@@ -387,9 +387,9 @@ def test_foot_is_all_that_a_path_from_a_curve_may_be_off(scale):
     mesh = gc.TriangleMesh(places, [[0, 2, 3], [3, 1, 2]])  # vertex 2 lies on the edge of 0 and 3
     field, node = gc.exact_distance(mesh, gc.Curve([3, 0])), mesh.topology.inner_vertex[2]
     assert field.path_to(2).length <= FOOT * mesh.diagonal
-    field._node_distances[node] = 0.5 * FOOT * mesh.diagonal
+    field._found.distance[node] = 0.5 * FOOT * mesh.diagonal
     field.path_to(2)
-    field._node_distances[node] = 2.0 * FOOT * mesh.diagonal
+    field._found.distance[node] = 2.0 * FOOT * mesh.diagonal
     with pytest.raises(gc.errors.InternalError, match="the field says"):
         field.path_to(2)
 
