@@ -7,7 +7,6 @@ the code found it. There are no books: workers write, and each removes what is b
 import logging
 import shutil
 import struct
-import tempfile
 import zlib
 from collections.abc import Collection, Mapping
 from contextlib import suppress
@@ -18,7 +17,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from app.store import FIELDS
+from app.store import FIELDS, remove_half_written, written_whole
 
 logger = logging.getLogger(__name__)
 
@@ -41,8 +40,7 @@ class FieldStore:
 
     def prepare(self, meshes: Collection[str]) -> None:
         """Remove what was left half-written, and the fields of meshes that are gone."""
-        for half_written in self.folder.glob("*/tmp*"):
-            half_written.unlink()
+        remove_half_written(self.folder)
         for folder in self.folder.glob("*"):
             if folder.name not in meshes:
                 self.forget_mesh(folder.name)
@@ -65,20 +63,12 @@ class FieldStore:
         """Keep a field, if there is room for it; what fails is told in the log only."""
         if sum(array.nbytes for array in arrays.values()) > self._capacity:
             return
-        path = self._path(mesh_id, key)
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with tempfile.NamedTemporaryFile(dir=path.parent, prefix="tmp", delete=False) as file:
-                try:
-                    np.savez(file, allow_pickle=False, **arrays, **{_CODE: np.array(code)})
-                    file.close()
-                    Path(file.name).rename(path)
-                except BaseException:
-                    Path(file.name).unlink(missing_ok=True)
-                    raise
+            with written_whole(self._path(mesh_id, key)) as file:
+                np.savez(file, allow_pickle=False, **arrays, **{_CODE: np.array(code)})
             self._evict()
         except (OSError, MemoryError) as error:
-            logger.warning("a field is not kept on disk: %s: %s", path, error)
+            logger.warning("a field is not kept on disk: %s/%s: %s", mesh_id, key, error)
 
     def forget_mesh(self, mesh_id: str) -> None:
         """Remove the fields of a mesh; one that is being written may be left for `prepare`."""

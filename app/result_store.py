@@ -6,16 +6,17 @@ files: two of them took half as long as all else that its worker did.
 """
 
 import os
-import tempfile
 import zlib
 from collections import Counter, OrderedDict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
 from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
+
+from app.store import remove_half_written, written_whole
 
 Buffer = bytes | memoryview
 
@@ -92,19 +93,15 @@ def write_result(
 def _write(
     root: Path, name: str, parts: Iterable[Buffer], headers: Mapping[str, str], code: str
 ) -> Written:
-    """Write the files of a result, body first and seal last, each atomically."""
+    """Write the files of a result, body first and seal last."""
     size = checksum = 0
-
-    def noted() -> Iterator[Buffer]:
-        nonlocal size, checksum
+    with written_whole(_body(root, name)) as file:
         for part in parts:
-            size += len(part)
+            size += file.write(part)
             checksum = zlib.crc32(part, checksum)
-            yield part
-
-    _write_atomically(_body(root, name), noted())
     seal = Seal(headers=dict(headers), size=size, crc32=checksum, code=code)
-    _write_atomically(_seal(root, name), [seal.model_dump_json().encode()])
+    with written_whole(_seal(root, name)) as file:
+        file.write(seal.model_dump_json().encode())
     return Written(seal, None, has_files=True)
 
 
@@ -137,8 +134,7 @@ class ResultStore:
                 self._count(name, path.stat().st_size)
             else:
                 path.unlink()
-        for half_written in self._root.glob("*/tmp*"):
-            half_written.unlink()
+        remove_half_written(self._root)
         self._evict()
 
     @property
@@ -291,19 +287,6 @@ def _body(root: Path, name: str) -> Path:
 
 def _seal(root: Path, name: str) -> Path:
     return root / f"{name}.json"
-
-
-def _write_atomically(path: Path, parts: Iterable[Buffer]) -> None:
-    path.parent.mkdir(exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=path.parent, prefix="tmp", delete=False) as file:
-        try:
-            for part in parts:
-                file.write(part)
-            file.close()
-            Path(file.name).rename(path)
-        except BaseException:
-            Path(file.name).unlink(missing_ok=True)
-            raise
 
 
 def _read(root: Path, name: str) -> Written | None:

@@ -13,10 +13,12 @@
 """
 
 import os
+import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 import orjson
 from filelock import FileLock, Timeout
@@ -84,6 +86,32 @@ def require_layout(root: Path) -> None:
 def is_store(root: Path) -> bool:
     """Tell whether there is a store in ``root``."""
     return (root / "VERSION").is_file() or (root / MESHES).is_dir()
+
+
+@contextmanager
+def written_whole(path: Path) -> Iterator[IO[bytes]]:
+    """Write a file that is either there, with all that was written inside, or not at all.
+
+    What a killed process leaves of it is for `remove_half_written`.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=_HALF_WRITTEN, delete=False) as file:
+        try:
+            yield file
+            file.close()
+            Path(file.name).rename(path)
+        except BaseException:
+            Path(file.name).unlink(missing_ok=True)
+            raise
+
+
+_HALF_WRITTEN = "tmp"
+
+
+def remove_half_written(folder: Path) -> None:
+    """Remove from all folders in ``folder`` what `written_whole` did not finish."""
+    for path in folder.glob(f"*/{_HALF_WRITTEN}*"):
+        path.unlink()
 
 
 def sync(path: Path) -> None:

@@ -136,10 +136,6 @@ class Worker:
             found = estimate(work.query, work.form, opened, cancel)
         return Done(clock.seconds, estimate=found)
 
-    def finish_writing(self) -> None:
-        """Wait until all fields that are to be on disk are there."""
-        self._writer.submit(lambda: None).result()
-
     def _report(self, share: float) -> None:
         self.progress.value = share
 

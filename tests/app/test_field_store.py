@@ -149,7 +149,7 @@ def test_another_worker_finds_the_field(
         form = Form("application/x-npy")
         name = result_name(mesh_id, result_key(query, form))
         done = state.do(1, Answering(query, form, name))
-        state.finish_writing()
+        wait_until(lambda: field_files(tmp_path))
         return state, done.answer.body
 
     first, body = answer()
