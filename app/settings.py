@@ -4,6 +4,8 @@ import os
 import re
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
+from urllib.parse import urlsplit
+from urllib.request import url2pathname
 
 from pydantic import (
     BeforeValidator,
@@ -55,6 +57,28 @@ def _listed(value: object) -> object:
     return [item.strip() for item in value.split(",")] if value.strip() else []
 
 
+def folder_of(store: str) -> Path:
+    """Return the folder that a setting names, by its path or by a URL of the scheme ``file``.
+
+    Raises
+    ------
+    ValueError
+        It names none, or something else than a folder of this machine.
+    """
+    url = urlsplit(store) if "://" in store else None
+    if url is None and store:
+        return Path(store)
+    if url is None or url.scheme != "file" or url.netloc not in ("", "localhost"):
+        raise ValueError(
+            f"{store!r} names no folder of this machine: give its path, or a URL such as file:///srv/x"
+        )
+    return Path(url2pathname(url.path))
+
+
+def _store(value: object) -> object:
+    return folder_of(value) if isinstance(value, str) else value
+
+
 def _keys(value: object) -> object:
     return parse_keys(value) if isinstance(value, str) else value
 
@@ -78,8 +102,8 @@ class Settings(BaseSettings):
         hide_input_in_errors=True,  # it may be a key
     )
 
-    store: Path = Path("geodesic-store")
-    """Folder of meshes, results and fields; created where it is not there."""
+    store: Annotated[Path, BeforeValidator(_store)] = Path("geodesic-store")
+    """Folder of meshes, results and fields, or its `file://` URL; created where it is not there."""
     workers: PositiveInt = Field(default_factory=_cores)
     """Worker processes; one for each core, unless set."""
     worker_memory_bytes: int = Field(ge=LEAST_WORKER_MEMORY, default_factory=_worker_memory)

@@ -271,6 +271,15 @@ def test_serve_refuses_a_store_that_it_cannot_have(
     assert "has layout '4.5'" in error_line(ran)
 
 
+def test_a_store_by_its_url(run: Run, tmp_path: Path) -> None:  # noqa: F811
+    with owned(tmp_path / "store"):
+        pass
+    assert run("store", "ls", f"file://{tmp_path}/store").figure("meshes") == "0, 0 bytes"
+    refused = run("store", "ls", "s3://bucket/store")
+    assert refused.code == 2
+    assert "names no folder of this machine" in " ".join(refused.err.split())
+
+
 def test_the_command_has_to_be_named(run: Run) -> None:  # noqa: F811
     ran = run("store")
     assert ran.code == 2

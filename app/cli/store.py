@@ -19,9 +19,24 @@ store = typer.Typer(
     rich_markup_mode=None,
 )
 
+
+def _folder(named: object) -> Path:
+    from app.settings import folder_of
+
+    try:
+        return folder_of(str(named))
+    except ValueError as error:
+        raise typer.BadParameter(str(error)) from error
+
+
 Root = Annotated[
     Path,
-    typer.Argument(metavar="STORE", envvar="GEODESIC_STORE", help="Folder of the store."),
+    typer.Argument(
+        metavar="STORE",
+        envvar="GEODESIC_STORE",
+        help="Folder of the store, or its file:// URL.",
+        parser=_folder,
+    ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 

@@ -35,6 +35,34 @@ def test_every_setting_is_an_environment_variable(monkeypatch: pytest.MonkeyPatc
     assert settings.model_dump() == {name: value for name, (_, value) in given.items()}
 
 
+@pytest.mark.parametrize(
+    ("url", "folder"),
+    [
+        ("file:///srv/my%20meshes", "/srv/my meshes"),
+        ("file://localhost/srv/store", "/srv/store"),
+        ("srv/store", "srv/store"),
+    ],
+)
+def test_the_store_is_a_folder_or_its_url(
+    monkeypatch: pytest.MonkeyPatch, url: str, folder: str
+) -> None:
+    monkeypatch.setenv("GEODESIC_STORE", url)
+
+    assert Settings().store == Path(folder)
+
+
+@pytest.mark.parametrize(
+    "url", ["", "s3://bucket/meshes", "file://elsewhere/srv", "https://x.org/"]
+)
+def test_a_store_that_is_no_folder_here_stops_the_start(
+    monkeypatch: pytest.MonkeyPatch, url: str
+) -> None:
+    monkeypatch.setenv("GEODESIC_STORE", url)
+
+    with pytest.raises(ValidationError, match="names no folder of this machine"):
+        Settings()
+
+
 def test_every_setting_is_put_to_use_in_a_test() -> None:
     used: set[str | None] = set()
     for path in TESTS.rglob("*.py"):
