@@ -20,7 +20,8 @@ from app.result_store import Result, ResultStore
 from app.schemas import ProblemDocument
 from app.service import Answered
 
-CACHED = {"Cache-Control": "private, max-age=3600", "Vary": "Accept, Accept-Encoding, Prefer"}
+NEGOTIATED = {"Vary": "Accept, Accept-Encoding, Prefer"}
+CACHED = {"Cache-Control": "private, max-age=3600"}
 IMMUTABLE = {"Cache-Control": "private, max-age=31536000, immutable"}
 UNSTORED = {"Cache-Control": "no-store"}
 REVALIDATED = {"Cache-Control": "private, no-cache"}

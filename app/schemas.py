@@ -815,7 +815,7 @@ class About(BaseModel):
     mesh_formats: list[str]
     answer_formats: dict[str, str]
     samples: list[str]
-    limits: dict[str, float] = Field(description="By the environment variable that sets it")
+    limits: dict[str, int | float] = Field(description="By the environment variable that sets it")
 
 
 class ProblemCode(BaseModel):

@@ -31,6 +31,7 @@ from app.queries import Query as ValidQuery
 from app.responses import (
     CACHED,
     ENDS,
+    NEGOTIATED,
     OF_FILES,
     UNSTORED,
     accepted_response,
@@ -147,14 +148,14 @@ class Asked:
         if self.is_async:
             return accepted_response(await service.submit(query, form, asker, self.key))
         is_cacheable = request.method == "GET" and query.is_repeatable
+        headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
         if is_cacheable:
-            unchanged = not_modified(request, etag_of(result_key(query, form)), CACHED)
+            unchanged = not_modified(request, etag_of(result_key(query, form)), headers)
             if unchanged is not None:
                 return unchanged
         answering = service.answer(query, form, asker, as_file="range" in request.headers)
         answered = await while_connected(request, answering)
-        caching = CACHED if is_cacheable else UNSTORED
-        return result_response(request, answered, form.media_type, service.results, caching)
+        return result_response(request, answered, form.media_type, service.results, headers)
 
 
 async def get_asked(

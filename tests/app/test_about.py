@@ -24,6 +24,7 @@ def test_about_tells_the_limits_in_force(client: TestClient) -> None:
     about = client.get("/v1").json()
 
     assert about["limits"]["GEODESIC_MAX_FACES"] == 5_000_000
+    assert isinstance(about["limits"]["GEODESIC_MAX_FACES"], int)
     assert about["limits"]["GEODESIC_WORKER_MEMORY_BYTES"] >= 2**30
     assert "GEODESIC_RATE_LIMIT" not in about["limits"]
     assert about["answer_formats"]["npy"] == "application/x-npy"

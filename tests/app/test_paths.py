@@ -41,11 +41,14 @@ def test_get_answers_as_post_and_is_cached(client: TestClient, plane: str) -> No
 
     got = client.get(link)
 
-    assert got.json() == client.post(f"/v1/meshes/{plane}/path", json=body).json()
+    posted = client.post(f"/v1/meshes/{plane}/path", json=body)
+    assert got.json() == posted.json()
     assert "max-age" in got.headers["cache-control"]
-    assert "Accept" in got.headers["vary"]
+    assert posted.headers["cache-control"] == "no-store"
     again = client.get(link, headers={"If-None-Match": got.headers["etag"]})
     assert (again.status_code, again.content) == (304, b"")
+    for response in (got, posted, again):
+        assert response.headers["vary"] == "Accept, Accept-Encoding, Prefer"
     npy = client.get(link, headers=NPY | {"If-None-Match": got.headers["etag"]})
     assert npy.status_code == 200
     np.testing.assert_array_equal(np.load(BytesIO(npy.content)), got.json()["points"])
