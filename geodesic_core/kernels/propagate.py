@@ -363,13 +363,13 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
         if i != nearest:
             if ends_at_apex:
                 # Two windows that meet on the ray to the apex both cover it: each keeps its side.
+                # Where one lies within the other, the other may have both.
                 goes_right = x >= (crossing - overlap) * rise
                 goes_left = x <= (crossing + overlap) * rise
-                if merging(wave):
-                    # One window may lie within the other and win there: what is beyond the nearest
-                    # path to the apex already has not crossed it.
-                    goes_right = goes_right or b1 > crossing
-                    goes_left = goes_left or b0 < crossing
+                if not goes_right and b1 > crossing:
+                    goes_right = not is_beaten(wave, i, nearest, crossing, b1)
+                if not goes_left and b0 < crossing:
+                    goes_left = not is_beaten(wave, i, nearest, crossing, b0)
             elif goes_left:
                 if b0 >= crossing and bent_distance(wave, i, ax, ay)[0] >= least:
                     continue
@@ -433,6 +433,31 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
         wave.lists[r + LAST] = right_last
         wave.lists[r + SIZE] += right_size
         queue_if_due(wave, right, apex, head)
+
+
+@kernel
+def is_beaten(wave: Any, i: int, nearest: int, crossing: float, b: float) -> bool:
+    """Whether window i of scratch is nowhere nearest between the nearest path to the apex and b.
+
+    That path crosses the edge at ``crossing``; window i covers it, and all up to b. Back from the
+    edge both run through the same faces, until the path meets the ray of window i to b, or begins
+    between its rays. Where they meet the ray is no nearer, or else window i would be nearest to the
+    apex, too. Beyond an edge of several faces, though, they may have come by different ones.
+    """
+    w, n = WIDTH * i, WIDTH * nearest
+    is_strip = (
+        source_weight(wave, wave.scratch_ints[INTS * i + ROOT]) == 0.0
+        or source_weight(wave, wave.scratch_ints[INTS * nearest + ROOT]) == 0.0
+    )
+    if merging(wave) or wave.irregular or is_strip:
+        return False
+    dx, dy = wave.scratch[w + SX] - b, wave.scratch[w + SY]
+    nx, ny = wave.scratch[n + SX] - crossing, wave.scratch[n + SY]
+    ray, path = (crossing - b) * ny, (crossing - b) * dy
+    slant = dx * ny - dy * nx  # they meet at these shares of it
+    if slant < 0.0:
+        ray, path, slant = -ray, -path, -slant
+    return 0.0 < ray <= slant and 0.0 < path <= slant
 
 
 @kernel

@@ -308,6 +308,7 @@ class View(NamedTuple):
     strips: tuple[int, ...]
     first_piece: int
     pruned: bool
+    irregular: bool
     limit: float
     landmark_count: int
     knows: bool
@@ -373,6 +374,7 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         bounds.strips,
         bounds.first_piece,
         wave.toward.shape[0] > 0,
+        wave.passed.shape[0] > 0,
         bounds.goal.limit,
         bounds.goal.landmark_count,
         bounds.goal.known.shape[0] > 0,

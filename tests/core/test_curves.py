@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
@@ -14,7 +14,7 @@ from tests import zoo
 from tests.conftest import WITHOUT_JIT
 from tests.core.certificates import LENGTH
 from tests.oracles import closed_forms, visibility
-from tests.properties.meshes import KINDS
+from tests.properties.meshes import KINDS, thin_terrain
 
 EXACT = 1e-9
 """Relative error allowed against an oracle."""
@@ -243,6 +243,7 @@ def test_distances_are_least_over_the_points_of_the_curve(case, error):
 
 
 @given(st.sampled_from(KINDS), st.integers(0, 2**31 - 1))
+@example(thin_terrain, 56)  # of two windows that were not told apart one went to one side only
 def test_a_curve_is_as_good_as_its_pieces_cut_and_turned_round(kind, seed):
     """Metamorphic: cut at points of its own, reversed, in two, or with its points beside it."""
     rng = np.random.default_rng(seed)
