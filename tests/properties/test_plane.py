@@ -1,4 +1,4 @@
-"""On a convex plane all is known, however thin its triangles: windows cross, overlap and nest."""
+"""On planes all is known, however thin the triangles: windows cross, overlap and nest."""
 
 import numpy as np
 from hypothesis import given
@@ -6,6 +6,7 @@ from hypothesis import given
 import geodesic_core as gc
 from tests import zoo
 from tests.core.test_curves import random_curve
+from tests.oracles import visibility
 from tests.properties.test_approximate import errors
 from tests.properties.test_exact import seeds
 
@@ -131,3 +132,42 @@ def test_within_an_error_from_a_curve(seed, error):
     field = gc.approximate_distance(mesh, curve, error)
 
     check(mesh, field.distances, to_curve(mesh.vertices, mesh, curve), error)
+
+
+@given(seeds, errors)
+def test_among_obstacles(seed, error):
+    """With corners that are pseudosources; positions are integers, so that the oracle is exact."""
+    rng = np.random.default_rng(seed)
+    columns, rows, holes = rng.integers((3, 3, 1), (6, 5, 4)).tolist()
+    points, faces = zoo.grid(columns, rows, seed=seed, jitter=0.22)
+    cells = [tuple(rng.integers((columns, rows)).tolist()) for _ in range(holes)]
+    points, faces = zoo.drop_unused(points, zoo.without_cells(faces, columns, cells))
+    planar = np.rint(points[:, :2] * (1e6, 10.0 ** rng.uniform(2.5, 6))).astype(int)
+    mesh = gc.TriangleMesh(np.insert(planar.astype(float), 2, 0, axis=1), faces)
+    places, sources = [], []
+    for face in rng.integers(len(faces), size=int(rng.integers(1, 5))).tolist():
+        corners = planar[faces[face]]
+        place = np.rint(rng.dirichlet(np.ones(3)) @ corners).astype(int)
+        (ax, ay), (bx, by) = (np.roll(corners, -k, axis=0).T - place[:, None] for k in (1, 2))
+        areas = ax * by - ay * bx
+        if areas.min() > 0:
+            places.append(place)
+            sources.append(gc.SurfacePoint.face(face, tuple((areas / areas.sum()).tolist())))
+    if not sources:
+        return
+    table = visibility.distance_matrix(np.vstack([planar, places]), faces)[len(planar) :]
+    expected = table[:, : len(planar)].min(axis=0)
+    reached = np.flatnonzero(np.isfinite(expected))
+
+    field = gc.exact_distance(mesh, sources)
+
+    assert (np.isfinite(field.distances) == np.isfinite(expected)).all()
+    check(mesh, field.distances[reached], expected[reached])
+    rough = gc.approximate_distance(mesh, sources, error)
+    check(mesh, rough.distances[reached], expected[reached], error)
+    for target in rng.choice(reached, 2).tolist():
+        length = field.path_to(target).length
+        check(mesh, np.array([length]), expected[[target]])
+        if np.isfinite(table[0, target]):
+            length = gc.shortest_path(mesh, sources[0], target).length
+            check(mesh, np.array([length]), table[[0], target])
