@@ -1,9 +1,12 @@
 """What all tests share: how much to run, and on what."""
 
 import os
+from collections.abc import Callable
 
 import pytest
 from hypothesis import settings
+
+import geodesic_core as gc
 
 WITHOUT_JIT = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
@@ -21,6 +24,28 @@ def pytest_configure(config: pytest.Config) -> None:
         "full", derandomize=True, max_examples=2000, deadline=None, database=None
     )
     settings.load_profile("slice" if "not full" in config.option.markexpr else "full")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def compiled_kernels(worker_id: str) -> None:
+    """Compile all kernels, for minutes on a fresh checkout; then all processes load them.
+
+    Every other process of pytest-xdist begins at the other end, so that two have one half each.
+    """
+    if WITHOUT_JIT:
+        return
+    mesh = gc.TriangleMesh(*gc.samples.plane(8))
+    vertex = int(mesh.faces[0, 0])
+    curve = gc.Curve(mesh.faces[0, :2].tolist())
+    steps: list[Callable[[], object]] = [
+        gc.warm_up,
+        lambda: gc.exact_distance(mesh, vertex).isolines([0.1]),
+        lambda: gc.distance_matrix(mesh, [0], [1]),
+        lambda: gc.approximate_distance(mesh, curve),
+        lambda: gc.exact_distance(mesh, curve).isolines([0.1]),
+    ]
+    for step in steps if worker_id in ("master", "gw0") else reversed(steps):
+        step()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

@@ -243,6 +243,6 @@ def _die_with_parent() -> None:
     # The sentinel is the read end of a pipe whose other end closes with the parent, however that
     # ends; PR_SET_PDEATHSIG would fire already when the parent's *thread* that started us ends.
     parent = parent_process()
-    assert parent is not None, "workers are spawned"  # noqa: S101
+    assert parent is not None, "a worker has a parent"  # noqa: S101
     connection.wait([parent.sentinel])
     os._exit(1)

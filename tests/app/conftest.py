@@ -44,18 +44,6 @@ def is_ready(client: Any) -> bool:
     return bool(client.get("/readyz").status_code == 200)
 
 
-@pytest.fixture(scope="session", autouse=True)
-def compiled_kernels() -> None:
-    """Compile what the services' workers then load: for minutes, on a fresh checkout."""
-    gc.warm_up()
-    mesh = gc.TriangleMesh(*gc.samples.plane(8))
-    start = int(mesh.faces[0, 0])
-    for source in (start, gc.Curve(mesh.faces[0, :2].tolist())):
-        gc.exact_distance(mesh, source).isolines([0.1])
-        gc.approximate_distance(mesh, source)
-    gc.distance_matrix(mesh, [0], [1])
-
-
 @contextmanager
 def serving(store: Path, **settings: Any) -> Iterator[TestClient]:
     """Run the service in this process, with workers of its own."""

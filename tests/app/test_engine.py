@@ -90,6 +90,12 @@ def wait_until_busy(client: TestClient, running: int = 2, waiting: int = 0) -> N
     )
 
 
+def wait_until_begun(client: TestClient) -> None:
+    """Wait until all busy workers have taken up their work; before, it would go to others."""
+    engine = engine_of(client)
+    wait_until(lambda: all(slot.progress > 0 for slot in engine._open - set(engine._idle)))
+
+
 def wait_until_whole(client: TestClient) -> None:
     wait_until(lambda: len(engine_of(client)._idle) == 3)
 
@@ -141,7 +147,7 @@ def test_a_busy_worker_killed(
     two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
 ) -> None:
     running = start_slow(two, slow, threads)
-    time.sleep(0.2)
+    wait_until_begun(two)
     os.kill(min(busy_workers(two)), signal.SIGKILL)
     responses = sorted((future.result() for future in running), key=lambda r: r.status_code)
 
@@ -156,7 +162,7 @@ def test_all_killed_while_others_wait(
     running = start_slow(two, slow, threads)
     waiting = [threads.submit(ask, two, medium) for _ in range(2)]
     wait_until_busy(two, 2, 2)
-    time.sleep(0.2)
+    wait_until_begun(two)
     for pid in workers(two):
         os.kill(pid, signal.SIGKILL)
 

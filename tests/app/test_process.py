@@ -41,17 +41,17 @@ class Server:
             return False
 
     def workers(self) -> set[int]:
-        """Ids of the worker processes, also once their parent is gone."""
+        """Ids of the worker processes: those that the process forks which this one keeps for it."""
         found = set()
         for entry in Path("/proc").iterdir():
             if entry.name.isdigit():
                 try:
                     is_worker = (entry / "cmdline").read_bytes().startswith(b"geodesic-worker")
-                    parent = int((entry / "stat").read_text().rpartition(")")[2].split()[1])
+                    forker = parent_of(int(entry.name))
+                    if is_worker and parent_of(forker) == self.process.pid:
+                        found.add(int(entry.name))
                 except (FileNotFoundError, ProcessLookupError):
                     continue
-                if is_worker and parent == self.process.pid:
-                    found.add(int(entry.name))
         return found
 
     def begin_slow_query(self, mesh_id: str) -> socket.socket:
@@ -70,6 +70,10 @@ class Server:
         if self.process.poll() is None:
             self.process.kill()
         self.process.wait()
+
+
+def parent_of(pid: int) -> int:
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
 
 
 @pytest.fixture
@@ -98,6 +102,21 @@ def test_workers_die_with_their_parent_however_busy(server: Server) -> None:
     with server.begin_slow_query(mesh_id):
         server.process.kill()
         wait_until(lambda: are_gone(workers), seconds=2)
+
+
+def test_the_process_that_workers_are_forked_from_is_replaced_as_well(server: Server) -> None:
+    mesh_id = upload_sample(server.client, "plane", 200)
+    wait_until(lambda: len(server.workers()) == 2)
+    workers = server.workers()
+
+    os.kill(parent_of(min(workers)), signal.SIGKILL)
+
+    distances = server.client.post(
+        f"/v1/meshes/{mesh_id}/distances", json={"sources": [{"vertex": 0}]}
+    )
+    assert distances.status_code == 200, distances.text
+    wait_until(lambda: len(server.workers()) == 2)
+    wait_until(lambda: are_gone(workers))
 
 
 def test_a_client_that_hangs_up_stops_its_query(server: Server) -> None:
