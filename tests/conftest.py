@@ -16,7 +16,7 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.register_profile(
         "slice",
         derandomize=True,
-        max_examples=8 if WITHOUT_JIT else 20,
+        max_examples=5 if WITHOUT_JIT else 20,
         deadline=None,
         database=None,
     )
@@ -54,7 +54,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             if item.get_closest_marker("jit"):
                 item.add_marker(pytest.mark.skip(reason="kernels run in pure Python"))
     if "not full" in config.option.markexpr:
-        kept = _slice_of(items, 4 if WITHOUT_JIT else 6)
+        kept = _slice_of(items, 3 if WITHOUT_JIT else 6)
         config.hook.pytest_deselected(items=[item for item in items if item not in kept])
         items[:] = [item for item in items if item in kept]
 

@@ -63,6 +63,7 @@ def answers(field: gc.DistanceField) -> list[Any]:
     ]
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize(
     ("sources", "kind", "rest"),
     [*product(SOURCES, KINDS, [{}, {"max_distance": 0.4, "targets": [POINTS[1], POINTS[1], 7]}])],

@@ -42,6 +42,7 @@ def test_small_meshes_against_unfolding(case):
                 assert path.length == pytest.approx(distance, rel=EXACT, abs=0)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("name", ["annulus", "obstacles", "comb", "pinched_holes"])
 def test_among_holes_in_the_plane(name):
     case = zoo.SMALL[name]

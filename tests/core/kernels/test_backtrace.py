@@ -79,6 +79,7 @@ def test_a_lost_line_is_an_internal_error():
         field.path_to(int(mesh.topology.outer_vertex[v]))
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("scale", [1e-9, 1e9])
 def test_long_paths_get_more_room(scale):
     """More points than a path gets room for at first."""
