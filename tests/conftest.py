@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable
 
 import pytest
+from filelock import FileLock
 from hypothesis import settings
 
 import geodesic_core as gc
@@ -26,11 +27,17 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.load_profile("slice" if "not full" in config.option.markexpr else "full")
 
 
+def pytest_xdist_auto_num_workers() -> int:
+    """Tests of the service and of the page wait for a good part of their time."""
+    return (os.cpu_count() or 1) + (0 if WITHOUT_JIT else 1)
+
+
 @pytest.fixture(scope="session", autouse=True)
-def compiled_kernels(worker_id: str) -> None:
+def compiled_kernels(worker_id: str, tmp_path_factory: pytest.TempPathFactory) -> None:
     """Compile all kernels, for minutes on a fresh checkout; then all processes load them.
 
-    Every other process of pytest-xdist begins at the other end, so that two have one half each.
+    What one process of pytest-xdist compiles the others wait for, and the second begins at the
+    other end.
     """
     if WITHOUT_JIT:
         return
@@ -38,17 +45,22 @@ def compiled_kernels(worker_id: str) -> None:
     vertex = int(mesh.faces[0, 0])
     curve = gc.Curve(mesh.faces[0, :2].tolist())
     steps: list[Callable[[], object]] = [
-        gc.warm_up,
         lambda: gc.exact_distance(mesh, vertex).isolines([0.1]),
+        lambda: gc.approximate_distance(mesh, vertex),
+        gc.warm_up,
         lambda: gc.distance_matrix(mesh, [0], [1]),
         lambda: gc.approximate_distance(mesh, curve),
         lambda: gc.exact_distance(mesh, curve).isolines([0.1]),
     ]
-    for step in steps if worker_id in ("master", "gw0") else reversed(steps):
-        step()
+    locks = tmp_path_factory.getbasetemp().parent
+    numbered = list(enumerate(steps))
+    for number, step in numbered if worker_id != "gw1" else reversed(numbered):
+        with FileLock(locks / f"step-{number}"):
+            step()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: "tests/web" not in item.nodeid)  # the longest files go first
     if WITHOUT_JIT:
         for item in items:
             if item.get_closest_marker("jit"):
