@@ -2,6 +2,7 @@
 
 import asyncio
 
+from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.errors import refuse
@@ -17,7 +18,8 @@ class BodyDeadlineMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        end = asyncio.get_running_loop().time() + self.limit_s
+        clock = asyncio.get_running_loop().time
+        end = clock() + self.limit_s
         is_complete = False
 
         async def receive_in_time() -> Message:
@@ -31,13 +33,18 @@ class BodyDeadlineMiddleware:
                 detail = f"the body was not complete within {self.limit_s:g} s"
                 setting = variable_of("deadline_s")
                 raise refuse(
-                    "deadline_exceeded",
-                    detail,
-                    limit=self.limit_s,
-                    setting=setting,
-                    headers={"Connection": "close"},  # or it goes on to drip
+                    "deadline_exceeded", detail, limit=self.limit_s, setting=setting
                 ) from None
             is_complete = not message.get("more_body", False)
             return message
 
-        await self.app(scope, receive_in_time if scope["type"] == "http" else receive, send)
+        async def send_and_close(message: Message) -> None:
+            # Whoever refused it, the query's own deadline or this one: it would go on to drip.
+            if message["type"] == "http.response.start" and not is_complete and clock() >= end:
+                MutableHeaders(scope=message)["Connection"] = "close"
+            await send(message)
+
+        if scope["type"] == "http":
+            await self.app(scope, receive_in_time, send_and_close)
+        else:
+            await self.app(scope, receive, send)

@@ -85,6 +85,24 @@ def test_a_body_has_to_be_there_in_time(
     assert not any((tmp_path / "tmp").iterdir())
 
 
+class Stalling(Dripping):
+    """A client of a service that does something else until all deadlines have passed."""
+
+    async def receive(self) -> Any:
+        if self.taken == 1:
+            time.sleep(1.2)  # the event loop itself stalls
+        return await super().receive()
+
+
+def test_the_connection_closes_whichever_deadline_was_noticed_first(tmp_path: Path) -> None:
+    client = Stalling(app_in(tmp_path, deadline_s=1), "/v1/meshes", content_type=b"model/obj")
+
+    status, problem, _ = client.ask()
+
+    assert (status, problem["code"]) == (504, "deadline_exceeded")
+    assert (b"connection", b"close") in client.sent[0]["headers"]
+
+
 def test_an_upload_has_the_time_that_its_client_grants(tmp_path: Path) -> None:
     client = Dripping(
         app_in(tmp_path), "/v1/meshes", content_type=b"model/obj", x_timeout_ms=b"200"

@@ -19,7 +19,12 @@ from app import page as built
 from .viewing import View
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
-FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+FLAGS = [
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",  # WebGL is drawn as the GPU would, the rest of the page is not
+    "--no-sandbox",
+]
 SERVE = "from app.cli import main; main()"
 
 
