@@ -129,7 +129,7 @@ def test_a_client_that_hangs_up_stops_its_query(server: Server) -> None:
     def metrics() -> list[str]:
         return server.client.get("/metrics").text.splitlines()
 
-    wait_until(lambda: 'geodesic_workers{state="idle"} 2.0' in metrics())
+    wait_until(lambda: 'geodesic_workers{state="idle"} 2.0' in metrics(), seconds=0.5)
     assert "geodesic_cancellations_total 1.0" in metrics()
     assert not any(line.startswith("geodesic_solves_total{") for line in metrics())
     assert server.workers() == workers
