@@ -2,14 +2,18 @@
 
 import logging
 import os
+import pickle
+import select
+import signal
+import socket
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from ctypes import c_double, c_longlong
+from contextlib import contextmanager, suppress
+from ctypes import Structure, c_double, c_longlong
 from dataclasses import dataclass, replace
 from gc import freeze
-from multiprocessing import connection, parent_process
+from io import BufferedRWPair
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -45,6 +49,8 @@ from app.settings import Settings, variable_of
 logger = logging.getLogger(__name__)
 
 TITLE = "geodesic-worker"
+SIZE_BYTES = 8
+"""Of the number before each outcome"""
 
 
 @dataclass(frozen=True)
@@ -57,13 +63,22 @@ class WorkerConfig:
     """How far the process steps back behind others when there is more to do than cores"""
 
 
+class Signals(Structure):
+    """Memory that a worker shares with the service."""
+
+    _fields_ = (
+        ("stop_number", c_longlong),  # of the work to stop; earlier work has ended
+        ("begun_number", c_longlong),  # of the work that was taken up last
+        ("progress", c_double),  # which share of that is done
+    )
+
+
 @dataclass
 class Worker:
     """The state of a worker process: its meshes, kept open while they fit."""
 
     config: WorkerConfig
-    stop_number: c_longlong
-    progress: c_double
+    signals: Signals
 
     def __post_init__(self) -> None:
         self.settings = self.config.settings
@@ -75,12 +90,28 @@ class Worker:
         self.fields = Fields(self.settings.worker_field_bytes, store, code_version())
         self._writer = ThreadPoolExecutor(1)
 
-    def do(self, number: int, work: Work) -> Done:
+    def do(self, number: int, work: Work) -> Outcome:
+        """Do ``work``; what goes wrong is a value, since not every exception survives a pipe."""
+        try:
+            return self._do(number, work)
+        except gc.errors.Cancelled:
+            return None
+        except MemoryError as error:
+            self._forget_all()  # what is kept counts as well
+            limit, setting = self.settings.worker_memory_bytes, variable_of("worker_memory_bytes")
+            return replace(problem_of(error), limit=limit, setting=setting)
+        except Exception as error:
+            problem = problem_of(error)
+            if problem.code == "internal_error":
+                logger.exception("a worker failed at %s", work)
+            return problem
+
+    def _do(self, number: int, work: Work) -> Done:
         """Do ``work``, unless the number of the work to stop reaches ``number``."""
         clock = Clock()
 
         def is_to_stop() -> bool:
-            return self.stop_number.value >= number
+            return bool(self.signals.stop_number >= number)
 
         match work:
             case Storing():
@@ -137,7 +168,7 @@ class Worker:
         return Done(clock.seconds, estimate=found)
 
     def _report(self, share: float) -> None:
-        self.progress.value = share
+        self.signals.progress = share
 
     def _open(self, query: Query[Any]) -> OpenMesh:
         """Return the mesh of a query, with its barriers."""
@@ -154,7 +185,7 @@ class Worker:
             self.fields.forget(unused)
         return opened
 
-    def forget_all(self) -> None:
+    def _forget_all(self) -> None:
         """Give back all memory that is only kept."""
         for name in list(self.meshes):
             self.fields.forget(name)
@@ -193,56 +224,42 @@ def _make_mesh(origin: MeshOrigin, max_faces: int) -> gc.TriangleMesh:
 _JSON_GROWS = 40
 """Bytes that orjson takes for one of JSON; 37 were the most measured. Lacking them, it crashes."""
 
-# pebble calls module functions: the state of the process has to live beside them.
-_worker: Worker | None = None
 
-
-def initialize(
-    config: WorkerConfig, stop_number: c_longlong, pid: c_longlong, progress: c_double
-) -> None:
-    """Make this process a worker; called once, by its pool."""
-    global _worker  # noqa: PLW0603
+def run(config: WorkerConfig, signals: Signals, line: socket.socket) -> None:
+    """Be a worker process, at the end of a ``line``: do what comes along it, until it is cut."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the service, which ends its workers
     setproctitle(TITLE)
-    threading.Thread(target=_die_with_parent, daemon=True).start()
+    threading.Thread(target=_die_with, args=(line,), daemon=True).start()
     os.nice(config.niceness)
-    _worker = Worker(config, stop_number, progress)
-    pid.value = os.getpid()
+    worker = Worker(config, signals)
+    warm_up(config.settings.worker_memory_bytes)
+    with line.makefile("rwb") as messages, suppress(EOFError, BrokenPipeError):
+        _send(messages, None)
+        while True:
+            number, work = pickle.load(messages)  # noqa: S301 - of our own service
+            signals.begun_number = number
+            _send(messages, worker.do(number, work))
 
 
-def warm_up() -> None:
+def warm_up(allowed_memory: int) -> None:
     """Compile the kernels, or load them; from then on memory is limited."""
     gc.warm_up()
     freeze()  # what is loaded now stays: a collection that looks through it takes 90 ms
-    limit_memory(_this_worker().settings.worker_memory_bytes)
+    limit_memory(allowed_memory)
 
 
-def do(number: int, work: Work) -> Outcome:
-    """Do ``work``; what goes wrong is a value, since not every exception survives a pipe."""
-    worker = _this_worker()
-    try:
-        return worker.do(number, work)
-    except gc.errors.Cancelled:
-        return None
-    except MemoryError as error:
-        worker.forget_all()  # what is kept counts as well
-        limit, setting = worker.settings.worker_memory_bytes, variable_of("worker_memory_bytes")
-        return replace(problem_of(error), limit=limit, setting=setting)
-    except Exception as error:
-        problem = problem_of(error)
-        if problem.code == "internal_error":
-            logger.exception("a worker failed at %s", work)
-        return problem
+def _send(messages: BufferedRWPair, outcome: Outcome) -> None:
+    """Send an outcome after its size, by which who reads without waiting knows when it is whole."""
+    pickled = pickle.dumps(outcome)
+    messages.write(len(pickled).to_bytes(SIZE_BYTES))
+    messages.write(pickled)
+    messages.flush()
 
 
-def _this_worker() -> Worker:
-    assert _worker is not None, "the pool calls initialize first"  # noqa: S101
-    return _worker
-
-
-def _die_with_parent() -> None:
-    # The sentinel is the read end of a pipe whose other end closes with the parent, however that
-    # ends; PR_SET_PDEATHSIG would fire already when the parent's *thread* that started us ends.
-    parent = parent_process()
-    assert parent is not None, "a worker has a parent"  # noqa: S101
-    connection.wait([parent.sentinel])
+def _die_with(line: socket.socket) -> None:
+    # The other end closes with the service, however that ends, and with the slot. Who is busy does
+    # not read; PR_SET_PDEATHSIG would tell of the end of the process that forked us.
+    hung_up = select.poll()
+    hung_up.register(line, 0)
+    hung_up.poll()
     os._exit(1)

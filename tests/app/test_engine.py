@@ -6,7 +6,6 @@ import signal
 import time
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from ctypes import c_double, c_longlong
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -16,7 +15,7 @@ from starlette.testclient import TestClient
 
 from app.encoding import Form
 from app.engine import Answering, MeshFromSample, Order, Storing, local, worker
-from app.engine.worker import Clock, Worker, WorkerConfig
+from app.engine.worker import Clock, Signals, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
 from app.queries import DistancesQuery, PathQuery
@@ -75,12 +74,12 @@ def engine_of(client: TestClient) -> Any:
 
 
 def workers(client: TestClient) -> set[int]:
-    return {slot._pid.value for slot in engine_of(client)._open}
+    return {slot._process.pid for slot in engine_of(client)._open}
 
 
 def busy_workers(client: TestClient) -> set[int]:
     engine = engine_of(client)
-    return {slot._pid.value for slot in engine._open - set(engine._idle)}
+    return {slot._process.pid for slot in engine._open - set(engine._idle)}
 
 
 def wait_until_busy(client: TestClient, running: int = 2, waiting: int = 0) -> None:
@@ -133,6 +132,17 @@ def test_idle_workers_killed(
 
     assert ask(two, small).status_code == 200
     wait_until(lambda: len(workers(two) - before) == how_many)
+
+
+def test_workers_leave_an_interrupt_to_the_service(two: TestClient, small: str) -> None:
+    """Ctrl-C in a terminal comes to all processes there."""
+    before = workers(two)
+    for pid in before:
+        os.kill(pid, signal.SIGINT)
+
+    for _ in range(6):
+        assert ask(two, small).status_code == 200
+    assert workers(two) == before
 
 
 def test_a_query_right_after_the_kill_is_not_lost(two: TestClient, small: str) -> None:
@@ -355,12 +365,12 @@ def test_a_query_that_does_not_stop_is_killed(tmp_path: Path) -> None:
         assert ask(client, small).status_code == 200
 
 
-def die() -> None:
+def die(*_: Any) -> None:
     os._exit(3)
 
 
 def test_workers_that_cannot_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.engine.worker.warm_up", die)
+    monkeypatch.setattr("app.engine.worker.run", die)
     sample = {"sample": "plane", "faces": 10}
     with TestClient(create_app(Settings(store=tmp_path, workers=1))) as client:
         # The first asks before it is known that none can start, the second after.
@@ -390,7 +400,7 @@ def test_a_worker_closes_meshes_that_do_not_fit(tmp_path: Path) -> None:
     meshes = [TriangleMesh(*samples.plane(faces)) for faces in (100, 200, 300)]
     ids = [store_mesh(tmp_path, mesh) for mesh in meshes]
     room = meshes[1].nbytes + meshes[2].nbytes
-    state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0), c_double(0.0))
+    state = Worker(config(tmp_path, worker_mesh_bytes=room), Signals())
 
     for mesh_id in ids:
         state._open(asked(mesh_id))
@@ -401,9 +411,7 @@ def test_a_worker_closes_meshes_that_do_not_fit(tmp_path: Path) -> None:
 def test_a_worker_keeps_meshes_with_barriers_as_it_keeps_others(tmp_path: Path) -> None:
     mesh = TriangleMesh(*samples.plane(200))
     mesh_id = store_mesh(tmp_path, mesh)
-    state = Worker(
-        config(tmp_path, worker_mesh_bytes=2 * mesh.nbytes), c_longlong(0), c_double(0.0)
-    )
+    state = Worker(config(tmp_path, worker_mesh_bytes=2 * mesh.nbytes), Signals())
 
     blocked = state._open(asked(mesh_id, 3, 9))
 
@@ -418,7 +426,7 @@ def test_what_paths_need_counts_as_part_of_an_open_mesh(tmp_path: Path) -> None:
     meshes = [TriangleMesh(*samples.plane(faces)) for faces in (200, 300)]
     ids = [store_mesh(tmp_path, mesh) for mesh in meshes]
     room = sum(mesh.nbytes for mesh in meshes) + 100
-    state = Worker(config(tmp_path, worker_mesh_bytes=room), c_longlong(0), c_double(0.0))
+    state = Worker(config(tmp_path, worker_mesh_bytes=room), Signals())
 
     for mesh_id in ids:
         opened = state._open(asked(mesh_id))
@@ -440,10 +448,10 @@ def test_the_clock_measures_each_phase() -> None:
 def test_a_defect_in_a_worker_is_logged_there_and_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(worker, "_worker", Worker(config(tmp_path), c_longlong(0), c_double(0.0)))
     monkeypatch.setattr(worker, "_make_mesh", lambda *_: 1 / 0)
+    state = Worker(config(tmp_path), Signals())
 
-    outcome = worker.do(1, Storing(MeshFromSample("plane", 10, "none"), tmp_path / "mesh"))
+    outcome = state.do(1, Storing(MeshFromSample("plane", 10, "none"), tmp_path / "mesh"))
 
     assert isinstance(outcome, Problem)
     assert outcome.code == "internal_error"
@@ -451,19 +459,16 @@ def test_a_defect_in_a_worker_is_logged_there_and_told(
 
 
 @pytest.mark.parametrize("accuracy", [{}, {"method": "approximate", "relative_error": 0.01}])
-def test_work_that_was_asked_to_stop_stops(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accuracy: dict[str, Any]
-) -> None:
-    asked = c_longlong(0)
-    state = Worker(config(tmp_path), asked, c_double(0.0))
+def test_work_that_was_asked_to_stop_stops(tmp_path: Path, accuracy: dict[str, Any]) -> None:
+    signals = Signals()
+    state = Worker(config(tmp_path), signals)
     mesh_id = store_mesh(tmp_path, TriangleMesh(*samples.sphere(100_000)))
-    monkeypatch.setattr(worker, "_worker", state)
     ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
     query = PathQuery(mesh_id, PathRequest(**ends, **accuracy))
     work = Answering(query, Form("application/json"), f"{mesh_id}/key")
     (tmp_path / "results").mkdir()
 
-    asked.value = 2
-    assert worker.do(2, work) is None
+    signals.stop_number = 2
+    assert state.do(2, work) is None
     assert not list((tmp_path / "results").rglob("*"))
-    assert "encode" in worker.do(3, work).seconds
+    assert "encode" in state.do(3, work).seconds

@@ -132,7 +132,7 @@ def killed(site: Site) -> Any:
         # Work that its worker had not taken up yet goes to another one, and succeeds.
         wait_until(lambda: site.client.get(job).json()["progress"] > 0)
         (busy,) = site.engine._open - set(site.engine._idle)
-        os.kill(busy._pid.value, signal.SIGKILL)
+        os.kill(busy._process.pid, signal.SIGKILL)
         wait_until(lambda: not site.is_running(job))
         return site.client.get(f"{job}/results")
 

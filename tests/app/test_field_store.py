@@ -1,7 +1,6 @@
 """Fields on disk: whole or not there, within the bound, and found by whoever comes later."""
 
 import os
-from ctypes import c_double, c_longlong
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import pytest
 import geodesic_core as gc
 from app.encoding import Form
 from app.engine.work import Answering
-from app.engine.worker import Worker
+from app.engine.worker import Signals, Worker
 from app.field_store import FieldStore, code_of_field, field_files
 from app.queries import fields as kept_fields
 from app.queries import result_key
@@ -145,7 +144,7 @@ def test_another_worker_finds_the_field(
     query = asked(mesh_id, 5, 6, vertex=3, **accuracy)
 
     def answer() -> tuple[Worker, Any]:
-        state = Worker(config(tmp_path), c_longlong(0), c_double(0.0))
+        state = Worker(config(tmp_path), Signals())
         form = Form("application/x-npy")
         name = result_name(mesh_id, result_key(query, form))
         done = state.do(1, Answering(query, form, name))

@@ -1,6 +1,5 @@
 """Fields are kept between questions, and no answer tells whether its own was."""
 
-from ctypes import c_double, c_longlong
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ import pytest
 
 import geodesic_core as gc
 from app.encoding import Form, encode
-from app.engine.worker import Worker
+from app.engine.worker import Signals, Worker
 from app.mesh_store import OpenMesh
 from app.queries import DistancesQuery, Fields, IsolinesQuery, PathsQuery
 from geodesic_core import whole_sweep
@@ -171,7 +170,7 @@ def test_questions_about_one_field_go_to_one_worker() -> None:
 def test_a_worker_drops_fields_with_their_mesh(tmp_path: Path) -> None:
     meshes = [gc.TriangleMesh(*gc.samples.plane(faces)) for faces in (200, 300)]
     settings = config(tmp_path, worker_mesh_bytes=meshes[1].nbytes + 1, worker_field_bytes=10**6)
-    state = Worker(settings, c_longlong(0), c_double(0.0))
+    state = Worker(settings, Signals())
     ids = [store_mesh(tmp_path, mesh) for mesh in meshes]
     for mesh_id in ids:
         query = asked(mesh_id)
@@ -179,5 +178,5 @@ def test_a_worker_drops_fields_with_their_mesh(tmp_path: Path) -> None:
         query.answer(opened, granted(fields=state.fields))
 
     assert [name for (name, _), _ in state.fields._fields] == [ids[1]]
-    state.forget_all()
+    state._forget_all()
     assert state.fields.nbytes == 0

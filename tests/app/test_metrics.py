@@ -161,7 +161,7 @@ def test_jobs_queue_workers_and_cancellations(watched: TestClient) -> None:
 def test_workers_that_are_lost(watched: TestClient) -> None:
     before = scrape(watched)
     slots = watched.app.state.service.engine._slots
-    os.kill(slots[0]._pid.value, signal.SIGKILL)
+    os.kill(slots[0]._process.pid, signal.SIGKILL)
 
     wait_until(lambda: value(scrape(watched), "workers", state="missing") == 1)
     wait_until(lambda: value(scrape(watched), "workers", state="idle") == 2)

@@ -104,19 +104,24 @@ def test_workers_die_with_their_parent_however_busy(server: Server) -> None:
         wait_until(lambda: are_gone(workers), seconds=2)
 
 
-def test_the_process_that_workers_are_forked_from_is_replaced_as_well(server: Server) -> None:
-    mesh_id = upload_sample(server.client, "plane", 200)
+def test_the_process_that_workers_are_forked_from_killed(server: Server) -> None:
+    """Workers go on without it; one that is killed then is forked from another; none is left."""
     wait_until(lambda: len(server.workers()) == 2)
     workers = server.workers()
-
     os.kill(parent_of(min(workers)), signal.SIGKILL)
 
-    distances = server.client.post(
-        f"/v1/meshes/{mesh_id}/distances", json={"sources": [{"vertex": 0}]}
+    mesh_id = upload_sample(server.client, "plane", 200)
+    too_long = server.client.post(
+        "/v1/meshes?sample=sphere&faces=2000000", headers={"X-Timeout-Ms": "200"}
     )
-    assert distances.status_code == 200, distances.text
-    wait_until(lambda: len(server.workers()) == 2)
-    wait_until(lambda: are_gone(workers))
+    assert too_long.status_code == 504, "work that can only be killed"
+    wait_until(lambda: len(server.workers()) == 1)
+    (kept,) = (pid for pid in workers if is_running(pid))
+    assert server.client.get(f"/v1/meshes/{mesh_id}/path?from=v0&to=v9").status_code == 200
+
+    server.process.send_signal(signal.SIGTERM)
+    server.process.wait(5)
+    wait_until(lambda: are_gone({kept}))
 
 
 def test_a_client_that_hangs_up_stops_its_query(server: Server) -> None:

@@ -80,7 +80,7 @@ def tight(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
 
 def pid_of_worker(client: Any) -> int:
     _, slot = client.app.state.service.engine._slots
-    return int(slot._pid.value)
+    return int(slot._process.pid)
 
 
 def test_an_upload_that_takes_too_much_is_refused_and_the_worker_lives(tight: TestClient) -> None:
