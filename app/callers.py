@@ -1,6 +1,7 @@
 """Who asks: the name of an API key, or an address where no keys are asked for."""
 
 from dataclasses import dataclass
+from functools import lru_cache
 from ipaddress import IPv6Address, ip_address, ip_network
 
 
@@ -21,6 +22,7 @@ class Caller:
         return not self.has_key or owner in (None, self.name)
 
 
+@lru_cache(maxsize=1024)
 def caller_at(host: str | None) -> Caller:
     """Return who asks from an address; those of one IPv6 network (/64) are one."""
     try:

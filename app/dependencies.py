@@ -50,16 +50,21 @@ async def get_caller(request: Request) -> Caller:
 CallerDep = Annotated[Caller, Depends(get_caller)]
 
 
-async def get_asker(
-    request: Request,
-    x_timeout_ms: Annotated[
-        int | None, Header(gt=0, description="Milliseconds the client would wait")
-    ] = None,
-) -> Asker:
+TimeoutHeader = Annotated[
+    int | None, Header(gt=0, description="Milliseconds the client would wait")
+]
+
+
+def asker_of(request: Request, x_timeout_ms: int | None) -> Asker:
     """Return who asks, and the lower of how long they and the service would wait."""
     limit = service_of(request).settings.deadline_s
     deadline_s = limit if x_timeout_ms is None else min(limit, x_timeout_ms / 1000)
     return Asker(caller_of(request), deadline_s, request.state.request_id)
+
+
+async def get_asker(request: Request, x_timeout_ms: TimeoutHeader = None) -> Asker:
+    """Return the same, as a dependency."""
+    return asker_of(request, x_timeout_ms)
 
 
 AskerDep = Annotated[Asker, Depends(get_asker)]

@@ -127,7 +127,9 @@ class MeshBooks:
         try:
             yield
         finally:
-            self._held -= Counter([mesh_id])
+            self._held[mesh_id] -= 1
+            if not self._held[mesh_id]:
+                del self._held[mesh_id]
 
     def _chosen_to_go(self, size: int) -> list[str]:
         """Return the meshes that have to go for so many bytes more, or refuse these."""

@@ -171,20 +171,20 @@ class Service:
         await to_thread.run_sync(self.fields.forget_mesh, mesh_id)
 
     async def answer(
-        self, query: Query[Any], form: Form, asker: Asker, *, as_file: bool
+        self, query: Query[Any], size: MeshSize, form: Form, asker: Asker, *, as_file: bool
     ) -> Answered:
-        """Answer ``query``: from a kept result, or by a worker."""
+        """Answer ``query`` to a mesh of this ``size``: from a kept result, or by a worker."""
         async with self.within(asker.deadline_s):
-            answered = await self._answer(query, form, asker.caller.name, _nobody)
+            answered = await self._answer(query, size, form, asker.caller.name, _nobody)
             if as_file:
                 return replace(answered, result=await self.results.with_files(answered.result))
             return answered
 
     async def estimate(
-        self, query: Query[Any], form: Form, asker: Asker
+        self, query: Query[Any], size: MeshSize, form: Form, asker: Asker
     ) -> tuple[Estimate, Seconds]:
         """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
-        query.refuse_answer(form.media_type, self.size(query.mesh_id), self.settings)
+        query.refuse_answer(form.media_type, size, self.settings)
         order = Order(Estimating(query, form), asker.caller.name, query.topics, is_small=True)
         async with self.within(asker.deadline_s):
             with self.mesh_books.held(query.mesh_id):
@@ -192,14 +192,16 @@ class Service:
         assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
         return done.estimate, done.seconds
 
-    async def submit(self, query: Query[Any], form: Form, asker: Asker, key: str | None) -> Job:
+    async def submit(
+        self, query: Query[Any], size: MeshSize, form: Form, asker: Asker, key: str | None
+    ) -> Job:
         """Accept a job that answers ``query``; one for all with the same idempotency ``key``."""
-        query.refuse_answer(form.media_type, self.size(query.mesh_id), self.settings)
+        query.refuse_answer(form.media_type, size, self.settings)
         self.engine.refuse_when_full(asker.caller.name)
 
         async def solve(told: Told) -> Result:
             async with self.within(self.settings.job_deadline_s, "job_deadline_s"):
-                return (await self._answer(query, form, asker.caller.name, told)).result
+                return (await self._answer(query, size, form, asker.caller.name, told)).result
 
         errand = Errand(
             owner=asker.caller.owner,
@@ -212,9 +214,10 @@ class Service:
         )
         return await self.jobs.submit(errand, solve)
 
-    async def _answer(self, query: Query[Any], form: Form, client: str, told: Told) -> Answered:
+    async def _answer(
+        self, query: Query[Any], size: MeshSize, form: Form, client: str, told: Told
+    ) -> Answered:
         with self.mesh_books.held(query.mesh_id):
-            size = self.size(query.mesh_id)
             query.refuse_answer(form.media_type, size, self.settings)
             name = result_name(query.mesh_id, result_key(query, form))
             kept = await self.results.find(name)

@@ -7,7 +7,8 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Depends, Header, Query, Request, Response
 
 from app.dependencies import (
-    AskerDep,
+    TimeoutHeader,
+    asker_of,
     form_of,
     prefers_async,
     service_of,
@@ -142,18 +143,18 @@ class Asked:
         query = await beside_the_loop(request, ask)
         form = form_of(request, parameters, query.offers)
         if parameters.estimate:
-            estimating = service.estimate(query, form, asker)
+            estimating = service.estimate(query, size, form, asker)
             estimate, seconds = await while_connected(request, estimating)
             return estimate_response(self.mesh_id, estimate, form.media_type, seconds)
         if self.is_async:
-            return accepted_response(await service.submit(query, form, asker, self.key))
+            return accepted_response(await service.submit(query, size, form, asker, self.key))
         is_cacheable = request.method == "GET" and query.is_repeatable
         headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
         if is_cacheable:
             unchanged = not_modified(request, etag_of(result_key(query, form)), headers)
             if unchanged is not None:
                 return unchanged
-        answering = service.answer(query, form, asker, as_file="range" in request.headers)
+        answering = service.answer(query, size, form, asker, as_file="range" in request.headers)
         answered = await while_connected(request, answering)
         return result_response(request, answered, form.media_type, service.results, headers)
 
@@ -161,7 +162,6 @@ class Asked:
 async def get_asked(
     mesh_id: str,
     request: Request,
-    asker: AskerDep,
     prefer: Annotated[
         str | None,
         Header(description="`respond-async`: answer at once with a job, RFC 7240"),
@@ -174,8 +174,10 @@ async def get_asked(
             description="Of a job, freely chosen: what is sent again with it is the same job",
         ),
     ] = None,
+    x_timeout_ms: TimeoutHeader = None,
 ) -> Asked:
     """Return what a request for a query says beside the query."""
+    asker = asker_of(request, x_timeout_ms)
     return Asked(mesh_id, request, asker, prefers_async(prefer), idempotency_key)
 
 
