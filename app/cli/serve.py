@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from app import fork_server
 from app.cli.steps import Failure
 
 
@@ -15,6 +16,8 @@ def serve(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.")] = 8000,
 ) -> None:
     """Serve geodesics over HTTP until interrupted; settings are GEODESIC_… variables."""
+    fork_server.start()  # imports for the workers while this process imports for itself
+
     import uvicorn
     from pydantic import ValidationError
 

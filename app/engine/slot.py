@@ -1,7 +1,6 @@
 """A place for one worker process: begins work, asks it to stop, gives it up."""
 
 import asyncio
-import multiprocessing
 import pickle
 import socket
 from collections import deque
@@ -10,11 +9,8 @@ from multiprocessing.context import ForkServerProcess
 
 from app.engine import worker
 from app.engine.work import Outcome, Work
+from app.fork_server import CONTEXT
 
-# Workers are forked from a server process that has imported all they need and does nothing else:
-# imports take 2 s and a fork 10 ms, and to fork this process would copy its threads' locks.
-_CONTEXT = multiprocessing.get_context("forkserver")
-_CONTEXT.set_forkserver_preload([worker.__name__])
 _TOPICS = 64  # that are remembered
 
 
@@ -36,7 +32,7 @@ class Slot:
 
     def __init__(self, config: worker.WorkerConfig) -> None:
         self._config = config
-        self._signals: worker.Signals = _CONTEXT.RawValue(worker.Signals)
+        self._signals: worker.Signals = CONTEXT.RawValue(worker.Signals)
         self._number = 0  # of the work given last
         self._outcome: asyncio.Future[Outcome] | None = None
         self._process: ForkServerProcess | None = None
@@ -62,7 +58,7 @@ class Slot:
         ours, theirs = socket.socketpair()
         with theirs:
             arguments = (self._config, self._signals, theirs)
-            process = _CONTEXT.Process(target=worker.run, args=arguments, daemon=True)
+            process = CONTEXT.Process(target=worker.run, args=arguments, daemon=True)
             process.start()
         return process, ours
 
