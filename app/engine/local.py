@@ -154,7 +154,8 @@ class LocalEngine:
             try:
                 await slot.open()
             except WorkerLostError:
-                logger.exception("a worker could not be started; next try in %g s", pause)
+                if not self.is_draining:  # else the interrupt came to the new worker as well
+                    logger.exception("a worker could not be started; next try in %g s", pause)
                 self._fail_if_none_is_open()
                 await slot.close()
                 await asyncio.sleep(pause)

@@ -386,6 +386,19 @@ def test_workers_that_cannot_start(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         assert client.post("/v1/meshes", params=sample).status_code == 201
 
 
+def test_an_interrupt_while_workers_start_is_no_failure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr("app.engine.worker.run", die)
+    app = create_app(Settings(store=tmp_path, workers=1))
+    engine = app.state.service.engine
+    engine.drain()
+    with TestClient(app):
+        wait_until(lambda: engine._is_failing)
+
+    assert "could not be started" not in caplog.text
+
+
 def config(store: Path, **settings: Any) -> WorkerConfig:
     return WorkerConfig(Settings(store=store, **settings), store / "results")
 
