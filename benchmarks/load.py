@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import partial
-from gc import freeze
 from itertools import count
 from random import Random
 from statistics import median, quantiles
@@ -30,7 +29,6 @@ HEAVY = 120
 def run(_inputs: Inputs, _runs: int) -> Section:
     """Ask for paths on a small mesh, by one client and by four."""
     gc.warm_up()
-    freeze()  # who measures would look through Numba for garbage, for up to a tenth of a second
     rows: list[list[str]] = []
     with serving(GEODESIC_WORKERS=str(WORKERS)) as port, ProcessPoolExecutor(4) as pool:
         client = Client(port)
