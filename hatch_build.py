@@ -26,10 +26,11 @@ class PageHook(BuildHookInterface[Any]):
         """Return what building the page takes: nothing where it has been built."""
         return [] if is_fresh(Path(self.root)) else [NODE]
 
-    def initialize(self, version: str, build_data: dict[str, Any]) -> None:  # noqa: ARG002
-        """Build the page."""
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Build the page, and have it packed though git ignores it."""
         if version != "editable":
             build(Path(self.root))
+            build_data["artifacts"].append("app/web/dist")
 
 
 def is_fresh(root: Path) -> bool:
