@@ -21,10 +21,8 @@ logger = logging.getLogger(__name__)
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 30.0
 _RETRY_AFTER = {"Retry-After": "1"}
 _TELL_S = 0.1
-_STEP_BACK = 10
-"""Niceness of the workers for long work: small work and the API process go first."""
 _SMALL_S = 0.5
-"""Granted to work in the slot for small work: ten times what it is likely to take."""
+"""Granted to small work: ten times what it is likely to take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,15 +37,18 @@ class LocalEngine:
     """The engine of a service on one machine.
 
     One slot more than the setting asks for takes small work only: that never waits behind long
-    work. What proves not to be small is begun anew in another slot.
+    work. The others take it as well, but no more of it is done at once than the setting asks for,
+    for more than there are cores would only keep each other waiting. What proves not to be small is
+    begun anew as what it is.
     """
 
     def __init__(self, settings: Settings, results: Path) -> None:
         self._settings = settings
-        self._small = Slot(WorkerConfig(settings, results))
-        stepping_back = WorkerConfig(settings, results, niceness=_STEP_BACK)
-        self._slots = [self._small, *(Slot(stepping_back) for _ in range(settings.workers))]
+        config = WorkerConfig(settings, results)
+        self._small = Slot(config)
+        self._slots = [self._small, *(Slot(config) for _ in range(settings.workers))]
         self._idle: list[Slot] = []
+        self._at_small: set[Slot] = set()
         self._waiting: FairQueue[_Place] = FairQueue()
         self._open: set[Slot] = set()
         self._lost = self._cancelled = 0
@@ -114,14 +115,14 @@ class LocalEngine:
             return replace(outcome, seconds={"queue": queued, **outcome.seconds})
 
     async def _run_in(self, slot: Slot, order: Order, told: Told) -> Outcome:
-        outcome = slot.begin(order.work)
+        outcome = slot.begin(order.work, is_small=order.is_small)
         began = perf_counter()
         told(0.0)
         try:
             while not outcome.done():
                 await asyncio.wait({outcome}, timeout=_TELL_S)
                 told(slot.progress)
-                if slot is self._small and perf_counter() - began > _SMALL_S:
+                if order.is_small and perf_counter() - began > _SMALL_S:
                     slot.ask_to_stop()
             result = outcome.result()
         except asyncio.CancelledError:
@@ -172,6 +173,8 @@ class LocalEngine:
             self._open.discard(slot)
             if slot in self._idle:
                 self._idle.remove(slot)
+            self._at_small.discard(slot)
+            self._offer_idle()
             await slot.close()
 
     async def _take(self, order: Order) -> Slot:
@@ -181,6 +184,7 @@ class LocalEngine:
         if fit:
             slot = max(fit, key=lambda slot: self._fitness(slot, order))
             self._idle.remove(slot)
+            self._note_taken(slot, order)
         else:
             slot = await self._wait(order)
         slot.topics.extend(topic for topic in order.topics if topic not in slot.topics)
@@ -196,13 +200,13 @@ class LocalEngine:
         return *known, order.is_small and slot is self._small, -others
 
     def _takes(self, slot: Slot, is_small: bool) -> bool:
-        if slot is self._small:
-            return is_small
-        if not is_small or self._small not in self._open:
-            return True
-        # The last that is idle is kept for long work. Small work would fare worse in it than in its
-        # own slot: beside others that step back, with what the processor has to spare.
-        return any(other not in (slot, self._small) for other in self._idle)
+        if is_small:
+            return len(self._at_small) < self._settings.workers
+        return slot is not self._small
+
+    def _note_taken(self, slot: Slot, order: Order) -> None:
+        if order.is_small:
+            self._at_small.add(slot)
 
     async def _wait(self, order: Order) -> Slot:
         self._refuse_to_wait(order.client)
@@ -233,6 +237,7 @@ class LocalEngine:
             )
 
     def _give_back(self, slot: Slot) -> None:
+        self._at_small.discard(slot)
         if not slot.is_alive:
             return  # its keeper replaces it and gives it back then
         place = self._waiting.take(
@@ -241,7 +246,14 @@ class LocalEngine:
         if place is None:
             self._idle.insert(0, slot)
         else:
+            self._note_taken(slot, place.order)
             place.slot.set_result(slot)
+
+    def _offer_idle(self) -> None:
+        """Offer what is idle to who waits: a worker is gone, and less small work is under way."""
+        for slot in reversed(self._idle.copy()):  # so they keep their order
+            self._idle.remove(slot)
+            self._give_back(slot)
 
     def _fail_if_none_is_open(self) -> None:
         if self.is_ready:

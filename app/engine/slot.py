@@ -80,14 +80,17 @@ class Slot:
         """Say that this worker is not to be used again, so that its keeper replaces it."""
         self._given_up.set()
 
-    def begin(self, work: Work) -> "asyncio.Future[Outcome]":
-        """Hand ``work`` to the worker; the future fails with ``WorkerLostError`` if that dies."""
+    def begin(self, work: Work, *, is_small: bool) -> "asyncio.Future[Outcome]":
+        """Hand ``work`` to the worker; the future fails with ``WorkerLostError`` if that dies.
+
+        What is not small lets all else on the machine go first.
+        """
         self._number += 1
         self._signals.progress = 0.0
         self._outcome = asyncio.get_running_loop().create_future()
         if self.is_alive:
             assert self._line is not None, "who is alive has a line"  # noqa: S101
-            self._line.write(pickle.dumps((self._number, work)))
+            self._line.write(pickle.dumps((self._number, work, is_small)))
         else:
             self._lose_outcome()
         return self._outcome

@@ -52,6 +52,9 @@ TITLE = "geodesic-worker"
 SIZE_BYTES = 8
 """Of the number before each outcome"""
 
+_STEP_BACK = 10
+"""Niceness of what is not small: small work and the API process go first."""
+
 
 @dataclass(frozen=True)
 class WorkerConfig:
@@ -59,8 +62,6 @@ class WorkerConfig:
 
     settings: Settings
     results: Path
-    niceness: int = 0
-    """How far the process steps back behind others when there is more to do than cores"""
 
 
 class Signals(Structure):
@@ -88,7 +89,7 @@ class Worker:
         self.meshes = Kept(self.settings.worker_mesh_bytes, lambda opened: opened.nbytes)
         store = FieldStore(self.settings.store, self.settings.fields_bytes)
         self.fields = Fields(self.settings.worker_field_bytes, store, code_version())
-        self._writer = ThreadPoolExecutor(1)
+        self._writer = _thread_behind()
 
     def do(self, number: int, work: Work) -> Outcome:
         """Do ``work``; what goes wrong is a value, since not every exception survives a pipe."""
@@ -230,15 +231,19 @@ def run(config: WorkerConfig, signals: Signals, line: socket.socket) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the service, which ends its workers
     setproctitle(TITLE)
     threading.Thread(target=_die_with, args=(line,), daemon=True).start()
-    os.nice(config.niceness)
     worker = Worker(config, signals)
+    behind = _thread_behind()
     warm_up(config.settings.worker_memory_bytes)
     with line.makefile("rwb") as messages, suppress(EOFError, BrokenPipeError):
         _send(messages, None)
         while True:
-            number, work = pickle.load(messages)  # noqa: S301 - of our own service
+            number, work, is_small = pickle.load(messages)  # noqa: S301 - of our own service
             signals.begun_number = number
-            _send(messages, worker.do(number, work))
+            if is_small:
+                outcome = worker.do(number, work)
+            else:
+                outcome = behind.submit(worker.do, number, work).result()
+            _send(messages, outcome)
 
 
 def warm_up(allowed_memory: int) -> None:
@@ -246,6 +251,17 @@ def warm_up(allowed_memory: int) -> None:
     gc.warm_up()
     freeze()  # what is loaded now stays: a collection that looks through it takes 90 ms
     limit_memory(allowed_memory)
+
+
+def _thread_behind() -> ThreadPoolExecutor:
+    """Start a thread that lets others go first, when there is more to do than cores.
+
+    On Linux niceness is a thread's own. It cannot be taken back, so that a worker that stepped back
+    itself would do so for small work as well.
+    """
+    thread = ThreadPoolExecutor(1)
+    thread.submit(os.nice, _STEP_BACK).result()
+    return thread
 
 
 def _send(messages: BufferedRWPair, outcome: Outcome) -> None:

@@ -3,7 +3,10 @@
 import asyncio
 import os
 import signal
+import sys
+import threading
 import time
+from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import count
@@ -15,6 +18,7 @@ from starlette.testclient import TestClient
 
 from app.encoding import Form
 from app.engine import Answering, MeshFromSample, Order, Storing, local, worker
+from app.engine.slot import Slot
 from app.engine.worker import Clock, Signals, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
@@ -275,21 +279,91 @@ def test_small_work_does_not_wait_behind_long_work(
     assert not any(future.done() for future in [*running, waiting])
 
 
-def test_the_last_idle_worker_is_kept_for_long_work(
-    two: TestClient, small: str, slow: str, threads: ThreadPoolExecutor
+def test_small_work_may_use_any_worker_but_not_all_at_once(
+    two: TestClient, small: str, threads: ThreadPoolExecutor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert ask(two, small).status_code == 200
-    engine = engine_of(two)
-    for slot in engine._slots:
-        slot.topics.clear()
-    running = threads.submit(ask, two, slow, **{"X-Timeout-Ms": "2000"})
-    wait_until_busy(two, 1)
+    engine, run_in = engine_of(two), engine_of(two)._run_in
+    at_once, seen = set(), []
 
-    asked = [threads.submit(ask, two, small) for _ in range(3)]
+    async def run_and_note(slot: Slot, *rest: Any) -> Any:
+        at_once.add(slot)
+        seen.append(frozenset(at_once))
+        try:
+            return await run_in(slot, *rest)
+        finally:
+            at_once.discard(slot)
 
-    assert [future.result().status_code for future in asked] == [200] * 3
-    assert [slot is engine._small for slot in engine._slots if small in slot.topics] == [True]
-    assert not running.done()
+    monkeypatch.setattr(engine, "_run_in", run_and_note)
+
+    asked = [threads.submit(lambda: [ask(two, small) for _ in range(25)]) for _ in range(4)]
+
+    assert {answer.status_code for future in asked for answer in future.result()} == {200}
+    assert max(map(len, seen)) == 2
+    assert len(frozenset().union(*seen)) >= 2
+
+
+def test_small_work_that_waits_goes_on_when_a_worker_dies(
+    two: TestClient, small: str, threads: ThreadPoolExecutor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    engine, is_over = engine_of(two), threading.Event()
+    open_slot = Slot.open
+
+    async def open_later(slot: Slot) -> None:
+        await asyncio.to_thread(is_over.wait)
+        await open_slot(slot)
+
+    monkeypatch.setattr(Slot, "open", open_later)
+    held = workers(two)
+    try:
+        for pid in held:
+            os.kill(pid, signal.SIGSTOP)
+        running = [threads.submit(ask, two, small) for _ in range(2)]
+        wait_until_busy(two, 2)
+        waiting = threads.submit(ask, two, small)
+        wait_until_busy(two, 2, 1)
+        (idle,) = engine._idle
+        os.kill(idle._process.pid, signal.SIGCONT)
+        assert not waiting.done(), "there is room for two"
+
+        victim = next(slot for slot in engine._open if slot is not idle)
+        os.kill(victim._process.pid, signal.SIGKILL)
+
+        assert waiting.result(10).status_code == 200
+        assert not all(future.done() for future in running)
+    finally:
+        for slot in engine._open:
+            os.kill(slot._process.pid, signal.SIGCONT)
+        is_over.set()
+    assert [future.result().status_code for future in running] == [200] * 2
+
+
+def processor_time(pid: int) -> Counter[int]:
+    """Return the nanoseconds that the threads of a process have had, by niceness."""
+    taken: Counter[int] = Counter()
+    for thread in Path(f"/proc/{pid}/task").iterdir():
+        niceness = int((thread / "stat").read_text().rpartition(")")[2].split()[16])
+        taken[niceness] += int((thread / "schedstat").read_text().split()[0])
+    return taken
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="niceness is a thread's own on Linux only")
+def test_work_that_is_not_small_lets_others_go_first(
+    two: TestClient, small: str, slow: str
+) -> None:
+    def ask_path(vertex: int) -> Any:
+        body = {"source": {"vertex": 0}, "target": {"vertex": vertex}}
+        return two.post(f"/v1/meshes/{small}/path", json=body)
+
+    def ask_slow(_: int) -> Any:
+        return ask(two, slow)
+
+    for work, times, niceness in ((ask_slow, 2, 10), (ask_path, 40, 0), (ask_slow, 2, 10)):
+        before = {pid: processor_time(pid) for pid in workers(two)}
+        asked = [work(number) for number in range(times)]
+        taken = sum((processor_time(pid) - before[pid] for pid in before), Counter())
+
+        assert {answer.status_code for answer in asked} == {200}
+        assert taken[niceness] > 0.8 * taken.total()
 
 
 def test_what_proves_not_to_be_small_begins_anew_elsewhere(
