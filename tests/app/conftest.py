@@ -1,6 +1,7 @@
 """A running service: real worker processes, a real store."""
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from io import BytesIO
@@ -38,6 +39,15 @@ def wait_until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
     while not condition():
         assert time.monotonic() < end, "it did not happen in time"
         time.sleep(0.02)
+
+
+def processor_time(pid: int) -> Counter[int]:
+    """Return the nanoseconds that the threads of a process have had, by niceness."""
+    taken: Counter[int] = Counter()
+    for thread in Path(f"/proc/{pid}/task").iterdir():
+        niceness = int((thread / "stat").read_text().rpartition(")")[2].split()[16])
+        taken[niceness] += int((thread / "schedstat").read_text().split()[0])
+    return taken
 
 
 def is_ready(client: Any) -> bool:

@@ -27,7 +27,15 @@ from app.schemas import DistancesRequest, PathRequest, VertexPoint
 from app.settings import Settings
 from geodesic_core import TriangleMesh, samples
 
-from .conftest import check_problem, is_ready, serving, store_mesh, upload_sample, wait_until
+from .conftest import (
+    check_problem,
+    is_ready,
+    processor_time,
+    serving,
+    store_mesh,
+    upload_sample,
+    wait_until,
+)
 
 SLOW_FACES = 300_000
 """Distances on a sphere of so many faces take seconds."""
@@ -335,15 +343,6 @@ def test_small_work_that_waits_goes_on_when_a_worker_dies(
             os.kill(slot._process.pid, signal.SIGCONT)
         is_over.set()
     assert [future.result().status_code for future in running] == [200] * 2
-
-
-def processor_time(pid: int) -> Counter[int]:
-    """Return the nanoseconds that the threads of a process have had, by niceness."""
-    taken: Counter[int] = Counter()
-    for thread in Path(f"/proc/{pid}/task").iterdir():
-        niceness = int((thread / "stat").read_text().rpartition(")")[2].split()[16])
-        taken[niceness] += int((thread / "schedstat").read_text().split()[0])
-    return taken
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="niceness is a thread's own on Linux only")

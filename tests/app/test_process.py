@@ -12,7 +12,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from .conftest import is_ready, upload_sample, wait_until
+from .conftest import is_ready, processor_time, upload_sample, wait_until
 from .test_engine import SLOW_FACES
 
 SERVE = "from app.cli import main; main()"
@@ -129,14 +129,23 @@ def test_a_client_that_hangs_up_stops_its_query(server: Server) -> None:
     wait_until(lambda: len(server.workers()) == 2)
     workers = server.workers()
 
-    server.begin_slow_query(mesh_id).close()
+    def taken() -> int:
+        return sum(processor_time(pid).total() for pid in workers)
 
     def metrics() -> list[str]:
         return server.client.get("/metrics").text.splitlines()
 
-    wait_until(lambda: 'geodesic_workers{state="idle"} 2.0' in metrics(), seconds=0.5)
-    assert "geodesic_cancellations_total 1.0" in metrics()
-    assert not any(line.startswith("geodesic_solves_total{") for line in metrics())
+    before, other = taken(), {"sources": [{"vertex": 2}], "targets": [{"vertex": 1}]}
+    assert server.client.post(f"/v1/meshes/{mesh_id}/distances", json=other).status_code == 200
+    whole = taken() - before
+
+    server.begin_slow_query(mesh_id).close()
+    before = taken()
+
+    wait_until(lambda: "geodesic_cancellations_total 1.0" in metrics())
+    wait_until(lambda: 'geodesic_workers{state="idle"} 2.0' in metrics())
+    assert taken() - before < whole / 4
+    assert 'geodesic_solves_total{kind="distances"} 1.0' in metrics()
     assert server.workers() == workers
 
 
