@@ -46,13 +46,25 @@ class Slot:
         """Start a worker and warm its kernels; raises ``WorkerLostError`` when it cannot."""
         self.topics.clear()
         try:
-            self._process, line = await asyncio.to_thread(self._start)
+            line = await self._started()
             reader, self._line = await asyncio.open_unix_connection(sock=line)
             await _received(reader)  # says that it is ready
         except (EOFError, OSError) as error:
             raise WorkerLostError(had_begun=False) from error
         self._given_up.clear()
         self._listening = asyncio.create_task(self._listen(reader))
+
+    async def _started(self) -> socket.socket:
+        starting = asyncio.create_task(asyncio.to_thread(self._start))
+        try:
+            self._process, line = await asyncio.shield(starting)
+        except asyncio.CancelledError:
+            # The thread goes on all the same: what it makes is to be closed, or killed.
+            with suppress(OSError):
+                self._process, line = await starting
+                line.close()
+            raise
+        return line
 
     def _start(self) -> tuple[ForkServerProcess, socket.socket]:
         ours, theirs = socket.socketpair()

@@ -1,6 +1,7 @@
 """What becomes of requests when workers are busy, slow or killed."""
 
 import asyncio
+import gc
 import os
 import signal
 import sys
@@ -457,6 +458,27 @@ def test_workers_that_cannot_start(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         monkeypatch.undo()
         wait_until(lambda: is_ready(client))
         assert client.post("/v1/meshes", params=sample).status_code == 201
+
+
+def test_a_start_that_is_called_off_leaves_nothing(tmp_path: Path) -> None:
+    async def call_off() -> int:
+        slot = Slot(config(tmp_path))
+        opening = asyncio.create_task(slot.open())
+        await asyncio.sleep(0.001)
+        opening.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await opening
+        process = slot._process
+        assert process is not None
+        assert process.is_alive()
+        pid = int(process.pid or 0)
+        await slot.close()
+        return pid
+
+    pid = asyncio.run(call_off())
+
+    gc.collect()  # a socket that nobody closed would fail the test
+    wait_until(lambda: not Path(f"/proc/{pid}").exists())
 
 
 def test_an_interrupt_while_workers_start_is_no_failure(
