@@ -10,6 +10,7 @@ from collections.abc import Coroutine, Sequence
 from typing import Annotated, Any, TypeVar
 
 from fastapi import Depends, Header, Request
+from pydantic import BaseModel, Field
 from starlette.requests import ClientDisconnect
 
 from app.callers import Caller
@@ -50,21 +51,24 @@ async def get_caller(request: Request) -> Caller:
 CallerDep = Annotated[Caller, Depends(get_caller)]
 
 
-TimeoutHeader = Annotated[
-    int | None, Header(gt=0, description="Milliseconds the client would wait")
-]
+class TimeoutHeader(BaseModel):
+    """The header of a request for work."""
+
+    x_timeout_ms: int | None = Field(
+        default=None, alias="x-timeout-ms", gt=0, description="Milliseconds the client would wait"
+    )
 
 
-def asker_of(request: Request, x_timeout_ms: int | None) -> Asker:
+def asker_of(request: Request, headers: TimeoutHeader) -> Asker:
     """Return who asks, and the lower of how long they and the service would wait."""
-    limit = service_of(request).settings.deadline_s
-    deadline_s = limit if x_timeout_ms is None else min(limit, x_timeout_ms / 1000)
+    limit, own_ms = service_of(request).settings.deadline_s, headers.x_timeout_ms
+    deadline_s = limit if own_ms is None else min(limit, own_ms / 1000)
     return Asker(caller_of(request), deadline_s, request.state.request_id)
 
 
-async def get_asker(request: Request, x_timeout_ms: TimeoutHeader = None) -> Asker:
+async def get_asker(request: Request, headers: Annotated[TimeoutHeader, Header()]) -> Asker:
     """Return the same, as a dependency."""
-    return asker_of(request, x_timeout_ms)
+    return asker_of(request, headers)
 
 
 AskerDep = Annotated[Asker, Depends(get_asker)]

@@ -29,12 +29,6 @@ def install(app: FastAPI, settings: Settings) -> None:
     async def on_framework(request: Request, error: HTTPException) -> Response:
         if error.status_code == 413:
             return _respond(request, body_too_large(request.scope, settings))
-        # FastAPI's 400 for whatever stops a body
-        match error.__cause__:
-            case ProblemError() as refused:
-                return _respond(request, refused.problem)
-            case RequestValidationError() as invalid:
-                return _respond(request, validation_problem(invalid.errors()))
         detail = f"{request.method} {request.url.path}: {error.detail}"
         headers = error.headers
         if error.status_code == 405:
@@ -63,10 +57,6 @@ def _allow(app: FastAPI, path: str) -> Mapping[str, str] | None:
 
 def validation_problem(errors: Sequence[Any]) -> Problem:
     """Return the problem for what pydantic found wrong."""
-    first = errors[0]
-    if first["type"] == "json_invalid":
-        detail = f"the body is not JSON: {first['ctx']['error']} at character {first['loc'][1]}"
-        return Problem("malformed_body", detail)
     faults = tuple(Fault(_place(error["loc"]), error["msg"]) for error in errors[:10])
     place = faults[0].pointer or "the body"
     return Problem("invalid_request", f"{place}: {faults[0].message}", errors=faults)

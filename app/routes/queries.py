@@ -1,19 +1,10 @@
 """Queries on a mesh: one handler for each kind."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Depends, Header, Query, Request, Response
+from fastapi import APIRouter, Query, Response
 
-from app.dependencies import (
-    TimeoutHeader,
-    asker_of,
-    form_of,
-    prefers_async,
-    service_of,
-    while_connected,
-)
 from app.encoding import CSV, GEOJSON, JSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
 from app.encoding.form import ARRAYS, TEXTS
 from app.queries import (
@@ -25,25 +16,11 @@ from app.queries import (
     PathQuery,
     PathsQuery,
     naming_parameters,
-    result_key,
     written_request,
 )
-from app.queries import Query as ValidQuery
-from app.responses import (
-    CACHED,
-    ENDS,
-    NEGOTIATED,
-    OF_FILES,
-    UNSTORED,
-    accepted_response,
-    documented,
-    estimate_response,
-    etag_of,
-    not_modified,
-    problems,
-    result_response,
-)
-from app.routes.bodies import QueryRoute, beside_the_loop
+from app.responses import ENDS, OF_FILES, documented, problems
+from app.routes.asked import AskedDep
+from app.routes.query_route import QueryRoute
 from app.schemas import (
     AnswerParameters,
     DistancesAnswer,
@@ -65,7 +42,6 @@ from app.schemas import (
     PathsAnswer,
     PathsRequest,
 )
-from app.service import Asker
 
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"], route_class=QueryRoute)
 
@@ -117,71 +93,6 @@ def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[s
     }
 
 
-@dataclass(frozen=True)
-class Asked:
-    """Of what a query is asked, by whom, and how it is to be answered."""
-
-    mesh_id: str
-    request: Request
-    asker: Asker
-    is_async: bool
-    key: str | None
-
-    async def answer(
-        self, kind: type[ValidQuery[Any]], body: Any, parameters: AnswerParameters
-    ) -> Response:
-        """Answer the query of a kind that a body asks, or tell what that would take."""
-        request, asker = self.request, self.asker
-        service = service_of(request)
-        size = service.size(self.mesh_id)
-
-        def ask() -> ValidQuery[Any]:
-            query = kind.ask(self.mesh_id, size, body, service.settings)
-            query.written  # noqa: B018 - kept by it
-            return query
-
-        query = await beside_the_loop(request, ask)
-        form = form_of(request, parameters, query.offers)
-        if parameters.estimate:
-            estimating = service.estimate(query, size, form, asker)
-            estimate, seconds = await while_connected(request, estimating)
-            return estimate_response(self.mesh_id, estimate, form.media_type, seconds)
-        if self.is_async:
-            return accepted_response(await service.submit(query, size, form, asker, self.key))
-        is_cacheable = request.method == "GET" and query.is_repeatable
-        headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
-        if is_cacheable:
-            unchanged = not_modified(request, etag_of(result_key(query, form)), headers)
-            if unchanged is not None:
-                return unchanged
-        answering = service.answer(query, size, form, asker, as_file="range" in request.headers)
-        answered = await while_connected(request, answering)
-        return result_response(request, answered, form.media_type, service.results, headers)
-
-
-async def get_asked(
-    mesh_id: str,
-    request: Request,
-    prefer: Annotated[
-        str | None,
-        Header(description="`respond-async`: answer at once with a job, RFC 7240"),
-    ] = None,
-    idempotency_key: Annotated[
-        str | None,
-        Header(
-            min_length=1,
-            max_length=255,
-            description="Of a job, freely chosen: what is sent again with it is the same job",
-        ),
-    ] = None,
-    x_timeout_ms: TimeoutHeader = None,
-) -> Asked:
-    """Return what a request for a query says beside the query."""
-    asker = asker_of(request, x_timeout_ms)
-    return Asked(mesh_id, request, asker, prefers_async(prefer), idempotency_key)
-
-
-AskedDep = Annotated[Asked, Depends(get_asked)]
 Parameters = Annotated[AnswerParameters, Query()]
 
 

@@ -9,7 +9,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.queries import DistancesQuery, LocateQuery
-from app.routes import bodies
+from app.routes import bodies, query_route
 
 from .conftest import check_problem
 
@@ -18,7 +18,7 @@ MANY = {"sources": [{"vertex": 0}], "targets": [{"vertex": i % 100} for i in ran
 
 
 @pytest.mark.parametrize(
-    ("owner", "name"), [(bodies, "validated"), (DistancesQuery, "ask"), (DistancesQuery, "normal")]
+    ("owner", "name"), [(query_route, "read"), (DistancesQuery, "ask"), (DistancesQuery, "normal")]
 )
 def test_others_are_answered_while_a_large_body_is_checked(
     client: TestClient, plane: str, owner: Any, name: str, monkeypatch: pytest.MonkeyPatch
@@ -48,7 +48,7 @@ def test_large_bodies_are_checked_one_at_a_time(
     client: TestClient, plane: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They have one interpreter; a thread each would only keep the event loop from it."""
-    lock, original = Lock(), bodies.validated
+    lock, original = Lock(), query_route.read
 
     def alone(*arguments: Any) -> Any:
         assert lock.acquire(blocking=False), "two at a time"
@@ -57,7 +57,7 @@ def test_large_bodies_are_checked_one_at_a_time(
         finally:
             lock.release()
 
-    monkeypatch.setattr(bodies, "validated", alone)
+    monkeypatch.setattr(query_route, "read", alone)
     link = f"/v1/meshes/{plane}/distances"
     with ThreadPoolExecutor(4) as pool:
         answers = list(pool.map(lambda _: client.post(link, json=MANY).status_code, range(4)))

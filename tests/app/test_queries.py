@@ -182,6 +182,50 @@ def test_bodies_that_are_no_query(
     check_problem(response, status, code)
 
 
+@pytest.mark.parametrize(
+    ("headers", "parameters", "body", "places"),
+    [
+        ({"X-Timeout-Ms": "0"}, {}, {}, ["/header/x-timeout-ms"]),
+        ([("X-Timeout-Ms", "900"), ("X-Timeout-Ms", "800")], {}, {}, ["/header/x-timeout-ms"]),
+        ({"Idempotency-Key": ""}, {}, {}, ["/header/idempotency-key"]),
+        ({"Idempotency-Key": "k" * 256}, {}, {}, ["/header/idempotency-key"]),
+        ({}, {"dtype": "float16"}, {}, ["/query/dtype"]),
+        ({}, {"estimate": ["true", "perhaps"]}, {}, ["/query/estimate"]),
+        ({}, {"colour": "red"}, {}, ["/query/colour"]),
+        (
+            {"X-Timeout-Ms": "soon"},
+            {"estimate": "perhaps", "colour": "red"},
+            {"max_distance": -1},
+            ["/header/x-timeout-ms", "/query/estimate", "/query/colour", "/max_distance"],
+        ),
+    ],
+)
+def test_all_that_is_wrong_is_told_at_once(
+    client: TestClient, plane: str, headers: Any, parameters: Any, body: Any, places: list[str]
+) -> None:
+    query = {"sources": [{"vertex": 0}], **body}
+    link = f"/v1/meshes/{plane}/distances"
+    response = client.post(link, json=query, params=parameters, headers=headers)
+
+    problem = check_problem(response, 422, "invalid_request")
+    assert [fault["pointer"] for fault in problem["errors"]] == places
+
+
+def test_a_preference_may_come_in_a_header_of_its_own(client: TestClient, plane: str) -> None:
+    headers = [("Prefer", "wait=10"), ("Prefer", "respond-async")]
+    response = client.post(
+        f"/v1/meshes/{plane}/distances", json={"sources": [{"vertex": 0}]}, headers=headers
+    )
+    assert response.status_code == 202
+
+
+def test_of_a_parameter_that_is_given_again_the_last_counts(client: TestClient, plane: str) -> None:
+    link = f"/v1/meshes/{plane}/path?from=v0&to=v9&from=v5&format=csv&format=json&via=v7&via=v8"
+    answer = client.get(link).json()
+    assert answer["source"]["vertex"] == 5
+    assert [point["vertex"] for point in answer["waypoints"]] == [7, 8]
+
+
 def test_formats_that_there_are_not(client: TestClient, plane: str) -> None:
     response = distances(client, plane, {"Accept": "text/html"})
     check_problem(response, 406, "not_acceptable")
