@@ -13,6 +13,7 @@ result can be taken for one of another mesh.
 
 import hashlib
 import os
+import re
 import zlib
 from bisect import bisect_right
 from collections.abc import Iterator, Mapping, Sequence
@@ -40,6 +41,7 @@ PUBLIC_ARRAYS = {
 """The names under which clients read arrays, and those that ``TriangleMesh.arrays`` gives them."""
 
 _ID_BYTES = 16
+_ID = re.compile(f"[0-9a-f]{{{2 * _ID_BYTES}}}")
 _DEFINING_ARRAYS = ("vertices", "faces", "vertex_map", "face_map")
 
 
@@ -115,11 +117,13 @@ class MeshStore:
 
     def manifest(self, mesh_id: str) -> Mapping[str, Any]:
         """Return what is known of a mesh without opening its arrays."""
-        path = self._folder(mesh_id) / "manifest.json"
+        path = f"{self._path(mesh_id)}/manifest.json"
         try:
-            manifest = _read_manifest(path, path.stat().st_mtime_ns)
+            changed = os.stat(path).st_mtime_ns  # noqa: PTH116 - see _path
+            manifest = _read_manifest(path, changed)
             is_its_own = manifest["id"] == mesh_id
         except (OSError, ValueError, TypeError, KeyError) as error:
+            self._folder(mesh_id)  # refuses a mesh that is not there at all
             raise _damaged(mesh_id, "its manifest cannot be read") from error
         if not is_its_own:
             raise _damaged(mesh_id, "its manifest is that of another mesh")
@@ -199,19 +203,27 @@ class MeshStore:
 
     def note_use(self, mesh_id: str) -> None:
         """Note that a mesh is used now, where a restart finds it: the time of its folder."""
-        os.utime(self._folder(mesh_id))
+        try:
+            os.utime(self._path(mesh_id))
+        except FileNotFoundError:
+            raise unknown(mesh_id) from None
 
     def _folder(self, mesh_id: str) -> Path:
-        is_id = len(mesh_id) == 2 * _ID_BYTES and set(mesh_id) <= set("0123456789abcdef")
-        folder = self.folder / mesh_id
-        if not is_id or not folder.is_dir():
+        folder = Path(self._path(mesh_id))
+        if not folder.is_dir():
             raise unknown(mesh_id)
         return folder
 
+    def _path(self, mesh_id: str) -> str:
+        """Return where a mesh would be: as text, for each request asks, and a `Path` takes long."""
+        if not _ID.fullmatch(mesh_id):
+            raise unknown(mesh_id)
+        return f"{self.folder}/{mesh_id}"
+
 
 @lru_cache(maxsize=256)
-def _read_manifest(path: Path, _changed: int) -> Mapping[str, Any]:
-    manifest: dict[str, Any] = orjson.loads(path.read_bytes())
+def _read_manifest(path: str, _changed: int) -> Mapping[str, Any]:
+    manifest: dict[str, Any] = orjson.loads(Path(path).read_bytes())
     return manifest
 
 
