@@ -350,14 +350,19 @@ class TriangleMesh:
         InvalidPoint
             It is not a point of this mesh.
         """
-        place = self.point(point)
-        position: Floats
-        if place.vertex_index is not None:
-            position = self.vertices[place.vertex_index]
-        else:
-            # Not a matrix product, whose last bit depends on where its arrays lie in memory.
-            weights = np.array(place.barycentric)[:, None]
-            position = (weights * self.vertices[self.faces[place.face_index]]).sum(axis=0)
+        if isinstance(point, SurfacePoint) and point.vertex_index is None:
+            point = self.point(point)
+            if point.vertex_index is None:
+                return self._position_in_face(point)
+        vertex: Any = point.vertex_index if isinstance(point, SurfacePoint) else point
+        canonical.check_index(vertex, len(self.vertices), "vertex", "point")
+        position: Floats = self.vertices[vertex]
+        return position
+
+    def _position_in_face(self, point: SurfacePoint) -> Floats:
+        # Not a matrix product, whose last bit depends on where its arrays lie in memory.
+        weights = np.array(point.barycentric)[:, None]
+        position: Floats = (weights * self.vertices[self.faces[point.face_index]]).sum(axis=0)
         return position
 
     @cached_property

@@ -39,6 +39,11 @@ class Nodes:
     components: tuple[int, ...]
     """Those of the mesh with a source in them"""
 
+    @property
+    def has_sited_targets(self) -> bool:
+        """Whether a target is neither vertex nor piece."""
+        return len(self.sites.ints) > self.first_target
+
     def piece(self, node: int) -> PieceInFace | None:
         """Return the piece of a node; None if it is none."""
         rank = node - self.first_piece

@@ -45,7 +45,7 @@ from geodesic_core.kernels.wavefront import (
 from geodesic_core.landmarks import Landmarks
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nodes import Nodes, corners_of, nodes_of
-from geodesic_core.path import EXACT, GeodesicPath, SearchStep, StepName, length_of, traced_path
+from geodesic_core.path import EXACT, GeodesicPath, SearchStep, StepName, traced_path
 from geodesic_core.run import Control, sweep_nodes, winners_of
 from geodesic_core.surface_point import SurfacePoint
 from geodesic_core.tolerances import PATH_LENGTH, SEARCH_SLACK, STRAIGHT
@@ -117,9 +117,10 @@ class PathSearch:
             raise leg.beyond()
         try:
             upper = self._search_edges(leg)
-            goal = self._goal(leg.start, math.inf)
+            start = leg.start
+            goal = self._landmarks.goal(start.position, start.corners, start.reaches, math.inf)
             if leg.slack < math.inf:
-                upper, goal = self._sweep_toward(leg, upper)
+                upper, goal = self._sweep_toward(leg, upper, goal)
             path = self._sweep_outward(leg, upper, goal)
         finally:
             self._forget()
@@ -165,11 +166,12 @@ class PathSearch:
         leg.log.add("shorten", upper)
         return upper
 
-    def _sweep_toward(self, leg: "_Leg", upper: float) -> tuple[float, Goal]:
+    def _sweep_toward(self, leg: "_Leg", upper: float, goal: Goal) -> tuple[float, Goal]:
         """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
         limit = leg.bound(upper) * (1.0 + leg.slack) + self._margin
-        goal = self._goal(leg.start, limit)
-        bounds = wavefront.merging_bounds(math.inf, GUIDE_ERROR, math.inf, goal)
+        bounds = wavefront.merging_bounds(
+            math.inf, GUIDE_ERROR, math.inf, goal._replace(limit=limit)
+        )
         nodes = nodes_of(self.mesh, [(leg.end.point,)], [leg.start.point])
         self._toward = with_sites(self._toward, nodes.sites)
         wave = self._toward = self._run(self._toward, nodes, bounds, leg.control, _AFTER_EDGES)
@@ -179,10 +181,10 @@ class PathSearch:
         self._touched += int(wave.counters[TOUCHED])
         leg.log.add("approximate", upper, wave)
         guide = traced_path(self.mesh, winners_of(wave, self._nearest), nodes, node, EXACT)
-        upper = min(upper, length_of(guide.points))
+        upper = min(upper, guide.length)
         leg.log.add("backtrace", upper)
-        known = self._goal(leg.start, leg.bound(upper) * (1.0 + leg.slack))
-        return upper, known._replace(known=wave.distance, ceiling=limit)
+        tighter = leg.bound(upper) * (1.0 + leg.slack)
+        return upper, goal._replace(limit=tighter, known=wave.distance, ceiling=limit)
 
     def _sweep_outward(self, leg: "_Leg", upper: float, goal: Goal) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
@@ -208,9 +210,6 @@ class PathSearch:
     ) -> Wavefront:
         control = control.holding(self.nbytes - wavefront.bytes_of(wave))
         return sweep_nodes(self.mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: share)
-
-    def _goal(self, start: "_End", limit: float) -> Goal:
-        return self._landmarks.goal(start.position, start.corners, start.reaches, limit)
 
     def _forget(self) -> None:
         topology = self.mesh.topology

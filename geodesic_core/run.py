@@ -113,6 +113,8 @@ def sweep_nodes(
     """
     topology = mesh.topology
     sweep.start_sweep(topology, wave, nodes.sources, nodes.origins, start_distances, bounds)
+    if not nodes.has_sited_targets:
+        return run_sweep(mesh, wave, bounds, control, share_done, limit_of)
     sites.watch_sites(topology, wave, bounds, nodes.first_target)
     wave = run_sweep(mesh, wave, bounds, control, share_done, limit_of)
     sites.reach_sites_inside(topology, wave, bounds, nodes.first_target)

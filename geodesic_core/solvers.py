@@ -20,7 +20,7 @@ from geodesic_core.matrix import Layout, find_matrix
 from geodesic_core.mesh import TriangleMesh
 from geodesic_core.nearest import Nearest, find_nearest
 from geodesic_core.nodes import component_of, disconnected
-from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, joined
+from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
 from geodesic_core.path_search import PathSearch
 from geodesic_core.result import DistanceField, Source, Sources, SweepStats, field_of
 from geodesic_core.run import Control
@@ -315,13 +315,12 @@ def _shortest_through(
     """Search for leg after leg, each no longer than what those before and after it leave."""
     legs: list[GeodesicPath] = []
     positions = np.array([search.mesh.position(stop) for stop in stops])
-    straight = np.linalg.norm(np.diff(positions, axis=0), axis=1)
     left = limit * (1.0 + AT_LIMIT)
     for here, there in pairwise(stops):
         leg_control = control.for_part(len(legs), len(stops) - 1)
         if legs:
             search.add_landmark_if_due(here, replace(control, progress=None))
-        rest = float(straight[len(legs) + 1 :].sum())
+        rest = length_of(positions[len(legs) + 1 :])
         try:
             leg = search.find(here, there, leg_control, explain=explain, limit=left - rest)
         except NoPath:

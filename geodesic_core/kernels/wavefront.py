@@ -6,6 +6,7 @@ the rows in use within a cache's reach.
 """
 
 import math
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -485,4 +486,7 @@ def with_more_merges(wave: Wavefront) -> Wavefront:
 
 def bytes_of(wave: Wavefront) -> int:
     """Memory of the state."""
-    return sum(array.nbytes for array in wave)
+    return sum(map(_NBYTES, wave))
+
+
+_NBYTES = attrgetter("nbytes")
