@@ -207,7 +207,7 @@ class TriangleMesh:
         nodes = self.topology.inner_vertex[self.faces]
         return np.flatnonzero((self.inner_face < 0) & of_three_vertices(nodes))
 
-    @property
+    @cached_property
     def nbytes(self) -> int:
         """Memory of all arrays, bytes."""
         return sum(array.nbytes for array in self.arrays().values())

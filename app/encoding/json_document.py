@@ -25,6 +25,9 @@ def to_json(answer: Answer) -> Encoded:
 
 def document(members: Mapping[str, Any]) -> Iterator[Buffer]:
     """Yield the parts of an object, its long members in blocks."""
+    if all(_rows_at_a_time(value) is None for value in members.values()):
+        yield dumped(members)
+        return
     yield b"{"
     for i, (name, value) in enumerate(members.items()):
         yield b"%b%b:" % (b"," if i else b"", dumped(name))
@@ -39,19 +42,24 @@ def dumped(value: Any) -> bytes:
 
 
 def _value(value: Any) -> Iterator[Buffer]:
-    if not isinstance(value, np.ndarray | Indices | list | tuple):
-        yield dumped(value)
-        return
-    rows = _ELEMENTS
-    if isinstance(value, np.ndarray) and value.size:
-        rows = max(1, _VALUES * len(value) // value.size)
-    if len(value) <= rows:
+    rows = _rows_at_a_time(value)
+    if rows is None:
         yield dumped(value)
         return
     for start in range(0, len(value), rows):
         yield b"," if start else b"["
         yield dumped(value[start : start + rows])[1:-1]
     yield b"]"
+
+
+def _rows_at_a_time(value: Any) -> int | None:
+    """Return how many rows of a value are encoded at a time; None for all."""
+    if not isinstance(value, np.ndarray | Indices | list | tuple):
+        return None
+    rows = _ELEMENTS
+    if isinstance(value, np.ndarray) and value.size:
+        rows = max(1, _VALUES * len(value) // value.size)
+    return rows if len(value) > rows else None
 
 
 def _as_list(value: NDArray[Any] | Indices) -> list[Any]:
