@@ -34,8 +34,8 @@ def parsed(body: bytes) -> Any:
         return json.loads(body)
     except json.JSONDecodeError as error:
         detail = f"{error.msg} at character {error.pos}"
-    except ValueError as error:  # no text, or a number of thousands of digits
-        detail = str(error)
+    except ValueError:
+        detail = "it is no text in UTF-8, or has a number of thousands of digits"
     except RecursionError:
         detail = "it is nested too deeply"
     raise refuse("malformed_body", f"the body is not JSON: {detail}")
