@@ -8,14 +8,15 @@ from anyio import CapacityLimiter
 from fastapi import FastAPI
 from starlette.middleware.cors import CORSMiddleware
 
-from app import __version__, handlers, page
-from app.admission import AdmissionMiddleware
-from app.body_deadline import BodyDeadlineMiddleware
-from app.documentation import complete
-from app.metrics import MeasuringMiddleware, Metrics
-from app.middleware import RequestMiddleware
-from app.routes import about, jobs, meshes, queries
-from app.service import Service
+from app import __version__
+from app.http import exception_handlers, page
+from app.http.metrics import MeasuringMiddleware, Metrics
+from app.http.middleware.admission import AdmissionMiddleware
+from app.http.middleware.body_timeout import BodyDeadlineMiddleware
+from app.http.middleware.request_id import RequestMiddleware
+from app.http.openapi import complete
+from app.http.routes import about, jobs, meshes, queries
+from app.service.service import Service
 from app.settings import Settings
 
 
@@ -52,7 +53,7 @@ def create_app(settings: Settings) -> FastAPI:
             allow_headers=["*"],
             expose_headers=["*"],
         )
-    handlers.install(app, settings)
+    exception_handlers.install(app, settings)
     # Routes are tried one by one: those that are asked most go first.
     app.include_router(queries.router, prefix="/v1", max_body_size=settings.max_query_bytes)
     app.include_router(meshes.router, prefix="/v1", max_body_size=settings.max_upload_bytes)

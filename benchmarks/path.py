@@ -18,8 +18,8 @@ from benchmarks.inputs import Inputs
 from benchmarks.tables import Section, rated
 from benchmarks.timing import timed
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.kernels.wavefront import LANDMARKS
-from geodesic_core.path import SearchStep, length_of
+from geodesic_core.fields.path import SearchStep, length_of
+from geodesic_core.kernels.sweep.state import LANDMARKS
 from geodesic_core.tolerances import LANDMARK_ERROR
 
 try:

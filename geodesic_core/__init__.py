@@ -6,16 +6,17 @@ Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then
 """
 
 from geodesic_core import errors, samples
-from geodesic_core.curve import Curve
 from geodesic_core.errors import GeodesicError
-from geodesic_core.isolines import Isoline
-from geodesic_core.matrix import distance_matrix
-from geodesic_core.mesh import TriangleMesh
-from geodesic_core.mesh_io import load_mesh
-from geodesic_core.nearest import Nearest, nearest
-from geodesic_core.path import ErrorBound, GeodesicPath, SearchStep
-from geodesic_core.report import MeshReport, Sample
-from geodesic_core.result import DistanceField, Source, SweepStats
+from geodesic_core.fields.distance_field import DistanceField, Source, SweepStats
+from geodesic_core.fields.isolines import Isoline
+from geodesic_core.fields.path import ErrorBound, GeodesicPath, SearchStep
+from geodesic_core.io.load import load_mesh
+from geodesic_core.mesh.curve import Curve
+from geodesic_core.mesh.report import MeshReport, Sample
+from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.search.matrix import distance_matrix
+from geodesic_core.search.nearest import Nearest, nearest
 from geodesic_core.solvers import (
     Solver,
     approximate_distance,
@@ -23,7 +24,6 @@ from geodesic_core.solvers import (
     shortest_path,
     warm_up,
 )
-from geodesic_core.surface_point import SurfacePoint
 
 __all__ = [
     "Curve",

@@ -10,24 +10,24 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
-from geodesic_core.arguments import as_barriers, as_limit, is_number
 from geodesic_core.arrays import Floats
-from geodesic_core.curve import Curve, Polyline, polyline_of
 from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
-from geodesic_core.kernels import wavefront
-from geodesic_core.kernels.wavefront import Bounds, Wavefront
-from geodesic_core.matrix import Layout, find_matrix
-from geodesic_core.mesh import TriangleMesh
-from geodesic_core.nearest import Nearest, find_nearest
-from geodesic_core.nodes import component_of, disconnected
-from geodesic_core.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
-from geodesic_core.path_search import PathSearch
-from geodesic_core.result import DistanceField, Source, Sources, SweepStats, field_of
-from geodesic_core.run import Control
-from geodesic_core.surface_point import Point, SurfacePoint
-from geodesic_core.sweeper import Sweeper
+from geodesic_core.fields.distance_field import DistanceField, Source, Sources, SweepStats, field_of
+from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
+from geodesic_core.fields.sources import component_of, disconnected
+from geodesic_core.fields.sweep import Control
+from geodesic_core.fields.whole_sweep import WholeSweep, peak_bytes
+from geodesic_core.kernels.sweep import state
+from geodesic_core.kernels.sweep.state import Bounds, Wavefront
+from geodesic_core.mesh.curve import Curve, Polyline, polyline_of
+from geodesic_core.mesh.surface_point import Point, SurfacePoint
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.search.matrix import Layout, find_matrix
+from geodesic_core.search.nearest import Nearest, find_nearest
+from geodesic_core.search.path_search import PathSearch
+from geodesic_core.search.target_sweep import Sweeper
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
-from geodesic_core.whole_sweep import WholeSweep, peak_bytes
+from geodesic_core.validation import as_barriers, as_limit, is_number
 
 
 def exact_distance(
@@ -81,7 +81,7 @@ def exact_distance(
     arrays, since windows are given back as soon as they are propagated, unless they are kept.
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    bounds = wavefront.exact_bounds(as_limit(max_distance))
+    bounds = state.exact_bounds(as_limit(max_distance))
     mesh, control = _among(mesh, barriers, control)
     return _solve(mesh, sources, targets, bounds, EXACT, control, paths=True, windows=keep_windows)
 
@@ -138,7 +138,7 @@ def approximate_distance(
     control = Control(progress, cancel, deadline_s, memory_limit)
     relative, absolute = _as_errors(relative_error, absolute_error)
     limit = as_limit(max_distance)
-    bounds = wavefront.merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
+    bounds = state.merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
     mesh, control = _among(mesh, barriers, control)
     if math.isfinite(relative):
         promise = ErrorBound("relative", relative, "guaranteed")
@@ -384,9 +384,7 @@ def _solve(
 
 
 def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
-    created, kept, peak = (
-        int(wave.counters[i]) for i in (wavefront.CREATED, wavefront.KEPT, wavefront.PEAK)
-    )
+    created, kept, peak = (int(wave.counters[i]) for i in (state.CREATED, state.KEPT, state.PEAK))
     return SweepStats.of(mesh, created, kept, peak, peak_bytes(wave), seconds)
 
 

@@ -837,7 +837,9 @@ def test_ctrl_c_stops_the_sweep_and_leaves_nothing(
 
         return solve(*arguments, cancel=press_and_look)
 
-    monkeypatch.setattr("geodesic_core.run._FIRST_BUDGET", 10)  # looks soon, on so small a mesh
+    monkeypatch.setattr(
+        "geodesic_core.fields.sweep._FIRST_BUDGET", 10
+    )  # looks soon, on so small a mesh
     monkeypatch.setattr(gc, "exact_distance", press_ctrl_c_at_the_first_look)
     ran = run("distance", plane, "--source", 0, "--out", "d.npy")
     assert (ran.code, ran.out, ran.err) == (130, "", "error: interrupted\n")

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.field_store import FieldStore
 from app.queries import code_version
-from app.result_store import Seal
-from app.store import owned
+from app.store.fields import FieldStore
+from app.store.layout import owned
+from app.store.results import Seal
 
 from .app.conftest import serving, upload_sample, wait_until
 from .test_cli import Run, error_line, run  # noqa: F401 - a fixture

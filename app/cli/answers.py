@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def of_distances(field: "DistanceField", *, gradient: bool = False) -> "Answer":
     """Return the distances of all vertices, with the directions in which they grow if wanted."""
     from app.encoding import Answer, Indices
-    from app.points import described_source
+    from app.queries.points import described_source
     from app.queries.views import columns_of, surface_of, table_of_distances
 
     members = {

@@ -53,7 +53,7 @@ class Point(NamedTuple):
     @classmethod
     def parse(cls, text: str) -> "Point":
         """Return the point that an option names."""
-        from app.point_text import parse
+        from app.queries.point_text import parse
 
         try:
             return cls(text, parse(f"v{text}" if _INDEX.fullmatch(text) else text))

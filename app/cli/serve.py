@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from app import fork_server
 from app.cli.steps import Failure
+from app.engine import fork_server
 
 
 def serve(
@@ -23,7 +23,7 @@ def serve(
 
     from app.main import create_app
     from app.settings import Settings, variable_of
-    from app.store import StoreError
+    from app.store.layout import StoreError
 
     try:
         settings = Settings()

@@ -38,7 +38,7 @@ def read(
 
 def point_of(mesh: "TriangleMesh", option: str, written: Point) -> "SurfacePoint":
     """Return the point of the mesh that an option names."""
-    from app.points import resolve
+    from app.queries.points import resolve
     from geodesic_core.errors import InvalidPoint
 
     try:
@@ -53,8 +53,8 @@ def origin_of(mesh: "TriangleMesh", option: str, written: Origin) -> "SurfacePoi
     if len(points) == 1:
         return points[0]
     from geodesic_core import Curve
-    from geodesic_core.curve import polyline_of
     from geodesic_core.errors import InvalidPoint
+    from geodesic_core.mesh.curve import polyline_of
 
     try:
         return Curve(polyline_of(mesh, Curve(points), "the curve"))

@@ -12,7 +12,7 @@ import typer
 from app.cli.steps import Failure, showing
 
 if TYPE_CHECKING:
-    from app.upkeep import Contents
+    from app.service.maintenance import Contents
 
 store = typer.Typer(
     help="Look after the store of a service. To be run where the store is.",
@@ -46,7 +46,7 @@ _DEFAULT = Path("geodesic-store")
 @store.command()
 def ls(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
     """List the meshes, and sum up results, distance fields and jobs."""
-    from app.upkeep import contents
+    from app.service.maintenance import contents
 
     with _store_at(root):
         found = contents(root)
@@ -72,7 +72,7 @@ def ls(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
 @store.command()
 def check(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
     """Read all there is and hold it against its checksums; the exit code is 1 if any is damaged."""
-    from app.upkeep import damage
+    from app.service.maintenance import damage
 
     with _store_at(root), showing("Reading"):
         found = list(damage(root))
@@ -99,8 +99,8 @@ def prune(
     No service may run on the store. Meshes stay, and so do the answers of jobs.
     """
     from app.queries import code_version
-    from app.store import owned
-    from app.upkeep import leftovers, remove
+    from app.service.maintenance import leftovers, remove
+    from app.store.layout import owned
 
     with _store_at(root), owned(root), showing("Reading"):
         going = [(leftover, leftover.bytes) for leftover in leftovers(root, code_version())]
@@ -126,7 +126,7 @@ _ROW = "{:32}  {:>9}  {:>13}  {:25}  {:25}  {}"
 @contextmanager
 def _store_at(root: Path) -> Iterator[None]:
     """Refuse what is no store that can be read, and say what goes wrong in a line."""
-    from app.store import StoreError, is_store, require_layout
+    from app.store.layout import StoreError, is_store, require_layout
 
     if not is_store(root):
         raise Failure(f"there is no store in {root}")

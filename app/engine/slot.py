@@ -8,8 +8,8 @@ from contextlib import suppress
 from multiprocessing.context import ForkServerProcess
 
 from app.engine import worker
+from app.engine.fork_server import CONTEXT
 from app.engine.work import Outcome, Work
-from app.fork_server import CONTEXT
 
 _TOPICS = 64  # that are remembered
 

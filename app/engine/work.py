@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 from app.encoding import Form
 from app.errors import Problem
-from app.mesh_store import WrittenMesh
 from app.queries import Estimate, Query
-from app.result_store import Written
-from app.schemas import Merge
+from app.schemas.service import Merge
+from app.store.meshes import WrittenMesh
+from app.store.results import Written
 
 
 @dataclass(frozen=True)

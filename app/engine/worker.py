@@ -25,6 +25,7 @@ from setproctitle import setproctitle
 import geodesic_core as gc
 from app.encoding import JSON, encode
 from app.engine.memory import limit_memory, refuse_beyond_limit
+from app.engine.mesh_json import read_json_mesh
 from app.engine.work import (
     Answering,
     Done,
@@ -37,14 +38,13 @@ from app.engine.work import (
     Work,
 )
 from app.errors import problem_of
-from app.field_store import FieldStore
-from app.json_mesh import read_json_mesh
-from app.kept import Kept
-from app.mesh_store import MeshStore, OpenMesh
 from app.queries import SMALL_SECONDS, Fields, Grant, Query, code_version, estimate
-from app.queries.refusals import refuse_large_json
-from app.result_store import write_result
+from app.queries.validation import refuse_large_json
 from app.settings import Settings, variable_of
+from app.store.fields import FieldStore
+from app.store.lru_cache import Kept
+from app.store.meshes import MeshStore, OpenMesh
+from app.store.results import write_result
 
 logger = logging.getLogger(__name__)
 

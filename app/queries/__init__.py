@@ -5,17 +5,17 @@ checked before a worker is asked, the formats it is answered in, how it is answe
 is likely to cost.
 """
 
+from app.queries.base import SMALL_SECONDS, Grant, Query, code_version, fingerprint, result_key
 from app.queries.distances import DistancesQuery
 from app.queries.estimate import Estimate, estimate
-from app.queries.fields import Fields
+from app.queries.field_cache import Fields
 from app.queries.isolines import IsolinesQuery
 from app.queries.locate import LocateQuery
 from app.queries.matrix import MatrixQuery
 from app.queries.nearest import NearestQuery
 from app.queries.path import PathQuery, naming_parameters, written_request
 from app.queries.paths import PathsQuery
-from app.queries.query import SMALL_SECONDS, Grant, Query, code_version, fingerprint, result_key
-from app.queries.refusals import MeshSize
+from app.queries.validation import MeshSize
 
 __all__ = [
     "SMALL_SECONDS",

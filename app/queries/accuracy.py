@@ -7,13 +7,13 @@ from typing import Any, TypeVar
 import orjson
 
 import geodesic_core as gc
-from app import schemas
 from app.errors import pointer
-from app.mesh_store import OpenMesh
-from app.queries.query import Grant, Query
-from app.queries.refusals import refuse_places
+from app.queries.base import Grant, Query
+from app.queries.validation import refuse_places
+from app.schemas import service
+from app.store.meshes import OpenMesh
 
-A = TypeVar("A", bound=schemas.Accuracy)
+A = TypeVar("A", bound=service.Accuracy)
 
 _ERRORS = ("relative_error", "absolute_error")
 
@@ -35,14 +35,14 @@ def with_its_error(request: A) -> A:
     return request
 
 
-def errors_of(request: schemas.Accuracy) -> dict[str, float | None]:
+def errors_of(request: service.Accuracy) -> dict[str, float | None]:
     """Return the errors that are granted."""
     return {name: getattr(request, name) for name in _ERRORS}
 
 
 def solve_field(
     opened: OpenMesh,
-    request: schemas.Accuracy,
+    request: service.Accuracy,
     sources: Sequence[gc.Source],
     grant: Grant,
     *,
@@ -73,7 +73,7 @@ def solve_field(
 
 
 def topics_of(
-    query: Query[Any], sources: Sequence[schemas.Source | schemas.Origin]
+    query: Query[Any], sources: Sequence[service.Source | service.Origin]
 ) -> tuple[str, ...]:
     """Return what is known of the field that a query needs before its mesh is open."""
     request = query.request
@@ -82,17 +82,17 @@ def topics_of(
     return hashlib.blake2b(written, digest_size=8).hexdigest(), query.mesh_id
 
 
-def _as_source(point: schemas.Wire) -> dict[str, Any]:
+def _as_source(point: service.Wire) -> dict[str, Any]:
     # Some queries have sources without start distances; as JSON they are to look the same.
     return {"start_distance": 0.0, **vars(point)}
 
 
-def method_of(request: schemas.Accuracy) -> dict[str, Any]:
+def method_of(request: service.Accuracy) -> dict[str, Any]:
     """Return what answers say of their method."""
     return {"method": request.method, "exact": request.method == "exact"}
 
 
-def likely_bound(request: schemas.Accuracy) -> Mapping[str, Any]:
+def likely_bound(request: service.Accuracy) -> Mapping[str, Any]:
     """Return about the same as `bound_of` for a field that is not there yet."""
     return {"type": "relative", "value": request.relative_error or 0.0, "kind": "guaranteed"}
 

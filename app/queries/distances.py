@@ -8,11 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app import schemas
 from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, refuse
-from app.mesh_store import OpenMesh
-from app.points import described, described_source
 from app.queries.accuracy import (
     bound_of,
     likely_bound,
@@ -21,7 +18,8 @@ from app.queries.accuracy import (
     topics_of,
     with_its_error,
 )
-from app.queries.costs import (
+from app.queries.base import VALUES_OF_POINT, Grant, Likely, Query, numbered
+from app.queries.cost_model import (
     PER_POINT,
     Cost,
     rough_share,
@@ -30,25 +28,27 @@ from app.queries.costs import (
     sweep_cost,
 )
 from app.queries.places import Places, components_of, positions_of, unreachable
-from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
-from app.queries.refusals import MeshSize, Named, refuse_more, refuse_places
+from app.queries.points import described, described_source
 from app.queries.sources import named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
+from app.queries.validation import MeshSize, Named, refuse_more, refuse_places
 from app.queries.views import columns_of, surface_of, table_of_distances
+from app.schemas import service
 from app.settings import Settings
+from app.store.meshes import OpenMesh
 
 _VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3}
 """Values of JSON for each distance"""
 
 
-class DistancesQuery(Query[schemas.DistancesRequest]):
+class DistancesQuery(Query[service.DistancesRequest]):
     """Distances from ``sources`` to all vertices, or to ``targets`` only."""
 
     kind = "distances"
-    model = schemas.DistancesRequest
+    model = service.DistancesRequest
 
     @classmethod
-    def normal(cls, request: schemas.DistancesRequest) -> schemas.DistancesRequest:
+    def normal(cls, request: service.DistancesRequest) -> service.DistancesRequest:
         """Name the error that is granted, and what is included once.
 
         The gradient is known at vertices only.

@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from app.encoding import Form, encode
-from app.mesh_store import OpenMesh
-from app.queries.costs import PER_FACE_BLOCKED
+from app.queries.base import Query
+from app.queries.cost_model import PER_FACE_BLOCKED
 from app.queries.places import resolved
-from app.queries.query import Query
+from app.store.meshes import OpenMesh
 
 
 @dataclass(frozen=True)

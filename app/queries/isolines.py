@@ -8,10 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app import schemas
 from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
-from app.mesh_store import OpenMesh
-from app.points import described_source
 from app.queries.accuracy import (
     bound_of,
     likely_bound,
@@ -20,7 +17,8 @@ from app.queries.accuracy import (
     topics_of,
     with_its_error,
 )
-from app.queries.costs import (
+from app.queries.base import Grant, Likely, Query
+from app.queries.cost_model import (
     ARC_IN_FACE,
     FACES_ON_LEVEL,
     PER_FACE_CROSSED,
@@ -36,28 +34,30 @@ from app.queries.costs import (
     typical_edge,
 )
 from app.queries.places import Places
-from app.queries.query import Grant, Likely, Query
-from app.queries.refusals import MeshSize, Named, refuse_large_json, refuse_more, refuse_places
+from app.queries.points import described_source
 from app.queries.sources import named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
+from app.queries.validation import MeshSize, Named, refuse_large_json, refuse_more, refuse_places
 from app.queries.views import lines_of
+from app.schemas import service
 from app.settings import Settings
-from geodesic_core.isolines import as_chord_error, spaced_levels
+from app.store.meshes import OpenMesh
+from geodesic_core.fields.isolines import as_chord_error, spaced_levels
 
 _VALUES_OF_POINT, _VALUES_OF_LEVEL = 4, 1
 """What the JSON of a point has: position, and the face of its piece; and what each level adds."""
 
 
-class IsolinesQuery(Query[schemas.IsolinesRequest]):
+class IsolinesQuery(Query[service.IsolinesRequest]):
     """The points at some distances from ``sources``, as polylines."""
 
     kind = "isolines"
-    model = schemas.IsolinesRequest
+    model = service.IsolinesRequest
     offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
     hint = "ask for fewer levels at once, or grant a larger chord_error"
 
     @classmethod
-    def normal(cls, request: schemas.IsolinesRequest) -> schemas.IsolinesRequest:
+    def normal(cls, request: service.IsolinesRequest) -> service.IsolinesRequest:
         """Name the error that is granted; refuse levels that are told twice or not at all."""
         if request.levels is None and request.count is None:
             raise refuse_places(["/levels"], "give levels, or count for some evenly spaced")
@@ -210,7 +210,7 @@ def _straight_line(mesh: gc.TriangleMesh, level: float, faces: NDArray[np.int32]
 
 def _pieces(
     mesh: gc.TriangleMesh,
-    request: schemas.Accuracy,
+    request: service.Accuracy,
     levels: NDArray[np.float64],
     chord_error: float,
 ) -> NDArray[np.float64]:

@@ -6,23 +6,23 @@ from typing import Any
 import numpy as np
 
 import geodesic_core as gc
-from app import schemas
 from app.encoding import CSV, GEOJSON, JSON, Answer
 from app.errors import Fault
-from app.mesh_store import OpenMesh
-from app.points import described
-from app.queries.costs import PER_POSITION, Cost
+from app.queries.base import VALUES_OF_POINT, Grant, Likely, Query
+from app.queries.cost_model import PER_POSITION, Cost
 from app.queries.places import Places, look_up
-from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query
-from app.queries.refusals import MeshSize, refuse_points
+from app.queries.points import described
+from app.queries.validation import MeshSize, refuse_points
 from app.queries.views import places_of, table_of_places
+from app.schemas import service
+from app.store.meshes import OpenMesh
 
 
-class LocateQuery(Query[schemas.LocateRequest]):
+class LocateQuery(Query[service.LocateRequest]):
     """The points of the surface nearest to positions, where they are near enough."""
 
     kind = "locate"
-    model = schemas.LocateRequest
+    model = service.LocateRequest
     offers: Sequence[str] = (JSON, CSV, GEOJSON)
     hint = "ask for fewer points at once"
 

@@ -11,13 +11,11 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
 import geodesic_core as gc
-from app import schemas
 from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer
 from app.errors import over_limit
-from app.mesh_store import OpenMesh
-from app.points import described
 from app.queries.accuracy import CERTAIN
-from app.queries.costs import (
+from app.queries.base import VALUES_OF_POINT, Grant, Likely, Query, numbered
+from app.queries.cost_model import (
     PER_POINT,
     Cost,
     rough_share,
@@ -28,26 +26,28 @@ from app.queries.costs import (
     sweeps_cost,
 )
 from app.queries.places import Places, components_of
-from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
-from app.queries.refusals import MeshSize, Named, refuse_more, refuse_places
+from app.queries.points import described
+from app.queries.validation import MeshSize, Named, refuse_more, refuse_places
 from app.queries.views import table_of_matrix, table_of_sparse
+from app.schemas import service
 from app.settings import Settings
-from geodesic_core.matrix import SWEEP_FROM
-from geodesic_core.threads import available_cores
+from app.store.meshes import OpenMesh
+from geodesic_core.search.matrix import SWEEP_FROM
+from geodesic_core.search.threads import available_cores
 
 _CELLS = "cells of the matrix"
 _AT_A_TIME = 2**20
 """Straight distances that are worked on at a time."""
 
 
-class MatrixQuery(Query[schemas.MatrixRequest]):
+class MatrixQuery(Query[service.MatrixRequest]):
     """Distances from each of N sources to each of M targets, or from each to one target."""
 
     kind = "matrix"
-    model = schemas.MatrixRequest
+    model = service.MatrixRequest
 
     @classmethod
-    def normal(cls, request: schemas.MatrixRequest) -> schemas.MatrixRequest:
+    def normal(cls, request: service.MatrixRequest) -> service.MatrixRequest:
         """Refuse pairs of which one end is missing."""
         sources, targets = len(request.sources), len(request.targets)
         if request.layout == "pairs" and sources != targets:

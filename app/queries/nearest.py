@@ -7,12 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app import schemas
 from app.encoding import CSV, GEOJSON, JSON, Answer
-from app.mesh_store import OpenMesh
-from app.points import described
 from app.queries.accuracy import CERTAIN
-from app.queries.costs import (
+from app.queries.base import VALUES_OF_POINT, Grant, Likely, Query, numbered
+from app.queries.cost_model import (
     PER_POINT,
     Cost,
     rough_share,
@@ -21,21 +19,23 @@ from app.queries.costs import (
     sweeps_cost,
 )
 from app.queries.places import Places, components_of, unreachable
-from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
-from app.queries.refusals import MeshSize, Named, refuse_places
+from app.queries.points import described
+from app.queries.validation import MeshSize, Named, refuse_places
 from app.queries.views import places_of, table_of_places
+from app.schemas import service
+from app.store.meshes import OpenMesh
 
 
-class NearestQuery(Query[schemas.NearestRequest]):
+class NearestQuery(Query[service.NearestRequest]):
     """The ``k`` candidates that are geodesically nearest to a point."""
 
     kind = "nearest"
-    model = schemas.NearestRequest
+    model = service.NearestRequest
     offers: Sequence[str] = (JSON, CSV, GEOJSON)
     hint = "ask for a smaller k"
 
     @classmethod
-    def normal(cls, request: schemas.NearestRequest) -> schemas.NearestRequest:
+    def normal(cls, request: service.NearestRequest) -> service.NearestRequest:
         """Refuse to find more candidates than there are."""
         k, count = request.k, len(request.candidates)
         if k > count:

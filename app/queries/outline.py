@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app.queries.accuracy import CERTAIN, bound_of
-from app.queries.costs import CROSSINGS
+from app.queries.cost_model import CROSSINGS
 
 SHOWN = "points", "locations", "faces"
 """What drawings and tables of a path are made of."""

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 import geodesic_core as gc
-from app import point_text, schemas
 from app.encoding import CSV, GEOJSON, JSON, NPY, OBJ, OCTETS, SVG, Answer
 from app.errors import Fault, ProblemError, pointer
-from app.mesh_store import OpenMesh
-from app.points import described
+from app.queries import point_text
 from app.queries.accuracy import method_of, solve_field, with_its_error
-from app.queries.costs import (
+from app.queries.base import Grant, Likely, Query, numbered
+from app.queries.cost_model import (
     PER_PATH,
     PER_POINT,
     Cost,
@@ -28,8 +27,8 @@ from app.queries.costs import (
 )
 from app.queries.outline import SHOWN, likely_outline, no_outline, outline_of
 from app.queries.places import Places, components_of, positions_of
-from app.queries.query import Grant, Likely, Query, numbered
-from app.queries.refusals import (
+from app.queries.points import described
+from app.queries.validation import (
     MeshSize,
     Named,
     detail_of,
@@ -38,18 +37,20 @@ from app.queries.refusals import (
     refuse_points,
 )
 from app.queries.views import line_of
+from app.schemas import service
 from app.settings import Settings
+from app.store.meshes import OpenMesh
 
 
-class PathQuery(Query[schemas.PathRequest]):
+class PathQuery(Query[service.PathRequest]):
     """The shortest path between two points, past ``waypoints`` in their order."""
 
     kind = "path"
-    model = schemas.PathRequest
+    model = service.PathRequest
     offers: Sequence[str] = (JSON, NPY, OCTETS, OBJ, CSV, SVG, GEOJSON)
 
     @classmethod
-    def normal(cls, request: schemas.PathRequest) -> schemas.PathRequest:
+    def normal(cls, request: service.PathRequest) -> service.PathRequest:
         """Name the error that is granted."""
         request = with_its_error(request)
         if request.method == "approximate":
@@ -156,15 +157,15 @@ class PathQuery(Query[schemas.PathRequest]):
 # As a GET
 
 
-def written_request(parameters: schemas.PathParameters) -> schemas.PathRequest:
+def written_request(parameters: service.PathParameters) -> service.PathRequest:
     """Return the body of the ``POST`` that asks the same as the parameters of a ``GET``."""
-    return schemas.PathRequest(
+    return service.PathRequest(
         source=_parsed("/source", parameters.source),
         target=_parsed("/target", parameters.target),
         waypoints=[_parsed(pointer("waypoints", i), text) for i, text in enumerate(parameters.via)],
         max_distance=parameters.max_distance,
         explain=parameters.explain,
-        **parameters.model_dump(include=set(schemas.Accuracy.model_fields)),
+        **parameters.model_dump(include=set(service.Accuracy.model_fields)),
     )
 
 
@@ -182,7 +183,7 @@ def naming_parameters() -> Iterator[None]:
         ) from None
 
 
-def _parsed(place: str, text: str) -> schemas.Point:
+def _parsed(place: str, text: str) -> service.Point:
     try:
         return point_text.parse(text)
     except ValueError as error:

@@ -5,12 +5,10 @@ from itertools import chain
 from typing import Any
 
 import geodesic_core as gc
-from app import schemas
 from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
-from app.mesh_store import OpenMesh
-from app.points import described, described_origin
 from app.queries.accuracy import method_of, solve_field, topics_of, with_its_error
-from app.queries.costs import (
+from app.queries.base import VALUES_OF_POINT, Grant, Likely, Query, numbered
+from app.queries.cost_model import (
     PER_PATH,
     PER_POINT,
     Cost,
@@ -22,27 +20,29 @@ from app.queries.costs import (
 )
 from app.queries.outline import likely_outline, no_outline, outline_of
 from app.queries.places import Places, look_up, positions_of
-from app.queries.query import VALUES_OF_POINT, Grant, Likely, Query, numbered
-from app.queries.refusals import MeshSize, Named, refuse_large_json, refuse_more
+from app.queries.points import described, described_origin
 from app.queries.sources import named_origin, origin_of, point_count
 from app.queries.stats import likely_stats, stats_of
+from app.queries.validation import MeshSize, Named, refuse_large_json, refuse_more
 from app.queries.views import line_of
+from app.schemas import service
 from app.settings import Settings
+from app.store.meshes import OpenMesh
 
 _TRIED = 64
 """Targets to which a straight path is laid for an estimate, about."""
 
 
-class PathsQuery(Query[schemas.PathsRequest]):
+class PathsQuery(Query[service.PathsRequest]):
     """The shortest paths from a point to each of some targets."""
 
     kind = "paths"
-    model = schemas.PathsRequest
+    model = service.PathsRequest
     offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
     hint = "ask for fewer targets at once"
 
     @classmethod
-    def normal(cls, request: schemas.PathsRequest) -> schemas.PathsRequest:
+    def normal(cls, request: service.PathsRequest) -> service.PathsRequest:
         """Name the error that is granted."""
         return with_its_error(request)
 

@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app import schemas
 from app.errors import Fault
-from app.points import described, resolve
-from app.queries.refusals import FAULTS_SHOWN, Named, refuse_points
-from geodesic_core.nodes import component_of
+from app.queries.points import described, resolve
+from app.queries.validation import FAULTS_SHOWN, Named, refuse_points
+from app.schemas import service
+from geodesic_core.fields.sources import component_of
 
 Places = Sequence[gc.SurfacePoint]
 
@@ -58,11 +58,11 @@ def unreachable(missed: NDArray[np.bool_], connected: NDArray[np.bool_]) -> dict
     }
 
 
-def _at_fault(point: schemas.Point) -> str:
+def _at_fault(point: service.Point) -> str:
     """Return the member that is wrong with a point whose indices are sound."""
     match point:
-        case schemas.EdgePoint():
+        case service.EdgePoint():
             return "edge"
-        case schemas.FacePoint():
+        case service.FacePoint():
             return "barycentric"
     return "position"

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from itertools import chain, islice, pairwise
 
 import geodesic_core as gc
-from app import schemas
 from app.errors import Fault
+from app.queries.base import numbered
 from app.queries.places import Places
-from app.queries.query import numbered
-from app.queries.refusals import FAULTS_SHOWN, Named, refuse_points
-from geodesic_core.curve import share_a_face
+from app.queries.validation import FAULTS_SHOWN, Named, refuse_points
+from app.schemas import service
+from geodesic_core.mesh.curve import share_a_face
 
 _JUMPS = (
     "shares no face with the point before it; add those at which the curve crosses edges: a "
@@ -17,30 +17,30 @@ _JUMPS = (
 )
 
 
-def named_origin(where: str, written: schemas.Origin | schemas.Source) -> Named:
+def named_origin(where: str, written: service.Origin | service.Source) -> Named:
     """Yield a point, or those of a curve, each with its place."""
-    if isinstance(written, schemas.Polyline):
+    if isinstance(written, service.Polyline):
         return numbered(f"{where}/polyline", written.polyline)
     return iter([(where, written)])
 
 
-def named_sources(written: Sequence[schemas.Source]) -> Named:
+def named_sources(written: Sequence[service.Source]) -> Named:
     """Yield the points of sources, each with its place."""
     return chain.from_iterable(
         named_origin(f"/sources/{i}", source) for i, source in enumerate(written)
     )
 
 
-def point_count(*written: schemas.Origin | schemas.Source) -> int:
+def point_count(*written: service.Origin | service.Source) -> int:
     """Return how many points there are, those of curves counted one by one."""
-    return sum(len(each.polyline) if isinstance(each, schemas.Polyline) else 1 for each in written)
+    return sum(len(each.polyline) if isinstance(each, service.Polyline) else 1 for each in written)
 
 
 def origin_of(
-    mesh: gc.TriangleMesh, where: str, written: schemas.Origin | schemas.Source, places: Places
+    mesh: gc.TriangleMesh, where: str, written: service.Origin | service.Source, places: Places
 ) -> gc.SurfacePoint | gc.Curve:
     """Return a point, or a curve, as the library has it; refuse a curve that jumps."""
-    if not isinstance(written, schemas.Polyline):
+    if not isinstance(written, service.Polyline):
         return places[0]
     faults = (
         Fault(f"{where}/polyline/{i}", _JUMPS)
@@ -54,7 +54,7 @@ def origin_of(
 
 
 def starts_of(
-    mesh: gc.TriangleMesh, written: Sequence[schemas.Source], places: Places
+    mesh: gc.TriangleMesh, written: Sequence[service.Source], places: Places
 ) -> list[gc.Source]:
     """Return sources as the library has them; refuse curves that jump."""
     rest = iter(places)

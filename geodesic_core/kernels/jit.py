@@ -27,8 +27,8 @@ def sources_digest() -> str:
     """
     package = Path(__file__).parent
     digest = hashlib.sha256(f"numba {numba.__version__}".encode())
-    for path in [*sorted(package.glob("*.py")), package.parent / "tolerances.py"]:
-        digest.update(path.name.encode() + path.read_bytes())
+    for path in [*sorted(package.rglob("*.py")), package.parent / "tolerances.py"]:
+        digest.update(path.relative_to(package.parent).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
 

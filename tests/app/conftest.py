@@ -14,13 +14,13 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.field_store import FieldStore
 from app.main import create_app
-from app.mesh_books import MeshBooks
-from app.mesh_store import MeshStore
 from app.queries import Fields, Grant
 from app.settings import Settings
-from app.store import owned
+from app.store.fields import FieldStore
+from app.store.layout import owned
+from app.store.mesh_catalog import MeshBooks
+from app.store.meshes import MeshStore
 
 MESHES = Path(__file__).parents[3] / "shared" / "meshes"
 

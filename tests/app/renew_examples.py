@@ -2,7 +2,7 @@
 
 An answer that is the documented one, but for what changes each time, is left as it is. A new
 example needs a summary, its request, and a ``response`` with no more than its ``status``; the
-document is written (``python -m app.openapi``) before, and again afterwards.
+document is written (``python -m app.cli.openapi``) before, and again afterwards.
 """
 
 import json
@@ -13,7 +13,7 @@ from base64 import b64encode
 from pathlib import Path
 from typing import Any
 
-from app.documentation import EXAMPLES
+from app.http.openapi import EXAMPLES
 
 from .conftest import serving
 from .test_examples import JOB, OPERATIONS, replay, send, set_up

@@ -4,10 +4,10 @@ from typing import Any
 
 import pytest
 
-from app import allowances
-from app.allowances import Allowances
-from app.callers import Caller, caller_at
+from app.access import Caller, caller_at
 from app.errors import Problem, ProblemError
+from app.http.middleware import rate_limits
+from app.http.middleware.rate_limits import Allowances
 
 
 class Clock:
@@ -23,7 +23,7 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     clock = Clock()
-    monkeypatch.setattr(allowances, "monotonic", clock)
+    monkeypatch.setattr(rate_limits, "monotonic", clock)
     return clock
 
 

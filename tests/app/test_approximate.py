@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.queries import PathQuery, result_key
-from app.schemas import PathRequest, VertexPoint
+from app.schemas.service import PathRequest, VertexPoint
 
 from .conftest import NPY, check_problem, distances, mesh_of, upload_sample
 

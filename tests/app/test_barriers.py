@@ -8,10 +8,10 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.mesh_store import OpenMesh
 from app.queries import DistancesQuery, MeshSize, result_key
-from app.schemas import DistancesRequest
+from app.schemas.service import DistancesRequest
 from app.settings import Settings
+from app.store.meshes import OpenMesh
 
 from .conftest import check_problem, distances, mesh_of, serving, upload_sample
 

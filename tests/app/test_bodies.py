@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.http.routes import bodies, query_route
 from app.queries import DistancesQuery, LocateQuery
-from app.routes import bodies, query_route
 
 from .conftest import check_problem
 

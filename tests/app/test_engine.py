@@ -18,13 +18,14 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.encoding import Form
-from app.engine import Answering, MeshFromSample, Order, Storing, local, worker
+from app.engine import local, worker
 from app.engine.slot import Slot
+from app.engine.work import Answering, MeshFromSample, Order, Storing
 from app.engine.worker import Clock, Signals, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
 from app.queries import DistancesQuery, PathQuery
-from app.schemas import DistancesRequest, PathRequest, VertexPoint
+from app.schemas.service import DistancesRequest, PathRequest, VertexPoint
 from app.settings import Settings
 from geodesic_core import TriangleMesh, samples
 

@@ -11,7 +11,6 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.encoding import JSON, Form
-from app.mesh_store import OpenMesh
 from app.queries import (
     DistancesQuery,
     IsolinesQuery,
@@ -23,7 +22,8 @@ from app.queries import (
     Query,
     estimate,
 )
-from app.schemas import Wire
+from app.schemas.service import Wire
+from app.store.meshes import OpenMesh
 
 from .conftest import check_problem, granted, mesh_of, upload_sample
 
@@ -163,7 +163,7 @@ def test_memory_that_suffices(
     client: TestClient, ids: dict[str, str], name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Three times the estimate does, a third does not."""
-    for module in ("app.queries.matrix", "geodesic_core.matrix"):
+    for module in ("app.queries.matrix", "geodesic_core.search.matrix"):
         monkeypatch.setattr(f"{module}.available_cores", lambda: 1)
     opened = OpenMesh(("", b""), gc.Solver(mesh_of(client, ids["sphere"])), [])
     query = query_of(name)

@@ -123,7 +123,7 @@ def full(site: Site) -> Any:
 
 
 def defect(site: Site) -> Any:
-    site.patch.setattr("app.routes.about.About", None)
+    site.patch.setattr("app.http.routes.about.About", None)
     return site.client.get("/v1")
 
 
@@ -150,7 +150,7 @@ def no_disk(site: Site) -> Any:
     async def write(*_: Any) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    site.patch.setattr("app.uploads._write", write)
+    site.patch.setattr("app.http.uploads._write", write)
     return site.client.post("/v1/meshes", json=TWO_TRIANGLES)
 
 

@@ -13,7 +13,7 @@ from jsonschema import Draft202012Validator
 from openapi_spec_validator import validate
 from starlette.testclient import TestClient
 
-from app.documentation import complete
+from app.http.openapi import complete
 
 from .conftest import serving, wait_until
 from .test_openapi import COMMITTED
@@ -77,7 +77,7 @@ def test_an_example_of_a_parameter_that_is_not_there_is_refused(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     example = {"a": {"summary": "a", "parameters": {"colour": 1}, "response": {"status": 200}}}
-    monkeypatch.setattr("app.documentation._examples", lambda _: example)
+    monkeypatch.setattr("app.http.openapi._examples", lambda _: example)
     about = {"operationId": "getAbout", "responses": {"200": {"description": "well"}}}
     document = {"paths": {"/v1": {"get": about}}, "components": {"schemas": {}}}
 

@@ -11,10 +11,10 @@ import geodesic_core as gc
 from app.encoding import Form
 from app.engine.work import Answering
 from app.engine.worker import Signals, Worker
-from app.field_store import FieldStore, code_of_field, field_files
-from app.queries import fields as kept_fields
+from app.queries import field_cache as kept_fields
 from app.queries import result_key
-from app.result_store import result_name
+from app.store.fields import FieldStore, code_of_field, field_files
+from app.store.results import result_name
 
 from .conftest import distances, serving, store_mesh, upload_sample, wait_until
 from .test_engine import asked, config

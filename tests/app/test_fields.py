@@ -10,9 +10,9 @@ import pytest
 import geodesic_core as gc
 from app.encoding import Form, encode
 from app.engine.worker import Signals, Worker
-from app.mesh_store import OpenMesh
 from app.queries import DistancesQuery, Fields, IsolinesQuery, PathsQuery
-from geodesic_core import whole_sweep
+from app.store.meshes import OpenMesh
+from geodesic_core.fields import whole_sweep
 
 from .conftest import granted, new_fields, store_mesh
 from .test_engine import asked, config

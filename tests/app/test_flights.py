@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from app.engine import Told
-from app.flights import Flights
+from app.engine.interface import Told
+from app.service.single_flight import Flights
 
 
 class Work:

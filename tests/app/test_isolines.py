@@ -8,9 +8,9 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.mesh_store import OpenMesh
 from app.queries import IsolinesQuery
-from geodesic_core.whole_sweep import WholeSweep
+from app.store.meshes import OpenMesh
+from geodesic_core.fields.whole_sweep import WholeSweep
 
 from .conftest import check_problem, granted, mesh_of, serving, upload_sample
 

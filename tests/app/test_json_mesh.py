@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from app.engine.mesh_json import read_json_mesh
 from app.errors import ProblemError
-from app.json_mesh import read_json_mesh
 
 
 def test_reads_vertices_and_faces() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.kept import Kept
+from app.store.lru_cache import Kept
 
 
 class Value:

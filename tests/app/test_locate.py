@@ -8,9 +8,9 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.mesh_store import OpenMesh
 from app.queries import LocateQuery
-from geodesic_core.nearest_face import NearestFace
+from app.store.meshes import OpenMesh
+from geodesic_core.mesh.closest_point import NearestFace
 
 from .conftest import NPY, check_problem, granted, mesh_of, serving, upload_sample
 

@@ -5,16 +5,16 @@ import pytest
 from pydantic import BaseModel
 from starlette.testclient import TestClient
 
-from app import schemas
+from app.cli.openapi import openapi_text
 from app.errors import PROBLEM_JSON
-from app.openapi import openapi_text
+from app.schemas import service
 
 COMMITTED = Path(__file__).parents[2] / "openapi" / "openapi.json"
 
 
 def test_committed_document_is_the_generated_one() -> None:
     assert COMMITTED.read_text() == openapi_text(), (
-        "run: python -m app.openapi > openapi/openapi.json"
+        "run: python -m app.cli.openapi > openapi/openapi.json"
     )
 
 
@@ -106,7 +106,7 @@ def test_answers_are_what_is_described(
 
     for name, query in zip(names, ("", "?estimate=true"), strict=True):
         answer = client.post(link + query, json=body).json()
-        model: type[BaseModel] = getattr(schemas, name)
+        model: type[BaseModel] = getattr(service, name)
         assert set(answer) <= set(model.model_fields)
         read = model.model_validate(answer).model_dump(mode="json", exclude_unset=True)
         assert read == answer

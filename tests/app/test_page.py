@@ -3,7 +3,7 @@
 import pytest
 from starlette.testclient import TestClient
 
-from app import page
+from app.http import page
 
 from .conftest import check_problem
 

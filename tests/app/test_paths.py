@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.queries import PathQuery, result_key
-from app.schemas import PathRequest, StepName, VertexPoint
+from app.schemas.service import PathRequest, StepName, VertexPoint
 
 from .conftest import NPY, check_problem, mesh_of, serving, upload_sample
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from app.point_text import parse
-from app.schemas import EdgePoint, FacePoint, PositionPoint, VertexPoint
+from app.queries.point_text import parse
+from app.schemas.service import EdgePoint, FacePoint, PositionPoint, VertexPoint
 
 
 @pytest.mark.parametrize(

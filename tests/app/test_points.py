@@ -8,7 +8,6 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.mesh_store import OpenMesh
 from app.queries import (
     DistancesQuery,
     LocateQuery,
@@ -19,7 +18,7 @@ from app.queries import (
     Query,
     result_key,
 )
-from app.schemas import (
+from app.schemas.service import (
     DistancesRequest,
     FacePoint,
     LocateRequest,
@@ -30,6 +29,7 @@ from app.schemas import (
     VertexPoint,
     VertexSource,
 )
+from app.store.meshes import OpenMesh
 
 from .conftest import check_problem, distances, granted, mesh_of, upload_sample
 

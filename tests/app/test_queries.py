@@ -8,7 +8,7 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.queries import DistancesQuery, result_key
-from app.schemas import DistancesRequest
+from app.schemas.service import DistancesRequest
 
 from .conftest import NPY, check_problem, distances, mesh_of, serving, upload_sample
 
@@ -104,7 +104,7 @@ def test_the_hash_of_a_query_is_stable(monkeypatch: pytest.MonkeyPatch) -> None:
 
     assert key == result_key(twin, "a/b")
     assert len({key, result_key(other, "a/b"), result_key(query, "a/c")}) == 3
-    monkeypatch.setattr("app.queries.query.code_version", lambda: "another")
+    monkeypatch.setattr("app.queries.base.code_version", lambda: "another")
     assert result_key(query, "a/b") != key
 
 

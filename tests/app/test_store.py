@@ -21,14 +21,14 @@ import orjson
 import pytest
 
 import geodesic_core as gc
-from app import mesh_books, mesh_store
-from app.engine import Answering, Order
+from app.engine.work import Answering, Order
 from app.errors import ProblemError
 from app.jobs import require_whole
-from app.mesh_books import Kept, MeshBooks
-from app.mesh_store import MeshStore
 from app.settings import MIB
-from app.store import LAYOUT, StoreError, owned
+from app.store import mesh_catalog, meshes
+from app.store.layout import LAYOUT, StoreError, owned
+from app.store.mesh_catalog import Kept, MeshBooks
+from app.store.meshes import MeshStore
 
 from .conftest import check_problem, distances, serving, store_mesh, upload_sample, wait_until
 from .test_process import Server
@@ -55,7 +55,7 @@ def test_a_store_belongs_to_one_at_a_time(tmp_path: Path) -> None:
 
 
 def test_the_lock_goes_with_its_process_however_that_ends(tmp_path: Path) -> None:
-    script = "import sys; from pathlib import Path; from app.store import owned\n"
+    script = "import sys; from pathlib import Path; from app.store.layout import owned\n"
     script += "with owned(Path(sys.argv[1])): print('owned', flush=True); sys.stdin.read()"
     owner = subprocess.Popen(  # noqa: S603 - this Python, and the text above
         [sys.executable, "-c", script, str(tmp_path)],
@@ -361,9 +361,9 @@ class Crash(BaseException):
 
 
 STEPS = [
-    (mesh_store, "_write_array"),
-    (mesh_books, "sync_all"),
-    (mesh_books, "sync"),
+    (meshes, "_write_array"),
+    (mesh_catalog, "sync_all"),
+    (mesh_catalog, "sync"),
     (Path, "write_bytes"),
     (Path, "rename"),
     (Path, "mkdir"),
@@ -440,7 +440,7 @@ def test_a_full_disk_at_any_step_leaves_nothing(tmp_path: Path, number: int) -> 
 def test_a_device_that_is_full() -> None:
     """A real one, which np.save would answer with an error that does not say so."""
     with pytest.raises(OSError, match="No space left") as caught:
-        mesh_store._write_array(Path("/dev/full"), np.zeros(10_000))
+        meshes._write_array(Path("/dev/full"), np.zeros(10_000))
     assert caught.value.errno == errno.ENOSPC
 
 

@@ -7,8 +7,8 @@ import pytest
 
 import geodesic_core as gc
 from app.errors import ProblemError
-from app.mesh_store import MeshStore
-from app.result_store import ResultStore, write_result
+from app.store.meshes import MeshStore
+from app.store.results import ResultStore, write_result
 
 from .conftest import store_mesh
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels import edge_path, prune, wavefront
-from geodesic_core.landmarks import Landmarks
+from geodesic_core.kernels.paths import edge_dijkstra
+from geodesic_core.kernels.sweep import pruning, state
+from geodesic_core.search.landmarks import Landmarks
 from tests import zoo
 from tests.core.certificates import LENGTH, check_path
 
@@ -85,7 +86,7 @@ def goal_at_vertex(
     limit: float = np.inf,
     landmarks: Landmarks | None = None,
     **known: object,
-) -> wavefront.Goal:
+) -> state.Goal:
     """The goal of paths through inner vertex v."""
     here = mesh.topology.positions[v].copy(), np.array([v]), np.zeros(1)
     return (landmarks or Landmarks(mesh)).goal(*here, limit)._replace(**known)
@@ -94,16 +95,16 @@ def goal_at_vertex(
 def edge_paths(mesh: gc.TriangleMesh, pairs) -> Iterator[tuple[int, int, np.ndarray, float]]:
     """For each pair, what the search along edges finds: inner vertices from start to end."""
     topology = mesh.topology
-    wave = wavefront.new_wavefront(topology, pruned=True)
+    wave = state.new_wavefront(topology, pruned=True)
     for start, end in pairs:
         first, last = (int(topology.inner_vertex[v]) for v in (start, end))
-        bounds = wavefront.exact_bounds(np.inf, goal_at_vertex(mesh, first))
-        edge_path.search_edges(topology, wave, bounds, last, first)
+        bounds = state.exact_bounds(np.inf, goal_at_vertex(mesh, first))
+        edge_dijkstra.search_edges(topology, wave, bounds, last, first)
         length = float(wave.distance[first])
         yield (
             start,
             end,
-            edge_path.vertices_to(wave.winner_ints[:, wavefront.FROM], first),
+            edge_dijkstra.vertices_to(wave.winner_ints[:, state.FROM], first),
             length,
         )
-        prune.forget(topology, wave, bounds)
+        pruning.forget(topology, wave, bounds)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels import sweep, wavefront
+from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
 from tests.core.approximation import MERGING
@@ -73,17 +73,17 @@ def test_growing_changes_nothing(name, monkeypatch):
         return wave._replace(
             windows=np.empty((1, 8)),
             scratch=np.empty((1, 8)),
-            merges=np.empty((paths, wavefront.MERGE)),
-            merge_ints=np.empty((paths, wavefront.MERGE_INTS), np.int32),
+            merges=np.empty((paths, state.MERGE)),
+            merge_ints=np.empty((paths, state.MERGE_INTS), np.int32),
         )
 
     def counted(wave):
         grown.append(len(wave.merges))
         return more_merges(wave)
 
-    allocate, more_merges = wavefront.new_wavefront, wavefront.with_more_merges
-    monkeypatch.setattr(wavefront, "new_wavefront", cramped)
-    monkeypatch.setattr(wavefront, "with_more_merges", counted)
+    allocate, more_merges = state.new_wavefront, state.with_more_merges
+    monkeypatch.setattr(state, "new_wavefront", cramped)
+    monkeypatch.setattr(state, "with_more_merges", counted)
     assert answer(mesh, 7) == whole
     assert len(grown) > 5
     assert grown == [2**step for step in range(len(grown))]
@@ -95,12 +95,12 @@ def test_slices_change_nothing(name, monkeypatch):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     whole = answer(mesh, 3)
     slices = []
-    advance = sweep.advance
+    advance = continuous_dijkstra.advance
 
     def slowly(topology, wave, bounds, _):
         slices.append(1)
         return advance(topology, wave, bounds, 200 if WITHOUT_JIT else 1)
 
-    monkeypatch.setattr(sweep, "advance", slowly)
+    monkeypatch.setattr(continuous_dijkstra, "advance", slowly)
     assert answer(mesh, 3) == whole
     assert len(slices) > 20

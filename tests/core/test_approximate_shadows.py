@@ -5,17 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from geodesic_core.kernels.arrival import bound_vertex, light_vertex
 from geodesic_core.kernels.jit import kernel
-from geodesic_core.kernels.pseudosource import emit_shadows
-from geodesic_core.kernels.queue import HEAP_SIZE
-from geodesic_core.kernels.topology import (
-    COS_LEFT,
-    LENGTH_LEFT,
-    SIN_LEFT,
-    following,
-)
-from geodesic_core.kernels.wavefront import (
+from geodesic_core.kernels.mesh.half_edges import COS_LEFT, LENGTH_LEFT, SIN_LEFT, following
+from geodesic_core.kernels.sweep.pseudosources import emit_shadows
+from geodesic_core.kernels.sweep.queues import HEAP_SIZE
+from geodesic_core.kernels.sweep.relaxation import bound_vertex, light_vertex
+from geodesic_core.kernels.sweep.state import (
     DONE,
     LIT_FROM,
     LIT_TO,
@@ -23,7 +18,7 @@ from geodesic_core.kernels.wavefront import (
     new_wavefront,
     view_of,
 )
-from geodesic_core.kernels.window import B0, B1, SX, SY
+from geodesic_core.kernels.sweep.window import B0, B1, SX, SY
 from geodesic_core.tolerances import SECTOR_MARGIN
 from tests import zoo
 from tests.core.kernels.invariants import windows_of

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from geodesic_core.errors import InvalidMesh, TooManyFaces
-from geodesic_core.mesh import TriangleMesh
-from geodesic_core.mesh_io import load_mesh
+from geodesic_core.io.load import load_mesh
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 from .test_mesh_io import (
     FACES,
@@ -169,6 +169,6 @@ def test_lack_of_memory_is_no_fault_of_the_file(monkeypatch: pytest.MonkeyPatch)
     def run_out(*_: Any) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("geodesic_core.mesh_io.glb_faces", run_out)
+    monkeypatch.setattr("geodesic_core.io.load.glb_faces", run_out)
     with pytest.raises(MemoryError):
         load_mesh(glb(VERTICES, FACES), "glb", max_faces=1)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core import run
 from geodesic_core.errors import (
     Cancelled,
     DeadlineExceeded,
     InvalidArgument,
     MemoryLimitExceeded,
 )
+from geodesic_core.fields import sweep
 from tests import zoo
 
 pytestmark = pytest.mark.jit
@@ -60,9 +60,9 @@ def mesh():
 @pytest.fixture(autouse=True)
 def slices_by_number(monkeypatch):
     """Each slice twice as long as the one before, however fast the machine is."""
-    monkeypatch.setattr(run, "SLICE_SECONDS", 1e9)
-    monkeypatch.setattr(run, "_FIRST_BUDGET", 2000)
-    monkeypatch.setattr(run, "_FIRST_ITEMS", 8)
+    monkeypatch.setattr(sweep, "SLICE_SECONDS", 1e9)
+    monkeypatch.setattr(sweep, "_FIRST_BUDGET", 2000)
+    monkeypatch.setattr(sweep, "_FIRST_ITEMS", 8)
 
 
 def flat(answer):

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels.wavefront import LANDMARKS
-from geodesic_core.landmarks import Landmarks
-from geodesic_core.run import Control
+from geodesic_core.fields.sweep import Control
+from geodesic_core.kernels.sweep.state import LANDMARKS
+from geodesic_core.search.landmarks import Landmarks
 from geodesic_core.tolerances import LANDMARK_ERROR
 from tests import zoo
 from tests.conftest import WITHOUT_JIT

@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse import csr_array
 
 import geodesic_core as gc
-from geodesic_core import matrix, threads
+from geodesic_core.search import matrix, threads
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
 from tests.core.splitting import split_at

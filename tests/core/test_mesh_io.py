@@ -17,9 +17,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.mesh import TriangleMesh
-from geodesic_core.mesh_io import load_mesh
-from geodesic_core.report import Sample
+from geodesic_core.io.load import load_mesh
+from geodesic_core.mesh.report import Sample
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.solvers import exact_distance
 
 MESHES = Path(__file__).parents[3] / "shared" / "meshes"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core import sweeper
-from geodesic_core.kernels import wavefront
+from geodesic_core.kernels.sweep import state
+from geodesic_core.search import target_sweep
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
 from tests.core.splitting import split_at
@@ -96,14 +96,14 @@ def test_what_cannot_be_reached_is_left_out():
 def test_the_sweep_ends_at_the_last_of_the_nearest(monkeypatch):
     """It makes hardly more windows than one to the distance, which it could not know."""
     made = []
-    sweep_nodes = sweeper.sweep_nodes
+    sweep_nodes = target_sweep.sweep_nodes
 
     def counted(*arguments):
         wave = sweep_nodes(*arguments)
-        made.append(int(wave.counters[wavefront.CREATED]))
+        made.append(int(wave.counters[state.CREATED]))
         return wave
 
-    monkeypatch.setattr(sweeper, "sweep_nodes", counted)
+    monkeypatch.setattr(target_sweep, "sweep_nodes", counted)
     mesh = gc.TriangleMesh(*zoo.icosphere(6))
     field = gc.exact_distance(mesh, 0)
     order = np.argsort(field.distances)

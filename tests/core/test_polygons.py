@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import geodesic_core as gc
-from geodesic_core.polygons import triangulated
+from geodesic_core.mesh.triangulation import triangulated
 from tests import zoo
 from tests.oracles import visibility
 

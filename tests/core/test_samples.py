@@ -7,7 +7,7 @@ import pytest
 
 from geodesic_core import samples, shortest_path
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.mesh import TriangleMesh
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 EULER = {"knot": 0, "sphere": 2, "terrain": 1, "obstacles": -15, "plane": 1}
 BOUNDARIES = {"knot": 0, "sphere": 0, "terrain": 1, "obstacles": 17, "plane": 1}

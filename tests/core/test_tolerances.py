@@ -9,19 +9,12 @@ from hypothesis import strategies as st
 
 import geodesic_core as gc
 from geodesic_core import tolerances
-from geodesic_core.kernels import sweep, wavefront
-from geodesic_core.kernels.arcs import outer_arcs
-from geodesic_core.kernels.arrival import precedence
-from geodesic_core.kernels.backtrace import Winners, is_on_path
-from geodesic_core.kernels.isolines import united
-from geodesic_core.kernels.lists import put_window
-from geodesic_core.kernels.merge import accuracy, directionality, merged
-from geodesic_core.kernels.planar import bisector
-from geodesic_core.kernels.propagate import collect, reach_apex
-from geodesic_core.kernels.prune import least_to_start
-from geodesic_core.kernels.regions import CX, CY, RADIUS, REGION
-from geodesic_core.kernels.straighten import LEFT, NEITHER, RIGHT, shortened_part
-from geodesic_core.kernels.topology import (
+from geodesic_core.fields.sources import nodes_of
+from geodesic_core.fields.sweep import Control, run_sweep
+from geodesic_core.kernels.isolines.arcs import outer_arcs
+from geodesic_core.kernels.isolines.lines import united
+from geodesic_core.kernels.isolines.regions import CX, CY, RADIUS, REGION
+from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
     HEAD,
@@ -34,7 +27,15 @@ from geodesic_core.kernels.topology import (
     SIN_LEFT,
     TAIL,
 )
-from geodesic_core.kernels.wavefront import (
+from geodesic_core.kernels.paths.backtracing import Winners, is_on_path
+from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, shortened_part
+from geodesic_core.kernels.planar import bisector
+from geodesic_core.kernels.sweep import continuous_dijkstra, state
+from geodesic_core.kernels.sweep.merging import accuracy, directionality, merged
+from geodesic_core.kernels.sweep.propagation import collect, reach_apex
+from geodesic_core.kernels.sweep.pruning import least_to_start
+from geodesic_core.kernels.sweep.relaxation import precedence
+from geodesic_core.kernels.sweep.state import (
     FIRST,
     FRESH,
     LAST,
@@ -45,11 +46,10 @@ from geodesic_core.kernels.wavefront import (
     new_wavefront,
     with_strips,
 )
-from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
-from geodesic_core.landmarks import Landmarks
-from geodesic_core.nodes import nodes_of
-from geodesic_core.polygons import triangulated
-from geodesic_core.run import Control, run_sweep
+from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
+from geodesic_core.kernels.sweep.window_lists import put_window
+from geodesic_core.mesh.triangulation import triangulated
+from geodesic_core.search.landmarks import Landmarks
 from geodesic_core.tolerances import (
     AT_LIMIT,
     BEND,
@@ -457,7 +457,7 @@ def test_runs_are_all_that_a_list_is_given(monkeypatch):
         return wave
 
     gc.approximate_distance(mesh, 0)
-    monkeypatch.setattr(wavefront, "new_wavefront", worn_out)
+    monkeypatch.setattr(state, "new_wavefront", worn_out)
     with pytest.raises(gc.errors.NotConverged, match=r"edge between vertices \d+ and \d+"):
         gc.approximate_distance(mesh, 0)
 
@@ -526,7 +526,7 @@ def sought(mesh, source, target, exact, limit) -> float:
     goal = goal_at_vertex(mesh, start, limit, known=exact[topology.outer_vertex])
     bounds = exact_bounds(math.inf, goal)
     wave = new_wavefront(topology, pruned=True)
-    sweep.start_sweep(
+    continuous_dijkstra.start_sweep(
         topology, wave, np.array([start], np.int32), np.zeros(1, np.int32), np.zeros(1), bounds
     )
     return float(run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0).distance[end])
@@ -658,7 +658,9 @@ def test_slant_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope,
     nodes = nodes_of(mesh, [line], [])
     wave = new_wavefront(mesh.topology, nodes.sites)
     bounds = with_strips(exact_bounds(math.inf), int(nodes.sources[-1]))
-    sweep.start_sweep(mesh.topology, wave, nodes.sources, nodes.origins, np.zeros(1), bounds)
+    continuous_dijkstra.start_sweep(
+        mesh.topology, wave, nodes.sources, nodes.origins, np.zeros(1), bounds
+    )
     roots = wave.windows[: wave.counters[FRESH]].view(np.int32)[:, ROOT]
     assert (roots == nodes.sources[-1]).sum() == strips
     found = gc.exact_distance(mesh, gc.Curve(line)).distances

@@ -14,7 +14,7 @@ import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from app import page as built
+from app.http import page as built
 
 from .viewing import View
 

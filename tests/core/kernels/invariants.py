@@ -12,8 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from geodesic_core.kernels.queue import HEAP_SIZE, RING_HEAD, RING_SIZE
-from geodesic_core.kernels.topology import (
+from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
     HEAD,
@@ -23,7 +22,8 @@ from geodesic_core.kernels.topology import (
     SIN_LEFT,
     TAIL,
 )
-from geodesic_core.kernels.wavefront import (
+from geodesic_core.kernels.sweep.queues import HEAP_SIZE, RING_HEAD, RING_SIZE
+from geodesic_core.kernels.sweep.state import (
     DONE,
     DONE_VERTICES,
     FAR,
@@ -39,7 +39,7 @@ from geodesic_core.kernels.wavefront import (
     SIZE,
     VIA,
 )
-from geodesic_core.kernels.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
+from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from tests import zoo
 from tests.oracles import unfolding
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 import numpy as np
 
 import geodesic_core as gc
-from geodesic_core.kernels import sweep
-from geodesic_core.kernels.propagate import POOL_FULL, SCRATCH_FULL
-from geodesic_core.kernels.topology import Topology
-from geodesic_core.kernels.wavefront import (
+from geodesic_core.kernels.mesh.half_edges import Topology
+from geodesic_core.kernels.sweep import continuous_dijkstra
+from geodesic_core.kernels.sweep.propagation import POOL_FULL, SCRATCH_FULL
+from geodesic_core.kernels.sweep.state import (
     View,
     Wavefront,
     exact_bounds,
@@ -33,7 +33,7 @@ def started(topology, sources, starts=None, limit=math.inf) -> Wavefront:
     inner = topology.inner_vertex[np.atleast_1d(sources)]
     starts = np.zeros(len(inner)) if starts is None else np.asarray(starts, dtype=float)
     origins = np.arange(len(inner), dtype=np.int32)
-    sweep.start_sweep(topology, wave, inner, origins, starts, exact_bounds(limit))
+    continuous_dijkstra.start_sweep(topology, wave, inner, origins, starts, exact_bounds(limit))
     return wave
 
 
@@ -42,9 +42,9 @@ def steps(topology, wave, limit=math.inf, budget=1) -> Iterator[tuple[int, Wavef
 
     With a budget of 1 a slice is one list or one vertex.
     """
-    outcome = sweep.RUNNING
-    while outcome != sweep.FINISHED:
-        outcome = sweep.advance(topology, wave, exact_bounds(limit), budget)
+    outcome = continuous_dijkstra.RUNNING
+    while outcome != continuous_dijkstra.FINISHED:
+        outcome = continuous_dijkstra.advance(topology, wave, exact_bounds(limit), budget)
         if outcome == POOL_FULL:
             wave = with_larger_pool(wave)
         elif outcome == SCRATCH_FULL:

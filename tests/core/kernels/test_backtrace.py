@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels.backtrace import LOST, NO_ROOM, TRACED, Winners, trace_path
-from geodesic_core.kernels.sweep import nearest_sources
-from geodesic_core.kernels.topology import APEX, OPPOSITE
-from geodesic_core.kernels.wavefront import FROM, VIA
-from geodesic_core.run import Control
+from geodesic_core.fields.sweep import Control
+from geodesic_core.kernels.mesh.half_edges import APEX, OPPOSITE
+from geodesic_core.kernels.paths.backtracing import LOST, NO_ROOM, TRACED, Winners, trace_path
+from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources
+from geodesic_core.kernels.sweep.state import FROM, VIA
 from tests import zoo
 from tests.core.kernels.stepping import finished, started, topology_of
 

@@ -6,11 +6,11 @@ import math
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels import wavefront
-from geodesic_core.kernels.edge_path import HASTE, search_edges, vertices_to
-from geodesic_core.kernels.wavefront import FROM, TOUCHED, exact_bounds
-from geodesic_core.landmarks import Landmarks
-from geodesic_core.run import Control
+from geodesic_core.fields.sweep import Control
+from geodesic_core.kernels.paths.edge_dijkstra import HASTE, search_edges, vertices_to
+from geodesic_core.kernels.sweep import state
+from geodesic_core.kernels.sweep.state import FROM, TOUCHED, exact_bounds
+from geodesic_core.search.landmarks import Landmarks
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
 from tests.core.searches import edge_paths, goal_at_vertex, random_pairs, spread
@@ -68,7 +68,7 @@ def test_landmarks_do_not_lengthen_it_beyond_the_haste(name):
         landmarks.add(0, Control())
     for begin, end in random_pairs(mesh, 5 if WITHOUT_JIT else 40):
         first, last = int(topology.inner_vertex[begin]), int(topology.inner_vertex[end])
-        wave = wavefront.new_wavefront(topology, pruned=True)
+        wave = state.new_wavefront(topology, pruned=True)
         goal = goal_at_vertex(mesh, last, landmarks=landmarks)
         search_edges(topology, wave, exact_bounds(math.inf, goal), first, last)
         shortest = graph.edge_distances(case.vertices, case.faces, begin)[end]
@@ -81,7 +81,7 @@ def test_it_stops_at_its_end_and_goes_toward_it():
     mesh = gc.TriangleMesh(*zoo.grid(60, 2))
     topology = mesh.topology
     first, last = (int(topology.inner_vertex[v]) for v in (30, 60))
-    wave = wavefront.new_wavefront(topology, pruned=True)
+    wave = state.new_wavefront(topology, pruned=True)
     search_edges(topology, wave, exact_bounds(math.inf, goal_at_vertex(mesh, last)), first, last)
     assert wave.distance[last] == pytest.approx(30.0)
     seen = mesh.vertices[topology.outer_vertex[wave.touched[: wave.counters[TOUCHED]]], 0]
@@ -91,7 +91,7 @@ def test_it_stops_at_its_end_and_goes_toward_it():
 def test_an_unreachable_end_is_left_at_infinity():
     mesh = mesh_of(zoo.SMALL["two_components"])
     first, last = (int(mesh.topology.inner_vertex[v]) for v in (0, 15))
-    wave = wavefront.new_wavefront(mesh.topology, pruned=True)
+    wave = state.new_wavefront(mesh.topology, pruned=True)
     search_edges(
         mesh.topology, wave, exact_bounds(math.inf, goal_at_vertex(mesh, last)), first, last
     )

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from geodesic_core import tolerances
-from geodesic_core.kernels import jit, sweep
+from geodesic_core.kernels import jit
 from geodesic_core.kernels.jit import inlined, kernel, pointer, sources_digest
+from geodesic_core.kernels.sweep import continuous_dijkstra
 
 KERNELS = Path(jit.__file__).parent
 
@@ -37,7 +38,7 @@ def test_the_digest_does_not_depend_on_the_folder(monkeypatch):
     assert sources_digest() == copy
 
 
-@pytest.mark.parametrize("name", ["planar.py", "sweep.py", "../tolerances.py"])
+@pytest.mark.parametrize("name", ["planar.py", "sweep/continuous_dijkstra.py", "../tolerances.py"])
 def test_an_edit_of_any_source_changes_the_digest(copied, name):
     before = sources_digest()
     path = copied / name
@@ -47,7 +48,7 @@ def test_an_edit_of_any_source_changes_the_digest(copied, name):
 
 def test_a_new_name_changes_the_digest(copied):
     before = sources_digest()
-    (copied / "queue.py").rename(copied / "queues.py")
+    (copied / "sweep" / "queues.py").rename(copied / "sweep" / "heap.py")
     assert sources_digest() != before
 
 
@@ -69,7 +70,7 @@ def test_the_cache_is_where_numba_or_the_desktop_keeps_caches(monkeypatch):
 
 @pytest.mark.jit
 def test_kernels_are_kept_under_the_digest():
-    assert sources_digest() in sweep.advance.stats.cache_path
+    assert sources_digest() in continuous_dijkstra.advance.stats.cache_path
 
 
 @pytest.mark.parametrize("decorate", [kernel, inlined])

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from geodesic_core.kernels.merge import (
+from geodesic_core.kernels.sweep.merging import (
     accuracy,
     continuity,
     directionality,
@@ -17,8 +17,8 @@ from geodesic_core.kernels.merge import (
     shortfall,
     visibility,
 )
-from geodesic_core.kernels.overlap import leaves_gap
-from geodesic_core.kernels.wavefront import merging_bounds, new_wavefront
+from geodesic_core.kernels.sweep.state import merging_bounds, new_wavefront
+from geodesic_core.kernels.sweep.trimming import leaves_gap
 from geodesic_core.tolerances import LOCAL_SHARE
 from tests import zoo
 from tests.core.kernels.stepping import topology_of, view_of_arrays

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from geodesic_core.kernels.overlap import trim
+from geodesic_core.kernels.sweep.trimming import trim
 
 ALONG_THE_LINE = 2e-7
 """Where both sources lie on the edge's own line the bisector has half the digits."""

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels.places import leave_out_repeated, place_nodes
-from geodesic_core.kernels.topology import HEAD, TAIL
+from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
+from geodesic_core.kernels.paths.locations import leave_out_repeated, place_nodes
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
 

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from geodesic_core.kernels.planar import bisector, hit_left
-from geodesic_core.kernels.window import distance_at, reaches
+from geodesic_core.kernels.sweep.window import distance_at, reaches
 
 shares = st.floats(0, 1)
 positions = st.floats(-3, 3)

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels import edge_path, sweep, wavefront
-from geodesic_core.kernels.prune import (
+from geodesic_core.fields.sweep import Control, run_sweep
+from geodesic_core.kernels.paths import edge_dijkstra
+from geodesic_core.kernels.sweep import continuous_dijkstra, state
+from geodesic_core.kernels.sweep.pruning import (
     forget,
     least_rest,
     least_to_start,
@@ -15,7 +17,7 @@ from geodesic_core.kernels.prune import (
     may_pass,
     steepest_to_start,
 )
-from geodesic_core.kernels.wavefront import (
+from geodesic_core.kernels.sweep.state import (
     MARKS,
     SIZE,
     TOUCHED,
@@ -23,8 +25,7 @@ from geodesic_core.kernels.wavefront import (
     merging_bounds,
     new_wavefront,
 )
-from geodesic_core.landmarks import Landmarks
-from geodesic_core.run import Control, run_sweep
+from geodesic_core.search.landmarks import Landmarks
 from tests import expected, zoo
 from tests.conftest import WITHOUT_JIT
 from tests.core.approximation import MERGING
@@ -130,7 +131,7 @@ def test_what_an_earlier_sweep_knows_bounds_the_rest(case, count):
             goal = goal_at_vertex(mesh, start, limit, landmarks)
             bounds = merging_bounds(math.inf, GUIDE, math.inf, goal)
             wave = new_wavefront(topology, merges=True, pruned=True)
-            sweep.start_sweep(
+            continuous_dijkstra.start_sweep(
                 topology,
                 wave,
                 np.array([end], np.int32),
@@ -162,7 +163,7 @@ def test_what_may_pass_lies_within_the_limit():
 # What a search leaves behind --------------------------------------------------------------------
 
 
-def state(wave) -> dict[str, bytes]:
+def snapshot(wave) -> dict[str, bytes]:
     """All that a search builds upon; the rest of the arrays is written before it is read."""
     names = ("distance", "winner_ints", "status", "heap_place", "counters", "upper", "light")
     held = {name: getattr(wave, name).tobytes() for name in (*names, "reference", "runs", "origin")}
@@ -178,10 +179,10 @@ def after(mesh, start, end, *, merges, budget):
     bounds = (
         merging_bounds(math.inf, GUIDE, math.inf, goal) if merges else exact_bounds(math.inf, goal)
     )
-    sweep.start_sweep(
+    continuous_dijkstra.start_sweep(
         topology, wave, np.array([start], np.int32), np.zeros(1, np.int32), np.zeros(1), bounds
     )
-    sweep.advance(topology, wave, bounds, budget)
+    continuous_dijkstra.advance(topology, wave, bounds, budget)
     return wave, bounds
 
 
@@ -191,14 +192,14 @@ def test_a_sweep_is_forgotten_whole(name, merges):
     """Wherever it was interrupted."""
     case = zoo.SMALL[name]
     mesh = gc.TriangleMesh(case.vertices, case.faces)
-    fresh = state(new_wavefront(mesh.topology, merges=merges, paths=merges, pruned=True))
+    fresh = snapshot(new_wavefront(mesh.topology, merges=merges, paths=merges, pruned=True))
     budgets = [1, 300, 1 << 60] if WITHOUT_JIT else [*np.geomspace(1, 1e5, 40).astype(int), 1 << 60]
     last = len(case.vertices) - 1
     for budget in budgets:
         wave, bounds = after(mesh, 0, last, merges=merges, budget=int(budget))
-        assert state(wave) != fresh
+        assert snapshot(wave) != fresh
         forget(mesh.topology, wave, bounds)
-        assert state(wave) == fresh
+        assert snapshot(wave) == fresh
 
 
 @pytest.mark.parametrize("name", ["sphere", "crags_with_holes"])
@@ -206,12 +207,12 @@ def test_a_search_along_edges_is_forgotten_whole(name):
     case = zoo.SMALL[name]
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     wave = new_wavefront(mesh.topology, pruned=True)
-    fresh = state(wave)
+    fresh = snapshot(wave)
     bounds = exact_bounds(math.inf, goal_at_vertex(mesh, 30))
-    edge_path.search_edges(mesh.topology, wave, bounds, 0, 30)
-    assert state(wave) != fresh
+    edge_dijkstra.search_edges(mesh.topology, wave, bounds, 0, 30)
+    assert snapshot(wave) != fresh
     forget(mesh.topology, wave, bounds)
-    assert state(wave) == fresh
+    assert snapshot(wave) == fresh
 
 
 def test_every_touched_vertex_is_noted_once():
@@ -219,7 +220,7 @@ def test_every_touched_vertex_is_noted_once():
     wave, _ = after(mesh, 0, 55, merges=False, budget=1 << 60)
     touched = wave.touched[: wave.counters[TOUCHED]].tolist()
     assert len(touched) == len(set(touched)) < len(mesh.vertices)
-    changed = np.flatnonzero(np.isfinite(wave.distance) | (wave.status != wavefront.FAR))
+    changed = np.flatnonzero(np.isfinite(wave.distance) | (wave.status != state.FAR))
     assert sorted(touched) == changed.tolist()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels.straighten import (
+from geodesic_core.kernels.paths.funnel import (
     LEFT,
     NEITHER,
     RIGHT,

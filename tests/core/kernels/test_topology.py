@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.canonical import half_edges_around
-from geodesic_core.kernels.topology import (
+from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     APEX_ANGLE,
     BOUNDARY,
@@ -41,6 +40,7 @@ from geodesic_core.kernels.topology import (
     previous,
     unfold_fans,
 )
+from geodesic_core.mesh.canonical import half_edges_around
 from geodesic_core.tolerances import SADDLE_EXCESS
 from tests import zoo
 from tests.core.kernels.stepping import finished, started, topology_of

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from geodesic_core.kernels import sweep
-from geodesic_core.kernels.propagate import POOL_FULL, SCRATCH_FULL
+from geodesic_core.kernels.sweep import continuous_dijkstra
+from geodesic_core.kernels.sweep.propagation import POOL_FULL, SCRATCH_FULL
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
 from tests.core.kernels.invariants import Watch, exact_by_euclid, exact_by_unfolding
@@ -138,6 +138,11 @@ def test_growing_changes_nothing(name):
     for outcome, grown in steps(topology, wave):
         outcomes.append(outcome)
         wave = grown
-    assert set(outcomes) == {sweep.RUNNING, sweep.FINISHED, POOL_FULL, SCRATCH_FULL}
+    assert set(outcomes) == {
+        continuous_dijkstra.RUNNING,
+        continuous_dijkstra.FINISHED,
+        POOL_FULL,
+        SCRATCH_FULL,
+    }
     assert state_of(wave) == state_of(whole)
     np.testing.assert_array_equal(wave.counters[:10], whole.counters[:10])

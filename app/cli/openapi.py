@@ -1,0 +1,18 @@
+"""Prints the OpenAPI document: ``python -m app.cli.openapi > openapi/openapi.json``."""
+
+import json
+import sys
+from pathlib import Path
+
+from app.main import create_app
+from app.settings import Settings
+
+
+def openapi_text() -> str:
+    """Return the document as it is committed; it depends on no setting."""
+    app = create_app(Settings(store=Path("unused"), workers=1))
+    return json.dumps(app.openapi(), indent=2, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(openapi_text())

@@ -1,0 +1,71 @@
+"""What FastAPI is to do with exceptions: answer with the problem that ``errors`` makes of them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.responses import Response
+from starlette.routing import compile_path
+
+from app.errors import Fault, Problem, ProblemError, pointer, problem_of_status
+from app.http.middleware.request_id import body_too_large
+from app.http.responses import problem_response
+from app.schemas.service import POINT_TAGS
+from app.settings import Settings
+
+
+def install(app: FastAPI, settings: Settings) -> None:
+    """Give ``app`` its exception handlers."""
+
+    async def on_problem(request: Request, error: ProblemError) -> Response:
+        return _respond(request, error.problem)
+
+    async def on_validation(request: Request, error: RequestValidationError) -> Response:
+        return _respond(request, validation_problem(error.errors()))
+
+    async def on_framework(request: Request, error: HTTPException) -> Response:
+        if error.status_code == 413:
+            return _respond(request, body_too_large(request.scope, settings))
+        detail = f"{request.method} {request.url.path}: {error.detail}"
+        headers = error.headers
+        if error.status_code == 405:
+            headers = _allow(app, request.url.path) or headers
+        return _respond(request, problem_of_status(error.status_code, detail, headers))
+
+    async def on_disconnect(_request: Request, _error: ClientDisconnect) -> Response:
+        return Response(status_code=499)  # nobody reads it, but the access log shows it
+
+    handlers: dict[Any, Any] = {
+        ProblemError: on_problem,
+        RequestValidationError: on_validation,
+        HTTPException: on_framework,
+        ClientDisconnect: on_disconnect,
+    }
+    app.exception_handlers.update(handlers)
+
+
+def _allow(app: FastAPI, path: str) -> Mapping[str, str] | None:
+    # Starlette names the methods of the first route alone that has the path.
+    for template, operations in app.openapi()["paths"].items():
+        if compile_path(template)[0].match(path):
+            return {"Allow": ", ".join(sorted(method.upper() for method in operations))}
+    return None
+
+
+def validation_problem(errors: Sequence[Any]) -> Problem:
+    """Return the problem for what pydantic found wrong."""
+    faults = tuple(Fault(_place(error["loc"]), error["msg"]) for error in errors[:10])
+    place = faults[0].pointer or "the body"
+    return Problem("invalid_request", f"{place}: {faults[0].message}", errors=faults)
+
+
+def _place(location: Sequence[str | int]) -> str:
+    named = [part for part in location if part not in POINT_TAGS.values()]
+    return pointer(*(named[1:] if named[0] == "body" else named))
+
+
+def _respond(request: Request, problem: Problem) -> Response:
+    return problem_response(problem, request.url.path, request.state.request_id)

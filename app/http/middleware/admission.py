@@ -1,0 +1,57 @@
+"""Who may come in: a request with a key where keys are set, and no more than a caller may make."""
+
+import re
+
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from app.access import Caller, caller_at
+from app.api_keys import name_of_secret
+from app.errors import ProblemError, refuse
+from app.http.middleware.rate_limits import Allowances
+from app.http.page import ASSETS
+from app.settings import Settings
+
+_OPEN = frozenset({"/", "/livez", "/readyz", "/openapi.json"})
+_OPEN_FOLDERS = ("/problems/", f"{ASSETS}/")
+_BEARER = re.compile(rb"bearer +([A-Za-z0-9._~+/-]+=*)", re.IGNORECASE)
+
+
+def is_open(path: str) -> bool:
+    """Whether ``path`` needs no key and counts for no limit; all else does, if it exists or not."""
+    return path in _OPEN or path.startswith(_OPEN_FOLDERS)
+
+
+class AdmissionMiddleware:
+    """Finds out who asks (``request.state.caller``), and refuses who may not, or not so much."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self.app = app
+        self.keys = settings.api_keys
+        self.allowances = Allowances(settings.rate_limit, settings.max_concurrent)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] != "http" or is_open(scope["path"]):
+            await self.app(scope, receive, send)
+            return
+        scope["state"]["caller"] = caller = self._caller(scope)
+        with self.allowances.one_of(caller):
+            await self.app(scope, receive, send)
+
+    def _caller(self, scope: Scope) -> Caller:
+        if not self.keys:
+            return caller_at(scope["client"][0] if scope["client"] else None)
+        given = [value for name, value in scope["headers"] if name == b"authorization"]
+        if not given:
+            raise _unauthorized("the request has no API key", "Bearer")
+        # uvicorn leaves blanks at the end of a header.
+        credentials = _BEARER.fullmatch(given[0].strip(b" \t")) if len(given) == 1 else None
+        name = name_of_secret(self.keys, credentials[1]) if credentials else None
+        if name is None:
+            raise _unauthorized("the API key is wrong", 'Bearer error="invalid_token"')
+        return Caller(name, has_key=True)
+
+
+def _unauthorized(detail: str, challenge: str) -> ProblemError:
+    hint = "send the header Authorization: Bearer, with one key"
+    return refuse("unauthorized", detail, hint=hint, headers={"WWW-Authenticate": challenge})

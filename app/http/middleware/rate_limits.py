@@ -1,0 +1,66 @@
+"""How much each caller may ask for: requests a minute, and at the same time."""
+
+from collections import Counter, OrderedDict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import ceil
+from time import monotonic
+
+from pyrate_limiter import GCRA, Duration, Rate
+
+from app.access import Caller
+from app.errors import over_limit
+
+_REMEMBERED = 10_000
+"""Callers of whom it is known how much they asked, in some 200 bytes each.
+
+Who was forgotten begins anew: who has ten thousand addresses has as many allowances anyway.
+"""
+
+
+class Allowances:
+    """What callers have left; ``None`` stands for any amount."""
+
+    def __init__(self, a_minute: int | None, at_once: int | None) -> None:
+        self._rates = [Rate(a_minute, Duration.MINUTE)] if a_minute else []
+        self._at_once = at_once
+        self._running: Counter[str] = Counter()
+        # The generic cell rate algorithm knows a caller by one number. The library's own Limiter
+        # would add buckets that are never forgotten, and a thread that looks after them.
+        self._policy = GCRA()
+        self._known: OrderedDict[str, tuple[float, ...]] = OrderedDict()
+
+    @contextmanager
+    def one_of(self, caller: Caller) -> Iterator[None]:
+        """Count what runs inside as one request, or refuse it with ``rate_limited``."""
+        self._refuse_another(caller.name)
+        self._spend(caller.name)
+        self._running[caller.name] += 1
+        try:
+            yield
+        finally:
+            self._running[caller.name] -= 1
+            if not self._running[caller.name]:
+                del self._running[caller.name]
+
+    def _refuse_another(self, name: str) -> None:
+        running = self._running[name] + 1
+        if self._at_once is not None and running > self._at_once:
+            what, headers = "requests at the same time", {"Retry-After": "1"}
+            setting = "max_concurrent"
+            raise over_limit("rate_limited", what, running, self._at_once, setting, headers=headers)
+
+    def _spend(self, name: str) -> None:
+        if not self._rates:
+            return
+        before = self._known.get(name) or self._policy.initial(self._rates)
+        now = int(monotonic() * 1000)
+        self._known[name], decision = self._policy.step(self._rates, before, now, weight=1)
+        self._known.move_to_end(name)
+        if len(self._known) > _REMEMBERED:
+            self._known.popitem(last=False)
+        if not decision.allowed:
+            wait_s = ceil((decision.retry_after_ms or 0) / 1000)
+            what, headers = "requests within a minute", {"Retry-After": str(wait_s)}
+            limit, setting = self._rates[0].limit, "rate_limit"
+            raise over_limit("rate_limited", what, limit + 1, limit, setting, headers=headers)

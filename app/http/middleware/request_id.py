@@ -1,0 +1,87 @@
+"""Around every request: its id, and the promise that each error is a problem."""
+
+import logging
+import re
+from uuid import uuid4
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.middleware.body_limit import MAX_BODY_SIZE_SCOPE_KEY
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.errors import PROBLEM_JSON, Problem, ProblemError, problem_of, problem_of_status
+from app.http.responses import problem_response
+from app.settings import Settings, variable_of
+
+logger = logging.getLogger(__name__)
+
+_SANE_ID = re.compile(r"[\w.:-]{1,128}")
+
+
+class RequestMiddleware:
+    """Gives each request an id, and turns errors that nobody made a problem of into one."""
+
+    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+        self.app = app
+        self.settings = settings
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request."""
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        request_id = _request_id(scope)
+        scope.setdefault("state", {})["request_id"] = request_id
+        has_started = is_replaced = False
+
+        async def answer(problem: Problem) -> None:
+            response = problem_response(problem, scope["path"], request_id)
+            response.headers["X-Request-ID"] = request_id
+            await response(scope, receive, send)
+
+        async def send_checked(message: Message) -> None:
+            nonlocal has_started, is_replaced
+            if message["type"] == "http.response.start":
+                has_started = True
+                headers = MutableHeaders(scope=message)
+                headers["X-Request-ID"] = request_id
+                if message["status"] >= 400 and headers.get("content-type") != PROBLEM_JSON:
+                    is_replaced = True
+                    await answer(self._framework_problem(message["status"], headers, scope))
+            if not is_replaced:
+                await send(message)
+
+        try:
+            await self.app(scope, receive, send_checked)
+        except Exception as error:
+            if not isinstance(error, ProblemError):
+                logger.exception("request %s failed", request_id)
+            if has_started:
+                raise  # too late for a problem: the server cuts the connection
+            await answer(problem_of(error))
+
+    def _framework_problem(self, status: int, headers: Headers, scope: Scope) -> Problem:
+        """Make a problem of what Starlette answers in plain text: bodies and ranges too large."""
+        if status == 413:
+            return body_too_large(scope, self.settings)
+        kept = {"Content-Range": headers["content-range"]} if "content-range" in headers else {}
+        return problem_of_status(status, "", kept)
+
+
+def body_too_large(scope: Scope, settings: Settings) -> Problem:
+    """Return the problem for a body above the limit that Starlette noted in ``scope``."""
+    limit = scope[MAX_BODY_SIZE_SCOPE_KEY]
+    is_upload = limit == settings.max_upload_bytes
+    setting = variable_of("max_upload_bytes" if is_upload else "max_query_bytes")
+    declared = Headers(scope=scope).get("content-length", "")
+    return Problem(
+        "upload_too_large",
+        f"the body is larger than {limit} bytes",
+        limit=limit,
+        actual=int(declared) if declared.isdigit() else None,
+        setting=setting,
+    )
+
+
+def _request_id(scope: Scope) -> str:
+    given = Headers(scope=scope).get("x-request-id", "")
+    return given if _SANE_ID.fullmatch(given) else uuid4().hex

@@ -1,0 +1,143 @@
+"""The interface document: FastAPI's, with problems, headers and examples as they are here."""
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from app.errors import PROBLEM_JSON
+from app.http.middleware.admission import is_open
+from app.http.responses import documented, problems
+
+_PACKAGED = Path(__file__).parents[1] / "examples"
+EXAMPLES = _PACKAGED if _PACKAGED.is_dir() else Path(__file__).parents[2] / "openapi" / "examples"
+"""A file for each operation, by its id: examples by name, of a request and its answer.
+
+In the wheel they are inside the package, in a checkout beside the document.
+"""
+
+_FASTAPI_S_OWN = "Validation Error"  # what it supposes of each operation with parameters
+_TEXT, _NUMBER = {"type": "string"}, {"type": "integer"}
+_REFUSALS = ("unauthorized", "rate_limited")
+_PROBLEM = {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}
+_SECURITY_SCHEME = {
+    "type": "http",
+    "scheme": "bearer",
+    "description": "A key of this service, where it asks for one.",
+}
+
+
+def _header(meaning: str, schema: Mapping[str, Any] = _TEXT) -> dict[str, Any]:
+    return {"description": meaning, "schema": schema}
+
+
+_HEADERS = {
+    "Accept-Ranges": _header("`bytes`: ranges of the answer can be asked for"),
+    "Cache-Control": _header("Who may keep the answer, and for how long"),
+    "ETag": _header("Names the content of the answer, in its format and coding"),
+    "Last-Modified": _header("When the file of the answer was written"),
+    "Content-Range": _header("Which bytes these are, of how many"),
+    "Geodesic-Dtype": _header("Of the numbers in `npy`, `npz` and `octets`: `<f8` or `<f4`"),
+    "Geodesic-Shape": _header("Of the array in these formats, `rows,columns` of a matrix"),
+    "Location": _header("Where the mesh or the job is"),
+    "Preference-Applied": _header("`respond-async`"),
+    "Retry-After": _header("Seconds after which it is worth to try again", _NUMBER),
+    "Server-Timing": _header(
+        "Milliseconds of each phase, as `queue;dur=0.1, load;dur=0.0, compute;dur=3.2, "
+        "encode;dur=0.3`; `kept` where the answer was there already"
+    ),
+    "Vary": _header("Which headers of the request decide on the answer"),
+    "WWW-Authenticate": _header("`Bearer`, and what is wrong with the key that came"),
+    "X-Request-ID": _header("That of the request, or a new one; the log names it"),
+}
+_HEADERS_OF_STATUS = {
+    "401": ("WWW-Authenticate",),
+    "409": ("Retry-After",),
+    "429": ("Retry-After",),
+    "503": ("Retry-After",),
+}
+_CONDITION = {
+    "name": "If-None-Match",
+    "in": "header",
+    "required": False,
+    "description": "The `ETag` of an answer that is known; where it is the same still, 304",
+    "schema": _TEXT,
+}
+_RANGE = {
+    "name": "Range",
+    "in": "header",
+    "required": False,
+    "description": "Which bytes of the answer to send, RFC 9110; it comes without a content coding",
+    "schema": _TEXT,
+}
+
+
+def complete(document: dict[str, Any]) -> dict[str, Any]:
+    """Return FastAPI's ``document``, completed."""
+    for template, path in document["paths"].items():
+        for operation in path.values():
+            operation["responses"] = dict(_responses(operation, template))
+            if not is_open(template):
+                operation["security"] = [{"apiKey": []}, {}]
+            for status, parameter in (("206", _RANGE), ("304", _CONDITION)):
+                if status in operation["responses"]:
+                    operation.setdefault("parameters", []).append(dict(parameter))
+            for name, example in _examples(operation["operationId"]).items():
+                _show(operation, name, example)
+    components = document["components"]
+    for name in ("HTTPValidationError", "ValidationError"):
+        components["schemas"].pop(name, None)
+    components["securitySchemes"] = {"apiKey": _SECURITY_SCHEME}
+    components["headers"] = _HEADERS
+    return document
+
+
+def _responses(operation: Mapping[str, Any], template: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the answers of an operation by status, problems as what they are."""
+    found = {
+        status: response
+        for status, response in operation["responses"].items()
+        if response["description"] != _FASTAPI_S_OWN
+    }
+    added = ["internal_error"] if is_open(template) else ["internal_error", *_REFUSALS]
+    for status, refusal in problems(*added).items():
+        known = found.get(str(status), {"description": ""})["description"]
+        meant = ", ".join(filter(None, [known, refusal["description"]]))
+        found[str(status)] = {"description": meant}
+    for status in sorted(found):
+        names = ("X-Request-ID", *_HEADERS_OF_STATUS.get(status, ()))
+        response = {
+            **found[status],
+            "headers": found[status].get("headers", {}) | documented(*names),
+        }
+        if status >= "400":
+            response["content"] = {PROBLEM_JSON: dict(_PROBLEM)}
+        for content in response.get("content", {}).values():
+            if "itemSchema" in content:  # of OpenAPI 3.2, while the document is of 3.1
+                content.clear()
+                content["schema"] = _TEXT
+        yield status, response
+
+
+def _examples(operation_id: str) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((EXAMPLES / f"{operation_id}.json").read_bytes())
+    return found
+
+
+def _show(operation: dict[str, Any], name: str, example: Mapping[str, Any]) -> None:
+    """Write an example into the description of its operation, at each of the places it has."""
+    summary, answer = {"summary": example["summary"]}, example["response"]
+    given = dict(example.get("parameters", {}))
+    for parameter in operation.get("parameters", []):
+        if parameter["name"] in given:
+            shown = {**summary, "value": given.pop(parameter["name"])}
+            parameter.setdefault("examples", {})[name] = shown
+    if given:
+        raise ValueError(f"{operation['operationId']} has no parameter {', '.join(given)}")
+    bodies = [(operation.get("requestBody"), example.get("body"))]
+    bodies.append((operation["responses"][str(answer["status"])], answer.get("body")))
+    for place, body in bodies:
+        if place is not None and body is not None:
+            shown = {**summary, "value": body["value"]}
+            content = place["content"][body["media_type"]]
+            content.setdefault("examples", {})[name] = shown

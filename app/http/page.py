@@ -1,0 +1,64 @@
+"""The page at ``/``: what Vite has made of ``app/web``, and how browsers are to keep it."""
+
+from pathlib import Path
+
+from starlette.datastructures import Headers
+from starlette.responses import Response
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
+
+DIST = Path(__file__).parents[1] / "web" / "dist"
+ASSETS = "/assets"
+
+# Nothing is loaded from elsewhere, and nothing that is written in the page itself is run.
+_POLICY = "; ".join(
+    (
+        "default-src 'none'",
+        "script-src 'self'",
+        "worker-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' blob:",
+        "connect-src 'self'",
+        "base-uri 'none'",
+        "form-action 'none'",
+        "frame-ancestors 'none'",
+    )
+)
+_SAFE = {
+    "Content-Security-Policy": _POLICY,
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+_INDEX = {**_SAFE, "Cache-Control": "no-cache", "Vary": "Accept"}
+_ASSET = {**_SAFE, "Cache-Control": "public, max-age=31536000, immutable"}
+
+
+def is_built() -> bool:
+    """Whether the page is part of this installation."""
+    return (DIST / "index.html").is_file()
+
+
+def wants_page(headers: Headers) -> bool:
+    """Whether a browser asks, to show what it gets: others do not name HTML."""
+    return "text/html" in headers.get("accept", "")
+
+
+def page_response(scope: Scope) -> Response:
+    """Return the page, or that it has not changed."""
+    path = DIST / "index.html"
+    response = StaticFiles(directory=DIST).file_response(path, path.stat(), scope)
+    response.headers.update(_INDEX)
+    return response
+
+
+class Assets(StaticFiles):
+    """Scripts, styles and images of the page, whose names are hashes of their content."""
+
+    def __init__(self) -> None:
+        super().__init__(directory=DIST / "assets")
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        """Return a file that may be kept for good."""
+        response = await super().get_response(path, scope)
+        response.headers.update(_ASSET)
+        return response

@@ -1,0 +1,136 @@
+"""The service itself: index, health, limits, and the meaning of its errors."""
+
+from typing import get_args
+
+from fastapi import APIRouter, Request, Response
+from starlette.responses import PlainTextResponse
+
+from app import __version__
+from app.encoding import FORMATS
+from app.errors import CODES, refuse
+from app.http import page
+from app.http.dependencies import ServiceDep
+from app.http.metrics import Metrics
+from app.http.responses import UNSTORED, documented, problems
+from app.http.uploads import FORMATS as MESH_FORMATS
+from app.schemas.service import About, Health, Index, Method, ProblemCode, SampleName
+from app.settings import variable_of
+
+router = APIRouter(tags=["service"])
+
+_LIMITS = (
+    "store_bytes",
+    "max_upload_bytes",
+    "max_query_bytes",
+    "max_faces",
+    "max_sources",
+    "max_matrix_cells",
+    "max_waypoints",
+    "max_levels",
+    "max_json_values",
+    "query_memory_bytes",
+    "worker_memory_bytes",
+    "queue_size",
+    "deadline_s",
+    "job_deadline_s",
+    "job_ttl",
+    "rate_limit",
+    "max_concurrent",
+)
+
+
+@router.get(
+    "/",
+    operation_id="getIndex",
+    summary="Where to find what",
+    response_model=Index,
+    responses={
+        200: {
+            "content": {"text/html": {}},
+            "description": "Addresses; for browsers the page",
+            "headers": documented("Vary"),
+        }
+    },
+)
+async def get_index(request: Request, response: Response) -> Response | Index:
+    """Return the addresses to begin with; to a browser, the page."""
+    if page.is_built() and page.wants_page(request.headers):
+        return page.page_response(request.scope)
+    response.headers["Vary"] = "Accept"
+    links = {"about": "/v1", "meshes": "/v1/meshes", "openapi": "/openapi.json"}
+    shown = "for browsers" if page.is_built() else "left out when this package was built"
+    return Index(service="geodesic", version=__version__, page=shown, links=links)
+
+
+@router.get("/livez", operation_id="getLiveness", summary="Is the process alive?")
+async def get_liveness() -> Health:
+    """Return 200 as soon as the service listens."""
+    return Health(status="ok")
+
+
+@router.get(
+    "/readyz",
+    operation_id="getReadiness",
+    summary="Can it compute?",
+    response_model=Health,
+    responses=problems("engine_unavailable", "draining"),
+)
+async def get_readiness(service: ServiceDep) -> Health:
+    """Return 200 once a worker has its kernels compiled, 503 before."""
+    if service.engine.is_draining:
+        raise refuse("draining", "the service is about to stop", headers={"Retry-After": "1"})
+    if not service.engine.is_ready:
+        detail = "no worker is ready yet: kernels are being compiled or loaded"
+        raise refuse("engine_unavailable", detail, headers={"Retry-After": "1"})
+    return Health(status="ok")
+
+
+@router.get("/v1", operation_id="getAbout", summary="Version, formats and limits in force")
+async def get_about(service: ServiceDep) -> About:
+    """Return what this service can do, and how much of it."""
+    limits = {variable_of(name): getattr(service.settings, name) for name in _LIMITS}
+    return About(
+        version=__version__,
+        methods=list(get_args(Method)),
+        mesh_formats=[*MESH_FORMATS, "json"],
+        answer_formats=dict(FORMATS),
+        samples=list(get_args(SampleName)),
+        limits={name: limit for name, limit in limits.items() if limit is not None},
+    )
+
+
+@router.get(
+    "/metrics",
+    operation_id="getMetrics",
+    summary="Metrics, as Prometheus reads them",
+    response_class=PlainTextResponse,
+    responses={
+        200: {
+            "description": "Metrics named `geodesic_…`, in Prometheus's text format",
+            "headers": documented("Cache-Control"),
+        }
+    },
+)
+async def get_metrics(request: Request) -> Response:
+    """Return what an operator watches: requests, workers, queue, results, jobs."""
+    metrics: Metrics = request.app.state.metrics
+    text, media_type = await metrics.written(request.headers.get("accept", ""))
+    return Response(text, headers={**UNSTORED, "Content-Type": media_type})
+
+
+@router.get(
+    "/problems/{code}",
+    operation_id="getProblem",
+    summary="What an error code means",
+    response_model=ProblemCode,
+    responses={
+        200: {"description": "The meaning", "headers": documented("Cache-Control")},
+        **problems("not_found"),
+    },
+)
+async def get_problem(code: str, response: Response) -> ProblemCode:
+    """Return the row of the error table; the `type` of a problem leads here."""
+    if code not in CODES:
+        raise refuse("not_found", f"there is no code {code!r}; there are {', '.join(CODES)}")
+    response.headers["Cache-Control"] = "public, max-age=86400"
+    return ProblemCode(code=code, **vars(CODES[code]))

@@ -1,0 +1,167 @@
+"""Jobs: queries that are answered whether their client waits or not."""
+
+from collections.abc import AsyncIterator
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Header, Query, Request, Response
+from fastapi.sse import EventSourceResponse, ServerSentEvent
+
+from app.encoding import JSON
+from app.errors import refuse
+from app.http.dependencies import CallerDep, ServiceDep
+from app.http.responses import (
+    ENDS,
+    OF_FILES,
+    REVALIDATED,
+    UNSTORED,
+    documented,
+    etag_of,
+    job_document,
+    not_modified,
+    problems,
+    result_response,
+)
+from app.jobs import Job
+from app.schemas.service import JobDocument, JobList, ListParameters
+from app.service.service import Answered
+
+router = APIRouter(prefix="/jobs", tags=["jobs"])
+
+
+async def get_job_asked_for(job_id: str, service: ServiceDep, caller: CallerDep) -> Job:
+    """Return the job that the address names."""
+    return await service.jobs.find(caller.owner, job_id)
+
+
+JobDep = Annotated[Job, Depends(get_job_asked_for)]
+
+
+@router.get(
+    "",
+    operation_id="listJobs",
+    summary="List your jobs",
+    response_model=JobList,
+    response_model_exclude_unset=True,
+    responses={
+        200: {"description": "The jobs", "headers": documented("Cache-Control")},
+        **problems("invalid_request"),
+    },
+)
+async def list_jobs(
+    parameters: Annotated[ListParameters, Query()],
+    response: Response,
+    service: ServiceDep,
+    caller: CallerDep,
+) -> dict[str, Any]:
+    """List jobs, the newest first, `limit` at a time."""
+    response.headers.update(UNSTORED)
+    before = _number(parameters.cursor)
+    jobs, after = await service.jobs.page(caller.owner, parameters.limit, before)
+    cursor = None if after is None else str(after)
+    return {"jobs": [job_document(job) for job in jobs], "next_cursor": cursor}
+
+
+@router.get(
+    "/{job_id}",
+    operation_id="getJob",
+    summary="How far is a job?",
+    response_model=JobDocument,
+    response_model_exclude_unset=True,
+    responses={
+        200: {"description": "The job", "headers": documented("Cache-Control")},
+        **problems("job_not_found"),
+    },
+)
+async def get_job(job: JobDep, response: Response) -> dict[str, Any]:
+    """Return the state of a job; the status is 200 whatever has become of it."""
+    response.headers.update(UNSTORED)
+    return job_document(job)
+
+
+@router.delete(
+    "/{job_id}",
+    operation_id="dismissJob",
+    summary="Stop a job, or forget one that has finished",
+    response_model=JobDocument,
+    response_model_exclude_unset=True,
+    responses=problems("job_not_found"),
+)
+async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> dict[str, Any]:
+    """Stop a job that is waiting or running: it is `dismissed` then.
+
+    One that has finished, also a dismissed one, is removed with its answer.
+    """
+    return job_document(await service.jobs.dismiss(caller.owner, job.id))
+
+
+@router.get(
+    "/{job_id}/results",
+    operation_id="getJobResults",
+    summary="Read the answer of a job",
+    response_class=Response,
+    responses={
+        200: {
+            "description": "What the query itself would have been answered with",
+            "content": {JSON: {"schema": {}}},
+            "headers": documented("Server-Timing", *OF_FILES),
+        },
+        206: {
+            "description": "The range asked for",
+            "headers": documented("Server-Timing", "Content-Range", *OF_FILES),
+        },
+        304: {"description": "The answer is the one that is known", "headers": documented("ETag")},
+        **problems(
+            "job_not_found", "job_not_finished", "job_dismissed", *ENDS, "range_not_satisfiable"
+        ),
+    },
+)
+async def get_job_results(
+    job_id: str, request: Request, service: ServiceDep, caller: CallerDep
+) -> Response:
+    """Return the answer, in the format that the query asked for; or the problem that it met."""
+    job, result = await service.jobs.result(caller.owner, job_id)
+    unchanged = not_modified(request, etag_of(result.key), REVALIDATED)
+    if unchanged is not None:
+        service.results.give_back(result)
+        return unchanged
+    answered = Answered(result, {})
+    return result_response(request, answered, job.errand.media_type, service.results, REVALIDATED)
+
+
+@router.get(
+    "/{job_id}/events",
+    operation_id="watchJob",
+    summary="Watch a job",
+    response_class=EventSourceResponse,
+    responses={
+        200: {"description": "Events, the data of each of which is a `JobDocument`"},
+        **problems("job_not_found"),
+    },
+)
+async def watch_job(
+    job: JobDep,
+    service: ServiceDep,
+    last_event_id: Annotated[
+        str | None, Header(description="The id of the last event that was seen")
+    ] = None,
+) -> AsyncIterator[ServerSentEvent]:
+    """Send the job, as `GET` returns it, whenever it changes, until it has finished.
+
+    The id of an event counts the states of the job; a client that comes back with the last one it
+    saw is not sent that again. A comment comes every 15 s.
+    """
+    async for state in service.jobs.watch(job, _version(last_event_id)):
+        yield ServerSentEvent(data=job_document(state), id=str(state.version))
+
+
+def _version(event_id: str | None) -> int:
+    # What is no id of ours stands for having seen nothing, as the specification has it.
+    return int(event_id) if event_id is not None and event_id.isdecimal() else 0
+
+
+def _number(cursor: str | None) -> int | None:
+    if cursor is None:
+        return None
+    if not cursor.isdecimal():
+        raise refuse("invalid_request", f"{cursor!r} is no next_cursor of a list of jobs")
+    return int(cursor)

@@ -1,0 +1,225 @@
+"""Meshes: upload, list, describe, read arrays, delete."""
+
+from collections.abc import Mapping
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request, Response
+
+from app.access import Caller
+from app.encoding import NPY
+from app.engine.work import MeshFromFile, MeshFromSample
+from app.errors import Fault, over_limit, refuse
+from app.http.dependencies import AskerDep, CallerDep, ServiceDep, while_connected
+from app.http.responses import (
+    IMMUTABLE,
+    OF_FILES,
+    OF_WORK,
+    REVALIDATED,
+    StoredFileResponse,
+    documented,
+    etag_of,
+    not_modified,
+    problems,
+    server_timing,
+)
+from app.http.uploads import spool
+from app.schemas.service import ListParameters, MeshDocument, MeshList, UploadParameters
+from app.service.service import Added, Asker, Service
+
+router = APIRouter(prefix="/meshes", tags=["meshes"])
+
+_DEFAULT_SAMPLE_FACES = 20_000
+_BINARY = {"schema": {"type": "string", "format": "binary"}}
+_BODIES = {
+    "requestBody": {
+        "content": {
+            "application/octet-stream": _BINARY,
+            "multipart/form-data": {
+                "schema": {
+                    "type": "object",
+                    "properties": {"file": {"type": "string", "format": "binary"}},
+                }
+            },
+            "application/json": {
+                "schema": {
+                    "type": "object",
+                    "additionalProperties": False,
+                    "required": ["vertices", "faces"],
+                    "properties": {
+                        "vertices": {
+                            "type": "array",
+                            "items": {
+                                "type": "array",
+                                "items": {"type": "number"},
+                                "minItems": 3,
+                                "maxItems": 3,
+                            },
+                        },
+                        "faces": {
+                            "type": "array",
+                            "items": {
+                                "type": "array",
+                                "items": {"type": "integer", "minimum": 0},
+                                "minItems": 3,
+                                "maxItems": 3,
+                            },
+                        },
+                    },
+                },
+            },
+        }
+    }
+}
+
+
+@router.post(
+    "",
+    operation_id="createMesh",
+    summary="Upload a mesh, or make a sample",
+    status_code=201,
+    response_model=MeshDocument,
+    responses={
+        200: {
+            "model": MeshDocument,
+            "description": "The mesh was in the store already",
+            "headers": documented("Location", "Server-Timing"),
+        },
+        201: {
+            "description": "The mesh is new in the store",
+            "headers": documented("Location", "Server-Timing"),
+        },
+        **problems(
+            "malformed_body",
+            "upload_too_large",
+            "unsupported_media_type",
+            "invalid_mesh",
+            *OF_WORK,
+        ),
+    },
+    openapi_extra=_BODIES,
+)
+async def create_mesh(
+    parameters: Annotated[UploadParameters, Query()],
+    request: Request,
+    response: Response,
+    service: ServiceDep,
+    asker: AskerDep,
+) -> Mapping[str, object]:
+    """Read, check and store a mesh; the id is a hash of its content.
+
+    The body is the file itself (with its format in `Content-Type` or `?format=`), a form with one
+    file, or JSON. Vertices and triangles keep the order they have in the file; polygons become
+    triangles in their place, and `face_map` leads back to them.
+    """
+    if parameters.sample is None:
+        added = await _add_upload(service, parameters, request, asker)
+    else:
+        making = service.add_mesh(_sample(service, parameters, asker.caller), asker)
+        added = await while_connected(request, making)
+    response.status_code = 201 if added.is_new else 200
+    response.headers.update(server_timing(added.seconds))
+    response.headers["Location"] = f"/v1/meshes/{added.mesh['id']}"
+    return added.mesh
+
+
+@router.get(
+    "",
+    operation_id="listMeshes",
+    summary="List the meshes in the store",
+    response_model=MeshList,
+    responses=problems("invalid_request"),
+)
+async def list_meshes(
+    parameters: Annotated[ListParameters, Query()], service: ServiceDep
+) -> dict[str, object]:
+    """List the reports of the meshes by id, `limit` at a time."""
+    meshes, cursor = await service.list_meshes(parameters.limit, parameters.cursor or "")
+    return {"meshes": meshes, "next_cursor": cursor}
+
+
+@router.get(
+    "/{mesh_id}",
+    operation_id="getMesh",
+    summary="Describe a mesh",
+    response_model=MeshDocument,
+    responses={
+        200: {"description": "The report", "headers": documented("ETag", "Cache-Control")},
+        304: {"description": "The report is the one that is known", "headers": documented("ETag")},
+        **problems("mesh_not_found", "mesh_damaged"),
+    },
+)
+async def get_mesh(
+    mesh_id: str, request: Request, response: Response, service: ServiceDep
+) -> Response | dict[str, object]:
+    """Return the report that the upload was answered with."""
+    described = service.describe(mesh_id)
+    kept = {**REVALIDATED, "ETag": etag_of(mesh_id)}
+    response.headers.update(kept)
+    return not_modified(request, etag_of(mesh_id), kept) or described
+
+
+@router.delete(
+    "/{mesh_id}",
+    operation_id="deleteMesh",
+    summary="Remove a mesh and its results",
+    status_code=204,
+    responses=problems("forbidden", "mesh_not_found"),
+)
+async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> None:
+    """Remove a mesh; queries that run on it end as if it were there.
+
+    Where keys are asked for, it needs the one that stored the mesh first.
+    """
+    await service.delete_mesh(mesh_id, caller)
+
+
+@router.get(
+    "/{mesh_id}/arrays/{name}",
+    operation_id="getMeshArray",
+    summary="Read an array of a mesh",
+    response_class=Response,
+    responses={
+        200: {
+            "content": {NPY: _BINARY},
+            "description": "The array in numpy's own format",
+            "headers": documented(*OF_FILES),
+        },
+        206: {
+            "content": {NPY: _BINARY},
+            "description": "The range asked for",
+            "headers": documented("Content-Range", *OF_FILES),
+        },
+        304: {"description": "The array is the one that is known", "headers": documented("ETag")},
+        **problems("mesh_not_found", "not_found", "range_not_satisfiable"),
+    },
+)
+async def get_mesh_array(
+    mesh_id: str, name: str, request: Request, service: ServiceDep
+) -> Response:
+    """Send `vertices`, `faces`, `vertex_map`, `face_map` or `components`; ranges are served."""
+    path = service.array_file(mesh_id, name)
+    etag = etag_of(f"{mesh_id}-{name}")
+    return not_modified(request, etag, IMMUTABLE) or StoredFileResponse(
+        path, headers={"ETag": etag, **IMMUTABLE}, media_type=NPY
+    )
+
+
+async def _add_upload(
+    service: Service, parameters: UploadParameters, request: Request, asker: Asker
+) -> Added:
+    if parameters.faces is not None:
+        fault = Fault("/query/faces", "only a sample can be asked for with so many faces")
+        raise refuse("invalid_request", fault.message, errors=(fault,))
+    async with service.mesh_books.scratch_folder() as folder, service.within(asker.deadline_s):
+        path = folder / "upload"
+        file_format = await spool(request, path, parameters.format)
+        origin = MeshFromFile(path, file_format, parameters.merge, asker.caller.owner)
+        return await while_connected(request, service.add_mesh(origin, asker))
+
+
+def _sample(service: Service, parameters: UploadParameters, caller: Caller) -> MeshFromSample:
+    faces = parameters.faces or _DEFAULT_SAMPLE_FACES
+    if faces > service.settings.max_faces:
+        limit = service.settings.max_faces
+        raise over_limit("limit_exceeded", "faces", faces, limit, "max_faces")
+    return MeshFromSample(str(parameters.sample), faces, parameters.merge, caller.owner)

@@ -1,0 +1,236 @@
+"""Queries on a mesh: one handler for each kind."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Query, Response
+
+from app.encoding import CSV, GEOJSON, JSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
+from app.encoding.form import ARRAYS, TEXTS
+from app.http.responses import ENDS, OF_FILES, documented, problems
+from app.http.routes.query_request import AskedDep
+from app.http.routes.query_route import QueryRoute
+from app.queries import (
+    DistancesQuery,
+    IsolinesQuery,
+    LocateQuery,
+    MatrixQuery,
+    NearestQuery,
+    PathQuery,
+    PathsQuery,
+    naming_parameters,
+    written_request,
+)
+from app.schemas.service import (
+    AnswerParameters,
+    DistancesAnswer,
+    DistancesRequest,
+    Estimate,
+    IsolinesAnswer,
+    IsolinesRequest,
+    JobDocument,
+    LocateAnswer,
+    LocateRequest,
+    MatrixAnswer,
+    MatrixRequest,
+    NearestAnswer,
+    NearestRequest,
+    PathAnswer,
+    PathAnswerParameters,
+    PathParameters,
+    PathRequest,
+    PathsAnswer,
+    PathsRequest,
+)
+
+router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"], route_class=QueryRoute)
+
+_CODES = ("not_acceptable", *ENDS, "range_not_satisfiable")
+_BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
+
+
+def _answers(model: type, description: str, *others: str) -> dict[int | str, dict[str, Any]]:
+    """Describe an answer in JSON, and in ``others``, which have no room for all of it."""
+    description += ". In formats other than JSON the rest comes as `Geodesic-…` headers"
+    content = {name: {"schema": _TEXT if name in TEXTS else _BINARY} for name in others}
+    described = documented("Vary", "Server-Timing", *OF_FILES)
+    accepted = documented("Location", "Preference-Applied", "Cache-Control")
+    if any(name in ARRAYS for name in others):
+        described |= documented("Geodesic-Dtype", "Geodesic-Shape")
+    return {
+        200: {
+            "model": model | Estimate,
+            "content": content,
+            "description": description,
+            "headers": described,
+        },
+        202: {
+            "model": JobDocument,
+            "description": "With `Prefer: respond-async`: the job",
+            "headers": accepted,
+        },
+        206: {
+            "content": {name: {"schema": _BINARY} for name in (JSON, *others)},
+            "description": "The range asked for",
+            "headers": documented("Vary", "Server-Timing", "Content-Range", *OF_FILES),
+        },
+    }
+
+
+_TEXT = {"type": "string"}
+_BINARY = {"type": "string", "format": "binary"}
+_LINES = OBJ, CSV, SVG, GEOJSON
+_PATH = "The path; its points in binary"
+
+
+def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[str, Any]:
+    """Return what is said of a query whose points come as JSON."""
+    return {
+        "operation_id": name,
+        "summary": summary,
+        "response_class": Response,
+        "responses": {**answers, **problems(*_BODY_CODES)},
+    }
+
+
+Parameters = Annotated[AnswerParameters, Query()]
+
+
+@router.post(
+    "/distances",
+    **_posted(
+        "computeDistances",
+        "Distances from sources to all vertices, exact or within a chosen error",
+        _answers(
+            DistancesAnswer,
+            "The distances; as PLY the mesh with them at its vertices, for all vertices only",
+            NPY,
+            OCTETS,
+            CSV,
+            PLY,
+        ),
+    ),
+)
+async def compute_distances(
+    body: DistancesRequest, parameters: Parameters, asked: AskedDep
+) -> Response:
+    """Return the distance along the surface from the nearest source to each vertex."""
+    return await asked.answer(DistancesQuery, body, parameters)
+
+
+@router.post(
+    "/path",
+    **_posted(
+        "computePath",
+        "The shortest path between two points, exact or within a chosen error",
+        _answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES),
+    ),
+)
+async def compute_path(
+    body: PathRequest,
+    parameters: Annotated[PathAnswerParameters, Query()],
+    asked: AskedDep,
+) -> Response:
+    """Return the points of the path, from source to target, and the faces it crosses."""
+    explain = body.explain or parameters.explain
+    return await asked.answer(PathQuery, body.model_copy(update={"explain": explain}), parameters)
+
+
+@router.get(
+    "/path",
+    operation_id="getPath",
+    summary="The shortest path between two points, cacheable",
+    response_class=Response,
+    responses={
+        **_answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES),
+        304: {
+            "description": "The answer is the one that is known",
+            "headers": documented("ETag", "Cache-Control", "Vary"),
+        },
+        **problems(*_CODES),
+    },
+)
+async def get_path(parameters: Annotated[PathParameters, Query()], asked: AskedDep) -> Response:
+    """Return the same as `POST`, for points written as `v12` or `f7:0.2,0.3,0.5`."""
+    with naming_parameters():
+        return await asked.answer(PathQuery, written_request(parameters), parameters)
+
+
+@router.post(
+    "/paths",
+    **_posted(
+        "computePaths",
+        "Shortest paths from one point to many, from one solve",
+        _answers(PathsAnswer, "The paths, in the order of the targets", *_LINES),
+    ),
+)
+async def compute_paths(body: PathsRequest, parameters: Parameters, asked: AskedDep) -> Response:
+    """Return a path to each target, or the reason why there is none."""
+    return await asked.answer(PathsQuery, body, parameters)
+
+
+@router.post(
+    "/isolines",
+    **_posted(
+        "computeIsolines",
+        "Lines of equal distance from sources",
+        _answers(IsolinesAnswer, "The lines of each level, closed and open", *_LINES),
+    ),
+)
+async def compute_isolines(
+    body: IsolinesRequest, parameters: Parameters, asked: AskedDep
+) -> Response:
+    """Return the polylines of points at each level, exact where they cross edges."""
+    return await asked.answer(IsolinesQuery, body, parameters)
+
+
+@router.post(
+    "/matrix",
+    **_posted(
+        "computeMatrix",
+        "Exact distances from many points to many others",
+        _answers(
+            MatrixAnswer,
+            "The distances; a sparse matrix in binary as `scipy.sparse.load_npz` reads it",
+            NPY,
+            NPZ,
+            OCTETS,
+            CSV,
+        ),
+    ),
+)
+async def compute_matrix(body: MatrixRequest, parameters: Parameters, asked: AskedDep) -> Response:
+    """Return a distance for each source and target, or for each pair.
+
+    In binary, a dense matrix and pairs come as npy and octets, a sparse matrix as npz.
+    """
+    return await asked.answer(MatrixQuery, body, parameters)
+
+
+@router.post(
+    "/nearest",
+    **_posted(
+        "findNearest",
+        "The candidates that are nearest to a point along the surface",
+        _answers(NearestAnswer, "The candidates, nearest first", CSV, GEOJSON),
+    ),
+)
+async def find_nearest(body: NearestRequest, parameters: Parameters, asked: AskedDep) -> Response:
+    """Return the `k` nearest candidates, or as many as can be reached."""
+    return await asked.answer(NearestQuery, body, parameters)
+
+
+@router.post(
+    "/locate",
+    **_posted(
+        "locatePoints",
+        "The points of the surface that are nearest to positions",
+        _answers(LocateAnswer, "The points, in the order of the positions", CSV, GEOJSON),
+    ),
+)
+async def locate_points(body: LocateRequest, parameters: Parameters, asked: AskedDep) -> Response:
+    """Return the nearest point for each position, `null` where it is farther than `max_distance`.
+
+    A point that is nearer to a vertex or an edge than 1e-12 of the bounding box is on it.
+    """
+    return await asked.answer(LocateQuery, body, parameters)

@@ -1,0 +1,98 @@
+"""What every query is asked beside itself: of which mesh, by whom, how; and the way to answer."""
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from fastapi import Depends, Header, Request, Response
+from pydantic import Field
+
+from app.http.dependencies import (
+    TimeoutHeader,
+    asker_of,
+    form_of,
+    prefers_async,
+    service_of,
+    while_connected,
+)
+from app.http.responses import (
+    CACHED,
+    NEGOTIATED,
+    UNSTORED,
+    accepted_response,
+    estimate_response,
+    etag_of,
+    not_modified,
+    result_response,
+)
+from app.http.routes.bodies import beside_the_loop
+from app.queries import Query, result_key
+from app.schemas.service import AnswerParameters
+from app.service.service import Asker
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Of what a query is asked, by whom, and how it is to be answered."""
+
+    mesh_id: str
+    request: Request
+    asker: Asker
+    is_async: bool
+    key: str | None
+
+    async def answer(
+        self, kind: type[Query[Any]], body: Any, parameters: AnswerParameters
+    ) -> Response:
+        """Answer the query of a kind that a body asks, or tell what that would take."""
+        request, asker = self.request, self.asker
+        service = service_of(request)
+        size = service.size(self.mesh_id)
+
+        def ask() -> Query[Any]:
+            query = kind.ask(self.mesh_id, size, body, service.settings)
+            query.written  # noqa: B018 - kept by it
+            return query
+
+        query = await beside_the_loop(request, ask)
+        form = form_of(request, parameters, query.offers)
+        if parameters.estimate:
+            estimating = service.estimate(query, size, form, asker)
+            estimate, seconds = await while_connected(request, estimating)
+            return estimate_response(self.mesh_id, estimate, form.media_type, seconds)
+        if self.is_async:
+            return accepted_response(await service.submit(query, size, form, asker, self.key))
+        is_cacheable = request.method == "GET" and query.is_repeatable
+        headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
+        if is_cacheable:
+            unchanged = not_modified(request, etag_of(result_key(query, form)), headers)
+            if unchanged is not None:
+                return unchanged
+        answering = service.answer(query, size, form, asker, as_file="range" in request.headers)
+        answered = await while_connected(request, answering)
+        return result_response(request, answered, form.media_type, service.results, headers)
+
+
+class AskingHeaders(TimeoutHeader):
+    """The headers of a request for a query."""
+
+    prefer: str | None = Field(
+        default=None, description="`respond-async`: answer at once with a job, RFC 7240"
+    )
+    idempotency_key: str | None = Field(
+        default=None,
+        alias="idempotency-key",
+        min_length=1,
+        max_length=255,
+        description="Of a job, freely chosen: what is sent again with it is the same job",
+    )
+
+
+async def get_asked(
+    mesh_id: str, request: Request, headers: Annotated[AskingHeaders, Header()]
+) -> Asked:
+    """Return what a request for a query says beside the query."""
+    is_async = prefers_async(headers.prefer)
+    return Asked(mesh_id, request, asker_of(request, headers), is_async, headers.idempotency_key)
+
+
+AskedDep = Annotated[Asked, Depends(get_asked)]

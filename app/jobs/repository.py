@@ -1,0 +1,153 @@
+"""The records of jobs, in SQLite: they outlive the process that wrote them."""
+
+import sqlite3
+from collections.abc import Sequence
+from contextlib import closing
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import aiosqlite
+
+from app.jobs.job import Job
+from app.store.layout import StoreError
+
+_SCHEMA = """
+CREATE TABLE IF NOT EXISTS jobs (
+    number INTEGER PRIMARY KEY AUTOINCREMENT,
+    record TEXT NOT NULL,
+    id TEXT UNIQUE AS (record ->> '$.id'),
+    owner TEXT AS (record ->> '$.errand.owner'),
+    idempotency_key TEXT AS (record ->> '$.errand.idempotency_key'),
+    status TEXT AS (record ->> '$.status'),
+    finished TEXT AS (record ->> '$.finished')
+);
+CREATE INDEX IF NOT EXISTS jobs_by_owner ON jobs (owner, number);
+CREATE INDEX IF NOT EXISTS jobs_by_key ON jobs (owner, idempotency_key)
+    WHERE idempotency_key IS NOT NULL;
+CREATE INDEX IF NOT EXISTS jobs_by_end ON jobs (finished);
+"""
+
+
+class JobBook:
+    """One row for each job; the newest come first in lists."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._database: aiosqlite.Connection | None = None
+
+    async def open(self) -> None:
+        """Open the file, which is made where it is not there."""
+        self._database = await aiosqlite.connect(self._path, isolation_level=None)
+        await self._database.execute("PRAGMA journal_mode = WAL")
+        await self._database.execute("PRAGMA synchronous = NORMAL")
+        await self._database.executescript(_SCHEMA)
+
+    async def close(self) -> None:
+        """Close the file."""
+        if self._database is not None:
+            await self._database.close()
+            self._database = None
+
+    async def write(self, job: Job) -> None:
+        """Write the record of a job, in place of the one that there may be."""
+        await self._run(
+            "INSERT INTO jobs (record) VALUES (?) "
+            "ON CONFLICT (id) DO UPDATE SET record = excluded.record",
+            job.model_dump_json(),
+        )
+
+    async def remove(self, job_id: str) -> None:
+        """Remove the record of a job."""
+        await self._run("DELETE FROM jobs WHERE id = ?", job_id)
+
+    async def find(self, owner: str | None, job_id: str) -> Job | None:
+        """Return the job of an owner with this id, if there is one."""
+        found = await self._jobs("WHERE owner IS ? AND id = ?", owner, job_id)
+        return found[0] if found else None
+
+    async def find_by_key(self, owner: str | None, key: str) -> Job | None:
+        """Return the newest job of an owner with this idempotency key, if there is one."""
+        found = await self._jobs(
+            "WHERE owner IS ? AND idempotency_key = ? ORDER BY number DESC LIMIT 1", owner, key
+        )
+        return found[0] if found else None
+
+    async def page(
+        self, owner: str | None, limit: int, before: int | None
+    ) -> tuple[list[Job], int | None]:
+        """Return ``limit`` jobs of an owner, and the number before which to go on, if any."""
+        rows = await self._rows(
+            "SELECT number, record FROM jobs WHERE owner IS ? AND number < ? "
+            "ORDER BY number DESC LIMIT ?",
+            owner,
+            2**62 if before is None else before,
+            limit + 1,
+        )
+        jobs = [Job.model_validate_json(record) for _, record in rows[:limit]]
+        return jobs, rows[limit - 1][0] if len(rows) > limit else None
+
+    async def count_finished(self) -> dict[str, int]:
+        """Return how many jobs have finished, by status."""
+        counted = "SELECT status, COUNT(*) FROM jobs WHERE finished IS NOT NULL GROUP BY status"
+        return dict(await self._rows(counted))
+
+    async def unfinished(self) -> list[Job]:
+        """Return the jobs of which something was still to become."""
+        return await self._jobs("WHERE finished IS NULL")
+
+    async def with_results(self) -> list[Job]:
+        """Return the jobs that have been answered."""
+        return await self._jobs("WHERE status = 'successful'")
+
+    async def finished_before(self, moment: datetime) -> list[Job]:
+        """Return the jobs that finished before a moment."""
+        return [
+            job
+            for job in await self._jobs("WHERE finished IS NOT NULL")
+            if job.finished is not None and job.finished < moment
+        ]
+
+    async def _jobs(self, condition: str, *values: Any) -> list[Job]:
+        rows = await self._rows(f"SELECT record FROM jobs {condition}", *values)  # noqa: S608
+        return [Job.model_validate_json(record) for (record,) in rows]
+
+    async def _rows(self, statement: str, *values: Any) -> Sequence[Any]:
+        return list(await self._connection.execute_fetchall(statement, values))
+
+    async def _run(self, statement: str, *values: Any) -> None:
+        async with self._connection.execute(statement, values):
+            pass
+
+    @property
+    def _connection(self) -> aiosqlite.Connection:
+        assert self._database is not None, "the book is open while the service runs"  # noqa: S101
+        return self._database
+
+
+def read_book(path: Path) -> list[Job]:
+    """Return the jobs in the book at ``path``, the oldest first; none where there is no book."""
+    rows = _read(path, "SELECT record FROM jobs ORDER BY number")
+    return [Job.model_validate_json(record) for (record,) in rows]
+
+
+def require_whole(path: Path) -> None:
+    """Raise ``StoreError`` where the book at ``path`` is damaged."""
+    found = _read(path, "PRAGMA quick_check(1)")
+    if found not in ([], [("ok",)]):
+        raise _damaged(path, found[0][0])
+
+
+def _read(path: Path, statement: str) -> list[Any]:
+    if not path.is_file():
+        return []
+    try:
+        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+            return database.execute(statement).fetchall()
+    except sqlite3.DatabaseError as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, reason: object) -> StoreError:
+    in_a_line = " ".join(str(reason).split())
+    return StoreError(f"{path} is damaged ({in_a_line}): move it away, and jobs begin anew")

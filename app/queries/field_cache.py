@@ -1,0 +1,86 @@
+"""Fields that have been solved, kept by what was asked for: the next question finds its answer."""
+
+import hashlib
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import partial
+from time import perf_counter
+
+import geodesic_core as gc
+from app.store.fields import FieldStore
+from app.store.lru_cache import Kept
+from app.store.meshes import OpenMesh
+
+_WORTH_WRITING_S = 0.05
+"""Seconds of a solve; to write what takes less would take about as long, and be done as often."""
+
+Question = tuple[Hashable, ...]
+
+
+@dataclass(frozen=True)
+class Unwritten:
+    """A field that is not in the store yet, and its name there."""
+
+    mesh_id: str
+    key: str
+    field: gc.DistanceField
+
+
+class Fields:
+    """Fields of open meshes, at most ``capacity`` bytes; the least recently used go first.
+
+    What is not here may be in the ``store``, by any worker, found by this ``code``. Solving again
+    would give the same field to the bit, so that no answer tells whether its field was kept.
+    """
+
+    def __init__(self, capacity: int, store: FieldStore, code: str) -> None:
+        self._fields: Kept[tuple[Hashable, Question], gc.DistanceField]
+        self._fields = Kept(capacity, lambda field: field.nbytes)
+        self._store = store
+        self._code = code
+        self._unwritten: list[Unwritten] = []
+
+    def find(
+        self, opened: OpenMesh, question: Question, solve: Callable[[], gc.DistanceField]
+    ) -> gc.DistanceField:
+        """Return the field that answers a question on a mesh: kept, or solved now."""
+        read_or_solve = partial(self._read_or_solve, opened, question, solve)
+        field = self._fields.find((opened.name, question), read_or_solve)
+        list(self._fields.surplus())
+        return field
+
+    @property
+    def has_unwritten(self) -> bool:
+        """Whether there is something to `write`."""
+        return bool(self._unwritten)
+
+    def write(self) -> None:
+        """Write into the store what has been solved since the last time, and took long."""
+        while self._unwritten:
+            new = self._unwritten.pop()
+            self._store.write(new.mesh_id, new.key, new.field.arrays(), self._code)
+
+    def forget(self, mesh: Hashable) -> None:
+        """Drop the fields of a mesh, which hold on to it; they stay in the store."""
+        for name in [name for name in self._fields if name[0] == mesh]:
+            self._fields.drop(name)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of all of them, bytes, each as it was when it was measured last."""
+        return self._fields.nbytes
+
+    def _read_or_solve(
+        self, opened: OpenMesh, question: Question, solve: Callable[[], gc.DistanceField]
+    ) -> gc.DistanceField:
+        mesh_id, barriers = opened.name
+        written = repr((self._code, barriers, question)).encode()
+        key = hashlib.blake2b(written, digest_size=16).hexdigest()
+        arrays = self._store.read(mesh_id, key)
+        if arrays is not None:
+            return gc.DistanceField.from_arrays(opened.mesh, arrays)
+        start = perf_counter()
+        field = solve()
+        if perf_counter() - start > _WORTH_WRITING_S:
+            self._unwritten.append(Unwritten(mesh_id, key, field))
+        return field

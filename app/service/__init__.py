@@ -1,0 +1,1 @@
+"""Use cases: meshes, queries and maintenance, independent of HTTP."""

@@ -1,0 +1,1 @@
+"""The store on disk: meshes, answers and distance fields."""

@@ -1,0 +1,1 @@
+"""Distance fields: sweeps over the mesh, and answers from their results."""

@@ -1,0 +1,67 @@
+"""In which direction distance grows fastest, at the vertices."""
+
+import numpy as np
+
+from geodesic_core.arrays import Flags, Floats
+from geodesic_core.fields.path import EXACT, traced_path
+from geodesic_core.fields.sources import Nodes
+from geodesic_core.kernels.mesh.half_edges import APEX, COS_LEFT, HEAD, LENGTH_LEFT, SIN_LEFT, TAIL
+from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.kernels.sweep.state import FROM, NODE, VIA
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.tolerances import FOOT, SAME_PLACE
+
+
+def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> Floats:
+    """Return unit vectors (V, 3) away from where the path to each vertex comes from; NaN for none.
+
+    The winning window has the pseudosource in the plane of the face that the path ends in. A face
+    of no area has no such plane: there the path is traced. O(V).
+    """
+    topology = mesh.topology
+    gradient = np.full(mesh.vertices.shape, np.nan)
+    via = winners.winner_ints[: len(gradient), VIA]
+    is_strip = _is_strip(winners)
+    reached = np.flatnonzero((via >= 0) & np.isfinite(winners.distance[: len(gradient)]))
+    reached = reached[~_lies_on_curve(mesh, winners, is_strip)[reached]]
+    via = via[reached]
+    geometry, positions = topology.geometry[via], topology.positions
+    tail, head, apex = (positions[topology.links[via, k]] for k in (TAIL, HEAD, APEX))
+    reach = geometry[:, LENGTH_LEFT]
+    away = np.column_stack([geometry[:, COS_LEFT] * reach, geometry[:, SIN_LEFT] * reach])
+    away[is_strip[reached]] = 0.0  # a direction is all that there is of a strip's
+    away -= winners.winner[reached]
+    along = _unit(head - tail)
+    across = apex - tail
+    across = _unit(across - np.einsum("ij,ij->i", across, along)[:, None] * along)
+    gradient[reached] = _unit(away[:, :1] * along + away[:, 1:] * across)
+    for v in reached[np.isnan(gradient[reached, 0])]:
+        points = traced_path(mesh, winners, nodes, v, EXACT).points
+        away = points[-1] - points
+        elsewhere = np.linalg.norm(away, axis=1) > SAME_PLACE * winners.distance[v]
+        gradient[v] = _unit(away[elsewhere][-1:])
+    return gradient[topology.inner_vertex]
+
+
+def _is_strip(winners: Winners) -> Flags:
+    """Tell which nodes are reached from a piece of a curve."""
+    if len(winners.piece_ints) == 0:
+        return np.zeros(len(winners.distance), np.bool_)
+    is_strip: Flags = winners.winner_ints[:, FROM] >= winners.piece_ints[0, NODE]
+    return is_strip
+
+
+def _lies_on_curve(mesh: TriangleMesh, winners: Winners, is_strip: Flags) -> Flags:
+    """Tell which nodes lie on the piece that reaches them, as vertices of faces of no area may."""
+    lies = np.zeros_like(is_strip)
+    nodes = np.flatnonzero(is_strip & np.isfinite(winners.distance))
+    pieces = winners.winner_ints[nodes, FROM]
+    away = winners.distance[nodes] - winners.distance[pieces]
+    lies[nodes] = away <= FOOT * mesh.diagonal
+    return lies
+
+
+def _unit(vectors: Floats) -> Floats:
+    with np.errstate(invalid="ignore"):  # of no length, no direction: NaN
+        unit: Floats = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return unit

@@ -1,0 +1,247 @@
+"""Lines of equal distance on the surface."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.errors import InvalidArgument
+from geodesic_core.fields.path import length_of
+from geodesic_core.fields.sources import Nodes
+from geodesic_core.fields.sweep import Control, in_slices
+from geodesic_core.kernels.isolines import lines as kernels
+from geodesic_core.kernels.isolines.face_windows import Kept
+from geodesic_core.kernels.isolines.lines import Chains, Cuts, Field
+from geodesic_core.kernels.mesh.half_edges import LENGTH, LENGTH_LEFT, TAIL
+from geodesic_core.kernels.sweep.state import FACE, NODE
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.tolerances import LEVEL, PIECE
+from geodesic_core.validation import is_index, is_number
+
+CHORD_SHARE = 1e-3
+"""Share of the mean edge length that chords may stray from their arcs if nothing else is said."""
+
+FINEST_CHORD = 1e-9
+"""Share of the bounding box's diagonal below which no chord error is taken: what it takes in points
+grows with the inverse of its root."""
+
+
+@dataclass(frozen=True, slots=True)
+class Isoline:
+    """A polyline of points at one distance; between two points it lies in one face."""
+
+    points: Floats
+    """(K, 3) float64, mesh units"""
+    closed: bool
+    """Whether a last piece leads from the last point back to the first, which is not repeated."""
+    faces: Ints
+    """(K,) of a closed line, (K - 1,) of an open one: the face in which each piece lies"""
+
+    @property
+    def length(self) -> float:
+        """Mesh units."""
+        return length_of(np.vstack([self.points, self.points[:1]]) if self.closed else self.points)
+
+
+def spaced_levels(distances: Floats, count: int) -> Floats:
+    """Return levels evenly spaced between 0 and the largest finite distance, both left out.
+
+    Raises
+    ------
+    InvalidArgument
+        The count is not an integer, 1 or more; or no finite distance is above 0.
+    """
+    if not is_index(count) or count < 1:
+        raise InvalidArgument(f"the count of levels is {count!r}; it must be an integer, 1 or more")
+    largest = distances.max(where=np.isfinite(distances), initial=0.0)
+    if largest == 0.0:
+        raise InvalidArgument("only sources are reached: there is nothing to space levels in")
+    spaced: Floats = np.arange(1, count + 1) * (largest / (count + 1))
+    return spaced
+
+
+def as_levels(levels: Sequence[float]) -> list[float]:
+    """Return levels as floats.
+
+    Raises
+    ------
+    InvalidArgument
+        They are no sequence, or one of them is not a finite number above 0.
+    """
+    if isinstance(levels, str | bytes) or not isinstance(levels, Sequence | np.ndarray):
+        raise InvalidArgument(f"levels is {levels!r}; it must be a sequence of distances")
+    for i, level in enumerate(levels):
+        if not is_number(level) or not (math.isfinite(level) and level > 0.0):
+            raise InvalidArgument(f"level {i} is {level!r}; it must be a finite number above 0")
+    return [float(level) for level in levels]
+
+
+def as_chord_error(mesh: TriangleMesh, chord_error: float | None) -> float:
+    """Return how far chords may stray from their arcs, mesh units.
+
+    Raises
+    ------
+    InvalidArgument
+        It is not a finite number, or finer than `FINEST_CHORD`.
+    """
+    if chord_error is None:
+        return CHORD_SHARE * float(mesh.topology.geometry[:, LENGTH].mean())
+    finest = FINEST_CHORD * mesh.diagonal
+    if not is_number(chord_error) or not (math.isfinite(chord_error) and chord_error >= finest):
+        raise InvalidArgument(
+            f"chord_error is {chord_error!r}; it must be a finite number, {finest:g} or more"
+        )
+    return float(chord_error)
+
+
+def crossed_faces(
+    mesh: TriangleMesh, distances: Floats, max_distance: float, levels: Sequence[float]
+) -> Flags:
+    """Tell which inner faces (F,) some levels may pass, by the exact distances of the vertices.
+
+    Within a face no distance differs from that of a corner by more than the way there. Of vertices
+    beyond ``max_distance`` it is known that they are as far as that. O(F log n) for n levels.
+    """
+    topology = mesh.topology
+    corners = distances[topology.links[:, TAIL]]
+    ways = topology.geometry[:, [LENGTH, LENGTH_LEFT]].max(axis=1)
+    least = (np.minimum(corners, max_distance) - ways).reshape(-1, 3).max(axis=1)
+    most = (corners + ways).reshape(-1, 3).min(axis=1)
+    ordered = np.sort(levels)
+    below = np.searchsorted(ordered, least * (1.0 - PIECE), "left")  # rounding
+    crossed: Flags = np.searchsorted(ordered, most * (1.0 + PIECE), "right") > below
+    return crossed
+
+
+class Drawing:
+    """Draws the lines of a finished sweep, level by level."""
+
+    def __init__(
+        self, mesh: TriangleMesh, kept: Kept, distances: Floats, nodes: Nodes, control: Control
+    ) -> None:
+        """Look up between which distances each face lies: O(windows + F).
+
+        ``distances`` are by node. Raises as `lines` does.
+        """
+        sites = nodes.sites
+        site_rows = np.argsort(sites.ints[: nodes.first_target, FACE], kind="stable")
+        piece_rows = np.argsort(sites.piece_ints[:, FACE], kind="stable")
+        field = Field(
+            kept=kept,
+            distance=distances,
+            site_ints=sites.ints[site_rows],
+            site_weights=sites.weights[site_rows],
+            piece_ints=sites.piece_ints[piece_rows],
+            piece_ends=sites.piece_ends[piece_rows],
+            first_piece=nodes.first_piece,
+        )
+        count = len(mesh.topology.links) // 3
+        least, most = np.full(count, np.inf), np.full(count, np.inf)
+        self._mesh, self._field, self._least, self._most = mesh, field, least, most
+        self._nbytes = sum(array.nbytes for array in (*kept, least, most))
+        control.grant_memory(self._nbytes)
+
+        def bound(first: int, last: int) -> int:
+            kernels.bound_faces(mesh.topology, field, first, last, least, most)
+            return count
+
+        in_slices(count, bound, control)
+        for inside in (field.site_ints, field.piece_ints):
+            np.minimum.at(least, inside[:, FACE], distances[inside[:, NODE]])
+
+    def lines(self, level: float, chord_error: float, control: Control) -> list[Isoline]:
+        """Return the lines of a level: O(F + n² log n) for n windows in each face that it passes.
+
+        Raises
+        ------
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As the control says; what the lines are drawn from counts as memory of the call.
+        """
+        topology, distances = self._mesh.topology, self._field.distance
+        slack = LEVEL * level
+        passed = np.flatnonzero((self._least <= level + slack) & (self._most >= level - slack))
+        if len(passed) == 0:
+            return []
+        place = np.full(len(self._least), -1, np.int32)
+        control = control.holding(self._nbytes + place.nbytes)
+        cuts = self._cut(passed.astype(np.int32), level, place, control.for_part(0, 2))
+        crossings = kernels.cross_edges(topology, distances, cuts, level, place)
+        held = sum(array.nbytes for array in (*cuts, *crossings))
+        control = control.holding(held).for_part(1, 2)
+        parts: list[_Arrays] = []
+
+        def chain(first: int, last: int) -> int:
+            parts.append(
+                kernels.chain_pieces(
+                    topology, distances, cuts, crossings, level, chord_error, first, last
+                )
+            )
+            control.grant_memory(_bytes_of(parts))
+            return len(cuts.faces)
+
+        in_slices(len(cuts.faces), chain, control)
+        points, points_of, ends, faces = _joined(parts)
+        chains = Chains(points, _starts(points_of), ends, faces)
+        return _lines(
+            self._mesh, *kernels.link_chains(topology.links, crossings, chains, PIECE * level)
+        )
+
+    def _cut(self, passed: Ints, level: float, place: Ints, control: Control) -> Cuts:
+        """Cut the faces that a level may pass: by their bounds, and by what neighbours say.
+
+        ``place`` (F,) is -1 all over, and then tells where among the faces each one is.
+        """
+        place[passed] = np.arange(len(passed))
+        faces = passed[:, None]
+        parts: list[_Arrays] = []
+
+        def cut(first: int, last: int) -> int:
+            nonlocal faces
+            spans, spans_of, arcs, arcs_of, found = kernels.cut_faces(
+                self._mesh.topology, self._field, faces[first:last], len(faces), level, place
+            )
+            parts.append((spans, spans_of, arcs, arcs_of))
+            faces = np.concatenate([faces, found])
+            control.grant_memory(faces.nbytes + _bytes_of(parts))
+            return len(faces)
+
+        in_slices(len(faces), cut, control)
+        spans, spans_of, arcs, arcs_of = _joined(parts)
+        return Cuts(faces, spans, _starts(spans_of), arcs, _starts(arcs_of))
+
+
+_Arrays = Sequence[NDArray[Any]]
+
+
+def _bytes_of(parts: Sequence[_Arrays]) -> int:
+    return sum(array.nbytes for part in parts for array in part)
+
+
+def _joined(parts: Sequence[_Arrays]) -> list[NDArray[Any]]:
+    """Return the first arrays of all parts as one, then the second ones, and so on."""
+    return [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
+
+
+def _starts(counts: NDArray[Any]) -> NDArray[Any]:
+    """Return where each of some runs begins, and the last one ends, from their lengths (n, 1)."""
+    starts = np.zeros((len(counts) + 1, 1), counts.dtype)
+    np.cumsum(counts, axis=0, out=starts[1:])
+    return starts
+
+
+def _lines(
+    mesh: TriangleMesh, points: Floats, faces: Ints, first: Longs, closed: Flags
+) -> list[Isoline]:
+    bounds = zip(first[:-1].tolist(), first[1:].tolist(), closed.tolist(), strict=True)
+    return [
+        Isoline(
+            points=points[lo:hi].copy(),
+            closed=bool(is_closed),
+            faces=mesh.topology.outer_face[faces[lo : hi if is_closed else hi - 1]],
+        )
+        for lo, hi, is_closed in bounds
+    ]

@@ -1,0 +1,183 @@
+"""Paths over the surface: what they are, and how they are made of what backtracing finds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.errors import InternalError
+from geodesic_core.fields.sources import Nodes
+from geodesic_core.kernels.paths import backtracing, locations
+from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.mesh.curve import foot_on
+from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorBound:
+    """How far an answer may be from the exact one."""
+
+    type: Literal["relative", "absolute"]
+    value: float
+    kind: Literal["guaranteed", "estimated"]
+
+
+EXACT = ErrorBound("relative", 0.0, "guaranteed")
+"""The bound of exact answers: floating-point rounding aside, there is no error."""
+
+
+StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
+
+
+@dataclass(frozen=True, slots=True)
+class SearchStep:
+    """What a step of the search between two points did (section 5, figure 10)."""
+
+    leg: int
+    """From one stop to the next, counted from 0."""
+    name: StepName
+    seconds: float
+    bound: float
+    """The least upper bound of the distance that is known after the step, mesh units; after
+    "exact", the distance."""
+    windows: int
+    """Windows created."""
+    faces: Ints
+    """(N,) int32: the region that was visited."""
+
+
+@dataclass(frozen=True)
+class GeodesicPath:
+    """A path over the surface, from its source to its target.
+
+    An exact field gives shortest paths. An approximate one gives paths whose length U is an upper
+    bound of the exact distance, as the field's value D is a lower bound: ``error_bound`` holds
+    (U - D) / D.
+    """
+
+    points: Floats
+    """(K, 3) positions, mesh units."""
+    faces: Ints
+    """(K - 1,) int32: the face that each piece crosses."""
+    length: float
+    """Sum of the pieces, mesh units."""
+    error_bound: ErrorBound
+    steps: tuple[SearchStep, ...] | None
+    """Of the search between two points, leg by leg, where they were asked for."""
+    _location_faces: Ints
+    _location_weights: Floats
+    _location_vertices: Longs
+
+    @cached_property
+    def locations(self) -> tuple[SurfacePoint, ...]:
+        """The K points on the surface, canonical."""
+        return tuple(
+            SurfacePoint(face, (u, v, w), vertex if vertex >= 0 else None)
+            for face, (u, v, w), vertex in zip(
+                self._location_faces.tolist(),
+                self._location_weights.tolist(),
+                self._location_vertices.tolist(),
+                strict=True,
+            )
+        )
+
+
+def trace(mesh: TriangleMesh, winners: Winners, v: int) -> tuple[Ints, Floats, Ints]:
+    """Trace the path from node v to its source: nodes, parameters and inner faces."""
+    room = 256
+    while True:
+        nodes, parameters = np.empty(room, np.int32), np.empty(room)
+        faces = np.empty(room, np.int32)
+        outcome, count = backtracing.trace_path(mesh.topology, winners, v, nodes, parameters, faces)
+        if outcome == backtracing.TRACED:
+            return nodes[:count], parameters[:count], faces[: count - 1]
+        # A shortest path crosses a face at most once, and an approximate one hardly more often:
+        # a longer walk is lost as well.
+        if outcome == backtracing.LOST or room > 4 * len(mesh.faces) + 256:
+            raise InternalError(
+                f"the path to node {v} left the surface after {count} points; "
+                f"please report this mesh"
+            )
+        room *= 4
+
+
+def traced_path(
+    mesh: TriangleMesh, winners: Winners, nodes_of_sweep: Nodes, v: int, bound: ErrorBound
+) -> GeodesicPath:
+    """Return the path from its source to node v; O(faces crossed)."""
+    nodes, parameters, crossed = trace(mesh, winners, v)
+    count = len(nodes)
+    faces, vertices = np.empty(count, np.int32), np.empty(count, np.int64)
+    weights, points = np.empty((count, 3)), np.empty((count, 3))
+    nodes, parameters = nodes[::-1].copy(), parameters[::-1].copy()
+    locations.place_nodes(
+        mesh.topology, mesh.faces, nodes, parameters, faces, weights, vertices, points
+    )
+    for i in (count - 1, 0):
+        node = -1 - int(nodes[i])
+        if node < len(mesh.vertices):
+            continue
+        piece = nodes_of_sweep.piece(node)
+        if piece is None:
+            point, points[i] = nodes_of_sweep.site(node)
+        else:
+            point = foot_on(mesh, piece, points[1])
+            points[i] = mesh.position(point)
+        faces[i], weights[i] = point.face_index, point.barycentric
+        vertices[i] = -1 if point.vertex_index is None else point.vertex_index
+    kept = np.empty(count, np.uint8)
+    locations.leave_out_repeated(faces, weights, kept)
+    where = np.flatnonzero(kept)
+    points = points[where]
+    return GeodesicPath(
+        points=points,
+        faces=mesh.topology.outer_face[crossed[::-1][where[1:] - 1]],
+        length=length_of(points),
+        error_bound=bound,
+        steps=None,
+        _location_faces=faces[where],
+        _location_weights=weights[where],
+        _location_vertices=vertices[where],
+    )
+
+
+def length_of(points: Floats) -> float:
+    """Length of a polyline, mesh units."""
+    pieces = points[1:] - points[:-1]
+    return float(np.sqrt((pieces * pieces).sum(axis=1)).sum())
+
+
+def turned_round(path: GeodesicPath) -> GeodesicPath:
+    """Return the path from its target to its source."""
+    return replace(
+        path,
+        points=path.points[::-1].copy(),
+        faces=path.faces[::-1].copy(),
+        _location_faces=path._location_faces[::-1].copy(),
+        _location_weights=path._location_weights[::-1].copy(),
+        _location_vertices=path._location_vertices[::-1].copy(),
+    )
+
+
+def joined(legs: Sequence[GeodesicPath]) -> GeodesicPath:
+    """Return exact paths, each from where the one before ends, as one."""
+
+    def chained(name: str) -> Any:  # the first point of a leg is the last of the one before
+        arrays = [getattr(leg, name) for leg in legs]
+        return np.concatenate([arrays[0], *(array[1:] for array in arrays[1:])])
+
+    steps = [replace(step, leg=i) for i, leg in enumerate(legs) for step in (leg.steps or ())]
+    return GeodesicPath(
+        points=chained("points"),
+        faces=np.concatenate([leg.faces for leg in legs]),
+        length=sum(leg.length for leg in legs),
+        error_bound=EXACT,
+        steps=tuple(steps) or None,
+        _location_faces=chained("_location_faces"),
+        _location_weights=chained("_location_weights"),
+        _location_vertices=chained("_location_vertices"),
+    )

@@ -1,0 +1,1 @@
+"""Level sets of the distance, face by face, joined to lines."""

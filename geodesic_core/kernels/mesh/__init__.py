@@ -1,0 +1,1 @@
+"""The half-edge structure of a mesh, and its construction."""

@@ -1,0 +1,228 @@
+"""The continuous-Dijkstra loop (section 3.4), resumable in slices."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.jit import inlined, kernel, pointer, prefetch
+from geodesic_core.kernels.mesh.half_edges import (
+    APEX,
+    AROUND,
+    HEAD,
+    IRREGULAR,
+    OUT_LEFT,
+    OUT_RIGHT,
+    PINCHED,
+    ROW,
+    SEAM,
+    following,
+    previous,
+)
+from geodesic_core.kernels.sweep.propagation import POOL_FULL, PROPAGATED, propagate_list
+from geodesic_core.kernels.sweep.pruning import touch
+from geodesic_core.kernels.sweep.pseudosources import emit_pseudosource, is_pseudosource
+from geodesic_core.kernels.sweep.queues import (
+    HEAP_SIZE,
+    RING_HEAD,
+    RING_SIZE,
+    pop_nearest,
+    ring_pop,
+)
+from geodesic_core.kernels.sweep.relaxation import bound_vertex, improve_vertex
+from geodesic_core.kernels.sweep.segments import emit_piece
+from geodesic_core.kernels.sweep.state import (
+    DONE,
+    DONE_VERTICES,
+    FAR,
+    FROM,
+    FRONT,
+    IN_RING,
+    LIST,
+    MARKS,
+    NODE,
+    PIECE,
+    SITE,
+    SIZE,
+    VIA,
+    WINNER,
+    WORK,
+    merging,
+    view_of,
+)
+from geodesic_core.kernels.sweep.surface_points import emit_site
+from geodesic_core.kernels.sweep.window_lists import faces_beyond, free_windows, queue_list
+
+# Outcomes of a slice; those of `propagate` are the others
+FINISHED = 3
+RUNNING = 4
+
+
+@kernel
+def start_sweep(
+    topology: Any,
+    wavefront: Any,
+    sources: Ints,
+    origins: Ints,
+    start_distances: Floats,
+    bounds: Any,
+) -> None:
+    """Reach the nodes of the sources; sites and pieces among them emit their windows.
+
+    ``origins`` are the sources that the nodes belong to, of which each has a start distance.
+    """
+    wave = view_of(topology, wavefront, bounds)
+    for i in range(len(sources)):
+        v, start = sources[i], start_distances[origins[i]]
+        if start >= wave.distance[v]:
+            continue
+        wave.origin[v] = origins[i]
+        if v < wave.vertex_count:
+            if merging(wave):
+                bound_vertex(wave, v, start)
+            improve_vertex(wave, v, start, -1, 0.0, 0.0, v, -1 - v)
+        else:
+            wave.distance[v], wave.winner_ints[WINNER * v + FROM] = start, v
+    for k in range(wave.site_count):
+        if wave.distance[wave.site_ints[SITE * k + NODE]] < math.inf:
+            emit_site(wave, k)
+    if len(wave.strips) > 0:
+        ints, ends = pointer(wavefront.piece_ints), pointer(wavefront.piece_ends)
+        for k in range(len(wavefront.piece_ints)):
+            if wave.distance[ints[PIECE * k + NODE]] < math.inf:
+                emit_piece(wave, ints, ends, k)
+
+
+@kernel
+def advance(topology: Any, wavefront: Any, bounds: Any, budget: int) -> int:
+    """Run the sweep for a slice of about ``budget`` units of 10 ns; return its outcome.
+
+    Windows wholly beyond ``max_distance`` are dropped. Vertices beyond it are reached and settled
+    all the same, for a list waits for an end of its edge, and windows between two far ends may be
+    near; the caller takes their distances away.
+    """
+    wave = view_of(topology, wavefront, bounds)
+    wave.counters[WORK] = 0
+    outcome = drain(wave, budget)
+    while outcome == FINISHED and wave.counters[HEAP_SIZE] > 0:
+        if wave.counters[WORK] >= budget:
+            return RUNNING
+        outcome = settle_nearest(wave)
+        if outcome == FINISHED:
+            outcome = drain(wave, budget)
+    return outcome
+
+
+@kernel
+def settle_nearest(wave: Any) -> int:
+    """Take the nearest vertex: emit its windows, wake the lists around it."""
+    v = wave.heap[0]
+    emits = is_pseudosource(wave, v)
+    first, last = wave.first_corner[v], wave.first_corner[v + 1]
+    if emits and room_to_emit(wave, v) > free_windows(wave):
+        return POOL_FULL
+    pop_nearest(wave)
+    if wave.counters[HEAP_SIZE] > 0:
+        ask_ahead(wave, wave.heap[0])
+    if wave.status[v] != DONE:
+        wave.status[v] = DONE
+        wave.counters[DONE_VERTICES] += 1
+    wave.counters[WORK] += 30
+    if emits:
+        emit_pseudosource(wave, v)
+    for c in range(first, last):
+        row = ROW * wave.corners[c]
+        mark_front(wave, wave.links[row + HEAD])
+        if wave.links[row + OUT_LEFT] < 0:
+            mark_front(wave, wave.links[row + APEX])
+    for c in range(first, last):
+        h = wave.corners[c]
+        queue_list(wave, h)
+        queue_list(wave, previous(h))
+        across = wave.links[ROW * h + OUT_RIGHT]
+        if across >= 0 and wave.lists[LIST * across + SIZE] > 0:
+            far = wave.links[ROW * across + APEX]
+            if wave.status[far] != FAR:
+                queue_list(wave, across)
+        elif across == IRREGULAR:
+            queue_lists_beyond(wave, following(h))
+    return FINISHED
+
+
+@kernel
+def room_to_emit(wave: Any, v: int) -> int:
+    """How many windows v may emit, at most."""
+    first, last = wave.first_corner[v], wave.first_corner[v + 1]
+    room = 6 * (last - first)
+    if wave.flags[v] & (SEAM | PINCHED):
+        for c in range(first, last):
+            h = wave.corners[c]
+            if wave.links[ROW * h + OUT_RIGHT] == IRREGULAR:
+                room += 2 * faces_beyond(wave, following(h))
+    return room
+
+
+@kernel
+def queue_lists_beyond(wave: Any, g: int) -> None:
+    """Queue the lists beyond the irregular edge of g whose far vertex is in front, or done."""
+    h = wave.links[ROW * g + AROUND] >> 1
+    while h != g:
+        if wave.status[wave.links[ROW * h + APEX]] != FAR:
+            queue_list(wave, h)
+        h = wave.links[ROW * h + AROUND] >> 1
+
+
+@inlined
+def ask_ahead(wave: Any, v: int) -> None:
+    """Ask for the rows around the vertex that will probably be next: 3 to 6 % of a sweep."""
+    for c in range(wave.first_corner[v], wave.first_corner[v + 1]):
+        h = wave.corners[c]
+        prefetch(wave.links, ROW * h)
+        prefetch(wave.geometry, ROW * h)
+        prefetch(wave.lists, LIST * h)
+
+
+@kernel
+def mark_front(wave: Any, v: int) -> None:
+    """Mark a neighbour of a vertex that is done."""
+    if wave.status[v] == FAR:
+        if wave.distance[v] == math.inf:
+            touch(wave, v)
+        wave.status[v] = FRONT
+
+
+@kernel
+def drain(wave: Any, budget: int) -> int:
+    """Propagate the lists in the ring, and what they wake, until it is empty."""
+    while wave.counters[RING_SIZE] > 0:
+        if wave.counters[WORK] >= budget:
+            return RUNNING
+        h = wave.ring[wave.counters[RING_HEAD]]
+        outcome = propagate_list(wave, h)
+        if outcome != PROPAGATED:
+            return outcome
+        ring_pop(wave)
+        wave.lists[LIST * h + MARKS] &= ~IN_RING
+    return FINISHED
+
+
+@kernel
+def nearest_sources(distance: Floats, winner_ints: Ints, origin: Ints) -> Ints:
+    """Return for each vertex at a finite distance the index of its pseudosource's source.
+
+    Asked at the end: a pseudosource may have changed its own source after it emitted.
+    """
+    result = np.full(len(distance), -1, np.int32)
+    for start in range(len(distance)):
+        if distance[start] == math.inf:
+            continue
+        v = start
+        while result[v] < 0 and winner_ints[v, VIA] >= 0:
+            v = winner_ints[v, FROM]
+        found = result[v] if result[v] >= 0 else origin[v]
+        v = start
+        while result[v] < 0:
+            result[v] = found
+            v = winner_ints[v, FROM]
+    return result

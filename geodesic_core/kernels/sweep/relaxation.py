@@ -1,0 +1,120 @@
+"""How vertices are reached: the least distance, and in a merging sweep what bounds it."""
+
+import math
+from typing import Any
+
+from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import (
+    APEX_ANGLE,
+    BOUNDARY,
+    COS_LEFT,
+    LENGTH,
+    LENGTH_LEFT,
+    PINCHED,
+    ROW,
+    SIN_LEFT,
+)
+from geodesic_core.kernels.sweep.pruning import touch
+from geodesic_core.kernels.sweep.queues import push_or_raise
+from geodesic_core.kernels.sweep.state import (
+    DONE,
+    FAR,
+    FROM,
+    LIGHT,
+    LIT_FROM,
+    LIT_TO,
+    VIA,
+    WINNER,
+    merging,
+)
+from geodesic_core.tolerances import SLACK, TIE
+
+
+@inlined
+def precedence(distance: float, origin: int, known: float, known_origin: int) -> bool:
+    """Whether a distance from one source goes before that from another: ties to the lower."""
+    if origin == known_origin or known == math.inf or abs(distance - known) > TIE * known:
+        return distance < known
+    return origin < known_origin
+
+
+@kernel
+def improve_vertex(
+    wave: Any, v: int, distance: float, via: int, sx: float, sy: float, root: int, reference: int
+) -> None:
+    """Offer v a distance and the window that gives it; queue v if it is the least so far.
+
+    Of equal distances that of the lower source wins.
+    """
+    known = wave.distance[v]
+    if not precedence(distance, wave.origin[root], known, wave.origin[v]):
+        return
+    if known == math.inf and wave.status[v] == FAR:
+        touch(wave, v)
+    wave.winner[2 * v] = sx
+    wave.winner[2 * v + 1] = sy
+    wave.winner_ints[WINNER * v + VIA] = via
+    wave.winner_ints[WINNER * v + FROM] = root
+    wave.origin[v] = wave.origin[root]
+    if merging(wave):
+        wave.reference[v] = reference
+    if distance < known:
+        wave.distance[v] = distance
+        push_or_raise(wave, v, distance)
+
+
+@kernel
+def bound_vertex(wave: Any, v: int, upper: float) -> None:
+    """Note an upper bound of the exact distance of v."""
+    if upper < wave.upper[v]:
+        if upper < wave.distance[v]:  # whatever reached v so far comes too late for a shortest path
+            wave.light[LIGHT * v + LIT_FROM], wave.light[LIGHT * v + LIT_TO] = 1.0, -1.0
+        wave.upper[v] = upper
+
+
+@kernel
+def light_vertex(
+    wave: Any, v: int, distance: float, via: int, sx: float, sy: float, sw: float
+) -> None:
+    """Note the direction in which v sees a pseudosource that reaches it at ``distance``.
+
+    Where windows are merged, the winner's direction need not be that of the exact path: all that
+    may be, by the upper bound, make a range. A vertex that has emitted its windows and sees it
+    widen is queued again.
+    """
+    if distance > wave.upper[v] * (1.0 + SLACK):
+        return
+    angle = incoming_angle(wave, via, sx, sy, sw)
+    row = LIGHT * v
+    lo, hi = wave.light[row + LIT_FROM], wave.light[row + LIT_TO]
+    if lo > hi:
+        lo, hi = angle, angle
+    else:
+        if not wave.flags[v] & (BOUNDARY | PINCHED):  # around a tip there may be no angle at all
+            turn = wave.total_angle[v]
+            angle -= turn * math.floor((angle - 0.5 * (lo + hi)) / turn + 0.5)
+        if lo <= angle <= hi:
+            return
+        lo, hi = min(lo, angle), max(hi, angle)
+    wave.light[row + LIT_FROM], wave.light[row + LIT_TO] = lo, hi
+    if wave.status[v] == DONE:
+        push_or_raise(wave, v, wave.distance[v])
+
+
+@kernel
+def incoming_angle(wave: Any, via: int, sx: float, sy: float, sw: float) -> float:
+    """Angle, in its unfolded fan, at which the apex of a half-edge sees a pseudosource.
+
+    The pseudosource is at (sx, sy, sw) in the frame of the half-edge ``via``.
+    """
+    row = ROW * via
+    # From the apex: toward the tail, and toward the pseudosource
+    ex = -wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
+    ey = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
+    hx = ex + wave.geometry[row + LENGTH]
+    dx, dy = sx + sw * ex, sy + sw * ey
+    if hx * dy - ey * dx > 0.0:  # beyond the head
+        dx, dy = hx, ey
+    turn = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
+    start: float = wave.geometry[row + APEX_ANGLE]
+    return start + max(turn, 0.0)

@@ -1,0 +1,1 @@
+"""The surface: validated triangle meshes, and points and curves on them."""

@@ -1,0 +1,126 @@
+"""Curves on the surface, as sources: polylines of which each piece lies in a face."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from geodesic_core.arrays import Floats
+from geodesic_core.errors import InvalidArgument, InvalidPoint
+from geodesic_core.kernels.mesh.half_edges import APEX, TAIL
+from geodesic_core.mesh.canonical import half_edges_around
+from geodesic_core.mesh.surface_point import Point, SurfacePoint, Weights
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+
+Polyline = tuple[SurfacePoint, ...]
+"""The canonical points of a curve; of a point, itself alone."""
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A polyline on the surface; as a source, all of its points are one.
+
+    Each piece is straight, and lies in a face that both of its ends belong to. The `locations` of a
+    `GeodesicPath` make a curve, so that `shortest_path` through waypoints joins points that are
+    farther apart. A closed curve ends where it begins.
+    """
+
+    points: Sequence[Point]
+
+
+class PieceInFace(NamedTuple):
+    """A piece of a curve in one of the faces that it lies in."""
+
+    face: int
+    """Inner"""
+    start: Weights
+    """Of its beginning, at the face's inner corners"""
+    end: Weights
+
+
+def polyline_of(mesh: TriangleMesh, curve: Curve, name: str) -> Polyline:
+    """Return the canonical points of a curve; ``name`` is how messages call it.
+
+    Raises
+    ------
+    InvalidArgument
+        It has no points.
+    InvalidPoint
+        One is not a point of the mesh, or shares no face with the next.
+    """
+    if isinstance(curve.points, str | bytes) or not isinstance(curve.points, Iterable):
+        raise InvalidArgument(f"the points of {name} are {curve.points!r}; give a sequence of them")
+    points = tuple(
+        mesh.point(point, f"point {i} of {name}") for i, point in enumerate(curve.points)
+    )
+    if not points:
+        raise InvalidArgument(f"{name} is a curve without points; give at least one")
+    for i, (start, end) in enumerate(pairwise(points)):
+        if not share_a_face(mesh, start, end):
+            raise InvalidPoint(
+                f"the points {i} and {i + 1} of {name}, {start} and {end}, have no face in common; "
+                f"add those at which the curve crosses edges: a shortest path has them"
+            )
+    return points
+
+
+def share_a_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> bool:
+    """Whether a piece of a curve may join two canonical points."""
+    if start == end:
+        return True
+    return bool(weights_by_face(mesh, start).keys() & weights_by_face(mesh, end))
+
+
+def pieces_of(mesh: TriangleMesh, polyline: Polyline) -> list[list[PieceInFace]]:
+    """Return the pieces of a polyline, each in all faces that hold it.
+
+    Pieces of no length are left out.
+    """
+    pieces = []
+    for start, end in pairwise(polyline):
+        if not np.array_equal(mesh.position(start), mesh.position(end)):
+            at_start, at_end = weights_by_face(mesh, start), weights_by_face(mesh, end)
+            shared = [face for face in at_start if face in at_end]
+            pieces.append([PieceInFace(face, at_start[face], at_end[face]) for face in shared])
+    return pieces
+
+
+def weights_by_face(mesh: TriangleMesh, point: SurfacePoint) -> dict[int, Weights]:
+    """Return each inner face that a canonical point belongs to, with its weights there."""
+    topology = mesh.topology
+    if point.vertex_index is not None:
+        v = topology.inner_vertex[point.vertex_index]
+        leaving = topology.corners[topology.first_corner[v] : topology.first_corner[v + 1]].tolist()
+        return {h // 3: (float(h % 3 == 0), float(h % 3 == 1), float(h % 3 == 2)) for h in leaving}
+    corners = topology.inner_vertex[mesh.faces[point.face_index]].tolist()
+    share = dict(zip(corners, point.barycentric, strict=True))
+
+    def weights_in(face: int) -> Weights:
+        u, v, w = topology.links[3 * face : 3 * face + 3, TAIL].tolist()
+        return share.get(u, 0.0), share.get(v, 0.0), share.get(w, 0.0)
+
+    face = int(mesh.inner_face[point.face_index])
+    if 0.0 not in point.barycentric:
+        return {face: weights_in(face)}
+    (h,) = (h for h in range(3 * face, 3 * face + 3) if share[topology.links[h, APEX]] == 0.0)
+    return {g // 3: weights_in(g // 3) for g in half_edges_around(topology.links, h)}
+
+
+def foot_on(mesh: TriangleMesh, piece: PieceInFace, position: Floats) -> SurfacePoint:
+    """Return the canonical point of a piece that is nearest to a position."""
+    inner = mesh.topology.links[3 * piece.face : 3 * piece.face + 3, TAIL]
+    start, end = (
+        (np.array(weights)[:, None] * mesh.topology.positions[inner]).sum(axis=0)
+        for weights in (piece.start, piece.end)
+    )
+    along = end - start
+    t = min(max(float((position - start) @ along / (along @ along)), 0.0), 1.0)
+    share = {
+        v: (1.0 - t) * at_start + t * at_end
+        for v, at_start, at_end in zip(inner.tolist(), piece.start, piece.end, strict=True)
+    }
+    face = int(mesh.topology.outer_face[piece.face])
+    u, v, w = (share[v] for v in mesh.topology.inner_vertex[mesh.faces[face]].tolist())
+    return mesh.point(SurfacePoint.face(face, (u, v, w)))

@@ -1,0 +1,231 @@
+"""What is found in a mesh: counts and defects with the ids at fault, and what to do about them."""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.kernels.mesh import half_edges as kernels
+from geodesic_core.kernels.mesh.half_edges import Topology
+from geodesic_core.mesh.degeneracies import edges_of_no_length, of_three_vertices
+from geodesic_core.mesh.equal_rows import repeated
+
+NAMED = 10
+"""Ids named in a message or a report, at most."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """How many elements of a kind there are, and the ids of the first ten; an edge has two."""
+
+    count: int
+    ids: tuple[int | tuple[int, int], ...]
+
+    @classmethod
+    def of(cls, ids: NDArray[Any]) -> "Sample":
+        """Return the sample of an array of ids, or of rows of them."""
+        named = ids[:NAMED].tolist()
+        return cls(len(ids), tuple(tuple(i) if isinstance(i, list) else i for i in named))
+
+
+@dataclass(frozen=True, slots=True)
+class MeshReport:
+    """What was found in a mesh: the counts a user checks before trusting an answer."""
+
+    vertices: int
+    faces: int
+    """All of them, those that are no part of the surface as well."""
+    edges: int
+    """Of the surface, to which faces that repeat a vertex or are blocked do not belong."""
+    triangulated_polygons: int
+    """Polygons that became several faces."""
+    components: int
+    """Connected components of the surface."""
+    component_vertices: Sample
+    """The lowest vertex of each component."""
+    boundary_loops: int
+    euler_characteristic: int
+    """V - E + F of the surface: isolated vertices and faces beside it do not count.
+
+    Here and below, vertices that edges of no length join count as one, and go by the lowest.
+    """
+    saddle_vertices: int
+    boundary_vertices: int
+    bow_tie_vertices: Sample
+    """Vertices where several fans of faces meet, though they lie on no edge of three faces."""
+    isolated_vertices: Sample
+    """Vertices of no face of the surface."""
+    duplicate_vertices: Sample
+    """Vertices of the surface at the position of an earlier one."""
+    repeated_vertex_faces: Sample
+    """Faces that repeat a vertex: they have a number, but are no part of the surface."""
+    zero_length_edges: Sample
+    """Edges between different vertices at one position: their ends are one place."""
+    collapsed_faces: Sample
+    """Faces with such an edge: what is left of them is an edge of other faces, or a vertex."""
+    duplicate_faces: Sample
+    """Faces with the same three vertices as an earlier one."""
+    degenerate_faces: Sample
+    """Faces of the surface whose area is zero."""
+    non_manifold_edges: Sample
+    """Edges of three faces or more, each by its vertices: paths go on into any of the faces."""
+    inconsistent_orientation: bool
+    misoriented_edges: Sample
+    """Edges that their two faces run in the same direction, each by its vertices."""
+    bounds: tuple[tuple[float, ...], tuple[float, ...]]
+    """Lowest and highest corner of the bounding box, mesh units."""
+    mean_edge_length: float
+    """Mesh units."""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the report as what JSON can hold."""
+        return asdict(self)
+
+
+def edges_of(faces: Ints) -> tuple[Ints, Ints, NDArray[np.bool_]]:
+    """Return the edges of some faces, lower vertex first; O(F log F).
+
+    With each: how many faces it has, and whether it has two that run it the same way.
+    """
+    tails, heads = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
+    ends = np.stack([np.minimum(tails, heads), np.maximum(tails, heads)], axis=1)
+    keys = ends[:, 0].astype(np.int64) << 32 | ends[:, 1]
+    _, first, edge, count = np.unique(
+        keys, return_index=True, return_inverse=True, return_counts=True
+    )
+    upward = np.bincount(edge, tails < heads)
+    same_way = (count == 2) & (upward != 1.0)
+    return ends[first], count.astype(np.int32), same_way
+
+
+def report_of(
+    vertices: Floats, faces: Ints, face_map: Longs | None, topology: Topology
+) -> MeshReport:
+    """Return the report of a mesh; O(V log V + F log F)."""
+    inner = topology.inner_vertex
+    lowest_joined = topology.outer_vertex[inner]
+    is_used = (np.diff(topology.first_corner) > 0)[inner]
+    is_place = lowest_joined == np.arange(len(vertices))
+    used = np.flatnonzero(is_used & is_place)
+    flags = np.where(is_place, topology.flags[inner], 0)
+    flat = topology.geometry[::3, kernels.SIN_LEFT] == 0.0
+    surface = np.sort(topology.outer_face)
+    corners = lowest_joined[faces[surface]]
+    outside = np.setdiff1d(np.arange(len(faces)), surface)
+    is_collapsed = of_three_vertices(faces[outside]) & ~of_three_vertices(inner[faces[outside]])
+    collapsed = outside[is_collapsed]
+    edges, edge_faces, same_way = edges_of(corners)
+    lengths = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
+    lowest = used[np.unique(topology.component[used], return_index=True)[1]]
+    polygons = np.zeros(0) if face_map is None else np.bincount(face_map)
+    return MeshReport(
+        vertices=len(vertices),
+        faces=len(faces),
+        edges=len(edges),
+        triangulated_polygons=int(np.count_nonzero(polygons > 1)),
+        components=len(lowest),
+        component_vertices=Sample.of(np.sort(lowest)),
+        boundary_loops=int(kernels.count_boundary_loops(topology.links)),
+        euler_characteristic=len(used) - len(edges) + len(surface),
+        saddle_vertices=int(np.count_nonzero(flags & kernels.SADDLE)),
+        boundary_vertices=int(np.count_nonzero(flags & kernels.BOUNDARY)),
+        bow_tie_vertices=Sample.of(
+            np.flatnonzero(flags & (kernels.FANS | kernels.SEAM) == kernels.FANS)
+        ),
+        isolated_vertices=Sample.of(np.flatnonzero(~is_used)),
+        duplicate_vertices=Sample.of(used[repeated(vertices[used])]),
+        repeated_vertex_faces=Sample.of(outside[~of_three_vertices(faces[outside])]),
+        zero_length_edges=Sample.of(edges_of_no_length(vertices, faces[collapsed])),
+        collapsed_faces=Sample.of(collapsed),
+        duplicate_faces=Sample.of(surface[repeated(np.sort(corners, axis=1))]),
+        degenerate_faces=Sample.of(np.sort(topology.outer_face[flat])),
+        non_manifold_edges=Sample.of(edges[edge_faces > 2]),
+        inconsistent_orientation=bool(same_way.any()),
+        misoriented_edges=Sample.of(edges[same_way]),
+        bounds=(tuple(vertices.min(axis=0).tolist()), tuple(vertices.max(axis=0).tolist())),
+        mean_edge_length=float(lengths.mean()),
+    )
+
+
+def warnings_of(report: MeshReport) -> Iterator[str]:
+    """Yield what a user should know of a mesh, a sentence or two each, with the remedy."""
+    if report.components > 1:
+        yield (
+            f"The mesh has {report.components} connected components, which begin at the vertices "
+            f"{_list(report.component_vertices)}: vertices of other components than the source's "
+            f"are unreachable."
+        )
+    found = report.duplicate_vertices
+    if found.count:
+        yield (
+            f"{_vertices(found.count)} at the position of an earlier one but kept apart, so that "
+            f"no path leads from one to the other there; the first is vertex {found.ids[0]}. "
+            f"merge='exact' joins them."
+        )
+    found = report.isolated_vertices
+    if found.count:
+        yield (
+            f"{_vertices(found.count)} of no face and unreachable; the first is vertex "
+            f"{found.ids[0]}."
+        )
+    found = report.repeated_vertex_faces
+    if found.count:
+        yield (
+            f"{_faces(found.count)} made of fewer than three different vertices and no part of "
+            f"the surface; the first is face {found.ids[0]}."
+        )
+    found = report.zero_length_edges
+    if found.count:
+        yield (
+            f"{_edges(found.count)} of no length, both ends one place; the first joins the "
+            f"vertices {found.ids[0]}. {_faces(report.collapsed_faces.count)} thereby no more than "
+            f"an edge or a point; the first is face {report.collapsed_faces.ids[0]}."
+        )
+    found = report.duplicate_faces
+    if found.count:
+        yield (
+            f"{_faces(found.count)} made of the same vertices as an earlier one; the first is face "
+            f"{found.ids[0]}. Distances are the same without them."
+        )
+    found = report.degenerate_faces
+    if found.count:
+        yield f"{_faces(found.count)} without area; the first is face {found.ids[0]}."
+    found = report.non_manifold_edges
+    if found.count:
+        yield (
+            f"{_edges(found.count)} shared by three faces or more; the first joins the vertices "
+            f"{found.ids[0]}. Paths may go on into any of the faces."
+        )
+    found = report.misoriented_edges
+    if found.count:
+        yield (
+            f"{_edges(found.count)} run in the same direction by both faces, whose winding is "
+            f"inconsistent; the first joins the vertices {found.ids[0]}. Distances do not depend "
+            f"on it."
+        )
+    found = report.bow_tie_vertices
+    if found.count:
+        yield (
+            f"Several fans of faces meet at {found.count} "
+            f"{'vertex' if found.count == 1 else 'vertices'}; the first is vertex {found.ids[0]}. "
+            f"Paths may pass through."
+        )
+
+
+def _vertices(count: int) -> str:
+    return "1 vertex is" if count == 1 else f"{count} vertices are"
+
+
+def _faces(count: int) -> str:
+    return "1 face is" if count == 1 else f"{count} faces are"
+
+
+def _edges(count: int) -> str:
+    return "1 edge is" if count == 1 else f"{count} edges are"
+
+
+def _list(sample: Sample) -> str:
+    return ", ".join(map(str, sample.ids)) + (", …" if sample.count > len(sample.ids) else "")

@@ -1,0 +1,73 @@
+"""A point of the surface: on a vertex, on an edge or inside a face."""
+
+from dataclasses import dataclass
+
+from geodesic_core.errors import InvalidPoint
+from geodesic_core.validation import is_index
+
+UNPLACED = -1
+"""The face of a vertex that was named without a mesh, or belongs to no face."""
+
+Weights = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class SurfacePoint:
+    """A point of the surface, by its barycentric coordinates in a face.
+
+    Points that a mesh hands out are canonical: the face is the lowest that contains the point,
+    ``vertex_index`` is set exactly where the point is a vertex, and all spellings of a point on an
+    edge have become the same.
+    """
+
+    face_index: int
+    """Face id; -1 for a vertex that was named without a mesh."""
+    barycentric: Weights
+    """Weights of the face's three corners; they sum to one."""
+    vertex_index: int | None = None
+    """The vertex that this point is, if it is one."""
+
+    def __str__(self) -> str:
+        if self.vertex_index is not None:
+            return f"vertex {self.vertex_index}"
+        return f"the point {self.barycentric} of face {self.face_index}"
+
+    @classmethod
+    def vertex(cls, index: int) -> "SurfacePoint":
+        """Return the point at a vertex.
+
+        Raises
+        ------
+        InvalidPoint
+            The index is not an integer.
+        """
+        if not is_index(index):
+            raise InvalidPoint(f"the vertex is {index!r}; it must be an integer")
+        return cls(UNPLACED, (1.0, 0.0, 0.0), index)
+
+    @classmethod
+    def edge(cls, face: int, corner: int, t: float) -> "SurfacePoint":
+        """Return the point at share ``t`` of the way from a corner of a face to its next corner.
+
+        Raises
+        ------
+        InvalidPoint
+            The corner is not 0, 1 or 2.
+        """
+        match corner:
+            case 0:
+                return cls(face, (1.0 - t, t, 0.0))
+            case 1:
+                return cls(face, (0.0, 1.0 - t, t))
+            case 2:
+                return cls(face, (t, 0.0, 1.0 - t))
+        raise InvalidPoint(f"the corner of face {face} is {corner!r}; it must be 0, 1 or 2")
+
+    @classmethod
+    def face(cls, index: int, barycentric: Weights) -> "SurfacePoint":
+        """Return the point of a face with these weights of its corners."""
+        return cls(index, barycentric)
+
+
+Point = int | SurfacePoint
+"""How users write a point: a vertex by its index."""

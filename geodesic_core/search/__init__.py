@@ -1,0 +1,1 @@
+"""Distances and paths between chosen points: two, the k nearest, or many."""

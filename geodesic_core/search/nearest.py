@@ -1,0 +1,110 @@
+"""The geodesically nearest of some candidates."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.errors import InvalidArgument
+from geodesic_core.fields.sources import as_points, ends_of
+from geodesic_core.fields.sweep import Control
+from geodesic_core.mesh.surface_point import Point
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.search.target_sweep import Sweeper
+from geodesic_core.tolerances import TIE
+from geodesic_core.validation import as_limit, is_index
+
+
+@dataclass(frozen=True, slots=True)
+class Nearest:
+    """The nearest of some candidates, nearest first."""
+
+    indices: Ints
+    """(n,) int32, into the candidates; of equal distances the lower index goes first"""
+    distances: Floats
+    """(n,) float64, mesh units"""
+
+
+def nearest(
+    mesh: TriangleMesh,
+    source: Point,
+    candidates: Sequence[Point],
+    k: int = 1,
+    max_distance: float | None = None,
+    *,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> Nearest:
+    """Return the ``k`` candidates that are geodesically nearest to a point, exactly.
+
+    For many questions on one mesh, a `Solver` is faster.
+
+    Parameters
+    ----------
+    mesh
+        The surface.
+    source, candidates
+        Vertex indices or `SurfacePoint`.
+    k
+        How many to find: from 1 to the number of candidates. There are fewer in the answer where
+        fewer can be reached.
+    max_distance
+        Candidates farther than this (mesh units) are left out.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Raises
+    ------
+    InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    Distances that differ by rounding count as equal. The sweep goes no farther than the k-th
+    nearest; allocating its state is O(V + F), which a `Solver` does once.
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    return find_nearest(mesh, lambda: Sweeper(mesh), source, candidates, k, max_distance, control)
+
+
+def find_nearest(
+    mesh: TriangleMesh,
+    sweeper: Callable[[], Sweeper],
+    source: Point,
+    candidates: Sequence[Point],
+    k: int,
+    max_distance: float | None,
+    control: Control,
+) -> Nearest:
+    """Do as `nearest` does, with a sweeper that is asked for once the arguments are in order."""
+    limit = as_limit(max_distance)
+    start = mesh.point(source, "source")
+    places = as_points(mesh, candidates, "candidate")
+    if not is_index(k) or not 1 <= k <= len(places):
+        raise InvalidArgument(
+            f"k is {k!r}; it must be an integer from 1 to the number of candidates, {len(places)}"
+        )
+    ends = ends_of(mesh, [start], places)
+    connected = ends.targets_connected_to(0)
+    indices, distances = connected[:0], np.empty(0)
+    if len(connected) > 0:
+        count = min(int(k), len(connected))
+        found = sweeper().distances(ends, 0, connected, count, limit, control)
+        order = _nearest_first(found)[:count]
+        order = order[np.isfinite(found[order])]
+        indices, distances = connected[order], found[order]
+    if control.progress is not None:
+        control.progress(1.0)
+    return Nearest(indices, distances)
+
+
+def _nearest_first(distances: Floats) -> Longs:
+    """Return the order of distances, in which those that differ by rounding count as equal."""
+    order = np.argsort(distances, kind="stable")
+    ascending = distances[order]
+    rank = np.zeros(len(order), np.int64)
+    rank[1:] = np.cumsum(ascending[1:] > ascending[:-1] * (1.0 + TIE))
+    return order[np.lexsort((order, rank))]

@@ -1,0 +1,99 @@
+"""Exact distances from one point to some others: sweep after sweep in the same memory."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints
+from geodesic_core.fields.sources import Ends
+from geodesic_core.fields.sweep import Control, share_of_vertices, sweep_nodes
+from geodesic_core.kernels.sweep import pruning, state
+from geodesic_core.kernels.sweep.state import (
+    NO_SITES,
+    TOUCHED,
+    Sites,
+    Wavefront,
+    new_wavefront,
+    with_sites,
+)
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.tolerances import SEARCH_SLACK
+
+_RESET = 3
+"""How many times as much it costs to reset a vertex as to allocate it: 3 % of a whole sweep, which
+therefore leaves its memory behind."""
+
+
+class Sweeper:
+    """Finds exact distances between points of one mesh; not for several threads at once.
+
+    A short sweep resets what it touched, so that it does not depend on the size of the mesh; each
+    stops once it has found what was asked for.
+    """
+
+    def __init__(self, mesh: TriangleMesh) -> None:
+        self.mesh = mesh
+        self._room = 0
+        self._wave = self._new_wave()
+        self._vertices = np.bincount(mesh.components)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory held, bytes, the mesh not counted."""
+        return state.bytes_of(self._wave)
+
+    def distances(
+        self, ends: Ends, source: int, targets: Ints, count: int, limit: float, control: Control
+    ) -> Floats:
+        """Return the exact distances of the nearest ``count`` targets from a source of ``ends``.
+
+        Those of other targets, which are farther, may be too large; those beyond ``limit`` are
+        infinite. To look for more targets than can be reached costs time only.
+
+        Raises
+        ------
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in `run_sweep`.
+        """
+        nodes = ends.between(source, targets)
+        self._make_room(nodes.sites.nodes)
+        bounds = state.exact_bounds(limit)
+        wave = self._wave = with_sites(self._wave, nodes.sites)
+        control.grant_memory(self.nbytes)
+        share = share_of_vertices(int(self._vertices[nodes.components[0]]), limit)
+        limit_of = _limit_of(nodes.targets, ends.corners[targets], ends.reaches[targets], count)
+        try:
+            wave = self._wave = sweep_nodes(
+                self.mesh, wave, nodes, np.zeros(1), bounds, control, share, limit_of
+            )
+            distances: Floats = wave.distance[nodes.targets]
+        finally:
+            if _RESET * wave.counters[TOUCHED] < len(self.mesh.vertices):
+                pruning.forget(self.mesh.topology, wave, bounds)
+            else:
+                self._wave = self._new_wave()
+        distances[distances > limit] = np.inf
+        return distances
+
+    def _make_room(self, nodes: int) -> None:
+        if nodes > self._room:
+            self._room = nodes
+            self._wave = self._new_wave()
+
+    def _new_wave(self) -> Wavefront:
+        return new_wavefront(self.mesh.topology, Sites(self._room, *NO_SITES[1:]))
+
+
+def _limit_of(
+    nodes: Ints, corners: Ints, reaches: Floats, count: int
+) -> Callable[[Wavefront], float]:
+    """Return what tells how far a sweep has to look for the nearest ``count`` of its targets.
+
+    A distance known so far is that of a path: nothing beyond it can be nearer.
+    """
+
+    def limit(wave: Wavefront) -> float:
+        known = np.minimum(wave.distance[nodes], (wave.distance[corners] + reaches).min(axis=1))
+        return float(np.partition(known, count - 1)[count - 1]) * (1.0 + SEARCH_SLACK)
+
+    return limit

@@ -1,0 +1,52 @@
+"""The parts of a call done in threads: the kernels let go of the interpreter."""
+
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from dataclasses import replace
+from functools import partial
+
+from geodesic_core.fields.sweep import SLICE_SECONDS, Control
+
+Worker = Callable[[int, Control], None]
+"""Does the part of a number."""
+
+
+def available_cores() -> int:
+    """Return the number of cores that this process may use, or has where nothing tells that."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def share_out(parts: int, workers: Sequence[Worker], control: Control) -> None:
+    """Have workers, each in a thread of its own, do parts of a call, until all are done.
+
+    The caller's callbacks are called in the caller's thread only.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded
+        As the control says.
+    Exception
+        Whatever the first worker to fail raises.
+    """
+    stop = threading.Event()
+    shares = [0.0] * parts
+    todo = iter(range(parts))  # whose `next` is atomic
+    watched = replace(control, cancel=stop.is_set, deadline_s=None)
+
+    def work(worker: Worker) -> None:
+        while not stop.is_set() and (part := next(todo, None)) is not None:
+            worker(part, replace(watched, progress=partial(shares.__setitem__, part)))
+            shares[part] = 1.0
+
+    with ThreadPoolExecutor(len(workers)) as pool:
+        try:
+            working = {pool.submit(work, worker) for worker in workers}
+            while working:
+                control.look_up(sum(shares) / parts)
+                done, working = wait(working, SLICE_SECONDS, FIRST_EXCEPTION)
+                for future in done:
+                    future.result()
+        finally:
+            stop.set()
