@@ -142,7 +142,7 @@ class ProblemError(Exception):
         self.problem = problem
 
 
-def refuse(code: str, detail: str, **members: Any) -> ProblemError:
+def problem(code: str, detail: str, **members: Any) -> ProblemError:
     """Return the exception for a problem with these members."""
     return ProblemError(Problem(code, detail, **members))
 
@@ -153,7 +153,7 @@ def over_limit(
     """Return the exception for ``actual`` of something where ``setting`` allows ``limit``."""
     detail = f"{actual} {what}, where at most {limit} are allowed"
     variable = variable_of(setting)
-    return refuse(code, detail, limit=limit, actual=actual, setting=variable, **members)
+    return problem(code, detail, limit=limit, actual=actual, setting=variable, **members)
 
 
 def pointer(*parts: str | int) -> str:

@@ -16,7 +16,7 @@ from geodesic_core.fields.distance_field import DistanceField, Source, Sources, 
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
 from geodesic_core.fields.sources import component_of, disconnected
 from geodesic_core.fields.sweep import Control
-from geodesic_core.fields.whole_sweep import WholeSweep, peak_bytes
+from geodesic_core.fields.whole_sweep import RepeatableSweep, peak_bytes
 from geodesic_core.kernels.sweep import state
 from geodesic_core.kernels.sweep.state import Bounds, Wavefront
 from geodesic_core.mesh.curve import Curve, Polyline, polyline_of
@@ -25,7 +25,7 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.matrix import Layout, find_matrix
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
-from geodesic_core.search.target_sweep import Sweeper
+from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
 from geodesic_core.validation import as_barriers, as_limit, is_number
 
@@ -218,7 +218,7 @@ class Solver:
     def __init__(self, mesh: TriangleMesh) -> None:
         self.mesh = mesh
         self._search: PathSearch | None = None
-        self._sweeper: Sweeper | None = None
+        self._sweeper: TargetSweep | None = None
 
     @property
     def nbytes(self) -> int:
@@ -298,9 +298,9 @@ class Solver:
             self._search = PathSearch(self.mesh)
         return self._search
 
-    def _kept_sweeper(self) -> Sweeper:
+    def _kept_sweeper(self) -> TargetSweep:
         if self._sweeper is None:
-            self._sweeper = Sweeper(self.mesh)
+            self._sweeper = TargetSweep(self.mesh)
         return self._sweeper
 
 
@@ -357,7 +357,7 @@ def _among(
     if len(faces) == 0:
         return mesh, control
     control = control.holding(sum(array.nbytes for array in mesh.topology))
-    control.grant_memory(0)
+    control.check_memory(0)
     return mesh.with_barriers(faces), control
 
 
@@ -376,7 +376,7 @@ def _solve(
     starts, places = _as_sources(mesh, sources)
     ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
     distances = np.array([start.start_distance for start in starts])
-    sweep = WholeSweep.between(mesh, places, distances, ends, bounds)
+    sweep = RepeatableSweep.between(mesh, places, distances, ends, bounds)
     wave = sweep.run(control, paths=paths, windows=sweep.all_faces if windows else None)
     found = sweep.found(wave, paths=paths, windows=windows)
     stats = _stats(mesh, wave, time.perf_counter() - control.began)

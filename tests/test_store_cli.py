@@ -13,7 +13,7 @@ import pytest
 from app.queries import code_version
 from app.store.fields import FieldStore
 from app.store.layout import owned
-from app.store.results import Seal
+from app.store.results import ResultManifest
 
 from .app.conftest import serving, upload_sample, wait_until
 from .test_cli import Run, error_line, run  # noqa: F401 - a fixture
@@ -169,7 +169,7 @@ def test_prune(run: Run, left: Left) -> None:  # noqa: F811
     (held,) = left.results(1)
     damage(damaged)
     for body in (outdated, held):
-        seal = Seal.model_validate_json(body.with_suffix(".json").read_bytes())
+        seal = ResultManifest.model_validate_json(body.with_suffix(".json").read_bytes())
         assert seal.code
         written = seal.model_copy(update={"code": "an older one"}).model_dump_json()
         body.with_suffix(".json").write_text(written)

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 def write_answer(path: Path, answer: "Answer") -> None:
     """Write an answer in the format that the suffix of a path names."""
-    from app.encoding import FORMATS, Form, encode
+    from app.encoding import FORMATS, Representation, encode
 
     media_type = FORMATS[path.suffix.lower().removeprefix(".")]
-    write_file(path, encode(answer, Form(media_type)).parts)
+    write_file(path, encode(answer, Representation(media_type)).parts)
 
 
 def write_file(path: Path, parts: Iterable[bytes | memoryview]) -> None:

@@ -17,7 +17,7 @@ from app.encoding.form import (
     OCTETS,
     PLY,
     SVG,
-    Form,
+    Representation,
 )
 from app.encoding.negotiation import negotiate, negotiate_coding
 from app.encoding.registry import encode
@@ -36,10 +36,10 @@ __all__ = [
     "SVG",
     "Answer",
     "Encoded",
-    "Form",
     "Indices",
     "Line",
     "Place",
+    "Representation",
     "Surface",
     "Table",
     "encode",

@@ -9,7 +9,7 @@ from scipy.sparse import coo_array, save_npz
 
 from app.encoding.answer import Answer, Encoded
 from app.encoding.headers import headers_of
-from app.errors import refuse
+from app.errors import problem
 
 
 def to_npy(answer: Answer, dtype: str) -> Encoded:
@@ -44,7 +44,7 @@ def _body(answer: Answer, dtype: str) -> NDArray[Any]:
         with np.errstate(over="raise"):
             return np.ascontiguousarray(array, dtype=np.dtype(dtype).newbyteorder("<"))
     except FloatingPointError:
-        raise refuse("invalid_request", f"{dtype} cannot hold numbers so large") from None
+        raise problem("invalid_request", f"{dtype} cannot hold numbers so large") from None
 
 
 def _raw(array: NDArray[Any]) -> memoryview | bytes:

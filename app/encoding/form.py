@@ -31,7 +31,7 @@ TEXTS = frozenset({JSON, OBJ, CSV, SVG, GEOJSON})
 
 
 @dataclass(frozen=True)
-class Form:
+class Representation:
     """What is to be made of an answer; two forms of one answer are two results."""
 
     media_type: str

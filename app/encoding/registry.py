@@ -9,7 +9,19 @@ from app.encoding.arrays import to_npy, to_npz, to_octets
 from app.encoding.blocks import joined
 from app.encoding.codings import compressed
 from app.encoding.csv_table import to_csv
-from app.encoding.form import ARRAYS, CSV, GEOJSON, JSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG, Form
+from app.encoding.form import (
+    ARRAYS,
+    CSV,
+    GEOJSON,
+    JSON,
+    NPY,
+    NPZ,
+    OBJ,
+    OCTETS,
+    PLY,
+    SVG,
+    Representation,
+)
 from app.encoding.geojson import to_geojson
 from app.encoding.json_document import to_json
 from app.encoding.obj_lines import to_obj
@@ -29,7 +41,7 @@ _ENCODERS: Mapping[str, Callable[..., Encoded]] = {
 }
 
 
-def encode(answer: Answer, form: Form) -> Encoded:
+def encode(answer: Answer, form: Representation) -> Encoded:
     """Encode ``answer`` in a form that it comes in; its parts are made when they are asked for."""
     encoder = _ENCODERS[form.media_type]
     if form.media_type in ARRAYS:

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from app.engine.work import Done, Order
+from app.engine.work import Task, TaskResult
 
-Told = Callable[[float], None]
+ProgressCallback = Callable[[float], None]
 """Is told which share of some work is done: 0 when it begins, never less than before."""
 
 
@@ -53,7 +53,7 @@ class Engine(Protocol):
     def refuse_when_full(self, client: str) -> None:
         """Raise what ``run`` would, did the work of a client have to wait, and had no room to."""
 
-    async def run(self, order: Order, told: Told) -> Done:
+    async def run(self, order: Task, told: ProgressCallback) -> TaskResult:
         """Do the work of an order; cancel the call to stop it.
 
         Raises

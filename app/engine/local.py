@@ -8,12 +8,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from app.engine.interface import Load, Told
+from app.engine.interface import Load, ProgressCallback
 from app.engine.queue import FairQueue
 from app.engine.slot import Slot, WorkerLostError
-from app.engine.work import Done, Order, Outcome, Work
+from app.engine.work import Outcome, Task, TaskResult, Work
 from app.engine.worker import WorkerConfig
-from app.errors import Problem, ProblemError, over_limit, refuse
+from app.errors import Problem, ProblemError, over_limit, problem
 from app.settings import Settings
 
 logger = logging.getLogger(__name__)
@@ -29,7 +29,7 @@ _SMALL_S = 0.5
 class _Place:
     """A place in the queue."""
 
-    order: Order
+    order: Task
     slot: "asyncio.Future[Slot]"
 
 
@@ -92,7 +92,7 @@ class LocalEngine:
         if not any(self._takes(slot, is_small=False) for slot in self._idle):
             self._refuse_to_wait(client)
 
-    async def run(self, order: Order, told: Told) -> Done:
+    async def run(self, order: Task, told: ProgressCallback) -> TaskResult:
         """Do the work of an order in the next free worker, see ``Engine``."""
         self._refuse_when_draining()
         start = perf_counter()
@@ -105,7 +105,9 @@ class LocalEngine:
             except WorkerLostError as error:
                 deaths += 1
                 if error.had_begun or deaths > len(self._slots):
-                    raise refuse("worker_died", "the worker process of this request died") from None
+                    raise problem(
+                        "worker_died", "the worker process of this request died"
+                    ) from None
                 continue  # it had died idle, unnoticed: nothing was tried yet
             if outcome is None:  # it proved not to be small
                 order = replace(order, is_small=False)
@@ -114,7 +116,7 @@ class LocalEngine:
                 raise ProblemError(outcome)
             return replace(outcome, seconds={"queue": queued, **outcome.seconds})
 
-    async def _run_in(self, slot: Slot, order: Order, told: Told) -> Outcome:
+    async def _run_in(self, slot: Slot, order: Task, told: ProgressCallback) -> Outcome:
         outcome = slot.begin(order.work, is_small=order.is_small)
         began = perf_counter()
         told(0.0)
@@ -177,7 +179,7 @@ class LocalEngine:
             self._offer_idle()
             await slot.close()
 
-    async def _take(self, order: Order) -> Slot:
+    async def _take(self, order: Task) -> Slot:
         """Wait for a free slot, best one that knows what the order is about."""
         self._idle = [slot for slot in self._idle if slot.is_alive]
         fit = [slot for slot in self._idle if self._takes(slot, order.is_small)]
@@ -187,16 +189,18 @@ class LocalEngine:
             self._note_taken(slot, order)
         else:
             slot = await self._wait(order)
-        slot.topics.extend(topic for topic in order.topics if topic not in slot.topics)
+        slot.affinity_keys.extend(
+            topic for topic in order.affinity_keys if topic not in slot.affinity_keys
+        )
         return slot
 
-    def _fitness(self, slot: Slot, order: Order) -> tuple[Any, ...]:
+    def _fitness(self, slot: Slot, order: Task) -> tuple[Any, ...]:
         """Return what a slot has to do with an order; where nothing, the least it has with others.
 
         Of those that are equal the one that was used last has most in the processor's caches.
         """
-        known = tuple(topic in slot.topics for topic in order.topics)
-        others = 0 if any(known) else len(slot.topics)
+        known = tuple(topic in slot.affinity_keys for topic in order.affinity_keys)
+        others = 0 if any(known) else len(slot.affinity_keys)
         return *known, order.is_small and slot is self._small, -others
 
     def _takes(self, slot: Slot, is_small: bool) -> bool:
@@ -204,11 +208,11 @@ class LocalEngine:
             return len(self._at_small) < self._settings.workers
         return slot is not self._small
 
-    def _note_taken(self, slot: Slot, order: Order) -> None:
+    def _note_taken(self, slot: Slot, order: Task) -> None:
         if order.is_small:
             self._at_small.add(slot)
 
-    async def _wait(self, order: Order) -> Slot:
+    async def _wait(self, order: Task) -> Slot:
         self._refuse_to_wait(order.client)
         place = _Place(order, asyncio.get_running_loop().create_future())
         self._waiting.put(order.client, place)
@@ -222,7 +226,7 @@ class LocalEngine:
 
     def _refuse_when_draining(self) -> None:
         if self.is_draining:
-            raise refuse("draining", "the service is about to stop", headers=_RETRY_AFTER)
+            raise problem("draining", "the service is about to stop", headers=_RETRY_AFTER)
 
     def _refuse_to_wait(self, client: str) -> None:
         if self._is_failing:
@@ -271,4 +275,4 @@ class LocalEngine:
 
 def _unavailable() -> ProblemError:
     detail = "no worker process can be started; the service's log says why"
-    return refuse("engine_unavailable", detail, headers=_RETRY_AFTER)
+    return problem("engine_unavailable", detail, headers=_RETRY_AFTER)

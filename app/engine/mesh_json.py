@@ -6,7 +6,7 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from app.errors import Fault, ProblemError, pointer, refuse
+from app.errors import Fault, ProblemError, pointer, problem
 
 _MEMBERS = ("vertices", "faces")
 
@@ -16,7 +16,7 @@ def read_json_mesh(body: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]
     try:
         document = orjson.loads(body)
     except orjson.JSONDecodeError as error:
-        raise refuse("malformed_body", f"the body is not JSON: {error}") from error
+        raise problem("malformed_body", f"the body is not JSON: {error}") from error
     if not isinstance(document, dict):
         raise _invalid("", "an object with vertices and faces is expected")
     for name in document:
@@ -52,4 +52,4 @@ def _as_array(rows: Any) -> NDArray[Any]:
 
 
 def _invalid(place: str, message: str) -> ProblemError:
-    return refuse("invalid_request", message, errors=(Fault(place, message),))
+    return problem("invalid_request", message, errors=(Fault(place, message),))

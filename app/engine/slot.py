@@ -40,11 +40,11 @@ class Slot:
         self._listening: asyncio.Task[None] | None = None
         self._given_up = asyncio.Event()
         self._given_up.set()
-        self.topics: deque[str] = deque(maxlen=_TOPICS)
+        self.affinity_keys: deque[str] = deque(maxlen=_TOPICS)
 
     async def open(self) -> None:
         """Start a worker and warm its kernels; raises ``WorkerLostError`` when it cannot."""
-        self.topics.clear()
+        self.affinity_keys.clear()
         try:
             line = await self._started()
             reader, self._line = await asyncio.open_unix_connection(sock=line)

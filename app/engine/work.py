@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from app.encoding import Form
+from app.encoding import Representation
 from app.errors import Problem
 from app.queries import Estimate, Query
 from app.schemas.service import Merge
@@ -34,58 +34,58 @@ class MeshFromSample:
     owner: str | None = None
 
 
-MeshOrigin = MeshFromFile | MeshFromSample
+MeshInput = MeshFromFile | MeshFromSample
 
 
 @dataclass(frozen=True)
-class Storing:
+class StoreMesh:
     """Read or make a mesh, check it, and write it into a new folder."""
 
-    origin: MeshOrigin
+    origin: MeshInput
     folder: Path
 
     stops_when_asked: ClassVar[bool] = False
 
 
 @dataclass(frozen=True)
-class Answering:
+class RunQuery:
     """Answer ``query`` into the result ``result_name``."""
 
     query: Query[Any]
-    form: Form
+    form: Representation
     result_name: str
 
     stops_when_asked: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
-class Estimating:
+class EstimateQuery:
     """Tell what the answer to ``query`` would take."""
 
     query: Query[Any]
-    form: Form
+    form: Representation
 
     stops_when_asked: ClassVar[bool] = True
 
 
-Work = Storing | Answering | Estimating
+Work = StoreMesh | RunQuery | EstimateQuery
 
 
 @dataclass(frozen=True)
-class Order:
+class Task:
     """Work, and what decides when and where it is done."""
 
     work: Work
     client: str
     """On whose behalf: clients take turns"""
-    topics: tuple[str, ...] = ()
+    affinity_keys: tuple[str, ...] = ()
     """What it is about, the most telling first: best done where that came up before"""
     is_small: bool = False
     """Whether it is likely to be done at once, so that it need not wait behind long work"""
 
 
 @dataclass(frozen=True)
-class Done:
+class TaskResult:
     """What a worker reports: the seconds of each phase, and what the work was for.
 
     Answers are files; only small ones come along.
@@ -97,5 +97,5 @@ class Done:
     estimate: Estimate | None = None
 
 
-Outcome = Done | Problem | None
+Outcome = TaskResult | Problem | None
 """Of work: done, refused, or stopped when asked to."""

@@ -27,22 +27,22 @@ from app.encoding import JSON, encode
 from app.engine.memory import limit_memory, refuse_beyond_limit
 from app.engine.mesh_json import read_json_mesh
 from app.engine.work import (
-    Answering,
-    Done,
-    Estimating,
+    EstimateQuery,
     MeshFromFile,
     MeshFromSample,
-    MeshOrigin,
+    MeshInput,
     Outcome,
-    Storing,
+    RunQuery,
+    StoreMesh,
+    TaskResult,
     Work,
 )
 from app.errors import problem_of
-from app.queries import SMALL_SECONDS, Fields, Grant, Query, code_version, estimate
+from app.queries import SMALL_SECONDS, ExecutionContext, FieldCache, Query, code_version, estimate
 from app.queries.validation import refuse_large_json
 from app.settings import Settings, variable_of
 from app.store.fields import FieldStore
-from app.store.lru_cache import Kept
+from app.store.lru_cache import LRUCache
 from app.store.meshes import MeshStore, OpenMesh
 from app.store.results import write_result
 
@@ -84,11 +84,11 @@ class Worker:
     def __post_init__(self) -> None:
         self.settings = self.config.settings
         self.store = MeshStore(self.settings.store)
-        self.meshes: Kept[tuple[str, bytes], OpenMesh]
+        self.meshes: LRUCache[tuple[str, bytes], OpenMesh]
         """By id and barriers"""
-        self.meshes = Kept(self.settings.worker_mesh_bytes, lambda opened: opened.nbytes)
+        self.meshes = LRUCache(self.settings.worker_mesh_bytes, lambda opened: opened.nbytes)
         store = FieldStore(self.settings.store, self.settings.fields_bytes)
-        self.fields = Fields(self.settings.worker_field_bytes, store, code_version())
+        self.fields = FieldCache(self.settings.worker_field_bytes, store, code_version())
         self._writer = _thread_behind()
 
     def do(self, number: int, work: Work) -> Outcome:
@@ -107,7 +107,7 @@ class Worker:
                 logger.exception("a worker failed at %s", work)
             return problem
 
-    def _do(self, number: int, work: Work) -> Done:
+    def _do(self, number: int, work: Work) -> TaskResult:
         """Do ``work``, unless the number of the work to stop reaches ``number``."""
         clock = Clock()
 
@@ -115,27 +115,27 @@ class Worker:
             return bool(self.signals.stop_number >= number)
 
         match work:
-            case Storing():
+            case StoreMesh():
                 return self._store(work, clock)
-            case Answering():
+            case RunQuery():
                 try:
                     return self._answer(work, clock, is_to_stop)
                 finally:
                     if self.fields.has_unwritten:
                         self._writer.submit(self.fields.write)  # while the answer is on its way
-            case Estimating():
+            case EstimateQuery():
                 return self._estimate(work, clock, is_to_stop)
 
-    def _store(self, work: Storing, clock: "Clock") -> Done:
+    def _store(self, work: StoreMesh, clock: "Clock") -> TaskResult:
         with clock.phase("load"):
             mesh = _make_mesh(work.origin, self.settings.max_faces)
         with clock.phase("store"):
             written = self.store.write_aside(mesh, work.folder, work.origin.owner)
-        return Done(clock.seconds, mesh=written)
+        return TaskResult(clock.seconds, mesh=written)
 
-    def _answer(self, work: Answering, clock: "Clock", cancel: Callable[[], bool]) -> Done:
+    def _answer(self, work: RunQuery, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
         settings = self.settings
-        grant = Grant(
+        grant = ExecutionContext(
             cancel,
             self._report,
             self.fields,
@@ -159,14 +159,16 @@ class Worker:
                 code_version(),
                 is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
             )
-        return Done(clock.seconds, answer=written)
+        return TaskResult(clock.seconds, answer=written)
 
-    def _estimate(self, work: Estimating, clock: "Clock", cancel: Callable[[], bool]) -> Done:
+    def _estimate(
+        self, work: EstimateQuery, clock: "Clock", cancel: Callable[[], bool]
+    ) -> TaskResult:
         with clock.phase("load"):
             opened = self._open(work.query)
         with clock.phase("compute"):
             found = estimate(work.query, work.form, opened, cancel)
-        return Done(clock.seconds, estimate=found)
+        return TaskResult(clock.seconds, estimate=found)
 
     def _report(self, share: float) -> None:
         self.signals.progress = share
@@ -207,7 +209,7 @@ class Clock:
         self.seconds[name] = perf_counter() - start
 
 
-def _make_mesh(origin: MeshOrigin, max_faces: int) -> gc.TriangleMesh:
+def _make_mesh(origin: MeshInput, max_faces: int) -> gc.TriangleMesh:
     faces: NDArray[np.int32] | NDArray[np.int64]
     match origin:
         case MeshFromSample():

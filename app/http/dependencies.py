@@ -14,11 +14,11 @@ from pydantic import BaseModel, Field
 from starlette.requests import ClientDisconnect
 
 from app.access import Caller
-from app.encoding import Form, negotiate, negotiate_coding
+from app.encoding import Representation, negotiate, negotiate_coding
 from app.encoding.form import ARRAYS, TEXTS
-from app.errors import Fault, refuse
+from app.errors import Fault, problem
 from app.schemas.service import AnswerParameters
-from app.service.service import Asker, Service
+from app.service.service import RequestContext, Service
 
 T = TypeVar("T")
 
@@ -59,19 +59,21 @@ class TimeoutHeader(BaseModel):
     )
 
 
-def asker_of(request: Request, headers: TimeoutHeader) -> Asker:
+def asker_of(request: Request, headers: TimeoutHeader) -> RequestContext:
     """Return who asks, and the lower of how long they and the service would wait."""
     limit, own_ms = service_of(request).settings.deadline_s, headers.x_timeout_ms
     deadline_s = limit if own_ms is None else min(limit, own_ms / 1000)
-    return Asker(caller_of(request), deadline_s, request.state.request_id)
+    return RequestContext(caller_of(request), deadline_s, request.state.request_id)
 
 
-async def get_asker(request: Request, headers: Annotated[TimeoutHeader, Header()]) -> Asker:
+async def get_asker(
+    request: Request, headers: Annotated[TimeoutHeader, Header()]
+) -> RequestContext:
     """Return the same, as a dependency."""
     return asker_of(request, headers)
 
 
-AskerDep = Annotated[Asker, Depends(get_asker)]
+AskerDep = Annotated[RequestContext, Depends(get_asker)]
 
 
 def prefers_async(prefer: str | None) -> bool:
@@ -86,22 +88,24 @@ def require_json(request: Request) -> None:
     if not re.match(r"application/([\w.-]+\+)?json\b", media_type, re.IGNORECASE):
         hint = "send the header Content-Type: application/json"
         detail = f"the body of a query is JSON, not {media_type or 'without Content-Type'}"
-        raise refuse("unsupported_media_type", detail, hint=hint)
+        raise problem("unsupported_media_type", detail, hint=hint)
 
 
-def form_of(request: Request, parameters: AnswerParameters, offers: Sequence[str]) -> Form:
+def form_of(
+    request: Request, parameters: AnswerParameters, offers: Sequence[str]
+) -> Representation:
     """Return the form to answer in, its media type one of the ``offers``."""
     headers = request.headers
     media_type = negotiate(headers.get("accept"), parameters.format, offers)
     if media_type is None:
-        raise refuse("not_acceptable", f"this answer comes as {', '.join(offers)}")
-    if parameters.dtype != Form.dtype and media_type not in ARRAYS:
+        raise problem("not_acceptable", f"this answer comes as {', '.join(offers)}")
+    if parameters.dtype != Representation.dtype and media_type not in ARRAYS:
         fault = Fault("/query/dtype", f"goes with npy, npz and octets, not with {media_type}")
-        raise refuse("invalid_request", fault.message, errors=(fault,))
+        raise problem("invalid_request", fault.message, errors=(fault,))
     coding = None
     if media_type in TEXTS and "range" not in headers:
         coding = negotiate_coding(headers.get("accept-encoding"))
-    return Form(media_type, parameters.dtype, coding)
+    return Representation(media_type, parameters.dtype, coding)
 
 
 async def while_connected(request: Request, work: Coroutine[Any, Any, T]) -> T:

@@ -9,7 +9,7 @@ from anyio import to_thread
 from starlette.datastructures import UploadFile
 from starlette.requests import Request
 
-from app.errors import refuse
+from app.errors import problem
 from app.schemas.service import MeshFormat
 
 FORMATS = get_args(MeshFormat)
@@ -37,12 +37,12 @@ async def spool(request: Request, path: Path, file_format: str | None) -> str:
         await _write(path, request.stream())
         found = _FORMAT_OF_TYPE.get(media_type)
     if path.stat().st_size == 0:
-        raise refuse("invalid_mesh", "the body is empty: there is no mesh in it")
+        raise problem("invalid_mesh", "the body is empty: there is no mesh in it")
     chosen = file_format or found
     if chosen is None:
         hint = f"say ?format= with one of {', '.join(FORMATS)}, or send a Content-Type of a mesh"
         detail = f"{media_type or 'no Content-Type'} does not tell the format of the mesh"
-        raise refuse("unsupported_media_type", detail, hint=hint)
+        raise problem("unsupported_media_type", detail, hint=hint)
     return chosen
 
 
@@ -50,7 +50,7 @@ async def _spool_form(request: Request, path: Path) -> str | None:
     async with request.form(max_files=1, max_fields=0) as form:
         file = next((part for part in form.values() if isinstance(part, UploadFile)), None)
         if file is None:
-            raise refuse("malformed_body", "the form has no file")
+            raise problem("malformed_body", "the form has no file")
         with path.open("wb") as target:
             await to_thread.run_sync(shutil.copyfileobj, file.file, target, _BLOCK)
         suffix = Path(file.filename or "").suffix.lower().removeprefix(".")

@@ -11,7 +11,7 @@ from app.errors import Problem
 Status = Literal["accepted", "running", "successful", "failed", "dismissed"]
 
 
-class Errand(BaseModel):
+class JobSpec(BaseModel):
     """What a job is to do, and for whom."""
 
     model_config = ConfigDict(frozen=True)
@@ -37,7 +37,7 @@ class Job(BaseModel):
     model_config = ConfigDict(frozen=True)
 
     id: str = Field(default_factory=lambda: uuid4().hex)
-    errand: Errand
+    errand: JobSpec
     status: Status = "accepted"
     progress: float = 0.0
     version: int = 1

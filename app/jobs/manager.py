@@ -7,16 +7,16 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime, timedelta
 
-from app.engine.interface import Told
-from app.errors import Fault, Problem, problem_of, refuse
-from app.jobs.job import Errand, Job
-from app.jobs.repository import JobBook
+from app.engine.interface import ProgressCallback
+from app.errors import Fault, Problem, problem, problem_of
+from app.jobs.job import Job, JobSpec
+from app.jobs.repository import JobRepository
 from app.settings import variable_of
 from app.store.results import Result, ResultStore
 
 logger = logging.getLogger(__name__)
 
-Solve = Callable[[Told], Awaitable[Result]]
+Solve = Callable[[ProgressCallback], Awaitable[Result]]
 """Does what a job is for, telling which share is done"""
 
 _SWEEP_S = 60.0
@@ -63,7 +63,7 @@ class _Live:
 class Jobs:
     """The jobs of a service. Each holds its answer in ``results`` until it is forgotten."""
 
-    def __init__(self, book: JobBook, results: ResultStore, ttl_s: float) -> None:
+    def __init__(self, book: JobRepository, results: ResultStore, ttl_s: float) -> None:
         self._book = book
         self._results = results
         self._ttl = timedelta(seconds=ttl_s)
@@ -96,7 +96,7 @@ class Jobs:
         for live in self._live.values():
             live.wake()
 
-    async def submit(self, errand: Errand, solve: Solve) -> Job:
+    async def submit(self, errand: JobSpec, solve: Solve) -> Job:
         """Accept a job, or return the one that the errand's idempotency key already stands for.
 
         The key of a job that failed or was dismissed stands for nothing: it can be sent again.
@@ -123,7 +123,7 @@ class Jobs:
             return live.job
         job = await self._book.find(owner, job_id)
         if job is None:
-            raise refuse("job_not_found", f"there is no job {job_id!r}")
+            raise problem("job_not_found", f"there is no job {job_id!r}")
         return job
 
     async def page(
@@ -160,16 +160,16 @@ class Jobs:
         """
         job = await self.find(owner, job_id)
         if job.problem is not None:
-            raise refuse(**vars(job.problem))
+            raise problem(**vars(job.problem))
         if job.status == "dismissed":
-            raise refuse("job_dismissed", f"job {job_id} was dismissed")
+            raise problem("job_dismissed", f"job {job_id} was dismissed")
         if job.result is None:
             detail = f"job {job_id} is {job.status}: {job.progress:.0%} done"
-            raise refuse("job_not_finished", detail, headers={"Retry-After": "1"})
+            raise problem("job_not_finished", detail, headers={"Retry-After": "1"})
         found = await self._results.find(job.result)
         if found is None:
             hint = "send the query again"
-            raise refuse("mesh_damaged", f"the answer of job {job_id} is damaged", hint=hint)
+            raise problem("mesh_damaged", f"the answer of job {job_id} is damaged", hint=hint)
         return job, found
 
     async def watch(self, job: Job, seen: int) -> AsyncIterator[Job]:
@@ -184,7 +184,7 @@ class Jobs:
                 return
             await changed.wait()
 
-    async def _known(self, errand: Errand) -> Job | None:
+    async def _known(self, errand: JobSpec) -> Job | None:
         key = errand.idempotency_key
         if key is None:
             return None
@@ -194,7 +194,7 @@ class Jobs:
         if job.errand.fingerprint != errand.fingerprint:
             message = f"{key!r} stands for another question, asked by job {job.id}"
             fault = Fault("/header/Idempotency-Key", message)
-            raise refuse("invalid_request", message, errors=(fault,))
+            raise problem("invalid_request", message, errors=(fault,))
         return self._live[job.id].job if job.id in self._live else job
 
     async def _run(self, live: _Live, solve: Solve) -> None:

@@ -29,7 +29,7 @@ CREATE INDEX IF NOT EXISTS jobs_by_end ON jobs (finished);
 """
 
 
-class JobBook:
+class JobRepository:
     """One row for each job; the newest come first in lists."""
 
     def __init__(self, path: Path) -> None:

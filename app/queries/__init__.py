@@ -5,10 +5,17 @@ checked before a worker is asked, the formats it is answered in, how it is answe
 is likely to cost.
 """
 
-from app.queries.base import SMALL_SECONDS, Grant, Query, code_version, fingerprint, result_key
+from app.queries.base import (
+    SMALL_SECONDS,
+    ExecutionContext,
+    Query,
+    code_version,
+    fingerprint,
+    result_key,
+)
 from app.queries.distances import DistancesQuery
 from app.queries.estimate import Estimate, estimate
-from app.queries.field_cache import Fields
+from app.queries.field_cache import FieldCache
 from app.queries.isolines import IsolinesQuery
 from app.queries.locate import LocateQuery
 from app.queries.matrix import MatrixQuery
@@ -21,8 +28,8 @@ __all__ = [
     "SMALL_SECONDS",
     "DistancesQuery",
     "Estimate",
-    "Fields",
-    "Grant",
+    "ExecutionContext",
+    "FieldCache",
     "IsolinesQuery",
     "LocateQuery",
     "MatrixQuery",

@@ -8,7 +8,7 @@ import orjson
 
 import geodesic_core as gc
 from app.errors import pointer
-from app.queries.base import Grant, Query
+from app.queries.base import ExecutionContext, Query
 from app.queries.validation import refuse_places
 from app.schemas import service
 from app.store.meshes import OpenMesh
@@ -44,7 +44,7 @@ def solve_field(
     opened: OpenMesh,
     request: service.Accuracy,
     sources: Sequence[gc.Source],
-    grant: Grant,
+    grant: ExecutionContext,
     *,
     max_distance: float | None = None,
     targets: Sequence[gc.SurfacePoint] = (),
@@ -82,7 +82,7 @@ def topics_of(
     return hashlib.blake2b(written, digest_size=8).hexdigest(), query.mesh_id
 
 
-def _as_source(point: service.Wire) -> dict[str, Any]:
+def _as_source(point: service.StrictModel) -> dict[str, Any]:
     # Some queries have sources without start distances; as JSON they are to look the same.
     return {"start_distance": 0.0, **vars(point)}
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app import __version__
-from app.encoding import JSON, NPY, OCTETS, Answer, Form
+from app.encoding import JSON, NPY, OCTETS, Answer, Representation
 from app.queries.cost_model import PER_FACE_BLOCKED, Cost
-from app.queries.field_cache import Fields
+from app.queries.field_cache import FieldCache
 from app.queries.places import Places, resolved
 from app.queries.validation import (
     MeshSize,
@@ -36,23 +36,23 @@ VALUES_OF_POINT = 8
 
 SMALL_SECONDS = 0.05
 
-R = TypeVar("R", bound=service.Wire)
+R = TypeVar("R", bound=service.StrictModel)
 
 
 @dataclass(frozen=True)
-class Grant:
+class ExecutionContext:
     """What the answer to a query may take, and how it learns that it is to stop."""
 
     cancel: Callable[[], bool]
     progress: Callable[[float], None]
-    fields: Fields
+    fields: FieldCache
     memory_limit: int
     max_values: int
     """Most values of the answer, where it is written as JSON."""
     max_cells: int
     """Most cells of a matrix that tells its number only once it is there."""
 
-    def part(self, part: int, parts: int) -> "Grant":
+    def part(self, part: int, parts: int) -> "ExecutionContext":
         """Return the grant of one of several calls, of about the same length, for one answer."""
         return replace(self, progress=lambda share: self.progress((part + share) / parts))
 
@@ -91,7 +91,7 @@ class Query(ABC, Generic[R]):
 
     kind: ClassVar[str]
     """As clients call it"""
-    model: ClassVar[type[service.Wire]]
+    model: ClassVar[type[service.StrictModel]]
     """Of the request"""
 
     @classmethod
@@ -119,7 +119,7 @@ class Query(ABC, Generic[R]):
         return orjson.dumps(self.request, default=vars)
 
     @property
-    def topics(self) -> tuple[str, ...]:
+    def affinity_keys(self) -> tuple[str, ...]:
         """What a worker that was asked before may have kept: a field, and the mesh."""
         return (self.mesh_id,)
 
@@ -171,7 +171,7 @@ class Query(ABC, Generic[R]):
         """Return about how long ``solve`` takes, as far as the size of the mesh tells."""
 
     @abstractmethod
-    def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
+    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
         """Answer on an open mesh, for these ``points``."""
 
     @abstractmethod
@@ -199,7 +199,7 @@ class Query(ABC, Generic[R]):
         except gc.errors.InvalidArgument as error:
             raise refuse_places(["/barriers"], str(error)) from None
 
-    def answer(self, opened: OpenMesh, grant: Grant) -> Answer:
+    def answer(self, opened: OpenMesh, grant: ExecutionContext) -> Answer:
         """Answer on a mesh that is open `among` the barriers.
 
         Stops with ``Cancelled`` once the grant says so.
@@ -217,7 +217,7 @@ def code_version() -> str:
     return f"{__version__}+{sources_digest()}"
 
 
-def result_key(query: Query[Any], form: Form) -> str:
+def result_key(query: Query[Any], form: Representation) -> str:
     """Return the hash that names the answer to ``query`` in a form.
 
     It is the same in any run, unless the answer is not: that of each run has a name of its own.
@@ -225,7 +225,7 @@ def result_key(query: Query[Any], form: Form) -> str:
     return fingerprint(query, form) if query.is_repeatable else uuid4().hex
 
 
-def fingerprint(query: Query[Any], form: Form) -> str:
+def fingerprint(query: Query[Any], form: Representation) -> str:
     """Return the hash that stands for ``query`` in a form, answered by this code."""
     names = [type(query).__name__, query.mesh_id, form, code_version()]
     digest = hashlib.blake2b(orjson.dumps(names), digest_size=16)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
-from app.errors import Fault, refuse
+from app.errors import Fault, problem
 from app.queries.accuracy import (
     bound_of,
     likely_bound,
@@ -18,7 +18,7 @@ from app.queries.accuracy import (
     topics_of,
     with_its_error,
 )
-from app.queries.base import VALUES_OF_POINT, Grant, Likely, Query, numbered
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Likely, Query, numbered
 from app.queries.cost_model import (
     PER_POINT,
     Cost,
@@ -59,7 +59,7 @@ class DistancesQuery(Query[service.DistancesRequest]):
         once = request.model_copy(update={"include": list(dict.fromkeys(request.include))})
         return with_its_error(once)
 
-    def refuse(self, settings: Settings) -> None:
+    def problem(self, settings: Settings) -> None:
         """Refuse too many sources."""
         refuse_more("sources", point_count(*self.request.sources), settings, "max_sources")
 
@@ -73,7 +73,7 @@ class DistancesQuery(Query[service.DistancesRequest]):
         message = "does not come with a bare array; ask for json, csv or ply"
         faults = [Fault("/include", f"{name} {message}") for name in self._included]
         if faults and media_type in (NPY, OCTETS):
-            raise refuse("invalid_request", f"{media_type} holds one array", errors=tuple(faults))
+            raise problem("invalid_request", f"{media_type} holds one array", errors=tuple(faults))
 
     def value_count(self, size: MeshSize) -> int:
         """Return the number of distances and of what is told of each."""
@@ -83,7 +83,7 @@ class DistancesQuery(Query[service.DistancesRequest]):
         return (columns + VALUES_OF_POINT) * len(self.request.targets)
 
     @property
-    def topics(self) -> tuple[str, ...]:
+    def affinity_keys(self) -> tuple[str, ...]:
         """The field of these sources, and the mesh."""
         return topics_of(self, self.request.sources)
 
@@ -100,7 +100,7 @@ class DistancesQuery(Query[service.DistancesRequest]):
         points = point_count(*request.sources) + len(request.targets or ())
         return sweep_cost(size.faces, request, share, paths=paths).seconds + PER_POINT * points
 
-    def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
+    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
         """Sweep once."""
         request = self.request
         sources, targets = self._parted(places)

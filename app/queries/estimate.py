@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from app.encoding import Form, encode
+from app.encoding import Representation, encode
 from app.queries.base import Query
 from app.queries.cost_model import PER_FACE_BLOCKED
 from app.queries.places import resolved
@@ -21,7 +21,7 @@ class Estimate:
 
 
 def estimate(
-    query: Query[Any], form: Form, opened: OpenMesh, cancel: Callable[[], bool]
+    query: Query[Any], form: Representation, opened: OpenMesh, cancel: Callable[[], bool]
 ) -> Estimate:
     """Return what the answer to ``query`` would take, or refuse its points as the answer would."""
     places = resolved(query.points(), opened.mesh, cancel)

@@ -8,7 +8,7 @@ from time import perf_counter
 
 import geodesic_core as gc
 from app.store.fields import FieldStore
-from app.store.lru_cache import Kept
+from app.store.lru_cache import LRUCache
 from app.store.meshes import OpenMesh
 
 _WORTH_WRITING_S = 0.05
@@ -26,7 +26,7 @@ class Unwritten:
     field: gc.DistanceField
 
 
-class Fields:
+class FieldCache:
     """Fields of open meshes, at most ``capacity`` bytes; the least recently used go first.
 
     What is not here may be in the ``store``, by any worker, found by this ``code``. Solving again
@@ -34,8 +34,8 @@ class Fields:
     """
 
     def __init__(self, capacity: int, store: FieldStore, code: str) -> None:
-        self._fields: Kept[tuple[Hashable, Question], gc.DistanceField]
-        self._fields = Kept(capacity, lambda field: field.nbytes)
+        self._fields: LRUCache[tuple[Hashable, Question], gc.DistanceField]
+        self._fields = LRUCache(capacity, lambda field: field.nbytes)
         self._store = store
         self._code = code
         self._unwritten: list[Unwritten] = []

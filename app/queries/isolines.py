@@ -17,7 +17,7 @@ from app.queries.accuracy import (
     topics_of,
     with_its_error,
 )
-from app.queries.base import Grant, Likely, Query
+from app.queries.base import ExecutionContext, Likely, Query
 from app.queries.cost_model import (
     ARC_IN_FACE,
     FACES_ON_LEVEL,
@@ -71,7 +71,7 @@ class IsolinesQuery(Query[service.IsolinesRequest]):
         refuse_more("levels", self._level_count, settings, "max_levels")
 
     @property
-    def topics(self) -> tuple[str, ...]:
+    def affinity_keys(self) -> tuple[str, ...]:
         """The field of these sources, and the mesh."""
         return topics_of(self, self.request.sources)
 
@@ -87,7 +87,7 @@ class IsolinesQuery(Query[service.IsolinesRequest]):
         sweep = sweep_cost(size.faces, request, share, crossed=crossed)
         return sweep.seconds + PER_FACE_CROSSED * crossed * size.faces
 
-    def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
+    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
         """Sweep, and draw level after level, as long as they fit into the answer."""
         chord_error = self._chord_error(opened.mesh)
         starts = starts_of(opened.mesh, self.request.sources, places)

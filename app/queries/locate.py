@@ -8,9 +8,9 @@ import numpy as np
 import geodesic_core as gc
 from app.encoding import CSV, GEOJSON, JSON, Answer
 from app.errors import Fault
-from app.queries.base import VALUES_OF_POINT, Grant, Likely, Query
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Likely, Query
 from app.queries.cost_model import PER_POSITION, Cost
-from app.queries.places import Places, look_up
+from app.queries.places import Places, checkpoint
 from app.queries.points import described
 from app.queries.validation import MeshSize, refuse_points
 from app.queries.views import places_of, table_of_places
@@ -34,11 +34,11 @@ class LocateQuery(Query[service.LocateRequest]):
         """Return the cost of looking for each point."""
         return PER_POSITION * len(self.request.points)
 
-    def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
+    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
         """Look for one position after the other."""
         found = []
         for i in range(len(self.request.points)):
-            look_up(grant.cancel)
+            checkpoint(grant.cancel)
             found.append(self._located(opened.mesh, i))
         return self._answer(opened, found)
 

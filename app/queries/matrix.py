@@ -14,7 +14,7 @@ import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer
 from app.errors import over_limit
 from app.queries.accuracy import CERTAIN
-from app.queries.base import VALUES_OF_POINT, Grant, Likely, Query, numbered
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Likely, Query, numbered
 from app.queries.cost_model import (
     PER_POINT,
     Cost,
@@ -91,7 +91,7 @@ class MatrixQuery(Query[service.MatrixRequest]):
         share = rough_share(size, 1, request.max_distance)
         return sweeps_cost(size.faces, [share] * sweeps, 1).seconds + PER_POINT * points
 
-    def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
+    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
         """Sweep from the smaller side."""
         sources, targets = self._parted(places)
         request = self.request

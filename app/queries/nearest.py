@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.encoding import CSV, GEOJSON, JSON, Answer
 from app.queries.accuracy import CERTAIN
-from app.queries.base import VALUES_OF_POINT, Grant, Likely, Query, numbered
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Likely, Query, numbered
 from app.queries.cost_model import (
     PER_POINT,
     Cost,
@@ -58,7 +58,7 @@ class NearestQuery(Query[service.NearestRequest]):
         sweep = sweeps_cost(size.faces, [share], 1)
         return sweep.seconds + PER_POINT * len(self.request.candidates)
 
-    def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
+    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
         """Sweep to the k-th nearest."""
         source, *candidates = places
         request = self.request

@@ -14,7 +14,7 @@ from app.encoding import CSV, GEOJSON, JSON, NPY, OBJ, OCTETS, SVG, Answer
 from app.errors import Fault, ProblemError, pointer
 from app.queries import point_text
 from app.queries.accuracy import method_of, solve_field, with_its_error
-from app.queries.base import Grant, Likely, Query, numbered
+from app.queries.base import ExecutionContext, Likely, Query, numbered
 from app.queries.cost_model import (
     PER_PATH,
     PER_POINT,
@@ -89,7 +89,7 @@ class PathQuery(Query[service.PathRequest]):
             return sweep_cost(size.faces, request, share, paths=True).seconds
         return search_cost(size.faces, 1 + len(request.waypoints)).seconds
 
-    def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
+    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
         """Search, or sweep where the path is to be approximate."""
         request = self.request
         source, target, *waypoints = places

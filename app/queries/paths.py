@@ -7,7 +7,7 @@ from typing import Any
 import geodesic_core as gc
 from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
 from app.queries.accuracy import method_of, solve_field, topics_of, with_its_error
-from app.queries.base import VALUES_OF_POINT, Grant, Likely, Query, numbered
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Likely, Query, numbered
 from app.queries.cost_model import (
     PER_PATH,
     PER_POINT,
@@ -19,7 +19,7 @@ from app.queries.cost_model import (
     typical_edge,
 )
 from app.queries.outline import likely_outline, no_outline, outline_of
-from app.queries.places import Places, look_up, positions_of
+from app.queries.places import Places, checkpoint, positions_of
 from app.queries.points import described, described_origin
 from app.queries.sources import named_origin, origin_of, point_count
 from app.queries.stats import likely_stats, stats_of
@@ -51,7 +51,7 @@ class PathsQuery(Query[service.PathsRequest]):
         return VALUES_OF_POINT * len(self.request.targets)
 
     @property
-    def topics(self) -> tuple[str, ...]:
+    def affinity_keys(self) -> tuple[str, ...]:
         """The field of these sources, and the mesh."""
         return topics_of(self, [self.request.source])
 
@@ -71,7 +71,7 @@ class PathsQuery(Query[service.PathsRequest]):
         sweep = sweep_cost(size.faces, request, share, paths=True)
         return sweep.seconds + (PER_PATH + PER_POINT) * len(request.targets)
 
-    def solve(self, opened: OpenMesh, places: Places, grant: Grant) -> Answer:
+    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
         """Sweep once, and trace path after path, as long as they fit into the answer."""
         starts, targets = self._parted(places)
         origin = origin_of(opened.mesh, "/source", self.request.source, starts)
@@ -86,7 +86,7 @@ class PathsQuery(Query[service.PathsRequest]):
         found: list[dict[str, Any]] = []
         values = 0
         for target in targets:
-            look_up(grant.cancel)
+            checkpoint(grant.cancel)
             try:
                 path = field.path_to(target)
             except gc.errors.NoPath as error:

@@ -22,7 +22,7 @@ def resolved(
     places: list[gc.SurfacePoint] = []
     faults: list[Fault] = []
     for where, point in named:
-        look_up(cancel)
+        checkpoint(cancel)
         try:
             places.append(resolve(mesh, point))
         except gc.errors.InvalidPoint as error:
@@ -34,7 +34,7 @@ def resolved(
     return places
 
 
-def look_up(cancel: Callable[[], bool]) -> None:
+def checkpoint(cancel: Callable[[], bool]) -> None:
     """Stop if the query is to stop."""
     if cancel():
         raise gc.errors.Cancelled("cancelled while points were looked for")

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 from typing import NamedTuple
 
-from app.errors import Fault, ProblemError, over_limit, refuse
+from app.errors import Fault, ProblemError, over_limit, problem
 from app.schemas import service
 from app.settings import Settings
 from geodesic_core.tolerances import WEIGHT_ERROR
@@ -26,12 +26,12 @@ class MeshSize(NamedTuple):
 def refuse_places(places: Sequence[str], message: str) -> ProblemError:
     """Return the exception for what should not be at some places of a request."""
     faults = tuple(Fault(place, message) for place in places)
-    return refuse("invalid_request", detail_of(faults), errors=faults)
+    return problem("invalid_request", detail_of(faults), errors=faults)
 
 
 def refuse_points(faults: Sequence[Fault]) -> ProblemError:
     """Return the exception for points that are not on the mesh."""
-    return refuse("invalid_point", detail_of(faults), errors=tuple(faults))
+    return problem("invalid_point", detail_of(faults), errors=tuple(faults))
 
 
 def refuse_more(what: str, count: int, settings: Settings, setting: str) -> None:
@@ -65,7 +65,7 @@ def refuse_barriers_outside(barriers: Sequence[int], size: MeshSize) -> None:
     )
     faults = tuple(islice(found, FAULTS_SHOWN))
     if faults:
-        raise refuse("invalid_request", detail_of(faults), errors=faults)
+        raise problem("invalid_request", detail_of(faults), errors=faults)
 
 
 def detail_of(faults: Sequence[Fault]) -> str:

@@ -27,7 +27,7 @@ Positive = Annotated[Coordinate, Field(gt=0)]
 Triple = tuple[Coordinate, Coordinate, Coordinate]
 
 
-class Wire(BaseModel):
+class StrictModel(BaseModel):
     """A model that refuses fields it does not know."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
@@ -36,13 +36,13 @@ class Wire(BaseModel):
 # Requests
 
 
-class VertexPoint(Wire):
+class VertexPoint(StrictModel):
     """A vertex."""
 
     vertex: StrictInt = Field(description="Index of a vertex, from 0", examples=[0])
 
 
-class EdgePoint(Wire):
+class EdgePoint(StrictModel):
     """A point of an edge."""
 
     edge: tuple[StrictInt, StrictInt] = Field(
@@ -53,7 +53,7 @@ class EdgePoint(Wire):
     )
 
 
-class FacePoint(Wire):
+class FacePoint(StrictModel):
     """A point of a face."""
 
     face: StrictInt = Field(description="Index of a face, from 0", examples=[7])
@@ -63,7 +63,7 @@ class FacePoint(Wire):
     )
 
 
-class PositionPoint(Wire):
+class PositionPoint(StrictModel):
     """The point of the surface that is nearest to a position."""
 
     position: Triple = Field(description="x, y, z in mesh units", examples=[[1.0, 2.0, 3.0]])
@@ -72,7 +72,7 @@ class PositionPoint(Wire):
     )
 
 
-class Start(Wire):
+class Start(StrictModel):
     """What a source adds to a point."""
 
     start_distance: NonNegative = Field(
@@ -130,7 +130,7 @@ Point = Annotated[
 """A point of the surface, in any of four ways."""
 
 
-class Polyline(Wire):
+class Polyline(StrictModel):
     """A curve on the surface: straight from each point to the next, in a face that both are in."""
 
     polyline: list[Point] = Field(
@@ -165,7 +165,7 @@ Source = Annotated[
 """A point, or a curve, where distances start, at ``start_distance``."""
 
 
-class Accuracy(Wire):
+class Accuracy(StrictModel):
     """How exact the answer has to be."""
 
     method: Method = "exact"
@@ -181,7 +181,7 @@ class Accuracy(Wire):
     )
 
 
-class AmongBarriers(Wire):
+class AmongBarriers(StrictModel):
     """A question that is asked of a mesh without some of its faces."""
 
     barriers: list[StrictInt] = Field(
@@ -343,7 +343,7 @@ class NearestRequest(AmongBarriers):
     )
 
 
-class LocateRequest(Wire):
+class LocateRequest(StrictModel):
     """The points of the surface that are nearest to some positions."""
 
     model_config = ConfigDict(
@@ -359,7 +359,7 @@ class LocateRequest(Wire):
 AnswerFormat = Literal["json", "npy", "npz", "octets", "obj", "ply", "csv", "svg", "geojson"]
 
 
-class AnswerParameters(Wire):
+class AnswerParameters(StrictModel):
     """How the answer is to be written, or whether only to tell what it would take."""
 
     format: AnswerFormat | None = Field(default=None, description="Overrides `Accept`")
@@ -403,7 +403,7 @@ class PathParameters(PathAnswerParameters, Accuracy):
     max_distance: NonNegative | None = Field(default=None, description=_LONGEST)
 
 
-class UploadParameters(Wire):
+class UploadParameters(StrictModel):
     """How the mesh of an upload is to be read, or which sample to make."""
 
     format: MeshFormat | None = Field(default=None, description="Overrides `Content-Type`")
@@ -412,7 +412,7 @@ class UploadParameters(Wire):
     faces: PositiveInt | None = Field(default=None, description="Faces of the sample, about; 20000")
 
 
-class ListParameters(Wire):
+class ListParameters(StrictModel):
     """Which part of a list to answer with."""
 
     limit: int = Field(default=50, ge=1, le=1000)

@@ -13,18 +13,18 @@ from typing import Any
 from anyio import to_thread
 
 from app.access import Caller
-from app.encoding import Form
-from app.engine.interface import Engine, Told
+from app.encoding import Representation
+from app.engine.interface import Engine, ProgressCallback
 from app.engine.local import LocalEngine
-from app.engine.work import Answering, Done, Estimating, MeshOrigin, Order, Storing
-from app.errors import ProblemError, refuse
-from app.jobs import Errand, Job, JobBook, Jobs, require_whole
+from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
+from app.errors import ProblemError, problem
+from app.jobs import Job, JobRepository, Jobs, JobSpec, require_whole
 from app.queries import Estimate, MeshSize, Query, fingerprint, result_key
-from app.service.single_flight import Flights
+from app.service.single_flight import SingleFlight
 from app.settings import Settings, variable_of
 from app.store.fields import FieldStore
 from app.store.layout import JOB_BOOK, RESULTS, owned
-from app.store.mesh_catalog import MeshBooks
+from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import PUBLIC_ARRAYS, MeshStore
 from app.store.results import Result, ResultStore, result_name
 
@@ -32,7 +32,7 @@ Seconds = Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Asker:
+class RequestContext:
     """Who asks, and how long they would wait."""
 
     caller: Caller
@@ -64,7 +64,7 @@ class Service:
         self.settings = settings
         results = settings.store / RESULTS
         self.meshes = MeshStore(settings.store)
-        self.mesh_books = MeshBooks(
+        self.mesh_books = MeshCatalog(
             settings.store,
             self.meshes,
             settings.store_bytes,
@@ -74,13 +74,13 @@ class Service:
         self.fields = FieldStore(settings.store, settings.fields_bytes)
         self.engine: Engine = LocalEngine(settings, results)
         self._job_book = settings.store / JOB_BOOK
-        self.jobs = Jobs(JobBook(self._job_book), self.results, settings.job_ttl)
+        self.jobs = Jobs(JobRepository(self._job_book), self.results, settings.job_ttl)
         self.lookups = {"hit": 0, "miss": 0}
         """Whether answers asked for were kept"""
         self.solves: Counter[str] = Counter()
         """By kind of query"""
         self.solve_seconds: defaultdict[str, float] = defaultdict(float)
-        self._flights: Flights[Done] = Flights()
+        self._flights: SingleFlight[TaskResult] = SingleFlight()
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
@@ -111,11 +111,11 @@ class Service:
         self.engine.drain()
         self.jobs.end_events()
 
-    async def add_mesh(self, origin: MeshOrigin, asker: Asker) -> Added:
+    async def add_mesh(self, origin: MeshInput, asker: RequestContext) -> Added:
         """Have a worker read or make a mesh, and store it."""
         async with self.mesh_books.scratch_folder() as scratch, self.within(asker.deadline_s):
-            order = Order(Storing(origin, scratch / "mesh"), asker.caller.name)
-            done = await self.engine.run(order, _nobody)
+            order = Task(StoreMesh(origin, scratch / "mesh"), asker.caller.name)
+            done = await self.engine.run(order, ignore_progress)
             assert done.mesh is not None, "this kind of work writes a mesh"  # noqa: S101
             kept = await self.mesh_books.keep(done.mesh)
         for mesh_id in kept.evicted:
@@ -153,7 +153,7 @@ class Service:
     async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
         """Remove a mesh and its results."""
         if not caller.may_delete(self.meshes.owner(mesh_id)):
-            raise refuse("forbidden", f"mesh {mesh_id} was stored with another API key")
+            raise problem("forbidden", f"mesh {mesh_id} was stored with another API key")
         await self.mesh_books.delete(mesh_id)
         await self._forget(mesh_id)
 
@@ -163,39 +163,52 @@ class Service:
         await to_thread.run_sync(self.fields.forget_mesh, mesh_id)
 
     async def answer(
-        self, query: Query[Any], size: MeshSize, form: Form, asker: Asker, *, as_file: bool
+        self,
+        query: Query[Any],
+        size: MeshSize,
+        form: Representation,
+        asker: RequestContext,
+        *,
+        as_file: bool,
     ) -> Answered:
         """Answer ``query`` to a mesh of this ``size``: from a kept result, or by a worker."""
         async with self.within(asker.deadline_s):
-            answered = await self._answer(query, size, form, asker.caller.name, _nobody)
+            answered = await self._answer(query, size, form, asker.caller.name, ignore_progress)
             if as_file:
                 return replace(answered, result=await self.results.with_files(answered.result))
             return answered
 
     async def estimate(
-        self, query: Query[Any], size: MeshSize, form: Form, asker: Asker
+        self, query: Query[Any], size: MeshSize, form: Representation, asker: RequestContext
     ) -> tuple[Estimate, Seconds]:
         """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
         query.refuse_answer(form.media_type, size, self.settings)
-        order = Order(Estimating(query, form), asker.caller.name, query.topics, is_small=True)
+        order = Task(
+            EstimateQuery(query, form), asker.caller.name, query.affinity_keys, is_small=True
+        )
         async with self.within(asker.deadline_s):
             with self.mesh_books.held(query.mesh_id):
-                done = await self.engine.run(order, _nobody)
+                done = await self.engine.run(order, ignore_progress)
         assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
         return done.estimate, done.seconds
 
     async def submit(
-        self, query: Query[Any], size: MeshSize, form: Form, asker: Asker, key: str | None
+        self,
+        query: Query[Any],
+        size: MeshSize,
+        form: Representation,
+        asker: RequestContext,
+        key: str | None,
     ) -> Job:
         """Accept a job that answers ``query``; one for all with the same idempotency ``key``."""
         query.refuse_answer(form.media_type, size, self.settings)
         self.engine.refuse_when_full(asker.caller.name)
 
-        async def solve(told: Told) -> Result:
+        async def solve(told: ProgressCallback) -> Result:
             async with self.within(self.settings.job_deadline_s, "job_deadline_s"):
                 return (await self._answer(query, size, form, asker.caller.name, told)).result
 
-        errand = Errand(
+        errand = JobSpec(
             owner=asker.caller.owner,
             kind=query.kind,
             mesh_id=query.mesh_id,
@@ -207,7 +220,12 @@ class Service:
         return await self.jobs.submit(errand, solve)
 
     async def _answer(
-        self, query: Query[Any], size: MeshSize, form: Form, client: str, told: Told
+        self,
+        query: Query[Any],
+        size: MeshSize,
+        form: Representation,
+        client: str,
+        told: ProgressCallback,
     ) -> Answered:
         with self.mesh_books.held(query.mesh_id):
             query.refuse_answer(form.media_type, size, self.settings)
@@ -216,14 +234,14 @@ class Service:
             self.lookups["miss" if kept is None else "hit"] += 1
             if kept is not None:
                 return Answered(kept, {})
-            work = Answering(query, form, name)
-            order = Order(work, client, query.topics, query.is_small(size))
+            work = RunQuery(query, form, name)
+            order = Task(work, client, query.affinity_keys, query.is_small(size))
             done = await self._flights.join(name, partial(self._solve, order, query.kind), told)
             assert done.answer is not None, "this kind of work answers"  # noqa: S101
             result = self.results.take_new(name, done.answer, is_kept=query.is_repeatable)
             return Answered(result, done.seconds)
 
-    async def _solve(self, order: Order, kind: str, told: Told) -> Done:
+    async def _solve(self, order: Task, kind: str, told: ProgressCallback) -> TaskResult:
         done = await self.engine.run(order, told)
         self.solves[kind] += 1
         self.solve_seconds[kind] += done.seconds["compute"]
@@ -238,7 +256,7 @@ class Service:
         except TimeoutError:
             own = seconds >= getattr(self.settings, setting)
             detail = f"not finished within {seconds:g} s"
-            raise refuse(
+            raise problem(
                 "deadline_exceeded",
                 detail,
                 limit=seconds,
@@ -258,5 +276,5 @@ def _described(manifest: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _nobody(_share: float) -> None:
+def ignore_progress(_share: float) -> None:
     """Tell nobody which share is done."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
-from app.engine.interface import Told
+from app.engine.interface import ProgressCallback
 
 T = TypeVar("T")
 
@@ -13,13 +13,13 @@ T = TypeVar("T")
 @dataclass(eq=False)
 class _Flight(Generic[T]):
     task: "asyncio.Task[T]"
-    told: list[Told] = field(default_factory=list)
+    told: list[ProgressCallback] = field(default_factory=list)
     """Of those who wait, each its own"""
     share: float = 0.0
     has_begun: bool = False
 
 
-class Flights(Generic[T]):
+class SingleFlight(Generic[T]):
     """Work under way, by name. What is over, well or badly, is forgotten."""
 
     def __init__(self) -> None:
@@ -29,7 +29,10 @@ class Flights(Generic[T]):
         return name in self._flights
 
     async def join(
-        self, name: str, start: Callable[[Told], Coroutine[Any, Any, T]], told: Told
+        self,
+        name: str,
+        start: Callable[[ProgressCallback], Coroutine[Any, Any, T]],
+        told: ProgressCallback,
     ) -> T:
         """Wait for the work ``name``, which ``start`` begins where nobody waits for it yet.
 
@@ -48,7 +51,9 @@ class Flights(Generic[T]):
                 flight.task.cancel()
                 self._forget(name, flight)
 
-    def _depart(self, name: str, start: Callable[[Told], Coroutine[Any, Any, T]]) -> _Flight[T]:
+    def _depart(
+        self, name: str, start: Callable[[ProgressCallback], Coroutine[Any, Any, T]]
+    ) -> _Flight[T]:
         def tell(share: float) -> None:
             flight.share, flight.has_begun = share, True
             for told in flight.told:

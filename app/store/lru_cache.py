@@ -8,7 +8,7 @@ K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
 
-class Kept(Generic[K, V]):
+class LRUCache(Generic[K, V]):
     """Values by key, at most ``capacity`` bytes; the least recently used go first.
 
     A value may grow while it is used, until another is asked for. So the one and the other are

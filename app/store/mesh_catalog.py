@@ -29,7 +29,7 @@ class Kept:
     """The meshes that went, so that it had room"""
 
 
-class MeshBooks:
+class MeshCatalog:
     """The meshes of a store, at most ``capacity`` bytes.
 
     What finds no room is refused; or, where it ``evicts``, the meshes go that were used least

@@ -27,7 +27,7 @@ import numpy as np
 import orjson
 from numpy.typing import NDArray
 
-from app.errors import ProblemError, refuse
+from app.errors import ProblemError, problem
 from app.store.layout import MESHES
 from geodesic_core import Solver, TriangleMesh
 
@@ -177,12 +177,14 @@ class MeshStore:
         """Return the file of an array that clients may read."""
         folder = self._folder(mesh_id)
         if name not in PUBLIC_ARRAYS:
-            raise refuse("not_found", f"there is no array {name!r}, but {', '.join(PUBLIC_ARRAYS)}")
+            raise problem(
+                "not_found", f"there is no array {name!r}, but {', '.join(PUBLIC_ARRAYS)}"
+            )
         path = folder / f"{PUBLIC_ARRAYS[name]}.npy"
         if not path.is_file():
             # TriangleMesh has no map where it is the identity.
             kept = "vertices" if name == "vertex_map" else "faces"
-            raise refuse("not_found", f"the mesh has no {name}: it keeps the {kept} of its file")
+            raise problem("not_found", f"the mesh has no {name}: it keeps the {kept} of its file")
         return path
 
     def page(self, after: str, limit: int) -> tuple[list[str], bool]:
@@ -260,9 +262,9 @@ def _open_array(path: Path) -> NDArray[Any]:
 
 def unknown(mesh_id: str) -> ProblemError:
     """Return the refusal of a mesh that is not there."""
-    return refuse("mesh_not_found", f"there is no mesh {mesh_id!r}")
+    return problem("mesh_not_found", f"there is no mesh {mesh_id!r}")
 
 
 def _damaged(mesh_id: str, reason: str) -> ProblemError:
     hint = "delete the mesh and upload it again"
-    return refuse("mesh_damaged", f"mesh {mesh_id} is damaged: {reason}", hint=hint)
+    return problem("mesh_damaged", f"mesh {mesh_id} is damaged: {reason}", hint=hint)

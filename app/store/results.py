@@ -25,7 +25,7 @@ _SMALL = 2**16
 """Bytes of an answer that is kept in memory as well: most, but for fields and long lines"""
 
 
-class Seal(BaseModel):
+class ResultManifest(BaseModel):
     """What is known of an answer that is complete."""
 
     model_config = ConfigDict(frozen=True)
@@ -41,7 +41,7 @@ class Seal(BaseModel):
 class Written:
     """An answer that is complete."""
 
-    seal: Seal
+    seal: ResultManifest
     body: bytes | None
     """All of it, where it is small"""
     has_files: bool
@@ -85,7 +85,9 @@ def write_result(
             return _write(root, name, chain(first, rest), headers, code)
     body = b"".join(first)
     if is_cheap:
-        seal = Seal(headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code)
+        seal = ResultManifest(
+            headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code
+        )
         return Written(seal, body, has_files=False)
     return replace(_write(root, name, [body], headers, code), body=body)
 
@@ -99,7 +101,7 @@ def _write(
         for part in parts:
             size += file.write(part)
             checksum = zlib.crc32(part, checksum)
-    seal = Seal(headers=dict(headers), size=size, crc32=checksum, code=code)
+    seal = ResultManifest(headers=dict(headers), size=size, crc32=checksum, code=code)
     with written_whole(_seal(root, name)) as file:
         file.write(seal.model_dump_json().encode())
     return Written(seal, None, has_files=True)
@@ -275,7 +277,7 @@ def sealed_results(root: Path) -> dict[str, tuple[Path, Path]]:
     }
 
 
-def read_seal(root: Path, name: str) -> Seal | None:
+def read_seal(root: Path, name: str) -> ResultManifest | None:
     """Return the seal of the result ``name``, where it is what was written."""
     written = _read(root, name)
     return None if written is None else written.seal
@@ -294,7 +296,7 @@ def _read(root: Path, name: str) -> Written | None:
     checksum = size = 0
     small: list[bytes] = []
     try:
-        seal = Seal.model_validate_json(_seal(root, name).read_bytes())
+        seal = ResultManifest.model_validate_json(_seal(root, name).read_bytes())
         with _body(root, name).open("rb") as file:
             while chunk := file.read(2**20):
                 checksum = zlib.crc32(chunk, checksum)

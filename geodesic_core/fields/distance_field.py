@@ -21,16 +21,16 @@ from geodesic_core.fields.isolines import (
     spaced_levels,
 )
 from geodesic_core.fields.nearest_source import NearestSource, find_nearest_source
-from geodesic_core.fields.once import Once
-from geodesic_core.fields.packed import packed, unpacked
+from geodesic_core.fields.once import Lazy
+from geodesic_core.fields.packed import from_arrays, to_arrays
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, traced_path
 from geodesic_core.fields.point_query import Arrival, arrival_at, with_target
 from geodesic_core.fields.sources import Nodes, component_of, disconnected
 from geodesic_core.fields.sweep import Control
-from geodesic_core.fields.whole_sweep import Found, WholeSweep
-from geodesic_core.kernels.isolines.face_windows import Kept
+from geodesic_core.fields.whole_sweep import RepeatableSweep, SweepResult
+from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep.state import exact_bounds, merging_bounds, with_strips
+from geodesic_core.kernels.sweep.state import exact_bounds, merging_bounds, with_parallel_windows
 from geodesic_core.mesh.curve import Curve, Polyline
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -93,9 +93,9 @@ class DistanceField:
     """The sources' points, canonical"""
     _targets: tuple[SurfacePoint, ...]
     """Those that the sweep was told of, canonical"""
-    _sweep: WholeSweep
+    _sweep: RepeatableSweep
     """Where the values come from"""
-    _found: Found
+    _found: SweepResult
 
     @classmethod
     def from_arrays(cls, mesh: TriangleMesh, arrays: Mapping[str, NDArray[Any]]) -> "DistanceField":
@@ -103,8 +103,8 @@ class DistanceField:
 
         What it answers is the same to the bit; its sources are spelled canonically.
         """
-        places = unpacked("source", arrays)
-        targets = tuple(point for (point,) in unpacked("target", arrays))
+        places = from_arrays("source", arrays)
+        targets = tuple(point for (point,) in from_arrays("target", arrays))
         starts = arrays["start_distances"]
         sources = tuple(
             Source(line[0] if len(line) == 1 else Curve(line), start)
@@ -119,9 +119,9 @@ class DistanceField:
             sources,
             places,
             targets,
-            WholeSweep.between(mesh, places, starts, targets, bounds),
+            RepeatableSweep.between(mesh, places, starts, targets, bounds),
             ErrorBound(of_type, float(arrays["promised"]), kind),
-            Found.from_arrays(arrays),
+            SweepResult.from_arrays(arrays),
             SweepStats.of(mesh, created, kept, peak, peak_bytes, seconds),
         )
 
@@ -134,8 +134,8 @@ class DistanceField:
         errors = [bounds.relative_error, bounds.absolute_error] if bounds.merging else []
         counts = stats.windows_created, stats.windows_kept, stats.windows_peak, stats.peak_bytes
         return {
-            **packed("source", self._places),
-            **packed("target", [(target,) for target in self._targets]),
+            **to_arrays("source", self._places),
+            **to_arrays("target", [(target,) for target in self._targets]),
             "start_distances": self._sweep.start_distances,
             "limits": np.array([bounds.max_distance, *errors]),
             "promise": np.array([promise.type, promise.kind]),
@@ -161,19 +161,19 @@ class DistanceField:
         return dict(zip(self._targets, self._sweep.nodes.targets.tolist(), strict=True))
 
     @cached_property
-    def _winners(self) -> Once[Winners]:
+    def _winners(self) -> Lazy[Winners]:
         """For backtracing; the sweep may not have kept what that needs."""
-        return Once(self._sweep.find_winners, self._found.winners)
+        return Lazy(self._sweep.find_winners, self._found.winners)
 
     @cached_property
-    def _ways(self) -> Once[tuple[Winners, Kept]] | None:
+    def _ways(self) -> Lazy[tuple[Winners, FaceWindows]] | None:
         """By which windows any point is found exactly; None where it is searched from."""
         sweep, bounds, found = self._sweep, self._sweep.bounds, self._found
         if found.winners is not None and found.windows is not None and not bounds.merging:
-            return Once(sweep.find_ways, (found.winners, found.windows))
+            return Lazy(sweep.find_ways, (found.winners, found.windows))
         if bounds.strips:  # a sweep back from a point ends at points, not on curves
-            exact = with_strips(exact_bounds(bounds.max_distance), bounds.first_piece)
-            return Once(replace(sweep, bounds=exact).find_ways)
+            exact = with_parallel_windows(exact_bounds(bounds.max_distance), bounds.first_piece)
+            return Lazy(replace(sweep, bounds=exact).find_ways)
         return None
 
     def distance_at(
@@ -393,7 +393,7 @@ class DistanceField:
         if control.progress is not None:
             control.progress(1.0)
 
-    def _windows_at(self, levels: Sequence[float], control: Control) -> Kept:
+    def _windows_at(self, levels: Sequence[float], control: Control) -> FaceWindows:
         """Return the windows of all faces that some levels may pass."""
         if self._sweep.bounds.merging:
             return self._sweep.find_windows(self._sweep.all_faces, control)
@@ -426,7 +426,7 @@ class DistanceField:
             return int(self.mesh.topology.inner_vertex[place.vertex_index])
         return self._node_of.get(place)
 
-    def _arrival_at(self, place: SurfacePoint, winners: Winners, windows: Kept) -> Arrival:
+    def _arrival_at(self, place: SurfacePoint, winners: Winners, windows: FaceWindows) -> Arrival:
         """Return how windows reach a point."""
         nodes = self._sweep.nodes
         return arrival_at(self.mesh, winners, windows, nodes, place, self.max_distance)
@@ -457,9 +457,9 @@ def field_of(
     sources: tuple[Source, ...],
     places: tuple[Polyline, ...],
     targets: tuple[SurfacePoint, ...],
-    sweep: WholeSweep,
+    sweep: RepeatableSweep,
     promise: ErrorBound,
-    found: Found,
+    found: SweepResult,
     stats: SweepStats,
 ) -> DistanceField:
     """Return the field of a sweep that has found what it was asked for."""

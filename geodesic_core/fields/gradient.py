@@ -7,7 +7,7 @@ from geodesic_core.fields.path import EXACT, traced_path
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.mesh.half_edges import APEX, COS_LEFT, HEAD, LENGTH_LEFT, SIN_LEFT, TAIL
 from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep.state import FROM, NODE, VIA
+from geodesic_core.kernels.sweep.state import ENTRY_EDGE, NODE, PREDECESSOR
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import FOOT, SAME_PLACE
 
@@ -20,7 +20,7 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
     """
     topology = mesh.topology
     gradient = np.full(mesh.vertices.shape, np.nan)
-    via = winners.winner_ints[: len(gradient), VIA]
+    via = winners.winner_ints[: len(gradient), ENTRY_EDGE]
     is_strip = _is_strip(winners)
     reached = np.flatnonzero((via >= 0) & np.isfinite(winners.distance[: len(gradient)]))
     reached = reached[~_lies_on_curve(mesh, winners, is_strip)[reached]]
@@ -47,7 +47,7 @@ def _is_strip(winners: Winners) -> Flags:
     """Tell which nodes are reached from a piece of a curve."""
     if len(winners.piece_ints) == 0:
         return np.zeros(len(winners.distance), np.bool_)
-    is_strip: Flags = winners.winner_ints[:, FROM] >= winners.piece_ints[0, NODE]
+    is_strip: Flags = winners.winner_ints[:, PREDECESSOR] >= winners.piece_ints[0, NODE]
     return is_strip
 
 
@@ -55,7 +55,7 @@ def _lies_on_curve(mesh: TriangleMesh, winners: Winners, is_strip: Flags) -> Fla
     """Tell which nodes lie on the piece that reaches them, as vertices of faces of no area may."""
     lies = np.zeros_like(is_strip)
     nodes = np.flatnonzero(is_strip & np.isfinite(winners.distance))
-    pieces = winners.winner_ints[nodes, FROM]
+    pieces = winners.winner_ints[nodes, PREDECESSOR]
     away = winners.distance[nodes] - winners.distance[pieces]
     lies[nodes] = away <= FOOT * mesh.diagonal
     return lies

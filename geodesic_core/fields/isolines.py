@@ -14,7 +14,7 @@ from geodesic_core.fields.path import length_of
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.fields.sweep import Control, in_slices
 from geodesic_core.kernels.isolines import lines as kernels
-from geodesic_core.kernels.isolines.face_windows import Kept
+from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.isolines.lines import Chains, Cuts, Field
 from geodesic_core.kernels.mesh.half_edges import LENGTH, LENGTH_LEFT, TAIL
 from geodesic_core.kernels.sweep.state import FACE, NODE
@@ -121,7 +121,12 @@ class Drawing:
     """Draws the lines of a finished sweep, level by level."""
 
     def __init__(
-        self, mesh: TriangleMesh, kept: Kept, distances: Floats, nodes: Nodes, control: Control
+        self,
+        mesh: TriangleMesh,
+        kept: FaceWindows,
+        distances: Floats,
+        nodes: Nodes,
+        control: Control,
     ) -> None:
         """Look up between which distances each face lies: O(windows + F).
 
@@ -143,7 +148,7 @@ class Drawing:
         least, most = np.full(count, np.inf), np.full(count, np.inf)
         self._mesh, self._field, self._least, self._most = mesh, field, least, most
         self._nbytes = sum(array.nbytes for array in (*kept, least, most))
-        control.grant_memory(self._nbytes)
+        control.check_memory(self._nbytes)
 
         def bound(first: int, last: int) -> int:
             kernels.bound_faces(mesh.topology, field, first, last, least, most)
@@ -180,7 +185,7 @@ class Drawing:
                     topology, distances, cuts, crossings, level, chord_error, first, last
                 )
             )
-            control.grant_memory(_bytes_of(parts))
+            control.check_memory(_bytes_of(parts))
             return len(cuts.faces)
 
         in_slices(len(cuts.faces), chain, control)
@@ -206,7 +211,7 @@ class Drawing:
             )
             parts.append((spans, spans_of, arcs, arcs_of))
             faces = np.concatenate([faces, found])
-            control.grant_memory(faces.nbytes + _bytes_of(parts))
+            control.check_memory(faces.nbytes + _bytes_of(parts))
             return len(faces)
 
         in_slices(len(faces), cut, control)

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats
-from geodesic_core.fields.path import EXACT, GeodesicPath, traced_path, turned_round
+from geodesic_core.fields.path import EXACT, GeodesicPath, reversed_path, traced_path
 from geodesic_core.fields.sources import corners_of, nodes_of
 from geodesic_core.fields.sweep import Control, sweep_nodes, winners_of
 from geodesic_core.kernels.sweep import state
-from geodesic_core.kernels.sweep.state import Bounds, goal_at
+from geodesic_core.kernels.sweep.state import Bounds, pruning_toward
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import SEARCH_SLACK, TIE
@@ -58,9 +58,9 @@ def find_nearest_source(
         return NearestSource(-1, math.inf, None)
     # Whatever is farther than the field was to look is as far as that, at least.
     rest = np.minimum(least, bounds.max_distance)
-    goal = goal_at(np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
+    goal = pruning_toward(np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
     wave = state.new_wavefront(mesh.topology, nodes.sites, pruned=True)
-    control.grant_memory(state.bytes_of(wave))
+    control.check_memory(state.bytes_of(wave))
     backward = state.exact_bounds(math.inf, goal)
     wave = sweep_nodes(mesh, wave, nodes, np.zeros(1), backward, control, lambda _: 0.0)
     totals = wave.distance[nodes.targets] + start_distances
@@ -70,7 +70,7 @@ def find_nearest_source(
     nearest = int(np.flatnonzero(totals <= distance * (1.0 + TIE))[0])
     winners = winners_of(wave, np.zeros(len(wave.distance), np.int32))
     path = traced_path(mesh, winners, nodes, int(nodes.targets[nearest]), EXACT)
-    return NearestSource(nearest, float(totals[nearest]), turned_round(path))
+    return NearestSource(nearest, float(totals[nearest]), reversed_path(path))
 
 
 def _most(least: Floats, bounds: Bounds) -> Floats:

@@ -8,7 +8,7 @@ from geodesic_core.fields.sweep import Control
 T = TypeVar("T")
 
 
-class Once(Generic[T]):
+class Lazy(Generic[T]):
     """A value that is there already, or is found at the first call that is not stopped."""
 
     def __init__(self, find: Callable[[Control], T], found: T | None = None) -> None:

@@ -13,7 +13,7 @@ from geodesic_core.mesh.surface_point import SurfacePoint
 _NO_VERTEX = -1
 
 
-def packed(name: str, lines: Sequence[Polyline]) -> dict[str, NDArray[Any]]:
+def to_arrays(name: str, lines: Sequence[Polyline]) -> dict[str, NDArray[Any]]:
     """Return canonical points, line by line, as arrays whose names begin with ``name``."""
     points = list(chain.from_iterable(lines))
     vertices = [_NO_VERTEX if p.vertex_index is None else p.vertex_index for p in points]
@@ -25,8 +25,8 @@ def packed(name: str, lines: Sequence[Polyline]) -> dict[str, NDArray[Any]]:
     }
 
 
-def unpacked(name: str, arrays: Mapping[str, NDArray[Any]]) -> tuple[Polyline, ...]:
-    """Return the lines that were `packed` under this name."""
+def from_arrays(name: str, arrays: Mapping[str, NDArray[Any]]) -> tuple[Polyline, ...]:
+    """Return the lines that were `to_arrays` under this name."""
     rows = zip(
         *(arrays[f"{name}_{part}"].tolist() for part in ("faces", "weights", "vertices")),
         strict=True,

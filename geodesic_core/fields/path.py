@@ -151,7 +151,7 @@ def length_of(points: Floats) -> float:
     return float(np.sqrt((pieces * pieces).sum(axis=1)).sum())
 
 
-def turned_round(path: GeodesicPath) -> GeodesicPath:
+def reversed_path(path: GeodesicPath) -> GeodesicPath:
     """Return the path from its target to its source."""
     return replace(
         path,

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geodesic_core.fields.sources import Nodes
-from geodesic_core.kernels.isolines.face_windows import Kept, Reach, reach_point
+from geodesic_core.kernels.isolines.face_windows import FaceWindows, Reach, reach_point
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep.state import SITE
 from geodesic_core.mesh.curve import weights_by_face
@@ -28,7 +28,7 @@ class Arrival(NamedTuple):
 def arrival_at(
     mesh: TriangleMesh,
     winners: Winners,
-    kept: Kept,
+    kept: FaceWindows,
     nodes: Nodes,
     point: SurfacePoint,
     max_distance: float,

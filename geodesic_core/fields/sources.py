@@ -7,7 +7,7 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import InvalidArgument, NoPath
-from geodesic_core.kernels.sweep.state import NODE, PIECE, PIECE_ENDS, SITE, Sites
+from geodesic_core.kernels.sweep.state import NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.mesh.canonical import half_edges_around
 from geodesic_core.mesh.curve import PieceInFace, Polyline, pieces_of, weights_by_face
 from geodesic_core.mesh.surface_point import UNPLACED, SurfacePoint
@@ -156,10 +156,10 @@ def nodes_of(
             weights=np.array(weights).reshape(-1, 3),
             windows=sum(_edge_faces(mesh, face) for face in faces),
             piece_ints=np.array([(k, part.face) for k, part in in_faces], np.int32).reshape(
-                -1, PIECE
+                -1, SEGMENT
             ),
             piece_ends=np.array([part.start + part.end for _, part in in_faces]).reshape(
-                -1, PIECE_ENDS
+                -1, SEGMENT_ENDS
             ),
         ),
         first_target=first_target,

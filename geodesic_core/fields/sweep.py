@@ -20,9 +20,9 @@ from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep import continuous_dijkstra, state, surface_points
 from geodesic_core.kernels.sweep.propagation import (
-    KEPT_FULL,
     MERGES_FULL,
     POOL_FULL,
+    RETAINED_FULL,
     RUNAWAY,
     SCRATCH_FULL,
 )
@@ -67,7 +67,7 @@ class Control:
             if value is not None and (not is_number(value) or not value > 0):
                 raise InvalidArgument(f"{name} is {value!r}; it must be a number above 0")
 
-    def look_up(self, share: float) -> None:
+    def checkpoint(self, share: float) -> None:
         """Report progress; raise if the call is to stop."""
         if self.progress is not None:
             self.progress(share)
@@ -87,7 +87,7 @@ class Control:
         """Return the control of a sweep beside which the call holds so many more bytes."""
         return replace(self, bytes_beside=self.bytes_beside + bytes_beside)
 
-    def grant_memory(self, needed: int) -> None:
+    def check_memory(self, needed: int) -> None:
         """Raise if the call needs more memory than it may take."""
         needed += self.bytes_beside
         if self.memory_limit is not None and needed > self.memory_limit:
@@ -148,7 +148,7 @@ def run_sweep(
     left, shown, outcome = budget, 0.0, continuous_dijkstra.RUNNING
     while outcome != continuous_dijkstra.FINISHED:
         shown = max(shown, share_done(wave))
-        control.look_up(shown)
+        control.checkpoint(shown)
         began = time.perf_counter()
         outcome = continuous_dijkstra.advance(mesh.topology, wave, bounds, left)
         took = time.perf_counter() - began
@@ -156,8 +156,8 @@ def run_sweep(
             grown = state.with_larger_pool
         elif outcome == SCRATCH_FULL:
             grown = state.with_larger_scratch
-        elif outcome == KEPT_FULL:
-            grown = state.with_more_kept
+        elif outcome == RETAINED_FULL:
+            grown = state.with_more_retained
         elif outcome == MERGES_FULL:
             grown = state.with_more_merges
         elif outcome == RUNAWAY:
@@ -173,7 +173,7 @@ def run_sweep(
             continue
         left -= int(wave.counters[state.WORK])  # slices do not depend on the room there was
         wave = grown(wave)
-        control.grant_memory(state.bytes_of(wave))
+        control.check_memory(state.bytes_of(wave))
     return wave
 
 
@@ -190,7 +190,7 @@ def in_slices(count: int, work: Callable[[int, int], int], control: Control) -> 
     done, size, shown = 0, _FIRST_ITEMS, 0.0
     while done < count:
         shown = max(shown, done / count)
-        control.look_up(shown)
+        control.checkpoint(shown)
         last = min(done + size, count)
         began = time.perf_counter()
         count = work(done, last)
@@ -230,7 +230,7 @@ def share_of_vertices(reachable: int, limit: float) -> Callable[[Wavefront], flo
     """Return what tells the share of a sweep: of its vertices, or of the distance to a limit."""
 
     def share(wave: Wavefront) -> float:
-        done = float(wave.counters[state.DONE_VERTICES]) / reachable
+        done = float(wave.counters[state.SETTLED_VERTICES]) / reachable
         if math.isfinite(limit) and wave.counters[0] > 0:
             done = max(done, float(wave.distance[wave.heap[0]]) / limit if limit else 1.0)
         return min(done, 1.0)

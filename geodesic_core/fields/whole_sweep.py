@@ -12,16 +12,16 @@ from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.fields.sources import Nodes, nodes_of
 from geodesic_core.fields.sweep import Control, share_of_vertices, sweep_nodes, winners_of
 from geodesic_core.kernels.isolines import face_windows
-from geodesic_core.kernels.isolines.face_windows import Kept
+from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
-from geodesic_core.kernels.sweep.state import Bounds, Wavefront, with_strips
+from geodesic_core.kernels.sweep.state import Bounds, Wavefront, with_parallel_windows
 from geodesic_core.mesh.curve import Polyline
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 
-class Found(NamedTuple):
+class SweepResult(NamedTuple):
     """What a sweep over all of a mesh has found, as far as it is kept; N as in its `Winners`."""
 
     distance: Floats
@@ -30,17 +30,17 @@ class Found(NamedTuple):
     """(N,): the index of the nearest source, by node; -1 where unreached"""
     winners: Winners | None
     """What paths need"""
-    windows: Kept | None
+    windows: FaceWindows | None
     """Those of all faces"""
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "Found":
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "SweepResult":
         """Return what these `arrays` hold."""
         winners = windows = None
         if "winner" in arrays:
             winners = Winners(**{name: arrays[name] for name in Winners._fields})
         if "windows" in arrays:
-            windows = Kept(**{name: arrays[name] for name in Kept._fields})
+            windows = FaceWindows(**{name: arrays[name] for name in FaceWindows._fields})
         return cls(arrays["distance"], arrays["nearest"], winners, windows)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
@@ -52,7 +52,7 @@ class Found(NamedTuple):
 
 
 @dataclass(frozen=True)
-class WholeSweep:
+class RepeatableSweep:
     """A sweep that can be run any number of times: what it finds is the same to the bit."""
 
     mesh: TriangleMesh
@@ -68,11 +68,11 @@ class WholeSweep:
         start_distances: Floats,
         targets: Sequence[SurfacePoint],
         bounds: Bounds,
-    ) -> "WholeSweep":
+    ) -> "RepeatableSweep":
         """Return the sweep from points and curves, which are canonical, that knows of targets."""
         nodes = nodes_of(mesh, places, targets)
         if nodes.pieces:
-            bounds = with_strips(bounds, nodes.first_piece)
+            bounds = with_parallel_windows(bounds, nodes.first_piece)
         return cls(mesh, nodes, start_distances, bounds)
 
     @property
@@ -88,46 +88,46 @@ class WholeSweep:
         Raises
         ------
         Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged
-            As in `run_sweep`; the memory of `kept_of` counts as well.
+            As in `run_sweep`; the memory of `face_windows_of` counts as well.
         """
         mesh, limit, merges = self.mesh, self.bounds.max_distance, bool(self.bounds.merging)
         wave = state.new_wavefront(
             mesh.topology, self.nodes.sites, merges=merges, paths=merges and paths, windows=windows
         )
-        control.grant_memory(state.bytes_of(wave))
+        control.check_memory(state.bytes_of(wave))
         reachable = int(np.isin(mesh.components, self.nodes.components).sum())
         share = share_of_vertices(reachable, limit)
         wave = sweep_nodes(
             mesh, wave, self.nodes, self.start_distances, self.bounds, control, share
         )
-        control.grant_memory(peak_bytes(wave))
+        control.check_memory(peak_bytes(wave))
         wave.distance[wave.distance > limit] = math.inf
         if control.progress is not None:
             control.progress(1.0)
         return wave
 
-    def found(self, wave: Wavefront, *, paths: bool, windows: bool) -> Found:
+    def found(self, wave: Wavefront, *, paths: bool, windows: bool) -> SweepResult:
         """Return what a `run` has found, in memory of its own."""
         winners = all_winners(wave)
-        return Found(
+        return SweepResult(
             wave.distance,
             winners.nearest,
             winners if paths else None,
-            face_windows.kept_of(wave) if windows else None,
+            face_windows.face_windows_of(wave) if windows else None,
         )
 
     def find_winners(self, control: Control) -> Winners:
         """Run the sweep for what paths need."""
         return all_winners(self.run(control, paths=True))
 
-    def find_windows(self, faces: Flags, control: Control) -> Kept:
+    def find_windows(self, faces: Flags, control: Control) -> FaceWindows:
         """Run the sweep for the windows of some inner faces (F,)."""
-        return face_windows.kept_of(self.run(control, windows=faces))
+        return face_windows.face_windows_of(self.run(control, windows=faces))
 
-    def find_ways(self, control: Control) -> tuple[Winners, Kept]:
+    def find_ways(self, control: Control) -> tuple[Winners, FaceWindows]:
         """Run the sweep for what paths need, and for all windows."""
         wave = self.run(control, paths=True, windows=self.all_faces)
-        return all_winners(wave), face_windows.kept_of(wave)
+        return all_winners(wave), face_windows.face_windows_of(wave)
 
 
 def all_winners(wave: Wavefront) -> Winners:

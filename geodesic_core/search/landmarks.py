@@ -11,7 +11,7 @@ from geodesic_core.arrays import Floats, Ints, Singles, aligned_rows
 from geodesic_core.fields.sweep import Control, run_sweep
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from geodesic_core.kernels.sweep.pruning import LEAST, MOST
-from geodesic_core.kernels.sweep.state import LANDMARKS, Goal, goal_at
+from geodesic_core.kernels.sweep.state import LANDMARKS, PruningBounds, pruning_toward
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import LANDMARK_ERROR
 
@@ -31,14 +31,14 @@ class Landmarks:
         """(V, LANDMARKS) by inner vertex, mesh units; the first ``count`` columns are set"""
         self._nearest = np.full(len(mesh.vertices), math.inf)
 
-    def goal(self, position: Floats, corners: Ints, reaches: Floats, limit: float) -> Goal:
+    def goal(self, position: Floats, corners: Ints, reaches: Floats, limit: float) -> PruningBounds:
         """Return the goal of paths through a point that lies ``reaches`` away from ``corners``."""
         least, most = np.zeros(LANDMARKS), np.zeros(LANDMARKS)
         if self.count > 0:
             known = self.distances[corners, : self.count].astype(np.float64)
             least[: self.count] = (LEAST * known - reaches[:, None]).max(axis=0)
             most[: self.count] = (MOST * known + reaches[:, None]).min(axis=0)
-        return goal_at(position, limit)._replace(
+        return pruning_toward(position, limit)._replace(
             landmarks=self.distances, landmark_count=self.count, least=least, most=most
         )
 
@@ -61,7 +61,7 @@ class Landmarks:
             chosen = candidates[np.argmax(self._nearest[candidates])]
         bounds = state.merging_bounds(math.inf, LANDMARK_ERROR, math.inf)
         wave = state.new_wavefront(topology, merges=True)
-        control.grant_memory(state.bytes_of(wave))
+        control.check_memory(state.bytes_of(wave))
         start = np.array([chosen], np.int32)
         continuous_dijkstra.start_sweep(
             topology, wave, start, np.zeros(1, np.int32), np.zeros(1), bounds

@@ -16,7 +16,7 @@ from geodesic_core.fields.sweep import Control
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.path_search import PathSearch
-from geodesic_core.search.target_sweep import Sweeper
+from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import available_cores, share_out
 from geodesic_core.tolerances import AT_LIMIT
 from geodesic_core.validation import as_limit, is_index
@@ -80,13 +80,13 @@ def distance_matrix(
     not depend on the number of threads.
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    make = partial(Sweeper, mesh), partial(PathSearch, mesh)
+    make = partial(TargetSweep, mesh), partial(PathSearch, mesh)
     return find_matrix(mesh, *make, sources, targets, max_distance, layout, threads, control)
 
 
 def find_matrix(
     mesh: TriangleMesh,
-    sweeper: Callable[[], Sweeper],
+    sweeper: Callable[[], TargetSweep],
     search: Callable[[], PathSearch],
     sources: Sequence[Point],
     targets: Sequence[Point],
@@ -107,7 +107,7 @@ def find_matrix(
         return _find_pairs(mesh, sweeper, search, starts, stops, limit, cores, control)
     table: _Dense | _Sparse
     if layout == "dense":
-        control.grant_memory(8 * len(starts) * len(stops))
+        control.check_memory(8 * len(starts) * len(stops))
         table = _Dense(mesh, starts, stops)
     else:
         table = _Sparse(mesh, starts, stops)
@@ -119,7 +119,7 @@ def find_matrix(
 
 def _find_pairs(
     mesh: TriangleMesh,
-    sweeper: Callable[[], Sweeper],
+    sweeper: Callable[[], TargetSweep],
     search: Callable[[], PathSearch],
     sources: Sequence[SurfacePoint],
     targets: Sequence[SurfacePoint],
@@ -155,7 +155,7 @@ def _searched(
     """Return the distance of two points, infinite beyond the limit, by a search."""
     mesh = search.mesh
     if component_of(mesh, source) != component_of(mesh, target):
-        control.look_up(0.0)
+        control.checkpoint(0.0)
         return math.inf
     try:
         return search.find(
@@ -169,7 +169,7 @@ def _searched(
 
 def _sweep_all(
     mesh: TriangleMesh,
-    sweeper: Sweeper,
+    sweeper: TargetSweep,
     table: "_Dense | _Sparse | _Pairs",
     limit: float,
     cores: int,
@@ -181,9 +181,9 @@ def _sweep_all(
     if control.memory_limit is not None:
         room = control.memory_limit - control.bytes_beside - table.nbytes
         count = max(1, min(count, room // (_GROWTH * sweeper.nbytes)))
-    sweepers = [sweeper, *(Sweeper(mesh) for _ in range(count - 1))]
+    sweepers = [sweeper, *(TargetSweep(mesh) for _ in range(count - 1))]
 
-    def sweep(sweeper: Sweeper, source: int, control: Control) -> None:
+    def sweep(sweeper: TargetSweep, source: int, control: Control) -> None:
         targets = np.intersect1d(table.wanted(source), ends.targets_connected_to(source))
         if len(targets) == 0:
             return

@@ -11,7 +11,7 @@ from geodesic_core.fields.sources import as_points, ends_of
 from geodesic_core.fields.sweep import Control
 from geodesic_core.mesh.surface_point import Point
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.search.target_sweep import Sweeper
+from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.tolerances import TIE
 from geodesic_core.validation import as_limit, is_index
 
@@ -67,12 +67,14 @@ def nearest(
     nearest; allocating its state is O(V + F), which a `Solver` does once.
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    return find_nearest(mesh, lambda: Sweeper(mesh), source, candidates, k, max_distance, control)
+    return find_nearest(
+        mesh, lambda: TargetSweep(mesh), source, candidates, k, max_distance, control
+    )
 
 
 def find_nearest(
     mesh: TriangleMesh,
-    sweeper: Callable[[], Sweeper],
+    sweeper: Callable[[], TargetSweep],
     source: Point,
     candidates: Sequence[Point],
     k: int,

@@ -36,11 +36,11 @@ from geodesic_core.kernels.paths import edge_dijkstra, funnel
 from geodesic_core.kernels.sweep import pruning, state
 from geodesic_core.kernels.sweep.state import (
     CREATED,
-    FROM,
     NO_SITES,
+    PREDECESSOR,
     TOUCHED,
     Bounds,
-    Goal,
+    PruningBounds,
     Sites,
     Wavefront,
     new_wavefront,
@@ -103,8 +103,8 @@ class PathSearch:
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As in `run_sweep`.
         """
-        control.grant_memory(self.nbytes)
-        control.look_up(0.0)
+        control.check_memory(self.nbytes)
+        control.checkpoint(0.0)
         ends = _End(self.mesh, source), _End(self.mesh, target)
         try:
             return self._search(_Leg(*ends, limit, SEARCH_SLACK, control, _Log(self, explain)))
@@ -158,7 +158,7 @@ class PathSearch:
         if math.isinf(upper):
             raise leg.lost("along edges")
         leg.log.add("dijkstra", upper + beside, wave)
-        path = edge_dijkstra.vertices_to(wave.winner_ints[:, FROM], first)
+        path = edge_dijkstra.vertices_to(wave.winner_ints[:, PREDECESSOR], first)
         pruning.forget(topology, wave, bounds)
         # Unfolding rounds: by more than the slack of the searches, where faces are slivers.
         upper = min(upper, funnel.shortened(topology, path) * (1.0 + STRAIGHT)) + beside
@@ -167,7 +167,9 @@ class PathSearch:
         leg.log.add("shorten", upper)
         return upper
 
-    def _sweep_toward(self, leg: "_Leg", upper: float, goal: Goal) -> tuple[float, Goal]:
+    def _sweep_toward(
+        self, leg: "_Leg", upper: float, goal: PruningBounds
+    ) -> tuple[float, PruningBounds]:
         """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
         limit = leg.bound(upper) * (1.0 + leg.slack) + self._margin
         bounds = state.merging_bounds(math.inf, GUIDE_ERROR, math.inf, goal._replace(limit=limit))
@@ -185,7 +187,7 @@ class PathSearch:
         tighter = leg.bound(upper) * (1.0 + leg.slack)
         return upper, goal._replace(limit=tighter, known=wave.distance, ceiling=limit)
 
-    def _sweep_outward(self, leg: "_Leg", upper: float, goal: Goal) -> GeodesicPath:
+    def _sweep_outward(self, leg: "_Leg", upper: float, goal: PruningBounds) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
         bounds = state.exact_bounds(math.inf, goal)
         nodes = nodes_of(self.mesh, [(leg.start.point,)], [leg.end.point])

@@ -24,7 +24,7 @@ _RESET = 3
 therefore leaves its memory behind."""
 
 
-class Sweeper:
+class TargetSweep:
     """Finds exact distances between points of one mesh; not for several threads at once.
 
     A short sweep resets what it touched, so that it does not depend on the size of the mesh; each
@@ -59,7 +59,7 @@ class Sweeper:
         self._make_room(nodes.sites.nodes)
         bounds = state.exact_bounds(limit)
         wave = self._wave = with_sites(self._wave, nodes.sites)
-        control.grant_memory(self.nbytes)
+        control.check_memory(self.nbytes)
         share = share_of_vertices(int(self._vertices[nodes.components[0]]), limit)
         limit_of = _limit_of(nodes.targets, ends.corners[targets], ends.reaches[targets], count)
         try:

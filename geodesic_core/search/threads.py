@@ -44,7 +44,7 @@ def share_out(parts: int, workers: Sequence[Worker], control: Control) -> None:
         try:
             working = {pool.submit(work, worker) for worker in workers}
             while working:
-                control.look_up(sum(shares) / parts)
+                control.checkpoint(sum(shares) / parts)
                 done, working = wait(working, SLICE_SECONDS, FIRST_EXCEPTION)
                 for future in done:
                     future.result()

@@ -15,11 +15,11 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.main import create_app
-from app.queries import Fields, Grant
+from app.queries import ExecutionContext, FieldCache
 from app.settings import Settings
 from app.store.fields import FieldStore
 from app.store.layout import owned
-from app.store.mesh_catalog import MeshBooks
+from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
 
 MESHES = Path(__file__).parents[3] / "shared" / "meshes"
@@ -85,7 +85,7 @@ def apart(client: TestClient) -> str:
 def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> str:
     """Put a mesh into a store on which no service runs."""
     store = MeshStore(root)
-    books = MeshBooks(root, store, 2**60, evicts=False)
+    books = MeshCatalog(root, store, 2**60, evicts=False)
 
     async def keep() -> str:
         async with books.scratch_folder() as folder:
@@ -110,19 +110,19 @@ def distances(client: TestClient, mesh_id: str, headers: Any = None, **body: Any
     return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
 
 
-def new_fields(room: int = 10**9, store: Path = Path("nowhere")) -> Fields:
+def new_fields(room: int = 10**9, store: Path = Path("nowhere")) -> FieldCache:
     """Return no fields yet, but those of a store, if there is one."""
-    return Fields(room, FieldStore(store, 10**9), "this code")
+    return FieldCache(room, FieldStore(store, 10**9), "this code")
 
 
 def granted(
     cancel: Callable[[], bool] = lambda: False,
     memory: int = 2**40,
-    fields: Fields | None = None,
-) -> Grant:
+    fields: FieldCache | None = None,
+) -> ExecutionContext:
     """Return a grant that nobody reads the progress of, by default with no field known."""
     known = new_fields() if fields is None else fields
-    return Grant(cancel, lambda _: None, known, memory, 10**7, 10**7)
+    return ExecutionContext(cancel, lambda _: None, known, memory, 10**7, 10**7)
 
 
 def mesh_of(client: TestClient, mesh_id: str) -> gc.TriangleMesh:

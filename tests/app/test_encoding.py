@@ -18,8 +18,8 @@ from app.encoding import (
     OCTETS,
     PLY,
     Answer,
-    Form,
     Indices,
+    Representation,
     Surface,
     Table,
     encode,
@@ -34,7 +34,7 @@ ANSWER = Answer(
 
 
 def body(media_type: str) -> bytes:
-    return b"".join(encode(ANSWER, Form(media_type)).parts)
+    return b"".join(encode(ANSWER, Representation(media_type)).parts)
 
 
 def test_json_has_all_members_and_null_for_infinity() -> None:
@@ -48,7 +48,7 @@ def test_json_has_all_members_and_null_for_infinity() -> None:
 
 def test_npy_has_the_array_and_headers_the_rest() -> None:
     np.testing.assert_array_equal(np.load(BytesIO(body(NPY))), [0.5, np.inf])
-    headers = encode(ANSWER, Form(NPY)).headers
+    headers = encode(ANSWER, Representation(NPY)).headers
     assert headers["Geodesic-Dtype"] == "<f8"
     assert headers["Geodesic-Shape"] == "2"
     assert headers["Geodesic-Mesh-Id"] == "abc"
@@ -62,7 +62,7 @@ def test_octets_are_the_bare_array() -> None:
 
 def test_binary_is_little_endian_and_in_c_order() -> None:
     array = np.asfortranarray(np.arange(6.0).reshape(2, 3)).astype(">f8")
-    encoded = encode(Answer({"points": array}, ("points",)), Form(OCTETS))
+    encoded = encode(Answer({"points": array}, ("points",)), Representation(OCTETS))
 
     found = np.frombuffer(b"".join(encoded.parts), "<f8").reshape(2, 3)
     np.testing.assert_array_equal(found, array)
@@ -71,7 +71,7 @@ def test_binary_is_little_endian_and_in_c_order() -> None:
 
 @pytest.mark.parametrize("media_type", [JSON, NPY, OCTETS])
 def test_empty_arrays(media_type: str) -> None:
-    encoded = encode(Answer({"points": np.empty((0, 3))}, ("points",)), Form(media_type))
+    encoded = encode(Answer({"points": np.empty((0, 3))}, ("points",)), Representation(media_type))
 
     assert b"".join(encoded.parts) is not None
 
@@ -84,7 +84,7 @@ def test_npz_has_a_sparse_matrix_as_scipy_reads_it() -> None:
         "columns": np.array([2, 1, 0], np.int32),
         "distances": np.array([0.5, 0.0, 2.0]),
     }
-    encoded = encode(Answer(members, ("distances", "rows", "columns")), Form(NPZ))
+    encoded = encode(Answer(members, ("distances", "rows", "columns")), Representation(NPZ))
 
     table = load_npz(BytesIO(b"".join(encoded.parts)))
     assert table.shape == (2, 3)
@@ -112,7 +112,7 @@ def test_blocks_make_one_document() -> None:
         "empty": np.empty((0, 3)),
         "text": "π",
     }
-    found = json.loads(b"".join(encode(Answer(members), Form(JSON)).parts))
+    found = json.loads(b"".join(encode(Answer(members), Representation(JSON)).parts))
 
     plain = [x if np.isfinite(x) else None for x in numbers.tolist()]
     assert list(found) == list(members)
@@ -138,16 +138,16 @@ LARGE = Answer(
 @pytest.mark.parametrize(
     ("form", "most"),
     [
-        (Form(JSON), 1e6),
-        (Form(JSON, coding="gzip"), 2e6),
-        (Form(CSV), 3e6),
-        (Form(NPY), 1e5),
-        (Form(OCTETS), 1e5),
-        (Form(OCTETS, "float32"), 4.1e6),
-        (Form(PLY), 2e6),
+        (Representation(JSON), 1e6),
+        (Representation(JSON, coding="gzip"), 2e6),
+        (Representation(CSV), 3e6),
+        (Representation(NPY), 1e5),
+        (Representation(OCTETS), 1e5),
+        (Representation(OCTETS, "float32"), 4.1e6),
+        (Representation(PLY), 2e6),
     ],
 )
-def test_large_answers_are_never_there_as_a_whole(form: Form, most: float) -> None:
+def test_large_answers_are_never_there_as_a_whole(form: Representation, most: float) -> None:
     size, peak = size_and_peak(LARGE, form)
     assert size >= 4e6
     assert peak < most
@@ -163,12 +163,12 @@ def test_large_answers_are_never_there_as_a_whole(form: Form, most: float) -> No
     ],
 )
 def test_large_matrices_become_rows_one_after_the_other(table: Table) -> None:
-    size, peak = size_and_peak(Answer({}, table=table), Form(CSV))
+    size, peak = size_and_peak(Answer({}, table=table), Representation(CSV))
     assert size >= 8e6
     assert peak < 3e6
 
 
-def size_and_peak(answer: Answer, form: Form) -> tuple[int, int]:
+def size_and_peak(answer: Answer, form: Representation) -> tuple[int, int]:
     """Return how many bytes an answer has, and how many are in memory at most."""
     tracemalloc.start()
     try:
@@ -182,7 +182,7 @@ def test_members_are_headers_where_they_are_short() -> None:
     answer = Answer({"points": [1] * 10**6, "status": "ok", "warnings": []}, shown=("points",))
     answer = replace(answer, places=list)
 
-    assert encode(answer, Form(GEOJSON)).headers == {
+    assert encode(answer, Representation(GEOJSON)).headers == {
         "Geodesic-Status": "ok",
         "Geodesic-Warnings": "[]",
     }
@@ -191,7 +191,7 @@ def test_members_are_headers_where_they_are_short() -> None:
 def test_long_members_are_left_out_of_headers() -> None:
     answer = Answer({"values": np.zeros(1), "sources": list(range(10_000))}, ("values",))
 
-    assert "Geodesic-Sources" not in encode(answer, Form(NPY)).headers
+    assert "Geodesic-Sources" not in encode(answer, Representation(NPY)).headers
 
 
 @pytest.mark.parametrize(

@@ -17,10 +17,10 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.encoding import Form
+from app.encoding import Representation
 from app.engine import local, worker
 from app.engine.slot import Slot
-from app.engine.work import Answering, MeshFromSample, Order, Storing
+from app.engine.work import MeshFromSample, RunQuery, StoreMesh, Task
 from app.engine.worker import Clock, Signals, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
@@ -267,7 +267,7 @@ def test_a_query_goes_where_its_mesh_is_open(two: TestClient, small: str) -> Non
     for mesh_id in (small, other):
         for _ in range(3):
             assert ask(two, mesh_id).status_code == 200
-    known = [slot.topics for slot in engine_of(two)._slots]
+    known = [slot.affinity_keys for slot in engine_of(two)._slots]
 
     assert all(sum(mesh_id in slot for slot in known) >= 1 for mesh_id in (small, other))
     for _ in range(4):
@@ -374,7 +374,7 @@ def test_what_proves_not_to_be_small_begins_anew_elsewhere(
     engine = engine_of(two)
     engine._idle.sort(key=lambda slot: slot is not engine._small)
     for slot in engine._slots:
-        slot.topics.clear()
+        slot.affinity_keys.clear()
 
     response = ask(two, slow)
 
@@ -389,15 +389,15 @@ def test_clients_take_turns(two: TestClient, slow: str, medium: str) -> None:
 
     async def ask_as(client: str, mesh_id: str) -> None:
         vertex = next(_starts)
-        work = Answering(
-            asked(mesh_id, vertex=vertex), Form("application/json"), f"{mesh_id}/{vertex}"
+        work = RunQuery(
+            asked(mesh_id, vertex=vertex), Representation("application/json"), f"{mesh_id}/{vertex}"
         )
 
         def note(share: float) -> None:
             if share == 0.0:
                 begun.append(client)
 
-        await engine_of(two).run(Order(work, client, (mesh_id,)), note)
+        await engine_of(two).run(Task(work, client, (mesh_id,)), note)
 
     async def ask_all() -> None:
         running = [asyncio.create_task(ask_as("greedy", slow)) for _ in range(2)]
@@ -560,7 +560,7 @@ def test_a_defect_in_a_worker_is_logged_there_and_told(
     monkeypatch.setattr(worker, "_make_mesh", lambda *_: 1 / 0)
     state = Worker(config(tmp_path), Signals())
 
-    outcome = state.do(1, Storing(MeshFromSample("plane", 10, "none"), tmp_path / "mesh"))
+    outcome = state.do(1, StoreMesh(MeshFromSample("plane", 10, "none"), tmp_path / "mesh"))
 
     assert isinstance(outcome, Problem)
     assert outcome.code == "internal_error"
@@ -574,7 +574,7 @@ def test_work_that_was_asked_to_stop_stops(tmp_path: Path, accuracy: dict[str, A
     mesh_id = store_mesh(tmp_path, TriangleMesh(*samples.sphere(100_000)))
     ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
     query = PathQuery(mesh_id, PathRequest(**ends, **accuracy))
-    work = Answering(query, Form("application/json"), f"{mesh_id}/key")
+    work = RunQuery(query, Representation("application/json"), f"{mesh_id}/key")
     (tmp_path / "results").mkdir()
 
     signals.stop_number = 2

@@ -10,7 +10,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from app.encoding import JSON, Form
+from app.encoding import JSON, Representation
 from app.queries import (
     DistancesQuery,
     IsolinesQuery,
@@ -22,7 +22,7 @@ from app.queries import (
     Query,
     estimate,
 )
-from app.schemas.service import Wire
+from app.schemas.service import StrictModel
 from app.store.meshes import OpenMesh
 
 from .conftest import check_problem, granted, mesh_of, upload_sample
@@ -77,7 +77,7 @@ KINDS: dict[str, type[Query[Any]]] = {
 def query_of(name: str) -> Query[Any]:
     operation, body, _, _ = QUERIES[name]
     kind = KINDS[operation]
-    request: Wire = kind.model.model_validate(body)
+    request: StrictModel = kind.model.model_validate(body)
     return kind("m", kind.normal(request))
 
 
@@ -147,7 +147,7 @@ ALLOCATED = [name for name in STATEFUL if QUERIES[name][0] != "paths"]
 def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mesh: str) -> None:
     opened = OpenMesh(("", b""), gc.Solver(mesh_of(client, ids[mesh])), [])
     query = query_of(name)
-    told = estimate(query, Form(JSON), opened, lambda: False)
+    told = estimate(query, Representation(JSON), opened, lambda: False)
     tracemalloc.start()
     try:
         query.answer(opened, granted())
@@ -167,7 +167,7 @@ def test_memory_that_suffices(
         monkeypatch.setattr(f"{module}.available_cores", lambda: 1)
     opened = OpenMesh(("", b""), gc.Solver(mesh_of(client, ids["sphere"])), [])
     query = query_of(name)
-    told = estimate(query, Form(JSON), opened, lambda: False)
+    told = estimate(query, Representation(JSON), opened, lambda: False)
 
     with pytest.raises(gc.errors.MemoryLimitExceeded):
         query.answer(opened, granted(memory=told.memory_bytes // 3))

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from app.encoding import Form
-from app.engine.work import Answering
+from app.encoding import Representation
+from app.engine.work import RunQuery
 from app.engine.worker import Signals, Worker
 from app.queries import field_cache as kept_fields
 from app.queries import result_key
@@ -145,9 +145,9 @@ def test_another_worker_finds_the_field(
 
     def answer() -> tuple[Worker, Any]:
         state = Worker(config(tmp_path), Signals())
-        form = Form("application/x-npy")
+        form = Representation("application/x-npy")
         name = result_name(mesh_id, result_key(query, form))
-        done = state.do(1, Answering(query, form, name))
+        done = state.do(1, RunQuery(query, form, name))
         wait_until(lambda: field_files(tmp_path))
         return state, done.answer.body
 

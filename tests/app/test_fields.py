@@ -8,9 +8,9 @@ import orjson
 import pytest
 
 import geodesic_core as gc
-from app.encoding import Form, encode
+from app.encoding import Representation, encode
 from app.engine.worker import Signals, Worker
-from app.queries import DistancesQuery, Fields, IsolinesQuery, PathsQuery
+from app.queries import DistancesQuery, FieldCache, IsolinesQuery, PathsQuery
 from app.store.meshes import OpenMesh
 from geodesic_core.fields import whole_sweep
 
@@ -28,20 +28,20 @@ def opened() -> OpenMesh:
 @pytest.fixture
 def sweeps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Grows by one with each sweep."""
-    run, ran = whole_sweep.WholeSweep.run, []
+    run, ran = whole_sweep.RepeatableSweep.run, []
 
     def counted(self: Any, *arguments: Any, **options: Any) -> Any:
         ran.append(1)
         return run(self, *arguments, **options)
 
-    monkeypatch.setattr(whole_sweep.WholeSweep, "run", counted)
+    monkeypatch.setattr(whole_sweep.RepeatableSweep, "run", counted)
     return ran
 
 
-def ask(opened: OpenMesh, fields: Fields, kind: Any, **body: Any) -> bytes:
+def ask(opened: OpenMesh, fields: FieldCache, kind: Any, **body: Any) -> bytes:
     query = kind("id", kind.normal(kind.model(**body)))
     answer = query.answer(opened, granted(fields=fields))
-    return b"".join(encode(answer, Form("application/json")).parts)
+    return b"".join(encode(answer, Representation("application/json")).parts)
 
 
 SOURCES = [{"vertex": 3}, {"face": 70, "barycentric": [0.2, 0.3, 0.5], "start_distance": 0.1}]
@@ -154,17 +154,17 @@ def test_the_size_of_a_field_is_that_of_its_arrays() -> None:
 
 
 def test_questions_about_one_field_go_to_one_worker() -> None:
-    def topics(kind: Any, **body: Any) -> Any:
-        return kind("id", kind.normal(kind.model(**body))).topics
+    def affinity_keys(kind: Any, **body: Any) -> Any:
+        return kind("id", kind.normal(kind.model(**body))).affinity_keys
 
-    about = topics(DistancesQuery, sources=[{"vertex": 3}])
+    about = affinity_keys(DistancesQuery, sources=[{"vertex": 3}])
     assert about[1:] == ("id",)
-    assert topics(PathsQuery, source={"vertex": 3}, targets=TARGETS) == about
-    assert topics(IsolinesQuery, sources=[{"vertex": 3}], count=2) == about
-    assert topics(DistancesQuery, sources=[{"vertex": 3}], targets=TARGETS) == about
+    assert affinity_keys(PathsQuery, source={"vertex": 3}, targets=TARGETS) == about
+    assert affinity_keys(IsolinesQuery, sources=[{"vertex": 3}], count=2) == about
+    assert affinity_keys(DistancesQuery, sources=[{"vertex": 3}], targets=TARGETS) == about
     for other in ({"vertex": 4}, {"vertex": 3, "start_distance": 1.0}):
-        assert topics(DistancesQuery, sources=[other])[0] != about[0]
-    assert topics(DistancesQuery, sources=[{"vertex": 3}], **APPROXIMATE)[0] != about[0]
+        assert affinity_keys(DistancesQuery, sources=[other])[0] != about[0]
+    assert affinity_keys(DistancesQuery, sources=[{"vertex": 3}], **APPROXIMATE)[0] != about[0]
 
 
 def test_a_worker_drops_fields_with_their_mesh(tmp_path: Path) -> None:

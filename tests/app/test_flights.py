@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from app.engine.interface import Told
-from app.service.single_flight import Flights
+from app.engine.interface import ProgressCallback
+from app.service.single_flight import SingleFlight
 
 
 class Work:
@@ -14,10 +14,10 @@ class Work:
 
     def __init__(self) -> None:
         self.begun = self.cancelled = 0
-        self.told: Told = print
+        self.told: ProgressCallback = print
         self.end: asyncio.Future[int] = asyncio.Future()
 
-    async def __call__(self, told: Told) -> int:
+    async def __call__(self, told: ProgressCallback) -> int:
         self.begun += 1
         self.told = told
         told(0.0)
@@ -31,16 +31,18 @@ class Work:
 def nobody(_: float) -> None: ...
 
 
-async def joined(flights: Flights[int], work: Work, told: Told = nobody) -> "asyncio.Task[int]":
+async def joined(
+    flights: SingleFlight[int], work: Work, told: ProgressCallback = nobody
+) -> "asyncio.Task[int]":
     task = asyncio.create_task(flights.join("name", work, told))
     await asyncio.sleep(0)
     await asyncio.sleep(0)
     return task
 
 
-def run(test: Callable[[Flights[int], Work], object]) -> None:
+def run(test: Callable[[SingleFlight[int], Work], object]) -> None:
     async def main() -> None:
-        flights: Flights[int] = Flights()
+        flights: SingleFlight[int] = SingleFlight()
         await test(flights, Work())  # type: ignore[misc]
         await asyncio.sleep(0)
         assert "name" not in flights, "what is over is forgotten"
@@ -49,7 +51,7 @@ def run(test: Callable[[Flights[int], Work], object]) -> None:
 
 
 def test_all_get_what_was_done_once() -> None:
-    async def test(flights: Flights[int], work: Work) -> None:
+    async def test(flights: SingleFlight[int], work: Work) -> None:
         waiting = [await joined(flights, work) for _ in range(5)]
         assert "name" in flights
         work.end.set_result(7)
@@ -61,7 +63,7 @@ def test_all_get_what_was_done_once() -> None:
 
 
 def test_who_leaves_does_not_stop_it_for_the_others() -> None:
-    async def test(flights: Flights[int], work: Work) -> None:
+    async def test(flights: SingleFlight[int], work: Work) -> None:
         first, second = await joined(flights, work), await joined(flights, work)
         first.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -75,7 +77,7 @@ def test_who_leaves_does_not_stop_it_for_the_others() -> None:
 
 
 def test_it_stops_when_the_last_leaves() -> None:
-    async def test(flights: Flights[int], work: Work) -> None:
+    async def test(flights: SingleFlight[int], work: Work) -> None:
         waiting = [await joined(flights, work) for _ in range(3)]
         for task in waiting:
             assert work.cancelled == 0
@@ -89,7 +91,7 @@ def test_it_stops_when_the_last_leaves() -> None:
 
 
 def test_who_comes_after_the_last_has_left_begins_anew() -> None:
-    async def test(flights: Flights[int], work: Work) -> None:
+    async def test(flights: SingleFlight[int], work: Work) -> None:
         first = await joined(flights, work)
         first.cancel()
         await asyncio.wait({first})
@@ -104,7 +106,7 @@ def test_who_comes_after_the_last_has_left_begins_anew() -> None:
 
 
 def test_each_has_a_deadline_of_its_own() -> None:
-    async def test(flights: Flights[int], work: Work) -> None:
+    async def test(flights: SingleFlight[int], work: Work) -> None:
         patient = await joined(flights, work)
         with pytest.raises(TimeoutError):
             async with asyncio.timeout(0.01):
@@ -118,7 +120,7 @@ def test_each_has_a_deadline_of_its_own() -> None:
 
 
 def test_a_failure_is_told_to_all_and_kept_for_nobody() -> None:
-    async def test(flights: Flights[int], work: Work) -> None:
+    async def test(flights: SingleFlight[int], work: Work) -> None:
         waiting = [await joined(flights, work) for _ in range(2)]
         work.end.set_exception(ValueError("no"))
         assert [str(e) for e in await asyncio.gather(*waiting, return_exceptions=True)] == [
@@ -133,7 +135,7 @@ def test_a_failure_is_told_to_all_and_kept_for_nobody() -> None:
 
 
 def test_all_are_told_how_far_it_is_also_who_comes_late() -> None:
-    async def test(flights: Flights[int], work: Work) -> None:
+    async def test(flights: SingleFlight[int], work: Work) -> None:
         early: list[float] = []
         late: list[float] = []
         await joined(flights, work, early.append)

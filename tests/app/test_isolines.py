@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 import geodesic_core as gc
 from app.queries import IsolinesQuery
 from app.store.meshes import OpenMesh
-from geodesic_core.fields.whole_sweep import WholeSweep
+from geodesic_core.fields.whole_sweep import RepeatableSweep
 
 from .conftest import check_problem, granted, mesh_of, serving, upload_sample
 
@@ -134,9 +134,9 @@ def test_the_grant_is_in_force_throughout(
     request = IsolinesQuery.model.model_validate({"sources": [INSIDE], "count": 4, **method})
     query = IsolinesQuery("m", IsolinesQuery.normal(request))
     watched: list[dict[str, Any]] = []
-    run, asked = WholeSweep.run, 0
+    run, asked = RepeatableSweep.run, 0
 
-    def watch(sweep: WholeSweep, control: Any, **keep: Any) -> Any:
+    def watch(sweep: RepeatableSweep, control: Any, **keep: Any) -> Any:
         watched.append({"cancel": control.cancel, "memory_limit": control.memory_limit})
         return run(sweep, control, **keep)
 
@@ -145,7 +145,7 @@ def test_the_grant_is_in_force_throughout(
         asked += 1
         return asked == stop_at
 
-    monkeypatch.setattr(WholeSweep, "run", watch)
+    monkeypatch.setattr(RepeatableSweep, "run", watch)
     stop_at = -1
     query.answer(opened, granted(cancel, memory=10**9))
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.store.lru_cache import Kept
+from app.store.lru_cache import LRUCache
 
 
 class Value:
@@ -15,8 +15,8 @@ class Value:
         return self.size
 
 
-def kept(capacity: int) -> Kept[str, Value]:
-    return Kept(capacity, Value.measure)
+def kept(capacity: int) -> LRUCache[str, Value]:
+    return LRUCache(capacity, Value.measure)
 
 
 def test_the_least_recently_used_go_first() -> None:

@@ -21,13 +21,13 @@ import orjson
 import pytest
 
 import geodesic_core as gc
-from app.engine.work import Answering, Order
+from app.engine.work import RunQuery, Task
 from app.errors import ProblemError
 from app.jobs import require_whole
 from app.settings import MIB
 from app.store import mesh_catalog, meshes
 from app.store.layout import LAYOUT, StoreError, owned
-from app.store.mesh_catalog import Kept, MeshBooks
+from app.store.mesh_catalog import Kept, MeshCatalog
 from app.store.meshes import MeshStore
 
 from .conftest import check_problem, distances, serving, store_mesh, upload_sample, wait_until
@@ -154,13 +154,13 @@ def test_a_damaged_job_book_is_refused(tmp_path: Path) -> None:
 
 # Its bound
 
-Store = tuple[MeshStore, MeshBooks]
+Store = tuple[MeshStore, MeshCatalog]
 
 
 @contextmanager
 def opened(root: Path, capacity: int = 2**60, *, evicts: bool = False) -> Iterator[Store]:
     store = MeshStore(root)
-    books = MeshBooks(root, store, capacity, evicts=evicts)
+    books = MeshCatalog(root, store, capacity, evicts=evicts)
     with owned(root):
         books.prepare()
         yield store, books
@@ -335,8 +335,8 @@ def test_a_mesh_stays_while_a_query_waits(tmp_path: Path, monkeypatch: pytest.Mo
         service = client.app.state.service
         run, goes_on = service.engine.run, threading.Event()
 
-        async def run_later(order: Order, told: Any) -> Any:
-            while isinstance(order.work, Answering) and not goes_on.is_set():
+        async def run_later(order: Task, told: Any) -> Any:
+            while isinstance(order.work, RunQuery) and not goes_on.is_set():
                 await asyncio.sleep(0.01)
             return await run(order, told)
 

@@ -86,7 +86,7 @@ def goal_at_vertex(
     limit: float = np.inf,
     landmarks: Landmarks | None = None,
     **known: object,
-) -> state.Goal:
+) -> state.PruningBounds:
     """The goal of paths through inner vertex v."""
     here = mesh.topology.positions[v].copy(), np.array([v]), np.zeros(1)
     return (landmarks or Landmarks(mesh)).goal(*here, limit)._replace(**known)
@@ -104,7 +104,7 @@ def edge_paths(mesh: gc.TriangleMesh, pairs) -> Iterator[tuple[int, int, np.ndar
         yield (
             start,
             end,
-            edge_dijkstra.vertices_to(wave.winner_ints[:, state.FROM], first),
+            edge_dijkstra.vertices_to(wave.winner_ints[:, state.PREDECESSOR], first),
             length,
         )
         pruning.forget(topology, wave, bounds)

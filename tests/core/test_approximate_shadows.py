@@ -9,11 +9,11 @@ from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import COS_LEFT, LENGTH_LEFT, SIN_LEFT, following
 from geodesic_core.kernels.sweep.pseudosources import emit_shadows
 from geodesic_core.kernels.sweep.queues import HEAP_SIZE
-from geodesic_core.kernels.sweep.relaxation import bound_vertex, light_vertex
+from geodesic_core.kernels.sweep.relaxation import bound_vertex, illuminate_vertex
 from geodesic_core.kernels.sweep.state import (
-    DONE,
     LIT_FROM,
     LIT_TO,
+    SETTLED,
     merging_bounds,
     new_wavefront,
     view_of,
@@ -49,7 +49,7 @@ class Vertex:
         self.v = int(self.topology.inner_vertex[0])
         self.total = float(self.topology.total_angle[self.v])
         self.wave.distance[self.v] = self.wave.upper[self.v] = 1.0
-        self.wave.status[self.v] = DONE
+        self.wave.status[self.v] = SETTLED
 
     def see(self, angle, distance=1.0):
         """A pseudosource in this direction of the unfolded fan."""
@@ -62,7 +62,7 @@ class Vertex:
         turn = angle - starts[place]
         toward_tail = complex(*-apex)
         s = complex(*apex) + 9 * toward_tail * complex(math.cos(turn), math.sin(turn))
-        light_vertex(self.view, self.v, distance, via, s.real, s.imag, 1.0)
+        illuminate_vertex(self.view, self.v, distance, via, s.real, s.imag, 1.0)
 
     def lit(self) -> tuple[float, float]:
         lo, hi = self.wave.light[self.v, [LIT_FROM, LIT_TO]]

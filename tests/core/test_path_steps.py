@@ -32,12 +32,12 @@ def check_steps(mesh, path, leg=0):
         sweeps = step.name in ("approximate", "exact")
         assert step.windows >= 0 if sweeps else step.windows == 0
         assert len(step.faces) == 0 or sweeps or step.name == "dijkstra"
-    edges, toward, outward = (
+    edges, heuristic, outward = (
         set(steps[STEPS.index(name)].faces.tolist())
         for name in ("dijkstra", "approximate", "exact")
     )
     assert set(path.faces.tolist()) <= outward
-    for faces in (edges, toward, outward):
+    for faces in (edges, heuristic, outward):
         ends = {int(v) for v in mesh.faces[list(faces)].ravel()}
         both = {path.locations[0].vertex_index, path.locations[-1].vertex_index}
         assert both <= ends
@@ -88,10 +88,10 @@ def test_each_bound_thins_the_next_search():
     """Between far points of a smooth surface: fewer faces step by step, in the end a thin strip."""
     mesh = gc.TriangleMesh(*zoo.icosphere(5))
     path = gc.shortest_path(mesh, 0, 4000, explain=True)
-    edges, toward, outward = (
+    edges, heuristic, outward = (
         len(path.steps[STEPS.index(name)].faces) for name in ("dijkstra", "approximate", "exact")
     )
-    assert outward < 0.3 * toward
+    assert outward < 0.3 * heuristic
     assert outward < edges
     assert outward < 0.1 * len(mesh.faces)
     sweep = gc.exact_distance(mesh, 0).stats.windows_created

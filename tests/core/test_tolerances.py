@@ -32,7 +32,7 @@ from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, shortened_p
 from geodesic_core.kernels.planar import bisector
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from geodesic_core.kernels.sweep.merging import accuracy, directionality, merged
-from geodesic_core.kernels.sweep.propagation import collect, reach_apex
+from geodesic_core.kernels.sweep.propagation import reach_apex, trim_list
 from geodesic_core.kernels.sweep.pruning import least_to_start
 from geodesic_core.kernels.sweep.relaxation import precedence
 from geodesic_core.kernels.sweep.state import (
@@ -44,7 +44,7 @@ from geodesic_core.kernels.sweep.state import (
     exact_bounds,
     merging_bounds,
     new_wavefront,
-    with_strips,
+    with_parallel_windows,
 )
 from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.sweep.window_lists import put_window
@@ -218,7 +218,7 @@ def is_trimmed(overlap, difference, scale) -> bool:
     b, source = 0.5 * scale, scale * np.array([(0.1, -1.0, 0.0), (1.0, -1.0, difference)])
     left, right = (0.1 * scale, b + overlap * scale), (b, 0.9 * scale)
     put_list(view, wave, h, [(*left, *source[0]), (*right, *source[1])], 0)
-    assert collect(view, h) == 2
+    assert trim_list(view, h) == 2
     ends = wave.scratch[0, B1], wave.scratch[1, B0]
     return ends != (left[1], right[0])
 
@@ -258,7 +258,7 @@ def test_gap_is_the_most_that_is_closed(scale, share, closed):
     b, gap = 0.5 * scale, share * GAP * scale
     source = (0.5 * scale, -scale, 0.0)
     put_list(view, wave, h, [(0.1 * scale, b, *source), (b + gap, 0.9 * scale, *source)], 0)
-    assert collect(view, h) == 2
+    assert trim_list(view, h) == 2
     assert (wave.scratch[1, B0] == b) == closed
     assert wave.scratch[1, B0] - b <= gap * (1 + 1e-3)
     # The ray through the closed gap is off by no more than the gap, and so is its length.
@@ -283,7 +283,7 @@ def test_slack_keeps_windows_that_tie_with_a_vertex(scale, detour, kept, from_ta
     reach = math.sqrt(straight**2 - sy**2)
     sx = b1 - reach if from_tail else b0 + reach
     put_list(view, wave, h, [(b0, b1, sx, sy, 0.0)], tail)
-    assert collect(view, h) == kept
+    assert trim_list(view, h) == kept
 
 
 @SCALES
@@ -657,7 +657,7 @@ def test_slant_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope,
     line = tuple(mesh.locate(place) for place in (foot, head))
     nodes = nodes_of(mesh, [line], [])
     wave = new_wavefront(mesh.topology, nodes.sites)
-    bounds = with_strips(exact_bounds(math.inf), int(nodes.sources[-1]))
+    bounds = with_parallel_windows(exact_bounds(math.inf), int(nodes.sources[-1]))
     continuous_dijkstra.start_sweep(
         mesh.topology, wave, nodes.sources, nodes.origins, np.zeros(1), bounds
     )

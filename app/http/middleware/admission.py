@@ -6,7 +6,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.access import Caller, caller_at
 from app.api_keys import name_of_secret
-from app.errors import ProblemError, refuse
+from app.errors import ProblemError, problem
 from app.http.middleware.rate_limits import Allowances
 from app.http.page import ASSETS
 from app.settings import Settings
@@ -54,4 +54,4 @@ class AdmissionMiddleware:
 
 def _unauthorized(detail: str, challenge: str) -> ProblemError:
     hint = "send the header Authorization: Bearer, with one key"
-    return refuse("unauthorized", detail, hint=hint, headers={"WWW-Authenticate": challenge})
+    return problem("unauthorized", detail, hint=hint, headers={"WWW-Authenticate": challenge})

@@ -5,7 +5,7 @@ import asyncio
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.errors import refuse
+from app.errors import problem
 from app.settings import Settings, variable_of
 
 
@@ -32,7 +32,7 @@ class BodyDeadlineMiddleware:
             except TimeoutError:
                 detail = f"the body was not complete within {self.limit_s:g} s"
                 setting = variable_of("deadline_s")
-                raise refuse(
+                raise problem(
                     "deadline_exceeded", detail, limit=self.limit_s, setting=setting
                 ) from None
             is_complete = not message.get("more_body", False)

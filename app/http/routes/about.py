@@ -7,7 +7,7 @@ from starlette.responses import PlainTextResponse
 
 from app import __version__
 from app.encoding import FORMATS
-from app.errors import CODES, refuse
+from app.errors import CODES, problem
 from app.http import page
 from app.http.dependencies import ServiceDep
 from app.http.metrics import Metrics
@@ -78,10 +78,10 @@ async def get_liveness() -> Health:
 async def get_readiness(service: ServiceDep) -> Health:
     """Return 200 once a worker has its kernels compiled, 503 before."""
     if service.engine.is_draining:
-        raise refuse("draining", "the service is about to stop", headers={"Retry-After": "1"})
+        raise problem("draining", "the service is about to stop", headers={"Retry-After": "1"})
     if not service.engine.is_ready:
         detail = "no worker is ready yet: kernels are being compiled or loaded"
-        raise refuse("engine_unavailable", detail, headers={"Retry-After": "1"})
+        raise problem("engine_unavailable", detail, headers={"Retry-After": "1"})
     return Health(status="ok")
 
 
@@ -131,6 +131,6 @@ async def get_metrics(request: Request) -> Response:
 async def get_problem(code: str, response: Response) -> ProblemCode:
     """Return the row of the error table; the `type` of a problem leads here."""
     if code not in CODES:
-        raise refuse("not_found", f"there is no code {code!r}; there are {', '.join(CODES)}")
+        raise problem("not_found", f"there is no code {code!r}; there are {', '.join(CODES)}")
     response.headers["Cache-Control"] = "public, max-age=86400"
     return ProblemCode(code=code, **vars(CODES[code]))

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from anyio import to_thread
 from fastapi import Request
 
-from app.errors import refuse
+from app.errors import problem
 
 LARGE = 2**16
 """Bytes of a body from which on it is worth a thread: they take some milliseconds."""
@@ -18,7 +18,7 @@ LARGE = 2**16
 T = TypeVar("T")
 
 
-async def beside_the_loop(request: Request, do: Callable[[], T]) -> T:
+async def offload_if_large(request: Request, do: Callable[[], T]) -> T:
     """Do what takes the longer, the larger the body is: in a thread, where it is large.
 
     One at a time: several would take the interpreter from each other, and from the event loop.
@@ -38,4 +38,4 @@ def parsed(body: bytes) -> Any:
         detail = "it is no text in UTF-8, or has a number of thousands of digits"
     except RecursionError:
         detail = "it is nested too deeply"
-    raise refuse("malformed_body", f"the body is not JSON: {detail}")
+    raise problem("malformed_body", f"the body is not JSON: {detail}")

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app.encoding import JSON
-from app.errors import refuse
+from app.errors import problem
 from app.http.dependencies import CallerDep, ServiceDep
 from app.http.responses import (
     ENDS,
@@ -163,5 +163,5 @@ def _number(cursor: str | None) -> int | None:
     if cursor is None:
         return None
     if not cursor.isdecimal():
-        raise refuse("invalid_request", f"{cursor!r} is no next_cursor of a list of jobs")
+        raise problem("invalid_request", f"{cursor!r} is no next_cursor of a list of jobs")
     return int(cursor)

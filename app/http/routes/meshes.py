@@ -8,7 +8,7 @@ from fastapi import APIRouter, Query, Request, Response
 from app.access import Caller
 from app.encoding import NPY
 from app.engine.work import MeshFromFile, MeshFromSample
-from app.errors import Fault, over_limit, refuse
+from app.errors import Fault, over_limit, problem
 from app.http.dependencies import AskerDep, CallerDep, ServiceDep, while_connected
 from app.http.responses import (
     IMMUTABLE,
@@ -24,7 +24,7 @@ from app.http.responses import (
 )
 from app.http.uploads import spool
 from app.schemas.service import ListParameters, MeshDocument, MeshList, UploadParameters
-from app.service.service import Added, Asker, Service
+from app.service.service import Added, RequestContext, Service
 
 router = APIRouter(prefix="/meshes", tags=["meshes"])
 
@@ -205,11 +205,11 @@ async def get_mesh_array(
 
 
 async def _add_upload(
-    service: Service, parameters: UploadParameters, request: Request, asker: Asker
+    service: Service, parameters: UploadParameters, request: Request, asker: RequestContext
 ) -> Added:
     if parameters.faces is not None:
         fault = Fault("/query/faces", "only a sample can be asked for with so many faces")
-        raise refuse("invalid_request", fault.message, errors=(fault,))
+        raise problem("invalid_request", fault.message, errors=(fault,))
     async with service.mesh_books.scratch_folder() as folder, service.within(asker.deadline_s):
         path = folder / "upload"
         file_format = await spool(request, path, parameters.format)

@@ -24,19 +24,19 @@ from app.http.responses import (
     not_modified,
     result_response,
 )
-from app.http.routes.bodies import beside_the_loop
+from app.http.routes.bodies import offload_if_large
 from app.queries import Query, result_key
 from app.schemas.service import AnswerParameters
-from app.service.service import Asker
+from app.service.service import RequestContext
 
 
 @dataclass(frozen=True)
-class Asked:
+class QueryRequest:
     """Of what a query is asked, by whom, and how it is to be answered."""
 
     mesh_id: str
     request: Request
-    asker: Asker
+    asker: RequestContext
     is_async: bool
     key: str | None
 
@@ -53,7 +53,7 @@ class Asked:
             query.written  # noqa: B018 - kept by it
             return query
 
-        query = await beside_the_loop(request, ask)
+        query = await offload_if_large(request, ask)
         form = form_of(request, parameters, query.offers)
         if parameters.estimate:
             estimating = service.estimate(query, size, form, asker)
@@ -89,10 +89,12 @@ class AskingHeaders(TimeoutHeader):
 
 async def get_asked(
     mesh_id: str, request: Request, headers: Annotated[AskingHeaders, Header()]
-) -> Asked:
+) -> QueryRequest:
     """Return what a request for a query says beside the query."""
     is_async = prefers_async(headers.prefer)
-    return Asked(mesh_id, request, asker_of(request, headers), is_async, headers.idempotency_key)
+    return QueryRequest(
+        mesh_id, request, asker_of(request, headers), is_async, headers.idempotency_key
+    )
 
 
-AskedDep = Annotated[Asked, Depends(get_asked)]
+AskedDep = Annotated[QueryRequest, Depends(get_asked)]

@@ -14,7 +14,7 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError, create_model
 
 from app.http.dependencies import require_json
-from app.http.routes.bodies import beside_the_loop, parsed
+from app.http.routes.bodies import offload_if_large, parsed
 from app.http.routes.query_request import AskingHeaders, get_asked
 
 
@@ -39,7 +39,7 @@ class QueryRoute(APIRoute):
                 require_json(request)
             written = {"header": _headers(request), "query": _parameters(request, lists)}
             body = await request.body() if takes_body else b""
-            whole = await beside_the_loop(request, partial(read, model, written, body))
+            whole = await offload_if_large(request, partial(read, model, written, body))
             asked = await get_asked(request.path_params["mesh_id"], request, whole.header)
             given = {"body": whole.body} if takes_body else {}
             response: Response = await self.endpoint(asked=asked, parameters=whole.query, **given)

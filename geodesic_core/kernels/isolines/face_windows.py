@@ -16,14 +16,14 @@ from geodesic_core.arrays import Floats, Longs, aligned_rows
 from geodesic_core.kernels.jit import kernel, pointer
 from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL, point_in_frame
 from geodesic_core.kernels.sweep.relaxation import precedence
-from geodesic_core.kernels.sweep.segments import distance_to_piece, is_piece
-from geodesic_core.kernels.sweep.state import FACE, KEPT_ROWS, NODE, Wavefront
+from geodesic_core.kernels.sweep.segments import distance_to_segment, is_segment
+from geodesic_core.kernels.sweep.state import FACE, NODE, RETAINED_ROWS, Wavefront
 from geodesic_core.kernels.sweep.surface_points import way_through
 from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY, WIDTH
 from geodesic_core.tolerances import GAP
 
 
-class Kept(NamedTuple):
+class FaceWindows(NamedTuple):
     """The windows of a sweep that has finished, sorted by the half-edge that they cross."""
 
     first: Longs
@@ -48,10 +48,10 @@ def sort_by_half_edge(rows: Floats, first: Longs, windows: Floats) -> None:
         free[h] += 1
 
 
-def kept_of(wave: Wavefront) -> Kept:
+def face_windows_of(wave: Wavefront) -> FaceWindows:
     """Return the windows that a sweep kept, in memory of their own."""
-    rows = wave.kept[: wave.counters[KEPT_ROWS]]
-    kept = Kept(
+    rows = wave.kept[: wave.counters[RETAINED_ROWS]]
+    kept = FaceWindows(
         first=np.empty(len(wave.lists) + 1, np.int64),
         windows=aligned_rows(len(rows), WIDTH, np.float64),
     )
@@ -60,8 +60,8 @@ def kept_of(wave: Wavefront) -> Kept:
 
 
 def bytes_of(wave: Wavefront) -> int:
-    """Memory that `kept_of` takes."""
-    return 8 * (len(wave.lists) + 1 + WIDTH * int(wave.counters[KEPT_ROWS]))
+    """Memory that `face_windows_of` takes."""
+    return 8 * (len(wave.lists) + 1 + WIDTH * int(wave.counters[RETAINED_ROWS]))
 
 
 class Reach(NamedTuple):
@@ -94,7 +94,7 @@ def reach_point(
         gap = GAP * geometry[h, LENGTH]
         for i in range(kept.first[h], kept.first[h + 1]):
             w = kept.windows[i]
-            sw = 0.0 if is_piece(winners.piece_ints, ints[i, ROOT]) else 1.0
+            sw = 0.0 if is_segment(winners.piece_ints, ints[i, ROOT]) else 1.0
             there = way_through(x, y, w[B0], w[B1], w[SX], w[SY], sw, w[SIGMA], gap)
             source = nearest[ints[i, ROOT]]
             if precedence(there, source, best, best_source):
@@ -117,7 +117,7 @@ def reach_point(
             if winners.piece_ints[k, FACE] == face:
                 node = winners.piece_ints[k, NODE]
                 ends = pointer(winners.piece_ends)
-                there = distance_to_piece(pointer(geometry), ends, k, h, x, y)
+                there = distance_to_segment(pointer(geometry), ends, k, h, x, y)
                 there += winners.distance[node]
                 if precedence(there, nearest[node], best, best_source):
                     best, best_source, via, root = min(best, there), nearest[node], h, node

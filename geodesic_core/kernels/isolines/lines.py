@@ -14,7 +14,7 @@ import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs
 from geodesic_core.kernels.isolines.arcs import ARC, FROM, TO, outer_arcs, point_on, with_room
-from geodesic_core.kernels.isolines.face_windows import Kept
+from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.isolines.regions import (
     RADIUS,
     is_line,
@@ -40,7 +40,7 @@ from geodesic_core.tolerances import CROSSING, LEVEL, PIECE
 class Field(NamedTuple):
     """What a finished sweep knows of the distances in its faces."""
 
-    kept: Kept
+    kept: FaceWindows
     distance: Floats
     """(N,) by node"""
     site_ints: Ints

@@ -24,7 +24,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL, half_edge_in_face, point_in_frame
-from geodesic_core.kernels.sweep.state import FACE, NODE, PIECE_END
+from geodesic_core.kernels.sweep.state import FACE, NODE, SEGMENT_END
 from geodesic_core.kernels.sweep.window import B0, B1, ROOT, SIGMA, SX, SY, reaches
 from geodesic_core.tolerances import GAP, LEVEL
 
@@ -151,8 +151,8 @@ def regions_of_face(topology: Any, field: Any, face: int, level: float) -> Float
                     put_side(region, end, nx * ux - ny * uy, nx * uy + ny * ux, 0.0)
     for k in range(first_piece, end_piece):
         far = level - field.distance[field.piece_ints[k, NODE]]
-        px, py = point_in_frame(geometry, 3 * face, field.piece_ends[k, :PIECE_END])
-        qx, qy = point_in_frame(geometry, 3 * face, field.piece_ends[k, PIECE_END:])
+        px, py = point_in_frame(geometry, 3 * face, field.piece_ends[k, :SEGMENT_END])
+        qx, qy = point_in_frame(geometry, 3 * face, field.piece_ends[k, SEGMENT_END:])
         length = math.hypot(qx - px, qy - py)
         if far > 0.0:
             ex, ey = (qx - px) / length, (qy - py) / length

@@ -38,18 +38,18 @@ from geodesic_core.kernels.mesh.half_edges import (
     point_in_frame,
     previous,
 )
-from geodesic_core.kernels.sweep.segments import distance_to_piece, is_piece
+from geodesic_core.kernels.sweep.segments import distance_to_segment, is_segment
 from geodesic_core.kernels.sweep.state import (
+    ENTRY_EDGE,
     FACE,
-    FROM,
     LEFT,
     LEFT_REFERENCE,
     MERGED_ON,
     NODE,
+    PREDECESSOR,
     RIGHT,
     RIGHT_REFERENCE,
     SPLIT,
-    VIA,
 )
 from geodesic_core.tolerances import GAP, ON_PATH, SAME_PLACE, WIDEST_ERROR
 
@@ -165,9 +165,9 @@ def row_in_face(winners: Any, node: int, face: int) -> int:
 
 
 @kernel
-def piece_in_face(winners: Any, node: int, face: int) -> int:
+def segment_in_face(winners: Any, node: int, face: int) -> int:
     """Row of a piece in a face; -1 where it is not in that face, or no piece."""
-    if is_piece(winners.piece_ints, node):
+    if is_segment(winners.piece_ints, node):
         for k in range(len(winners.piece_ints)):
             if winners.piece_ints[k, NODE] == node and winners.piece_ints[k, FACE] == face:
                 return k
@@ -176,7 +176,7 @@ def piece_in_face(winners: Any, node: int, face: int) -> int:
 
 @kernel
 def target_in_frame(topology: Any, winners: Any, node: int, h: int) -> tuple[float, float]:
-    """Where the target lies in the frame of its VIA h: at the apex, or a site in the face."""
+    """Where the target lies in the frame of h: the apex, or a site in the face."""
     geometry = topology.geometry
     if node < len(topology.total_angle):
         reach = geometry[h, LENGTH_LEFT]
@@ -261,7 +261,7 @@ def trace_path(
     """
     nodes[0], parameters[0] = -1 - target, 0.0
     count, v = 1, target
-    while winners.winner_ints[v, VIA] >= 0:
+    while winners.winner_ints[v, ENTRY_EDGE] >= 0:
         outcome, count, v = trace_line(topology, winners, v, nodes, parameters, faces, count)
         if outcome != TRACED:
             return outcome, count
@@ -289,16 +289,16 @@ def trace_line(
     A wrong one is given up where a vertex is farther than the way to it would be.
     """
     links, geometry, distance = topology.links, topology.geometry, winners.distance
-    m, root = winners.winner_ints[v, VIA], winners.winner_ints[v, FROM]
+    m, root = winners.winner_ints[v, ENTRY_EDGE], winners.winner_ints[v, PREDECESSOR]
     sx, sy, sigma = winners.winner[v, 0], winners.winner[v, 1], 0.0
     reference = winners.reference[v] if len(winners.reference) > 0 else -1 - root
     if reference >= 0:
         root = -1  # not known before the merges are undone
-    sw = 0.0 if is_piece(winners.piece_ints, root) else 1.0
+    sw = 0.0 if is_segment(winners.piece_ints, root) else 1.0
     face, length = m // 3, geometry[m, LENGTH]
     ax, ay = target_in_frame(topology, winners, v, m)
     faces[count - 1] = face
-    if row_in_face(winners, root, face) >= 0 or piece_in_face(winners, root, face) >= 0:
+    if row_in_face(winners, root, face) >= 0 or segment_in_face(winners, root, face) >= 0:
         return TRACED, count, root
     tail, head = links[m, TAIL], links[m, HEAD]
     if tail == root or is_on_path(winners, tail, math.hypot(ax, ay), distance[v], v):
@@ -365,10 +365,10 @@ def trace_line(
                     px, py = target_in_frame(topology, winners, root, h)
                     if math.hypot(px - x, py) <= most * (1.0 + SAME_PLACE) + GAP * length:
                         return TRACED, count, root
-                k = piece_in_face(winners, root, face)
+                k = segment_in_face(winners, root, face)
                 if k >= 0:
                     ends = pointer(winners.piece_ends)
-                    off = distance_to_piece(pointer(geometry), ends, k, h, x, 0.0)
+                    off = distance_to_segment(pointer(geometry), ends, k, h, x, 0.0)
                     if fork_count == 0 or distance[root] + off <= sigma + SAME_PLACE * length:
                         return TRACED, count, root
                 is_root = apex == root and reach <= most * (1.0 + SAME_PLACE) + GAP * length

@@ -12,9 +12,9 @@ from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import APEX, HEAD, LENGTH, LENGTH_LEFT, OUT_LEFT, ROW
 from geodesic_core.kernels.sweep.pruning import touch
 from geodesic_core.kernels.sweep.queues import HEAP_SIZE, pop_nearest, push_or_raise
-from geodesic_core.kernels.sweep.state import DONE, FROM, WINNER, view_of
+from geodesic_core.kernels.sweep.state import PREDECESSOR, SETTLED, WINNER, view_of
 
-HASTE = 1.15
+ASTAR_WEIGHT = 1.15
 """Weight of the lower bound: the path may come out longer than the shortest by this factor.
 
 Shortening makes up for it, but for turns around the other side of an obstacle. Against 1, a third
@@ -24,14 +24,14 @@ to a half of this step's time; 1.3 gains little more here and loses it in the ne
 
 @kernel
 def search_edges(topology: Any, wavefront: Any, bounds: Any, begin: int, end: int) -> None:
-    """Search from ``begin`` until ``end`` is settled: in FROM, a vertex names the one before."""
+    """Search from ``begin`` until ``end`` is settled; PREDECESSOR holds the vertex before."""
     wave = view_of(topology, wavefront, bounds)
     touch(wave, begin)
     wave.distance[begin] = 0.0
     push_or_raise(wave, begin, 0.0)
     while wave.counters[HEAP_SIZE] > 0:
         v = pop_nearest(wave)
-        wave.status[v] = DONE
+        wave.status[v] = SETTLED
         if v == end:
             return
         for c in range(wave.first_corner[v], wave.first_corner[v + 1]):
@@ -49,12 +49,12 @@ def relax(wave: Any, v: int, u: int, length: float) -> None:
     To settle vertices anew took 0.5 s on one pair in a hundred, of 1.4 million faces.
     """
     distance = wave.distance[v] + length
-    if wave.status[u] != DONE and distance < wave.distance[u]:
-        if wave.winner_ints[WINNER * u + FROM] < 0:
+    if wave.status[u] != SETTLED and distance < wave.distance[u]:
+        if wave.winner_ints[WINNER * u + PREDECESSOR] < 0:
             touch(wave, u)
         wave.distance[u] = distance
-        wave.winner_ints[WINNER * u + FROM] = v
-        push_or_raise(wave, u, distance + HASTE * wave.toward[u])
+        wave.winner_ints[WINNER * u + PREDECESSOR] = v
+        push_or_raise(wave, u, distance + ASTAR_WEIGHT * wave.heuristic[u])
 
 
 @kernel

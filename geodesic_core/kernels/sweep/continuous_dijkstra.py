@@ -30,22 +30,22 @@ from geodesic_core.kernels.sweep.queues import (
     pop_nearest,
     ring_pop,
 )
-from geodesic_core.kernels.sweep.relaxation import bound_vertex, improve_vertex
-from geodesic_core.kernels.sweep.segments import emit_piece
+from geodesic_core.kernels.sweep.relaxation import bound_vertex, relax_vertex
+from geodesic_core.kernels.sweep.segments import emit_segment
 from geodesic_core.kernels.sweep.state import (
-    DONE,
-    DONE_VERTICES,
+    ENTRY_EDGE,
     FAR,
-    FROM,
     FRONT,
     IN_RING,
     LIST,
     MARKS,
     NODE,
-    PIECE,
+    PREDECESSOR,
+    SEGMENT,
+    SETTLED,
+    SETTLED_VERTICES,
     SITE,
     SIZE,
-    VIA,
     WINNER,
     WORK,
     merging,
@@ -81,17 +81,17 @@ def start_sweep(
         if v < wave.vertex_count:
             if merging(wave):
                 bound_vertex(wave, v, start)
-            improve_vertex(wave, v, start, -1, 0.0, 0.0, v, -1 - v)
+            relax_vertex(wave, v, start, -1, 0.0, 0.0, v, -1 - v)
         else:
-            wave.distance[v], wave.winner_ints[WINNER * v + FROM] = start, v
+            wave.distance[v], wave.winner_ints[WINNER * v + PREDECESSOR] = start, v
     for k in range(wave.site_count):
         if wave.distance[wave.site_ints[SITE * k + NODE]] < math.inf:
             emit_site(wave, k)
     if len(wave.strips) > 0:
         ints, ends = pointer(wavefront.piece_ints), pointer(wavefront.piece_ends)
         for k in range(len(wavefront.piece_ints)):
-            if wave.distance[ints[PIECE * k + NODE]] < math.inf:
-                emit_piece(wave, ints, ends, k)
+            if wave.distance[ints[SEGMENT * k + NODE]] < math.inf:
+                emit_segment(wave, ints, ends, k)
 
 
 @kernel
@@ -125,9 +125,9 @@ def settle_nearest(wave: Any) -> int:
     pop_nearest(wave)
     if wave.counters[HEAP_SIZE] > 0:
         ask_ahead(wave, wave.heap[0])
-    if wave.status[v] != DONE:
-        wave.status[v] = DONE
-        wave.counters[DONE_VERTICES] += 1
+    if wave.status[v] != SETTLED:
+        wave.status[v] = SETTLED
+        wave.counters[SETTLED_VERTICES] += 1
     wave.counters[WORK] += 30
     if emits:
         emit_pseudosource(wave, v)
@@ -218,11 +218,11 @@ def nearest_sources(distance: Floats, winner_ints: Ints, origin: Ints) -> Ints:
         if distance[start] == math.inf:
             continue
         v = start
-        while result[v] < 0 and winner_ints[v, VIA] >= 0:
-            v = winner_ints[v, FROM]
+        while result[v] < 0 and winner_ints[v, ENTRY_EDGE] >= 0:
+            v = winner_ints[v, PREDECESSOR]
         found = result[v] if result[v] >= 0 else origin[v]
         v = start
         while result[v] < 0:
             result[v] = found
-            v = winner_ints[v, FROM]
+            v = winner_ints[v, PREDECESSOR]
     return result

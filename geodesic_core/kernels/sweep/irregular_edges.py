@@ -36,7 +36,7 @@ from geodesic_core.tolerances import GAP, SLACK
 
 
 @kernel
-def passes(wave: Any, g: int, slot: int) -> bool:
+def trim_against_crossings(wave: Any, g: int, slot: int) -> bool:
     """Trim a window that is to go over the irregular edge of g to where it is nearest so far.
 
     Return whether anything is left. O(windows that passed), mostly.
@@ -74,7 +74,7 @@ def passes(wave: Any, g: int, slot: int) -> bool:
 
 
 @kernel
-def keep_passed(wave: Any, g: int, slot: int) -> None:
+def record_crossing(wave: Any, g: int, slot: int) -> None:
     """Keep a window that went over the irregular edge of g."""
     name = lowest_half_edge(wave, g)
     if wave.links[ROW * g + TAIL] < wave.links[ROW * g + HEAD]:

@@ -27,18 +27,16 @@ from geodesic_core.kernels.planar import distance, hit_left
 from geodesic_core.kernels.sweep.merging import merged
 from geodesic_core.kernels.sweep.relaxation import (
     bound_vertex,
-    improve_vertex,
-    light_vertex,
+    illuminate_vertex,
     precedence,
+    relax_vertex,
 )
 from geodesic_core.kernels.sweep.state import (
     CREATED,
     FIRST,
     FREE_SIZE,
     FRESH,
-    KEEPS,
     KEPT,
-    KEPT_ROWS,
     LAST,
     LEFT,
     LEFT_REFERENCE,
@@ -49,6 +47,8 @@ from geodesic_core.kernels.sweep.state import (
     MERGED_ON,
     MERGES,
     PEAK,
+    RETAINED,
+    RETAINED_ROWS,
     RIGHT,
     RIGHT_REFERENCE,
     SITE_SHIFT,
@@ -92,11 +92,11 @@ POOL_FULL = 1
 SCRATCH_FULL = 2
 MERGES_FULL = 5
 RUNAWAY = 6  # a list came up again and again
-KEPT_FULL = 7
+RETAINED_FULL = 7
 
 
 @inlined
-def collect(wave: Any, h: int) -> int:
+def trim_list(wave: Any, h: int) -> int:
     """Copy the list of h to scratch, trimmed against each other; return how many are left.
 
     The filters of Xin and Wang (2009) take away what a path along the edge beats, or what no path
@@ -111,8 +111,8 @@ def collect(wave: Any, h: int) -> int:
         from_tail, from_head = wave.distance[tail], wave.distance[head]
     from_tail, from_head = from_tail * (1.0 + SLACK), from_head * (1.0 + SLACK)
     if wave.pruned:
-        from_tail = min(from_tail, wave.limit - wave.toward[tail])
-        from_head = min(from_head, wave.limit - wave.toward[head])
+        from_tail = min(from_tail, wave.limit - wave.heuristic[tail])
+        from_head = min(from_head, wave.limit - wave.heuristic[head])
     from_head += length
     gap, overlap = GAP * length, OVERLAP * length
     # Merging makes few windows of many: there, none is too many to be trimmed.
@@ -228,14 +228,14 @@ def record_merge(
 
 
 @kernel
-def keep_windows(wave: Any, h: int, count: int) -> None:
+def retain_windows(wave: Any, h: int, count: int) -> None:
     """Keep the windows of scratch, which are those that cross the face of h."""
-    first = wave.counters[KEPT_ROWS]
+    first = wave.counters[RETAINED_ROWS]
     for i in range(WIDTH * count):
         wave.kept[WIDTH * first + i] = wave.scratch[i]
     for i in range(first, first + count):
         wave.kept_ints[INTS * i + NEXT] = h
-    wave.counters[KEPT_ROWS] = first + count
+    wave.counters[RETAINED_ROWS] = first + count
 
 
 @inlined
@@ -286,8 +286,8 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
         reference = wave.scratch_ints[INTS * nearest + REFERENCE]
         bound_vertex(wave, v, min(upper, best + wave.scratch[w + XI]))
         if wave.flags[v]:
-            light_apex(wave, h, count, nearest, ax, ay, best)
-    improve_vertex(
+            illuminate_apex(wave, h, count, nearest, ax, ay, best)
+    relax_vertex(
         wave,
         v,
         best * surcharge,
@@ -302,7 +302,7 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
 
 
 @kernel
-def light_apex(
+def illuminate_apex(
     wave: Any, h: int, count: int, nearest: int, ax: float, ay: float, best: float
 ) -> None:
     """Note from where the windows of scratch light the apex: a saddle, or on the boundary."""
@@ -316,9 +316,9 @@ def light_apex(
         covers = (wave.scratch[w + B0] - gap) * rise <= x <= (wave.scratch[w + B1] + gap) * rise
         if covers:
             d = straight_distance(ax, ay, sx, sy, sw, wave.scratch[w + SIGMA])
-            light_vertex(wave, v, d, h, sx, sy, sw)
+            illuminate_vertex(wave, v, d, h, sx, sy, sw)
         elif i == nearest:
-            light_vertex(wave, v, best, h, sx, sy, sw)
+            illuminate_vertex(wave, v, best, h, sx, sy, sw)
 
 
 @kernel
@@ -497,19 +497,19 @@ def propagate_list(wave: Any, h: int) -> int:
     if size > wave.scratch_size:
         return SCRATCH_FULL
     # Asked per list, while the sweep runs: free, where a compiled switch would double the kernels.
-    keeps = wave.lists[LIST * h + MARKS] & KEEPS
-    if keeps and wave.counters[KEPT_ROWS] + size > wave.keep_capacity:
-        return KEPT_FULL
+    keeps = wave.lists[LIST * h + MARKS] & RETAINED
+    if keeps and wave.counters[RETAINED_ROWS] + size > wave.keep_capacity:
+        return RETAINED_FULL
     if merging(wave):
         if wave.merge_capacity > 0 and wave.counters[MERGES] + size > wave.merge_capacity:
             return MERGES_FULL
         if wave.runs[h] >= RUNS:
             return RUNAWAY
         wave.runs[h] += 1
-    count = collect(wave, h)
+    count = trim_list(wave, h)
     release_list(wave, h)
     if keeps:
-        keep_windows(wave, h, count)
+        retain_windows(wave, h, count)
     wave.counters[KEPT] += count
     wave.counters[WORK] += 4 * size + 20
     if count > 0:

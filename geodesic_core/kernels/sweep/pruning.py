@@ -15,10 +15,10 @@ from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL
 from geodesic_core.kernels.sweep.state import (
     COUNTERS,
+    ENTRY_EDGE,
     FACE,
     FAR,
     FREE_FIRST,
-    FROM,
     LANDMARKS,
     LIGHT,
     LIST,
@@ -26,13 +26,13 @@ from geodesic_core.kernels.sweep.state import (
     LIT_TO,
     MARKS,
     NODE,
+    PREDECESSOR,
     SENT_AT,
     SENT_FROM,
     SENT_TO,
     SITE,
     SIZE,
     TOUCHED,
-    VIA,
     WINNER,
     merging,
     view_of,
@@ -50,11 +50,11 @@ def touch(wave: Any, v: int) -> None:
     wave.touched[wave.counters[TOUCHED]] = v
     wave.counters[TOUCHED] += 1
     if wave.pruned:
-        wave.toward[v] = least_rest(wave, v)
+        wave.heuristic[v] = lower_bound_to_target(wave, v)
 
 
 @kernel
-def least_rest(wave: Any, v: int) -> float:
+def lower_bound_to_target(wave: Any, v: int) -> float:
     """Lower bound of the distance from v to where a path is to end.
 
     What an earlier sweep from there knows of v counts up to its ceiling. Had it pruned the path to
@@ -111,7 +111,7 @@ def steepest_to_start(wave: Any, v: int, straight: float) -> float:
 @inlined
 def may_pass(wave: Any, v: int) -> bool:
     """Whether a path of allowed length may pass v at its distance."""
-    return not wave.pruned or wave.distance[v] + wave.toward[v] <= wave.limit
+    return not wave.pruned or wave.distance[v] + wave.heuristic[v] <= wave.limit
 
 
 @kernel
@@ -121,8 +121,8 @@ def forget(topology: Any, wavefront: Any, bounds: Any) -> None:
     for i in range(wave.counters[TOUCHED]):
         v = wave.touched[i]
         wave.distance[v] = math.inf
-        wave.winner_ints[WINNER * v + VIA] = -1
-        wave.winner_ints[WINNER * v + FROM] = -1
+        wave.winner_ints[WINNER * v + ENTRY_EDGE] = -1
+        wave.winner_ints[WINNER * v + PREDECESSOR] = -1
         wave.status[v] = FAR
         wave.heap_place[v] = -1
         if merging(wave):
@@ -145,8 +145,8 @@ def forget(topology: Any, wavefront: Any, bounds: Any) -> None:
     for k in range(wave.site_count):
         node, face = wave.site_ints[SITE * k + NODE], wave.site_ints[SITE * k + FACE]
         wave.distance[node] = math.inf
-        wave.winner_ints[WINNER * node + VIA] = -1
-        wave.winner_ints[WINNER * node + FROM] = -1
+        wave.winner_ints[WINNER * node + ENTRY_EDGE] = -1
+        wave.winner_ints[WINNER * node + PREDECESSOR] = -1
         if merging(wave):
             wave.reference[node] = -1
         for h in range(3 * face, 3 * face + 3):

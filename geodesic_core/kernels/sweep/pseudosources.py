@@ -26,20 +26,20 @@ from geodesic_core.kernels.mesh.half_edges import (
 from geodesic_core.kernels.sweep.pruning import may_pass
 from geodesic_core.kernels.sweep.relaxation import (
     bound_vertex,
-    improve_vertex,
+    illuminate_vertex,
     incoming_angle,
-    light_vertex,
+    relax_vertex,
 )
 from geodesic_core.kernels.sweep.state import (
     CREATED,
-    FROM,
+    ENTRY_EDGE,
     LIGHT,
     LIT_FROM,
     LIT_TO,
+    PREDECESSOR,
     SENT_AT,
     SENT_FROM,
     SENT_TO,
-    VIA,
     WINNER,
     merging,
     source_weight,
@@ -56,7 +56,7 @@ from geodesic_core.tolerances import FLAT, SECTOR_MARGIN
 @kernel
 def is_pseudosource(wave: Any, v: int) -> bool:
     """Whether shortest paths may bend at v (or start there), within the limit."""
-    bends = wave.flags[v] != 0 or wave.winner_ints[WINNER * v + VIA] < 0
+    bends = wave.flags[v] != 0 or wave.winner_ints[WINNER * v + ENTRY_EDGE] < 0
     return bends and wave.distance[v] <= wave.max_distance and may_pass(wave, v)
 
 
@@ -69,13 +69,13 @@ def emit_pseudosource(wave: Any, v: int) -> None:
     will do. Where several fans meet, or faces are pinched, v emits all around.
     """
     total = wave.total_angle[v]
-    if wave.winner_ints[WINNER * v + VIA] < 0 or wave.flags[v] & (FANS | PINCHED) != 0:
+    if wave.winner_ints[WINNER * v + ENTRY_EDGE] < 0 or wave.flags[v] & (FANS | PINCHED) != 0:
         emit_around(wave, v)
     elif merging(wave):
         emit_shadows(wave, v)
     else:
-        via = wave.winner_ints[WINNER * v + VIA]
-        weight = source_weight(wave, wave.winner_ints[WINNER * v + FROM])
+        via = wave.winner_ints[WINNER * v + ENTRY_EDGE]
+        weight = source_weight(wave, wave.winner_ints[WINNER * v + PREDECESSOR])
         lit = incoming_angle(wave, via, wave.winner[2 * v], wave.winner[2 * v + 1], weight)
         if wave.flags[v] & BOUNDARY:
             emit_between(wave, v, lit + math.pi - SECTOR_MARGIN, total)
@@ -111,9 +111,9 @@ def emit_around(wave: Any, v: int) -> None:
     for c in range(wave.first_corner[v], wave.first_corner[v + 1]):
         h, widest = wave.corners[c], corner_end(wave, v, c) - wave.corner_angles[c]
         emit_sector(wave, v, h, 0.0, widest, widest)
-        walk_ahead(wave, v, h)
+        relax_edge_ahead(wave, v, h)
         if wave.links[ROW * h + OUT_LEFT] < 0:
-            walk_last(wave, v, h)
+            relax_last_edge(wave, v, h)
 
 
 @kernel
@@ -143,35 +143,35 @@ def emit_between(wave: Any, v: int, lo: float, hi: float) -> None:
         if start < around:
             emit_sector(wave, v, h, 0.0, around - start, end - start)
         if lo <= start <= hi or start <= around:
-            walk_ahead(wave, v, h)
+            relax_edge_ahead(wave, v, h)
         if end <= hi and wave.links[ROW * h + OUT_LEFT] < 0:
-            walk_last(wave, v, h)
+            relax_last_edge(wave, v, h)
 
 
 @kernel
-def walk_ahead(wave: Any, v: int, h: int) -> None:
+def relax_edge_ahead(wave: Any, v: int, h: int) -> None:
     """Offer the head of h, which leaves v, the straight path along it."""
     before = previous(h)  # its apex is the head of h, and it ends at v
     place = wave.geometry[ROW * before + LENGTH]
-    walk_edge(wave, v, wave.links[ROW * h + HEAD], wave.geometry[ROW * h + LENGTH], before, place)
+    relax_edge(wave, v, wave.links[ROW * h + HEAD], wave.geometry[ROW * h + LENGTH], before, place)
 
 
 @kernel
-def walk_last(wave: Any, v: int, h: int) -> None:
+def relax_last_edge(wave: Any, v: int, h: int) -> None:
     """Offer the path along the last edge of an open fan: from the tail of h to its apex."""
     reach = wave.geometry[ROW * h + LENGTH_LEFT]
-    walk_edge(wave, v, wave.links[ROW * h + APEX], reach, h, 0.0)
+    relax_edge(wave, v, wave.links[ROW * h + APEX], reach, h, 0.0)
 
 
 @kernel
-def walk_edge(wave: Any, v: int, u: int, reach: float, via: int, place: float) -> None:
+def relax_edge(wave: Any, v: int, u: int, reach: float, via: int, place: float) -> None:
     """Offer u the path along the edge from v, which lies at ``place`` on the half-edge ``via``."""
     distance = wave.distance[v] + reach
     if merging(wave):
         bound_vertex(wave, u, wave.upper[v] + reach)
         if wave.flags[u]:
-            light_vertex(wave, u, distance, via, place, 0.0, 1.0)
-    improve_vertex(wave, u, distance, via, place, 0.0, v, -1 - v)
+            illuminate_vertex(wave, u, distance, via, place, 0.0, 1.0)
+    relax_vertex(wave, u, distance, via, place, 0.0, v, -1 - v)
 
 
 @kernel

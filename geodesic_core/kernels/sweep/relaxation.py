@@ -17,13 +17,13 @@ from geodesic_core.kernels.mesh.half_edges import (
 from geodesic_core.kernels.sweep.pruning import touch
 from geodesic_core.kernels.sweep.queues import push_or_raise
 from geodesic_core.kernels.sweep.state import (
-    DONE,
+    ENTRY_EDGE,
     FAR,
-    FROM,
     LIGHT,
     LIT_FROM,
     LIT_TO,
-    VIA,
+    PREDECESSOR,
+    SETTLED,
     WINNER,
     merging,
 )
@@ -39,7 +39,7 @@ def precedence(distance: float, origin: int, known: float, known_origin: int) ->
 
 
 @kernel
-def improve_vertex(
+def relax_vertex(
     wave: Any, v: int, distance: float, via: int, sx: float, sy: float, root: int, reference: int
 ) -> None:
     """Offer v a distance and the window that gives it; queue v if it is the least so far.
@@ -53,8 +53,8 @@ def improve_vertex(
         touch(wave, v)
     wave.winner[2 * v] = sx
     wave.winner[2 * v + 1] = sy
-    wave.winner_ints[WINNER * v + VIA] = via
-    wave.winner_ints[WINNER * v + FROM] = root
+    wave.winner_ints[WINNER * v + ENTRY_EDGE] = via
+    wave.winner_ints[WINNER * v + PREDECESSOR] = root
     wave.origin[v] = wave.origin[root]
     if merging(wave):
         wave.reference[v] = reference
@@ -73,7 +73,7 @@ def bound_vertex(wave: Any, v: int, upper: float) -> None:
 
 
 @kernel
-def light_vertex(
+def illuminate_vertex(
     wave: Any, v: int, distance: float, via: int, sx: float, sy: float, sw: float
 ) -> None:
     """Note the direction in which v sees a pseudosource that reaches it at ``distance``.
@@ -97,7 +97,7 @@ def light_vertex(
             return
         lo, hi = min(lo, angle), max(hi, angle)
     wave.light[row + LIT_FROM], wave.light[row + LIT_TO] = lo, hi
-    if wave.status[v] == DONE:
+    if wave.status[v] == SETTLED:
         push_or_raise(wave, v, wave.distance[v])
 
 

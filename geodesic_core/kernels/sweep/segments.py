@@ -20,43 +20,50 @@ from geodesic_core.kernels.mesh.half_edges import (
     SIN_LEFT,
     weights_in_frame,
 )
-from geodesic_core.kernels.sweep.relaxation import bound_vertex, improve_vertex, light_vertex
-from geodesic_core.kernels.sweep.state import FACE, NODE, PIECE, PIECE_END, PIECE_ENDS, merging
+from geodesic_core.kernels.sweep.relaxation import bound_vertex, illuminate_vertex, relax_vertex
+from geodesic_core.kernels.sweep.state import (
+    FACE,
+    NODE,
+    SEGMENT,
+    SEGMENT_END,
+    SEGMENT_ENDS,
+    merging,
+)
 from geodesic_core.kernels.sweep.window_lists import put_window, send_out
 from geodesic_core.tolerances import SLANT
 
 
 @kernel
-def is_piece(ints: Any, node: int) -> bool:
+def is_segment(ints: Any, node: int) -> bool:
     """Whether a node is a piece; ``ints`` are rows of pieces, as `Wavefront.piece_ints`."""
     return len(ints) > 0 and ints[0, NODE] <= node <= ints[-1, NODE]
 
 
 @kernel
-def emit_piece(wave: Any, ints: Any, ends: Any, k: int) -> None:
+def emit_segment(wave: Any, ints: Any, ends: Any, k: int) -> None:
     """Send the strips of the piece of row k over the edges of its face, and reach the corners."""
-    node, face = ints[PIECE * k + NODE], ints[PIECE * k + FACE]
+    node, face = ints[SEGMENT * k + NODE], ints[SEGMENT * k + FACE]
     for h in range(3 * face, 3 * face + 3):
-        px, py = weights_in_frame(wave.geometry, ends, PIECE_ENDS * k, h)
-        qx, qy = weights_in_frame(wave.geometry, ends, PIECE_ENDS * k + PIECE_END, h)
+        px, py = weights_in_frame(wave.geometry, ends, SEGMENT_ENDS * k, h)
+        qx, qy = weights_in_frame(wave.geometry, ends, SEGMENT_ENDS * k + SEGMENT_END, h)
         reach = math.hypot(qx - px, qy - py)
         dx, dy = (qx - px) / reach, (qy - py) / reach
         if dx < 0.0:
             px, py, qx, qy, dx, dy = qx, qy, px, py, -dx, -dy
         if dx > SLANT and is_off_edge(ends, k, h):
-            emit_strip(wave, node, h, px, py, qx, qy, dx, dy)
+            emit_parallel_window(wave, node, h, px, py, qx, qy, dx, dy)
         reach_corner(wave, node, h, px, py, dx, dy, reach)
 
 
 @kernel
 def is_off_edge(ends: Any, k: int, h: int) -> bool:
     """Whether the piece does not run along the edge of h; by weights, as faces may have no area."""
-    up = PIECE_ENDS * k + (h + 2) % 3
-    return bool(max(ends[up], ends[up + PIECE_END]) > 0.0)
+    up = SEGMENT_ENDS * k + (h + 2) % 3
+    return bool(max(ends[up], ends[up + SEGMENT_END]) > 0.0)
 
 
 @kernel
-def emit_strip(
+def emit_parallel_window(
     wave: Any,
     node: int,
     h: int,
@@ -99,15 +106,15 @@ def reach_corner(
     if merging(wave):
         bound_vertex(wave, apex, distance)
         if wave.flags[apex]:
-            light_vertex(wave, apex, distance, h, sx, sy, 0.0)
-    improve_vertex(wave, apex, distance, h, sx, sy, node, -1 - node)
+            illuminate_vertex(wave, apex, distance, h, sx, sy, 0.0)
+    relax_vertex(wave, apex, distance, h, sx, sy, node, -1 - node)
 
 
 @kernel
-def distance_to_piece(geometry: Any, ends: Any, k: int, h: int, x: float, y: float) -> float:
+def distance_to_segment(geometry: Any, ends: Any, k: int, h: int, x: float, y: float) -> float:
     """Distance of the piece of row k from (x, y) in the frame of h, of the same face."""
-    px, py = weights_in_frame(geometry, ends, PIECE_ENDS * k, h)
-    qx, qy = weights_in_frame(geometry, ends, PIECE_ENDS * k + PIECE_END, h)
+    px, py = weights_in_frame(geometry, ends, SEGMENT_ENDS * k, h)
+    qx, qy = weights_in_frame(geometry, ends, SEGMENT_ENDS * k + SEGMENT_END, h)
     dx, dy = qx - px, qy - py
     t = ((x - px) * dx + (y - py) * dy) / (dx * dx + dy * dy)
     t = min(max(t, 0.0), 1.0)

@@ -24,7 +24,7 @@ MARKS = 3  # below, and from SITE_SHIFT on 1 + the row of the first site to reac
 LIST = 4
 
 IN_RING = 1  # the mark of a half-edge that is in the ring
-KEEPS = 2  # of one whose windows are kept as they are propagated
+RETAINED = 2  # of one whose windows are kept as they are propagated
 SITE_SHIFT = 2
 
 # Columns of Wavefront.site_ints, a row per site and face that it belongs to
@@ -35,22 +35,22 @@ SITE = 3
 
 # Columns of Wavefront.piece_ints (the first two of those above) and piece_ends, a row per piece of
 # a curve and face that it lies in
-PIECE = 2
-PIECE_END = 3  # barycentric coordinates of the one end from 0 on, of the other from here on
-PIECE_ENDS = 6
+SEGMENT = 2
+SEGMENT_END = 3  # barycentric coordinates of the one end from 0 on, of the other from here on
+SEGMENT_ENDS = 6
 
 # Columns of Wavefront.winner_ints, a row per node: the vertices, after them sites and pieces
-VIA = 0  # half-edge whose apex the vertex is and whose window reached it; -1 at a source
-FROM = 1  # node of that window's pseudosource; -1 where unreached, itself at a source
+ENTRY_EDGE = 0  # half-edge whose apex the vertex is and whose window reached it; -1 at a source
+PREDECESSOR = 1  # node of that window's pseudosource; -1 where unreached, itself at a source
 WINNER = 2
 
 # Status of a vertex
 FAR = 0
 FRONT = 1  # shares a face with a vertex that is done
-DONE = 2  # has left the heap
+SETTLED = 2  # has left the heap
 
 # Columns of Wavefront.light, a row per vertex: angles in its unfolded fan
-LIT_FROM = 0  # the range of directions in which pseudosources are seen; empty if FROM > TO
+LIT_FROM = 0  # the range of directions in which pseudosources are seen; empty if PREDECESSOR > TO
 LIT_TO = 1
 SENT_FROM = 2  # the same when windows were last emitted
 SENT_TO = 3
@@ -73,18 +73,18 @@ LANDMARKS = 16  # of a mesh, at most: a cache line of distances per vertex
 FREE_FIRST = 3  # free list
 FREE_SIZE = 4
 FRESH = 5  # rows of the pool from here on were never used
-DONE_VERTICES = 6
+SETTLED_VERTICES = 6
 CREATED = 7  # windows, in all
 KEPT = 8  # windows that survived trimming and were propagated
 PEAK = 9  # windows alive at once, at most
 WORK = 10  # done in this slice, about 10 ns each
 MERGES = 11  # recorded for backtracing
 TOUCHED = 12  # vertices
-KEPT_ROWS = 13  # of `kept`
+RETAINED_ROWS = 13  # of `kept`
 COUNTERS = 16
 
 
-class Goal(NamedTuple):
+class PruningBounds(NamedTuple):
     """What a pruned sweep is after (section 5): paths through a start, not longer than a limit.
 
     Lower bounds come from straight distances to the start, from landmarks and, where a sweep has
@@ -108,11 +108,11 @@ class Goal(NamedTuple):
     """The limit of that sweep"""
 
 
-def goal_at(
+def pruning_toward(
     position: Floats, limit: float, known: Floats | None = None, ceiling: float = math.inf
-) -> Goal:
+) -> PruningBounds:
     """Return a goal of which no landmarks are known."""
-    return Goal(
+    return PruningBounds(
         position=position,
         limit=limit,
         landmarks=np.empty((0, LANDMARKS), np.float32),
@@ -124,7 +124,7 @@ def goal_at(
     )
 
 
-NO_GOAL = goal_at(np.zeros(3), math.inf)
+NO_PRUNING = pruning_toward(np.zeros(3), math.inf)
 """Of a sweep that is not pruned."""
 
 
@@ -150,8 +150,8 @@ NO_SITES = Sites(
     np.empty((0, SITE), np.int32),
     np.empty((0, 3)),
     0,
-    np.empty((0, PIECE), np.int32),
-    np.empty((0, PIECE_ENDS)),
+    np.empty((0, SEGMENT), np.int32),
+    np.empty((0, SEGMENT_ENDS)),
 )
 
 
@@ -167,14 +167,14 @@ class Bounds(NamedTuple):
     merging: tuple[int, ...]
     """Empty in an exact sweep. Its length is part of its type: kernels are compiled twice, and the
     exact ones carry nothing of merging"""
-    goal: Goal
+    goal: PruningBounds
     strips: tuple[int, ...]
     """Empty where no source is a curve; the same for windows that are strips"""
     first_piece: int
     """The first node that is a piece of a curve, if there are any"""
 
 
-def exact_bounds(max_distance: float, goal: Goal = NO_GOAL) -> Bounds:
+def exact_bounds(max_distance: float, goal: PruningBounds = NO_PRUNING) -> Bounds:
     """Return the bounds of a sweep that never merges."""
     return Bounds(max_distance, 0.0, 0.0, (), goal, (), 0)
 
@@ -183,13 +183,13 @@ def merging_bounds(
     max_distance: float,
     relative_error: float,
     absolute_error: float,
-    goal: Goal = NO_GOAL,
+    goal: PruningBounds = NO_PRUNING,
 ) -> Bounds:
     """Return the bounds of a sweep that merges windows within both errors."""
     return Bounds(max_distance, relative_error, absolute_error, (1,), goal, (), 0)
 
 
-def with_strips(bounds: Bounds, first_piece: int) -> Bounds:
+def with_parallel_windows(bounds: Bounds, first_piece: int) -> Bounds:
     """Return the bounds of the same sweep from curves whose pieces are the nodes from there on."""
     return bounds._replace(strips=(1,), first_piece=first_piece)
 
@@ -200,11 +200,11 @@ class Wavefront(NamedTuple):
     distance: Floats
     """(N,): least distance known, infinite where unreached; final when the sweep has finished"""
     winner: Floats
-    """(N, 2): unfolded pseudosource of the winning window, in the frame of its VIA"""
+    """(N, 2): unfolded pseudosource of the winning window, in the frame of its ENTRY_EDGE"""
     winner_ints: Ints
-    """(N, 2): VIA, FROM"""
+    """(N, 2): ENTRY_EDGE, PREDECESSOR"""
     status: Flags
-    """(V,): FAR, FRONT or DONE"""
+    """(V,): FAR, FRONT or SETTLED"""
     origin: Ints
     """(N,): index of the source that the node had its distance from when it was last improved"""
     heap: Ints
@@ -228,10 +228,10 @@ class Wavefront(NamedTuple):
     """(P, 6): barycentric, of both ends"""
     touched: Ints
     """(V,): the vertices that are not as they were at first"""
-    toward: Floats
+    heuristic: Floats
     """(V,): lower bound of the rest of a path from a touched vertex on; empty unless pruned"""
     kept: Floats
-    """(K, 8): windows that crossed a half-edge that KEEPS them, as in the pool, NEXT the half-edge;
+    """(K, 8): windows that crossed a RETAINED half-edge, as in the pool, NEXT the half-edge;
     or empty"""
     passed: Ints
     """(3F,): slot of what last passed an irregular edge, by its lowest half-edge; -1 at the end;
@@ -280,7 +280,7 @@ class View(NamedTuple):
     site_ints: Any
     site_weights: Any
     touched: Any
-    toward: Any
+    heuristic: Any
     kept: Any
     kept_ints: Any
     known: Any
@@ -346,7 +346,7 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         pointer(wave.site_ints),
         pointer(wave.site_weights),
         pointer(wave.touched),
-        pointer(wave.toward),
+        pointer(wave.heuristic),
         pointer(wave.kept),
         pointer(wave.kept.view(np.int32)),
         pointer(bounds.goal.known),
@@ -374,7 +374,7 @@ def view_of(topology: Any, wave: Any, bounds: Any) -> Any:
         bounds.merging,
         bounds.strips,
         bounds.first_piece,
-        wave.toward.shape[0] > 0,
+        wave.heuristic.shape[0] > 0,
         wave.passed.shape[0] > 0,
         bounds.goal.limit,
         bounds.goal.landmark_count,
@@ -419,7 +419,7 @@ def new_wavefront(
     counters[FREE_FIRST] = -1
     lists = np.zeros((half_edges, LIST), np.int32)
     if windows is not None:
-        lists[:, MARKS] = np.repeat(np.where(windows, KEEPS, 0), 3)
+        lists[:, MARKS] = np.repeat(np.where(windows, RETAINED, 0), 3)
     return Wavefront(
         distance=np.full(nodes, np.inf),
         winner=np.empty((nodes, 2)),
@@ -439,7 +439,7 @@ def new_wavefront(
         piece_ints=sites.piece_ints,
         piece_ends=sites.piece_ends,
         touched=np.empty(vertices, np.int32),
-        toward=np.empty(vertices if pruned else 0),
+        heuristic=np.empty(vertices if pruned else 0),
         kept=aligned_rows(0 if windows is None else 4096, WIDTH, np.float64),
         passed=np.full(half_edges if irregular else 0, -1, np.int32),
         upper=np.full(merged_vertices, np.inf),
@@ -468,7 +468,7 @@ def with_larger_scratch(wave: Wavefront) -> Wavefront:
     return wave._replace(scratch=aligned_rows(2 * len(wave.scratch), WIDTH, np.float64))
 
 
-def with_more_kept(wave: Wavefront) -> Wavefront:
+def with_more_retained(wave: Wavefront) -> Wavefront:
     """Return the wavefront with room to keep twice the windows."""
     kept = aligned_rows(2 * len(wave.kept), WIDTH, np.float64)
     kept[: len(wave.kept)] = wave.kept

@@ -24,22 +24,22 @@ from geodesic_core.kernels.mesh.half_edges import (
 )
 from geodesic_core.kernels.sweep.relaxation import (
     bound_vertex,
-    improve_vertex,
-    light_vertex,
+    illuminate_vertex,
     precedence,
+    relax_vertex,
 )
-from geodesic_core.kernels.sweep.segments import distance_to_piece
+from geodesic_core.kernels.sweep.segments import distance_to_segment
 from geodesic_core.kernels.sweep.state import (
+    ENTRY_EDGE,
     FACE,
-    FROM,
     LIST,
     MARKS,
     NEXT_SITE,
     NODE,
-    PIECE,
+    PREDECESSOR,
+    SEGMENT,
     SITE,
     SITE_SHIFT,
-    VIA,
     WINNER,
     merging,
     source_weight,
@@ -84,8 +84,8 @@ def emit_site(wave: Any, k: int) -> None:
         if merging(wave):
             bound_vertex(wave, apex, distance)
             if wave.flags[apex]:
-                light_vertex(wave, apex, distance, h, x, y, 1.0)
-        improve_vertex(wave, apex, distance, h, x, y, node, -1 - node)
+                illuminate_vertex(wave, apex, distance, h, x, y, 1.0)
+        relax_vertex(wave, apex, distance, h, x, y, node, -1 - node)
 
 
 @kernel
@@ -125,7 +125,7 @@ def reach_site(wave: Any, h: int, count: int, k: int) -> None:
         b0, b1 = wave.scratch[w + B0], wave.scratch[w + B1]
         root = wave.scratch_ints[INTS * i + ROOT]
         sw, sigma = source_weight(wave, root), wave.scratch[w + SIGMA]
-        improve_site(
+        relax_site(
             wave,
             node,
             way_through(x, y, b0, b1, sx, sy, sw, sigma, gap),
@@ -160,7 +160,7 @@ def way_through(
 
 
 @kernel
-def improve_site(
+def relax_site(
     wave: Any, node: int, distance: float, via: int, sx: float, sy: float, root: int, reference: int
 ) -> None:
     """Offer a site a distance and what gives it; of equal ones that of the lower source wins."""
@@ -169,8 +169,8 @@ def improve_site(
         return
     wave.distance[node] = min(distance, known)
     wave.winner[2 * node], wave.winner[2 * node + 1] = sx, sy
-    wave.winner_ints[WINNER * node + VIA] = via
-    wave.winner_ints[WINNER * node + FROM] = root
+    wave.winner_ints[WINNER * node + ENTRY_EDGE] = via
+    wave.winner_ints[WINNER * node + PREDECESSOR] = root
     wave.origin[node] = wave.origin[root]
     if merging(wave):
         wave.reference[node] = reference
@@ -190,7 +190,7 @@ def reach_sites_inside(topology: Any, wavefront: Any, bounds: Any, first: int) -
             corner = wave.links[ROW * h + TAIL]
             distance = wave.distance[corner] + math.hypot(x, y)
             if distance < math.inf:
-                improve_site(wave, node, distance, h, 0.0, 0.0, corner, -1 - corner)
+                relax_site(wave, node, distance, h, 0.0, 0.0, corner, -1 - corner)
         h = 3 * face
         x, y = weights_in_frame(wave.geometry, wave.site_weights, 3 * k, h)
         for source in range(first):
@@ -198,11 +198,11 @@ def reach_sites_inside(topology: Any, wavefront: Any, bounds: Any, first: int) -
                 root = wave.site_ints[SITE * source + NODE]
                 sx, sy = weights_in_frame(wave.geometry, wave.site_weights, 3 * source, h)
                 distance = wave.distance[root] + math.hypot(x - sx, y - sy)
-                improve_site(wave, node, distance, h, sx, sy, root, -1 - root)
+                relax_site(wave, node, distance, h, sx, sy, root, -1 - root)
         ints, ends = pointer(wavefront.piece_ints), pointer(wavefront.piece_ends)
         for piece in range(len(wavefront.piece_ints)):
-            if ints[PIECE * piece + FACE] == face:
-                root = ints[PIECE * piece + NODE]
-                distance = distance_to_piece(wave.geometry, ends, piece, h, x, y)
+            if ints[SEGMENT * piece + FACE] == face:
+                root = ints[SEGMENT * piece + NODE]
+                distance = distance_to_segment(wave.geometry, ends, piece, h, x, y)
                 distance += wave.distance[root]
-                improve_site(wave, node, distance, h, 0.0, 0.0, root, -1 - root)
+                relax_site(wave, node, distance, h, 0.0, 0.0, root, -1 - root)

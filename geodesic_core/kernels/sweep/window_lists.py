@@ -14,11 +14,14 @@ from geodesic_core.kernels.mesh.half_edges import (
     TAIL,
     following,
 )
-from geodesic_core.kernels.sweep.irregular_edges import keep_passed, mirror, passes
+from geodesic_core.kernels.sweep.irregular_edges import (
+    mirror,
+    record_crossing,
+    trim_against_crossings,
+)
 from geodesic_core.kernels.sweep.queues import ring_push
 from geodesic_core.kernels.sweep.state import (
     CREATED,
-    DONE,
     FIRST,
     FREE_FIRST,
     FREE_SIZE,
@@ -27,6 +30,7 @@ from geodesic_core.kernels.sweep.state import (
     LAST,
     LIST,
     MARKS,
+    SETTLED,
     SIZE,
     merging,
 )
@@ -115,7 +119,7 @@ def queue_list(wave: Any, h: int) -> None:
 @kernel
 def queue_if_due(wave: Any, h: int, u: int, v: int) -> None:
     """Queue the list of h if an end of its edge (u, v) is done; else it waits for more windows."""
-    if wave.status[u] == DONE or wave.status[v] == DONE:
+    if wave.status[u] == SETTLED or wave.status[v] == SETTLED:
         queue_list(wave, h)
 
 
@@ -138,7 +142,7 @@ def send_across(wave: Any, g: int, slot: int) -> None:
     """
     links, w = wave.links, WIDTH * slot
     wave.counters[CREATED] -= 1
-    if not passes(wave, g, slot):
+    if not trim_against_crossings(wave, g, slot):
         free_window(wave, slot)
         return
     h = links[ROW * g + AROUND] >> 1
@@ -160,7 +164,7 @@ def send_across(wave: Any, g: int, slot: int) -> None:
         wave.counters[CREATED] += 1
         queue_if_due(wave, h, links[ROW * h + TAIL], links[ROW * h + HEAD])
         h = links[ROW * h + AROUND] >> 1
-    keep_passed(wave, g, slot)
+    record_crossing(wave, g, slot)
 
 
 @kernel

@@ -24,20 +24,20 @@ from geodesic_core.kernels.mesh.half_edges import (
 )
 from geodesic_core.kernels.sweep.queues import HEAP_SIZE, RING_HEAD, RING_SIZE
 from geodesic_core.kernels.sweep.state import (
-    DONE,
-    DONE_VERTICES,
+    ENTRY_EDGE,
     FAR,
     FIRST,
     FREE_FIRST,
     FREE_SIZE,
     FRESH,
-    FROM,
     IN_RING,
     KEPT,
     LAST,
     MARKS,
+    PREDECESSOR,
+    SETTLED,
+    SETTLED_VERTICES,
     SIZE,
-    VIA,
 )
 from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from tests import zoo
@@ -133,8 +133,10 @@ def check_heap(wave) -> None:
     assert all(keys[(i - 1) // 4] < keys[i] for i in range(1, len(keys)))
     assert np.isfinite(wave.distance[heap]).all()
     reached = np.isfinite(wave.distance)
-    assert (place[reached & (wave.status != DONE)] >= 0).all(), "what is reached is done or waits"
-    assert wave.counters[DONE_VERTICES] == np.count_nonzero(wave.status == DONE)
+    assert (place[reached & (wave.status != SETTLED)] >= 0).all(), (
+        "what is reached is done or waits"
+    )
+    assert wave.counters[SETTLED_VERTICES] == np.count_nonzero(wave.status == SETTLED)
 
 
 def ring_of(wave) -> np.ndarray:
@@ -147,7 +149,7 @@ def check_ring(topology, wave) -> None:
     ring, sizes = ring_of(wave), wave.lists[:, SIZE]
     np.testing.assert_array_equal(np.sort(ring), np.flatnonzero(wave.lists[:, MARKS] & IN_RING))
     assert (sizes[ring] > 0).all()
-    ends_done = (wave.status[topology.links[:, [TAIL, HEAD]]] == DONE).any(axis=1)
+    ends_done = (wave.status[topology.links[:, [TAIL, HEAD]]] == SETTLED).any(axis=1)
     assert (wave.lists[(sizes > 0) & ends_done, MARKS] & IN_RING).all(), (
         "a due list waits for nobody"
     )
@@ -194,20 +196,22 @@ def check_vertices(wave, exact: Exact) -> None:
     assert (wave.distance >= exact.vertices * (1 - ROUNDING)).all()
     reached = np.isfinite(wave.distance)
     assert (wave.winner_ints[~reached] == -1).all()
-    at_source = reached & (wave.winner_ints[:, VIA] < 0)
-    np.testing.assert_array_equal(wave.winner_ints[at_source, FROM], np.flatnonzero(at_source))
-    roots = wave.winner_ints[reached, FROM]
+    at_source = reached & (wave.winner_ints[:, ENTRY_EDGE] < 0)
+    np.testing.assert_array_equal(
+        wave.winner_ints[at_source, PREDECESSOR], np.flatnonzero(at_source)
+    )
+    roots = wave.winner_ints[reached, PREDECESSOR]
     assert (wave.distance[roots] <= wave.distance[reached]).all()
 
 
 def straight_distances(topology, wave) -> np.ndarray:
     """(V,): from the source over each vertex's winning pseudosource, straight from there."""
     found = wave.distance.copy()
-    reached = np.flatnonzero(wave.winner_ints[:, VIA] >= 0)
-    rows = topology.geometry[wave.winner_ints[reached, VIA]]
+    reached = np.flatnonzero(wave.winner_ints[:, ENTRY_EDGE] >= 0)
+    rows = topology.geometry[wave.winner_ints[reached, ENTRY_EDGE]]
     apex = rows[:, LENGTH_LEFT, None] * rows[:, [COS_LEFT, SIN_LEFT]]
     onward = np.linalg.norm(apex - wave.winner[reached], axis=1)
-    found[reached] = wave.distance[wave.winner_ints[reached, FROM]] + onward
+    found[reached] = wave.distance[wave.winner_ints[reached, PREDECESSOR]] + onward
     return found
 
 

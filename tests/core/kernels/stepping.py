@@ -81,7 +81,7 @@ def view_of_arrays(topology, wave, bounds=exact_bounds(math.inf)) -> View:  # no
         keep_capacity=len(wave.kept),
         merge_capacity=len(wave.merges),
         **scalars,
-        pruned=len(wave.toward) > 0,
+        pruned=len(wave.heuristic) > 0,
         irregular=len(wave.passed) > 0,
         start=goal.position,
         least=goal.least,

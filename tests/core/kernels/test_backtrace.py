@@ -8,7 +8,7 @@ from geodesic_core.fields.sweep import Control
 from geodesic_core.kernels.mesh.half_edges import APEX, OPPOSITE
 from geodesic_core.kernels.paths.backtracing import LOST, NO_ROOM, TRACED, Winners, trace_path
 from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources
-from geodesic_core.kernels.sweep.state import FROM, VIA
+from geodesic_core.kernels.sweep.state import ENTRY_EDGE, PREDECESSOR
 from tests import zoo
 from tests.core.kernels.stepping import finished, started, topology_of
 
@@ -55,7 +55,7 @@ def broken(name):
     h = int(np.flatnonzero(topology.links[:, OPPOSITE] < 0)[-1])
     v = int(topology.links[h, APEX])
     others = np.setdiff1d(np.arange(len(wave.distance)), topology.links[h])
-    wave.winner_ints[v, VIA], wave.winner_ints[v, FROM] = h, others[0]
+    wave.winner_ints[v, ENTRY_EDGE], wave.winner_ints[v, PREDECESSOR] = h, others[0]
     wave.winner[v] = (0.1, -5.0)
     wave.distance[v] = 0.0  # nothing else lies on the way
     return topology, wave, v

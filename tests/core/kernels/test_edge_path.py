@@ -7,9 +7,9 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.fields.sweep import Control
-from geodesic_core.kernels.paths.edge_dijkstra import HASTE, search_edges, vertices_to
+from geodesic_core.kernels.paths.edge_dijkstra import ASTAR_WEIGHT, search_edges, vertices_to
 from geodesic_core.kernels.sweep import state
-from geodesic_core.kernels.sweep.state import FROM, TOUCHED, exact_bounds
+from geodesic_core.kernels.sweep.state import PREDECESSOR, TOUCHED, exact_bounds
 from geodesic_core.search.landmarks import Landmarks
 from tests import zoo
 from tests.conftest import WITHOUT_JIT
@@ -42,7 +42,7 @@ def test_a_path_along_edges_of_the_length_told(case):
 def test_no_longer_than_the_shortest_by_the_haste(case):
     for start, end, _, length in edge_paths(mesh_of(case), all_pairs(case)):
         shortest = graph.edge_distances(case.vertices, case.faces, start)[end]
-        assert shortest * (1 - 1e-12) <= length <= HASTE * shortest * (1 + 1e-12)
+        assert shortest * (1 - 1e-12) <= length <= ASTAR_WEIGHT * shortest * (1 + 1e-12)
 
 
 @pytest.mark.jit
@@ -53,7 +53,7 @@ def test_the_same_on_larger_meshes(name):
     longer = 0
     for start, end, _, length in edge_paths(mesh, random_pairs(mesh, 40)):
         shortest = graph.edge_distances(case.vertices, case.faces, start)[end]
-        assert shortest * (1 - 1e-12) <= length <= HASTE * shortest * (1 + 1e-12)
+        assert shortest * (1 - 1e-12) <= length <= ASTAR_WEIGHT * shortest * (1 + 1e-12)
         longer += length > shortest * (1 + 1e-9)
     assert longer < 30
 
@@ -73,7 +73,7 @@ def test_landmarks_do_not_lengthen_it_beyond_the_haste(name):
         search_edges(topology, wave, exact_bounds(math.inf, goal), first, last)
         shortest = graph.edge_distances(case.vertices, case.faces, begin)[end]
         length = wave.distance[last]
-        assert shortest * (1 - 1e-12) <= length <= HASTE * shortest * (1 + 1e-12)
+        assert shortest * (1 - 1e-12) <= length <= ASTAR_WEIGHT * shortest * (1 + 1e-12)
 
 
 def test_it_stops_at_its_end_and_goes_toward_it():
@@ -96,7 +96,7 @@ def test_an_unreachable_end_is_left_at_infinity():
         mesh.topology, wave, exact_bounds(math.inf, goal_at_vertex(mesh, last)), first, last
     )
     assert math.isinf(wave.distance[last])
-    assert vertices_to(wave.winner_ints[:, FROM], last).tolist() == [last]
+    assert vertices_to(wave.winner_ints[:, PREDECESSOR], last).tolist() == [last]
 
 
 def test_both_ends_of_an_open_fan_are_neighbours():

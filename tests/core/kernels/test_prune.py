@@ -11,8 +11,8 @@ from geodesic_core.kernels.paths import edge_dijkstra
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from geodesic_core.kernels.sweep.pruning import (
     forget,
-    least_rest,
     least_to_start,
+    lower_bound_to_target,
     mark_visited,
     may_pass,
     steepest_to_start,
@@ -76,7 +76,7 @@ def test_the_rest_is_never_bounded_above_the_distance(case, count):
         connected = np.flatnonzero(np.isfinite(matrix[start]))
         straight = np.linalg.norm(mesh.topology.positions - mesh.topology.positions[start], axis=1)
         for v in connected.tolist():
-            bound = least_rest(view, v)
+            bound = lower_bound_to_target(view, v)
             assert straight[v] * (1 - 1e-12) <= bound <= matrix[start, v] * (1 + ROUNDING)
             gain = max(gain, bound / straight[v] if straight[v] else 1.0)
     if case.name != "two_components":  # where every distance is that of a straight line
@@ -141,7 +141,7 @@ def test_what_an_earlier_sweep_knows_bounds_the_rest(case, count):
             )
             wave = run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0)
             view = view_toward(mesh, landmarks, start, known=wave.distance, ceiling=limit)
-            rest = np.array([least_rest(view, v) for v in range(len(exact))])
+            rest = np.array([lower_bound_to_target(view, v) for v in range(len(exact))])
             assert (rest <= exact * (1 + ROUNDING)).all()
             pruned += int((wave.distance > exact * (1 + 1e-3)).sum())
     assert pruned > 0, "else the ceiling was never needed"
@@ -150,7 +150,7 @@ def test_what_an_earlier_sweep_knows_bounds_the_rest(case, count):
 def test_what_may_pass_lies_within_the_limit():
     mesh = gc.TriangleMesh(*zoo.grid(4, 4))
     wave = new_wavefront(mesh.topology, pruned=True)
-    wave.distance[3], wave.toward[3] = 2.0, 1.5
+    wave.distance[3], wave.heuristic[3] = 2.0, 1.5
     for limit, passes in ((3.5, True), (3.6, True), (3.4, False)):
         view = view_of_arrays(
             mesh.topology, wave, exact_bounds(math.inf, goal_at_vertex(mesh, 0, limit))

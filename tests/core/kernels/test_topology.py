@@ -129,9 +129,9 @@ def test_rows_are_the_triangle_as_seen_from_the_half_edge(case):
     tail, head, apex = (points[topology.links[:, column]] for column in (TAIL, HEAD, APEX))
     rows = topology.geometry
 
-    def check(columns, at, toward, other):
+    def check(columns, at, heuristic, other):
         length, cosine, sine, side = columns
-        u, w = toward - at, other - at
+        u, w = heuristic - at, other - at
         angle = np.arctan2(np.linalg.norm(np.cross(u, w), axis=1), (u * w).sum(axis=1))
         close = {"rtol": 1e-14, "atol": 1e-14}
         np.testing.assert_allclose(rows[:, length], np.linalg.norm(u, axis=1), rtol=1e-14)
