@@ -8,6 +8,8 @@ from hypothesis import settings
 
 import geodesic_core as gc
 
+pytest_plugins = ["tests.support.service"]
+
 WITHOUT_JIT = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
 
@@ -49,7 +51,7 @@ def compiled_kernels(worker_id: str) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: "tests/web" not in item.nodeid)  # the longest files go first
+    items.sort(key=lambda item: "tests/page" not in item.nodeid)  # the longest files go first
     if WITHOUT_JIT:
         for item in items:
             if item.get_closest_marker("jit"):

@@ -7,8 +7,7 @@ from pydantic import ValidationError
 
 from app import settings as settings_module
 from app.settings import GIB, MIB, Settings, variable_of
-
-from .conftest import distances, serving, upload_sample
+from tests.support.service import distances, serving, upload_sample
 
 TESTS = Path(__file__).parents[1]
 

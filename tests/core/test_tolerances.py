@@ -81,13 +81,13 @@ from geodesic_core.tolerances import (
     WEIGHT_ERROR,
     WIDEST_ERROR,
 )
-from tests import zoo
-from tests.core.approximation import MERGING
-from tests.core.certificates import check_path
-from tests.core.kernels.invariants import windows_of
-from tests.core.kernels.stepping import started, steps, topology_of, view_of_arrays
-from tests.core.searches import goal_at_vertex, spread
-from tests.oracles import closed_forms
+from tests.support import zoo
+from tests.support.approximation import MERGING
+from tests.support.certificates import check_path
+from tests.support.invariants import windows_of
+from tests.support.oracles import closed_forms
+from tests.support.searches import goal_at_vertex, spread
+from tests.support.stepping import started, steps, topology_of, view_of_arrays
 
 SCALES = pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 

@@ -1,0 +1,73 @@
+import gc
+import re
+import time
+
+import pytest
+from starlette.testclient import TestClient
+
+from app import __version__
+from app.main import create_app
+from app.settings import Settings
+from tests.support.service import check_problem, is_ready, wait_until
+
+
+def test_index(client: TestClient) -> None:
+    index = client.get("/").json()
+
+    assert index["version"] == __version__
+    for link in index["links"].values():
+        assert client.get(link).status_code == 200
+
+
+def test_about_tells_the_limits_in_force(client: TestClient) -> None:
+    about = client.get("/v1").json()
+
+    assert about["limits"]["GEODESIC_MAX_FACES"] == 5_000_000
+    assert isinstance(about["limits"]["GEODESIC_MAX_FACES"], int)
+    assert about["limits"]["GEODESIC_WORKER_MEMORY_BYTES"] >= 2**30
+    assert "GEODESIC_RATE_LIMIT" not in about["limits"]
+    assert about["answer_formats"]["npy"] == "application/x-npy"
+    assert "ply" in about["mesh_formats"]
+    assert about["methods"] == ["exact", "approximate"]
+
+
+def test_listens_before_it_is_ready(tmp_path) -> None:
+    start = time.monotonic()
+    with TestClient(create_app(Settings(store=tmp_path, workers=1))) as client:
+        assert client.get("/livez").json() == {"status": "ok"}
+        response = client.get("/readyz")
+        check_problem(response, 503, "engine_unavailable")
+        assert response.headers["retry-after"] == "1"
+        assert time.monotonic() - start < 1
+        wait_until(lambda: is_ready(client))
+
+
+def test_nothing_is_on_disk_before_the_start(tmp_path) -> None:
+    create_app(Settings(store=tmp_path / "store"))
+
+    assert not (tmp_path / "store").exists()
+
+
+def test_every_request_has_an_id(client: TestClient) -> None:
+    first, second = (client.get("/livez").headers["x-request-id"] for _ in range(2))
+
+    assert re.fullmatch("[0-9a-f]{32}", first)
+    assert first != second
+
+
+def test_a_sane_id_of_the_client_is_kept(client: TestClient) -> None:
+    response = client.get("/livez", headers={"X-Request-ID": "trace-7"})
+
+    assert response.headers["x-request-id"] == "trace-7"
+
+
+@pytest.mark.parametrize("given", ["", "a b", "x" * 129, "<script>"])
+def test_another_is_not(client: TestClient, given: str) -> None:
+    response = client.get("/livez", headers={"X-Request-ID": given})
+
+    assert response.headers["x-request-id"] != given
+
+
+def test_what_is_imported_is_not_looked_through_for_garbage(client: TestClient) -> None:
+    assert is_ready(client)
+    assert gc.get_freeze_count() > 10_000

@@ -1,0 +1,98 @@
+"""Large bodies: while they are read and checked, others are answered."""
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from threading import Event, Lock
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.http.routes import bodies, query_route
+from app.queries import DistancesQuery, LocateQuery
+from tests.support.service import check_problem
+
+POINTS = 9_000
+MANY = {"sources": [{"vertex": 0}], "targets": [{"vertex": i % 100} for i in range(POINTS)]}
+
+
+@pytest.mark.parametrize(
+    ("owner", "name"), [(query_route, "read"), (DistancesQuery, "ask"), (DistancesQuery, "normal")]
+)
+def test_others_are_answered_while_a_large_body_is_checked(
+    client: TestClient, plane: str, owner: Any, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On the event loop this would wait for itself."""
+    at_it, answered = Event(), Event()
+    original = getattr(owner, name)
+
+    def wait(*arguments: Any) -> Any:
+        if not at_it.is_set():  # the first, which is the large one
+            at_it.set()
+            assert answered.wait(30), "nobody else was answered"
+        return original(*arguments)
+
+    monkeypatch.setattr(owner, name, wait)
+    with ThreadPoolExecutor(1) as pool:
+        large = pool.submit(client.post, f"/v1/meshes/{plane}/distances", json=MANY)
+        assert at_it.wait(30)
+        assert client.get("/livez").status_code == 200
+        located = client.post(f"/v1/meshes/{plane}/locate", json={"points": [[0, 0, 0]]})
+        assert located.status_code == 200
+        answered.set()
+        assert len(large.result().json()["distances"]) == POINTS
+
+
+def test_large_bodies_are_checked_one_at_a_time(
+    client: TestClient, plane: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They have one interpreter; a thread each would only keep the event loop from it."""
+    lock, original = Lock(), query_route.read
+
+    def alone(*arguments: Any) -> Any:
+        assert lock.acquire(blocking=False), "two at a time"
+        try:
+            return original(*arguments)
+        finally:
+            lock.release()
+
+    monkeypatch.setattr(query_route, "read", alone)
+    link = f"/v1/meshes/{plane}/distances"
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(lambda _: client.post(link, json=MANY).status_code, range(4)))
+    assert answers == [200] * 4
+
+
+def test_small_bodies_need_no_thread(
+    client: TestClient, plane: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(bodies.to_thread, "run_sync", lambda *_, **__: pytest.fail("a thread"))
+    body = LocateQuery.model.model_validate({"points": [[0, 0, 0]]}).model_dump()
+    assert client.post(f"/v1/meshes/{plane}/locate", json=body).status_code == 200
+
+
+@pytest.mark.parametrize("count", [1, POINTS])
+def test_what_is_wrong_is_told_of_bodies_of_any_size(
+    client: TestClient, plane: str, count: int
+) -> None:
+    link = f"/v1/meshes/{plane}/distances"
+    headers = {"Content-Type": "application/json"}
+    targets = [{"vertex": i % 100} for i in range(count)]
+
+    def places(body: Any, code: str = "invalid_request") -> list[str]:
+        problem = check_problem(client.post(link, json=body), 422, code)
+        return [fault["pointer"] for fault in problem["errors"]]
+
+    sources = MANY["sources"]
+    assert places({"targets": targets}) == ["/sources"]
+    assert places({"sources": sources, "targets": targets, "body": 1}) == ["/body"]
+    wrong = {"sources": sources, "targets": [*targets, {"vertex": "0"}]}
+    assert places(wrong) == [f"/targets/{count}/vertex"]
+    assert places({**wrong, "targets": [*targets, {}]}) == [f"/targets/{count}"]
+    outside = {"sources": sources, "targets": [*targets, {"vertex": 10**6}]}
+    assert places(outside, "invalid_point") == [f"/targets/{count}/vertex"]
+    cut = json.dumps({"sources": sources, "targets": targets})[:-1]
+    problem = check_problem(client.post(link, content=cut, headers=headers), 400, "malformed_body")
+    assert f"at character {len(cut)}" in problem["detail"]
+    array = client.post(link, json=targets)
+    assert check_problem(array, 422, "invalid_request")["errors"][0]["pointer"] == ""

@@ -1,0 +1,112 @@
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+from starlette.testclient import TestClient
+
+from app.cli.openapi import openapi_text
+from app.errors import PROBLEM_JSON
+from app.schemas import service
+from tests.support.paths import ROOT
+
+COMMITTED = ROOT / "openapi" / "openapi.json"
+
+
+def test_committed_document_is_the_generated_one() -> None:
+    assert COMMITTED.read_text() == openapi_text(), (
+        "run: python -m app.cli.openapi > openapi/openapi.json"
+    )
+
+
+def test_every_operation_is_described(client) -> None:
+    paths = client.get("/openapi.json").json()["paths"]
+    operations = [operation for path in paths.values() for operation in path.values()]
+
+    assert len({operation["operationId"] for operation in operations}) == len(operations)
+    for operation in operations:
+        assert operation["summary"]
+        assert operation["description"]
+
+
+def test_errors_are_problems(client) -> None:
+    paths = client.get("/openapi.json").json()["paths"]
+    for path in paths.values():
+        for operation in path.values():
+            for status, response in operation["responses"].items():
+                if status >= "400":
+                    assert list(response["content"]) == [PROBLEM_JSON]
+
+
+def test_whatever_can_fail_says_so(client) -> None:
+    for path in client.get("/openapi.json").json()["paths"].values():
+        for operation in path.values():
+            assert "internal_error" in operation["responses"]["500"]["description"]
+
+
+def test_headers_are_described(client) -> None:
+    paths = client.get("/openapi.json").json()["paths"]
+    query = paths["/v1/meshes/{mesh_id}/distances"]["post"]
+    sent = {parameter["name"].lower() for parameter in query["parameters"]}
+    assert {"prefer", "idempotency-key", "x-timeout-ms", "range"} <= sent
+
+    answers = query["responses"]
+    assert {"ETag", "Server-Timing", "Accept-Ranges"} <= set(answers["200"]["headers"])
+    assert {"Location", "Preference-Applied"} <= set(answers["202"]["headers"])
+    assert "Content-Range" in answers["206"]["headers"]
+    assert "WWW-Authenticate" in answers["401"]["headers"]
+    assert all("Retry-After" in answers[status]["headers"] for status in ("429", "503"))
+    for path in paths.values():
+        for operation in path.values():
+            for response in operation["responses"].values():
+                assert "X-Request-ID" in response["headers"]
+            names = {each["name"] for each in operation.get("parameters", ())}
+            assert ("304" in operation["responses"]) == ("If-None-Match" in names)
+            assert ("206" in operation["responses"]) == ("Range" in names)
+
+
+def test_no_error_of_the_framework_is_left(client) -> None:
+    assert "HTTPValidationError" not in client.get("/openapi.json").text
+
+
+def test_both_codes_of_a_status_are_named(client) -> None:
+    paths = client.get("/openapi.json").json()["paths"]
+    responses = paths["/v1/meshes/{mesh_id}/distances"]["post"]["responses"]
+
+    assert responses["413"]["description"] == "upload_too_large, result_too_large"
+
+
+ENDS = [{"vertex": 0}, {"vertex": 4}]
+ASKED = [
+    ("distances", {"sources": ENDS, "targets": ENDS, "include": ["nearest_source"]}),
+    ("distances", {"sources": ENDS, "include": ["gradient"], "barriers": [1]}),
+    ("distances", {"sources": [ENDS[1], {"polyline": [{"vertex": 0}, {"vertex": 1}]}]}),
+    ("isolines", {"sources": ENDS, "levels": [0.5, 9.0]}),
+    ("paths", {"source": {"polyline": [{"vertex": 0}, {"vertex": 1}]}, "targets": ENDS}),
+    ("path", {"source": ENDS[0], "target": ENDS[1]}),
+    ("path", {"source": ENDS[0], "target": {"vertex": 1}, "explain": True}),
+    ("paths", {"source": ENDS[0], "targets": [*ENDS, {"vertex": 1}]}),
+    *(
+        ("matrix", {"sources": ENDS, "targets": ENDS, "layout": layout})
+        for layout in ("dense", "sparse", "pairs")
+    ),
+    ("nearest", {"source": ENDS[0], "candidates": ENDS, "k": 2}),
+    ("locate", {"points": [[0, 0, 1]]}),
+]
+
+
+@pytest.mark.parametrize(("operation", "body"), ASKED)
+def test_answers_are_what_is_described(
+    client: TestClient, apart: str, operation: str, body: dict[str, Any]
+) -> None:
+    link = f"/v1/meshes/{apart}/{operation}"
+    path = client.get("/openapi.json").json()["paths"][f"/v1/meshes/{{mesh_id}}/{operation}"]
+    described = path["post"]["responses"]["200"]["content"]["application/json"]["schema"]
+    names = [each["$ref"].rpartition("/")[2] for each in described["anyOf"]]
+    assert names[1] == "Estimate"
+
+    for name, query in zip(names, ("", "?estimate=true"), strict=True):
+        answer = client.post(link + query, json=body).json()
+        model: type[BaseModel] = getattr(service, name)
+        assert set(answer) <= set(model.model_fields)
+        read = model.model_validate(answer).model_dump(mode="json", exclude_unset=True)
+        assert read == answer

@@ -1,0 +1,504 @@
+"""The store as a whole: who owns it, its layout, its bound, and what crashes leave of it."""
+
+import asyncio
+import errno
+import os
+import signal
+import socket
+import sqlite3
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import anyio
+import numpy as np
+import orjson
+import pytest
+
+import geodesic_core as gc
+from app.engine.work import RunQuery, Task
+from app.errors import ProblemError
+from app.jobs import require_whole
+from app.settings import MIB
+from app.store import mesh_catalog, meshes
+from app.store.layout import LAYOUT, StoreError, owned
+from app.store.mesh_catalog import Kept, MeshCatalog
+from app.store.meshes import MeshStore
+from tests.service.test_process import Server
+from tests.support.paths import ROOT
+from tests.support.service import (
+    check_problem,
+    distances,
+    serving,
+    store_mesh,
+    upload_sample,
+    wait_until,
+)
+
+
+def plane(faces: int = 50) -> gc.TriangleMesh:
+    return gc.TriangleMesh(*gc.samples.plane(faces))
+
+
+def files_in(root: Path) -> set[str]:
+    return {path.relative_to(root).as_posix() for path in root.rglob("*")}
+
+
+# Whose it is
+
+
+def test_a_store_belongs_to_one_at_a_time(tmp_path: Path) -> None:
+    root = tmp_path / "new" / "store"
+    busy = pytest.raises(StoreError, match=r"store is in use by another process.*GEODESIC_STORE")
+    with owned(root), busy:
+        owned(root).__enter__()
+    with owned(root):
+        pass
+
+
+def test_the_lock_goes_with_its_process_however_that_ends(tmp_path: Path) -> None:
+    script = "import sys; from pathlib import Path; from app.store.layout import owned\n"
+    script += "with owned(Path(sys.argv[1])): print('owned', flush=True); sys.stdin.read()"
+    owner = subprocess.Popen(  # noqa: S603 - this Python, and the text above
+        [sys.executable, "-c", script, str(tmp_path)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        cwd=ROOT,
+    )
+    with owner:
+        assert owner.stdout is not None
+        assert owner.stdout.readline() == b"owned\n"
+        with pytest.raises(StoreError, match="in use"):
+            owned(tmp_path).__enter__()
+        owner.kill()
+        owner.wait()
+        with owned(tmp_path):
+            pass
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    with pytest.raises(StoreError, match="cannot be written: Permission denied"):
+        owned(tmp_path / "store").__enter__()
+
+
+def test_a_file_is_no_store(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(StoreError, match="cannot be written: "):
+        owned(tmp_path / "file").__enter__()
+
+
+# Its layout
+
+
+def test_a_new_store_tells_its_layout(tmp_path: Path) -> None:
+    with owned(tmp_path):
+        pass
+
+    assert (tmp_path / "VERSION").read_text() == f"{LAYOUT}\n"
+    assert files_in(tmp_path) == {"VERSION", "lock"}
+
+
+@pytest.mark.parametrize("written", ["3", "6", "5.1", "", "five", "-5"])
+def test_another_layout_is_refused(tmp_path: Path, written: str) -> None:
+    (tmp_path / "VERSION").write_text(written)
+
+    with pytest.raises(StoreError, match=rf"has layout '?{written}'?, and this release reads 5:"):
+        owned(tmp_path).__enter__()
+    assert (tmp_path / "VERSION").read_text() == written
+
+
+def make_older(root: Path, version: int) -> str:
+    """Make a store look like one of before layout 5, with one mesh that is damaged."""
+    mesh_id = store_mesh(root, plane())
+    damaged = store_mesh(root, plane(18))
+    manifest = root / "meshes" / mesh_id / "manifest.json"
+    manifest.write_bytes(orjson.dumps({"version": version, **orjson.loads(manifest.read_bytes())}))
+    (root / "meshes" / damaged / "manifest.json").write_bytes(b"{")
+    (root / "VERSION").unlink()
+    return mesh_id
+
+
+def test_a_store_of_layout_4_is_taken_over(tmp_path: Path) -> None:
+    mesh_id = make_older(tmp_path, 4)
+
+    with owned(tmp_path):
+        pass
+
+    assert (tmp_path / "VERSION").read_text() == f"{LAYOUT}\n"
+    assert MeshStore(tmp_path).open(mesh_id).mesh.report.faces == 50
+
+
+def test_an_older_store_is_refused(tmp_path: Path) -> None:
+    make_older(tmp_path, 3)
+    before = files_in(tmp_path)
+
+    with pytest.raises(StoreError, match=r"has layout 3, .*upload its meshes again"):
+        owned(tmp_path).__enter__()
+    assert files_in(tmp_path) == before
+
+
+def test_a_damaged_job_book_is_refused(tmp_path: Path) -> None:
+    book = tmp_path / "jobs.sqlite3"
+    require_whole(book)
+    with sqlite3.connect(book) as database:
+        database.execute("CREATE TABLE jobs (record TEXT)")
+        database.executemany("INSERT INTO jobs VALUES (?)", [("x" * 1000,)] * 100)
+    database.close()
+    require_whole(book)
+    content = book.read_bytes()
+    for damaged in (b"no database" * 100, content[:20000] + bytes(9000) + content[29000:]):
+        book.write_bytes(damaged)
+        with pytest.raises(StoreError, match=r"jobs.sqlite3 is damaged .*: move it away"):
+            require_whole(book)
+
+
+# Its bound
+
+Store = tuple[MeshStore, MeshCatalog]
+
+
+@contextmanager
+def opened(root: Path, capacity: int = 2**60, *, evicts: bool = False) -> Iterator[Store]:
+    store = MeshStore(root)
+    books = MeshCatalog(root, store, capacity, evicts=evicts)
+    with owned(root):
+        books.prepare()
+        yield store, books
+
+
+def add(opened: Store, mesh: gc.TriangleMesh) -> tuple[str, Kept]:
+    store, books = opened
+
+    async def run() -> tuple[str, Kept]:
+        async with books.scratch_folder() as folder:
+            written = store.write_aside(mesh, folder / "mesh", None)
+            return written.mesh_id, await books.keep(written)
+
+    return anyio.run(run)
+
+
+def sizes(root: Path, *faces: int) -> list[int]:
+    """Return the bytes that planes of so many faces take."""
+    with opened(root / "sizes") as store:
+        return [add(store, plane(count)) and list(store[0].sizes().values())[-1] for count in faces]
+
+
+def test_what_finds_no_room_is_refused_and_leaves_nothing(tmp_path: Path) -> None:
+    first, second = sizes(tmp_path, 50, 200)
+    with opened(tmp_path / "store", first + second - 1) as store:
+        mesh_id, _ = add(store, plane(50))
+        before = files_in(tmp_path / "store")
+
+        with pytest.raises(ProblemError) as caught:
+            add(store, plane(200))
+        problem = caught.value.problem
+        assert problem.code == "storage_full"
+        assert (problem.limit, problem.actual) == (first + second - 1, first + second)
+        assert problem.setting == "GEODESIC_STORE_BYTES"
+        assert files_in(tmp_path / "store") == before
+        assert add(store, plane(50)) == (mesh_id, Kept(is_new=False)), "it takes no room"
+        anyio.run(store[1].delete, mesh_id)
+        assert add(store, plane(200))[1].is_new
+
+
+def test_the_bound_holds_for_what_a_former_service_left(tmp_path: Path) -> None:
+    (size,) = sizes(tmp_path, 50)
+    store_mesh(tmp_path / "store", plane(50))
+
+    with opened(tmp_path / "store", size) as store:
+        assert store[1].total == size
+        with pytest.raises(ProblemError):
+            add(store, plane(18))
+
+
+@pytest.mark.parametrize("restarts", [False, True])
+def test_the_least_recently_used_go_first(tmp_path: Path, restarts: bool) -> None:
+    kinds = (50, 72, 98)
+    room = sum(sizes(tmp_path, *kinds))
+    root = tmp_path / "store"
+    with opened(root, room, evicts=True) as store:
+        ids = [add(store, plane(faces))[0] for faces in kinds]
+        for number, mesh_id in enumerate(ids):
+            os.utime(root / "meshes" / mesh_id, (number, number))
+        store[1].use(ids[0])
+        if not restarts:
+            assert add(store, plane(128))[1].evicted == ids[1:]
+    if restarts:
+        with opened(root, room, evicts=True) as store:
+            assert add(store, plane(128))[1].evicted == ids[1:]
+            assert sorted(store[0].sizes()) == sorted([ids[0], add(store, plane(128))[0]])
+    assert files_in(root / "tmp") == set()
+
+
+def test_what_is_held_does_not_go(tmp_path: Path) -> None:
+    first, second, third = sizes(tmp_path, 50, 72, 98)
+    with opened(tmp_path / "store", first + second, evicts=True) as store:
+        held, _ = add(store, plane(50))
+        other, _ = add(store, plane(72))
+        with store[1].held(held):
+            with pytest.raises(ProblemError):
+                add(store, plane(98))
+            assert set(store[0].sizes()) == {held, other}, "nothing goes in vain"
+            with store[1].held(held):
+                pass
+            assert add(store, plane(32))[1].evicted == [other]
+        assert third < first + second
+        assert held in add(store, plane(98))[1].evicted
+
+
+def test_nothing_goes_for_what_would_never_fit(tmp_path: Path) -> None:
+    small, large = sizes(tmp_path, 50, 200)
+    with opened(tmp_path / "store", large - 1, evicts=True) as store:
+        mesh_id, _ = add(store, plane(50))
+        with pytest.raises(ProblemError):
+            add(store, plane(200))
+        assert store[0].sizes() == {mesh_id: small}
+
+
+def test_two_that_write_one_mesh(tmp_path: Path) -> None:
+    with opened(tmp_path) as store:
+        meshes, books = store
+
+        async def run() -> list[bool]:
+            async with books.scratch_folder() as folder:
+                both = [meshes.write_aside(plane(), folder / name, None) for name in "ab"]
+                kept = await asyncio.gather(*map(books.keep, both))
+                return [each.is_new for each in kept]
+
+        assert sorted(anyio.run(run)) == [False, True]
+        assert len(meshes.sizes()) == 1
+        assert books.total == sum(meshes.sizes().values())
+        assert files_in(tmp_path / "tmp") == set()
+
+
+def test_uploads_at_the_same_time_do_not_exceed_the_bound(tmp_path: Path) -> None:
+    kinds = (50, 72, 98, 128)
+    room = sum(sizes(tmp_path, *kinds)[:2])
+    with opened(tmp_path / "store", room) as store:
+        meshes, books = store
+
+        async def run() -> list[Any]:
+            async with books.scratch_folder() as folder:
+                written = [
+                    meshes.write_aside(plane(faces), folder / str(faces), None) for faces in kinds
+                ]
+                return await asyncio.gather(*map(books.keep, written), return_exceptions=True)
+
+        kept = anyio.run(run)
+        refused = [each for each in kept if isinstance(each, ProblemError)]
+        assert len(refused) >= 2
+        assert len(meshes.sizes()) == len(kinds) - len(refused) >= 1
+        assert books.total == sum(meshes.sizes().values()) <= room
+        assert files_in(tmp_path / "store" / "tmp") == set()
+
+
+def test_over_http(tmp_path: Path) -> None:
+    room = sum(sizes(tmp_path, 50, 72))
+    store = tmp_path / "store"
+    with serving(store, store_bytes=room) as client:
+        first = upload_sample(client, "plane", 50)
+        upload_sample(client, "plane", 72)
+        sample = {"sample": "plane", "faces": 32}
+        problem = check_problem(client.post("/v1/meshes", params=sample), 507, "storage_full")
+        assert (problem["limit"], problem["setting"]) == (room, "GEODESIC_STORE_BYTES")
+        assert problem["actual"] > room
+        assert files_in(store / "tmp") == set()
+        assert distances(client, first).status_code == 200, "as is used after the other"
+
+    with serving(store, store_bytes=room, store_evict="lru") as client:
+        job = client.post(
+            f"/v1/meshes/{first}/distances",
+            json={"sources": [{"vertex": 1}]},
+            headers={"Prefer": "respond-async"},
+        ).headers["location"]
+        wait_until(lambda: client.get(job).json()["status"] == "successful")
+        third = upload_sample(client, "plane", 32)
+        assert {mesh["id"] for mesh in client.get("/v1/meshes").json()["meshes"]} == {first, third}
+        client.get(f"/v1/meshes/{third}/arrays/faces")
+        for faces in (98, 18):
+            upload_sample(client, "plane", faces)
+
+        check_problem(client.get(f"/v1/meshes/{first}"), 404, "mesh_not_found")
+        assert client.get(f"{job}/results").status_code == 200, "a job keeps its answer"
+        assert len(list((store / "results" / first).glob("*.body"))) == 1
+        total = client.app.state.service.mesh_books.total
+        assert total == sum(MeshStore(store).sizes().values()) <= room
+
+
+def test_a_mesh_stays_while_a_query_waits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    room = sum(sizes(tmp_path, 50, 72))
+    with (
+        serving(tmp_path / "store", store_bytes=room, store_evict="lru") as client,
+        ThreadPoolExecutor() as threads,
+    ):
+        asked, other = (upload_sample(client, "plane", faces) for faces in (50, 72))
+        service = client.app.state.service
+        run, goes_on = service.engine.run, threading.Event()
+
+        async def run_later(order: Task, told: Any) -> Any:
+            while isinstance(order.work, RunQuery) and not goes_on.is_set():
+                await asyncio.sleep(0.01)
+            return await run(order, told)
+
+        monkeypatch.setattr(service.engine, "run", run_later)
+        waiting = threads.submit(distances, client, asked)
+        wait_until(lambda: asked in service.mesh_books._held)
+        client.get(f"/v1/meshes/{other}")
+        third = upload_sample(client, "plane", 32)
+        stored = {mesh["id"] for mesh in client.get("/v1/meshes").json()["meshes"]}
+        goes_on.set()
+
+        assert stored == {asked, third}
+        assert waiting.result().status_code == 200
+        assert not service.mesh_books._held
+
+
+# Crashes
+
+
+class Crash(BaseException):
+    """The end of a process, as far as its files are concerned."""
+
+
+STEPS = [
+    (meshes, "_write_array"),
+    (mesh_catalog, "sync_all"),
+    (mesh_catalog, "sync"),
+    (Path, "write_bytes"),
+    (Path, "rename"),
+    (Path, "mkdir"),
+]
+
+
+def count_down(monkeypatch: pytest.MonkeyPatch, steps: int, error: BaseException) -> None:
+    """Fail at a step of all that change the disk."""
+    left = steps
+
+    def failing(real: Callable[..., Any]) -> Callable[..., Any]:
+        def step(*args: Any, **kwargs: Any) -> Any:
+            nonlocal left
+            left -= 1
+            if left == 0:
+                raise error
+            return real(*args, **kwargs)
+
+        return step
+
+    for owner, name in STEPS:
+        monkeypatch.setattr(owner, name, failing(getattr(owner, name)))
+
+
+def test_a_crash_at_any_step_leaves_a_mesh_whole_or_not_there(tmp_path: Path) -> None:
+    seen = set()
+    for step in range(1, 100):
+        root = tmp_path / str(step)
+        kept = store_mesh(root, plane(18))
+        with pytest.MonkeyPatch.context() as patch, opened(root) as store:
+            before = files_in(root)
+            folder = root / "tmp" / "crashed"
+            folder.mkdir()
+            count_down(patch, step, Crash())
+            try:
+                written = store[0].write_aside(plane(), folder / "mesh", None)
+                anyio.run(store[1].keep, written)
+            except Crash:
+                has_crashed = True
+            else:
+                has_crashed = False
+        with opened(root) as store:
+            there = set(store[0].sizes()) - {kept}
+            assert store[1].total == sum(store[0].sizes().values())
+            assert files_in(root / "tmp") == set()
+        for mesh_id in (kept, *there):
+            assert list(store[0].damage(mesh_id)) == []
+        assert there or files_in(root) == before
+        seen.add((has_crashed, bool(there)))
+        if not has_crashed:
+            break
+
+    assert step > 15
+    assert seen == {(True, False), (True, True), (False, True)}
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EDQUOT])
+def test_a_full_disk_at_any_step_leaves_nothing(tmp_path: Path, number: int) -> None:
+    for step in range(1, 100):
+        root = tmp_path / str(step)
+        with pytest.MonkeyPatch.context() as patch, opened(root) as store:
+            before = files_in(root)
+            count_down(patch, step, OSError(number, "full"))
+            try:
+                add(store, plane())
+            except OSError:
+                assert store[1].total == 0
+                assert files_in(root) == before
+                continue
+            break
+    assert step > 15
+
+
+def test_a_device_that_is_full() -> None:
+    """A real one, which np.save would answer with an error that does not say so."""
+    with pytest.raises(OSError, match="No space left") as caught:
+        meshes._write_array(Path("/dev/full"), np.zeros(10_000))
+    assert caught.value.errno == errno.ENOSPC
+
+
+def test_killed_while_a_body_arrives_and_started_again(tmp_path: Path) -> None:
+    first = Server(tmp_path)
+    mesh_id = upload_sample(first.client, "plane", 50)
+    with socket.create_connection(first.address) as connection:
+        head = b"POST /v1/meshes?format=obj HTTP/1.1\r\nHost: x\r\nContent-Length: 9000000\r\n\r\n"
+        connection.sendall(head + b"v 0 0 0\n" * (MIB // 4))
+        wait_until(lambda: any((tmp_path / "tmp").glob("*/upload")))
+        refused = subprocess.run(
+            [sys.executable, "-c", "from app.cli import main; main()", "serve", "--port", "0"],
+            env=os.environ | {"GEODESIC_STORE": str(tmp_path)},
+            cwd=ROOT,
+            capture_output=True,
+            timeout=60,
+            check=False,
+        )
+        assert refused.returncode == 1
+        assert refused.stderr.startswith(b"error: the store ")
+        assert b"in use by another process" in refused.stderr
+        assert refused.stderr.count(b"\n") == 1
+        first.process.send_signal(signal.SIGKILL)
+        first.close()
+    assert files_in(tmp_path / "tmp")
+
+    second = Server(tmp_path)
+    try:
+        assert files_in(tmp_path / "tmp") == set()
+        assert [mesh["id"] for mesh in second.client.get("/v1/meshes").json()["meshes"]] == [
+            mesh_id
+        ]
+        assert list(MeshStore(tmp_path).damage(mesh_id)) == []
+
+        # And a worker that is killed while it writes a mesh.
+        def kill_while_writing() -> bool:
+            if any((tmp_path / "tmp").glob("*/mesh/*")):
+                for pid in second.workers():
+                    os.kill(pid, signal.SIGKILL)
+                return True
+            return False
+
+        with socket.create_connection(second.address) as connection:
+            connection.sendall(
+                b"POST /v1/meshes?sample=sphere&faces=400000 HTTP/1.1\r\nHost: x\r\n"
+                b"Content-Length: 0\r\n\r\n"
+            )
+            wait_until(kill_while_writing)
+            answer = connection.recv(20)
+        assert answer.startswith(b"HTTP/1.1 500")
+        wait_until(lambda: files_in(tmp_path / "tmp") == set())
+        assert set(MeshStore(tmp_path).sizes()) == {mesh_id}
+    finally:
+        second.close()

@@ -1,0 +1,308 @@
+import os
+from pathlib import Path
+
+import anyio
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from app.errors import ProblemError
+from app.store.meshes import MeshStore
+from app.store.results import ResultStore, write_result
+from tests.support.service import store_mesh
+
+SQUARE = (
+    np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float),
+    np.array([[0, 1, 2], [0, 2, 3]]),
+)
+
+
+@pytest.fixture
+def meshes(tmp_path: Path) -> MeshStore:
+    return MeshStore(tmp_path)
+
+
+def damage(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
+
+
+def code_of(call) -> str:
+    with pytest.raises(ProblemError) as caught:
+        call()
+    return caught.value.problem.code
+
+
+def test_a_mesh_comes_back_as_it_was(meshes: MeshStore, tmp_path: Path) -> None:
+    mesh = gc.TriangleMesh(*SQUARE)
+
+    opened = meshes.open(store_mesh(tmp_path, mesh))
+
+    assert opened.warnings == list(mesh.warnings)
+    assert opened.mesh.arrays().keys() == mesh.arrays().keys()
+    for name, array in mesh.arrays().items():
+        np.testing.assert_array_equal(opened.mesh.arrays()[name], array)
+        assert opened.mesh.arrays()[name].dtype == array.dtype
+        assert not opened.mesh.arrays()[name].flags.writeable
+
+
+def test_the_id_is_of_the_content(tmp_path: Path) -> None:
+    vertices, faces = SQUARE
+    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(vertices, faces))
+
+    assert store_mesh(tmp_path, gc.TriangleMesh(vertices.tolist(), faces.tolist())) == mesh_id
+    assert store_mesh(tmp_path, gc.TriangleMesh(vertices * 2, faces)) != mesh_id
+    assert store_mesh(tmp_path, gc.TriangleMesh(vertices, faces[::-1])) != mesh_id
+
+
+def test_a_vertex_map_is_part_of_the_content(tmp_path: Path) -> None:
+    vertices, faces = SQUARE
+    doubled = np.concatenate([vertices, vertices])
+
+    merged = gc.TriangleMesh(doubled, faces, merge="exact")
+
+    assert store_mesh(tmp_path, merged) != store_mesh(tmp_path, gc.TriangleMesh(vertices, faces))
+
+
+def test_a_mesh_that_is_stored_is_not_written_again(meshes: MeshStore, tmp_path: Path) -> None:
+    mesh = gc.TriangleMesh(*SQUARE)
+    mesh_id = store_mesh(tmp_path, mesh, "alice")
+
+    written = meshes.write_aside(mesh, tmp_path / "aside", "bob")
+
+    assert (written.mesh_id, written.folder) == (mesh_id, None)
+    assert written.manifest["owner"] == "alice"
+    assert not (tmp_path / "aside").exists()
+
+
+@pytest.mark.parametrize("file", ["vertices.npy", "faces.npy", "component.npy"])
+def test_a_changed_array_is_noticed(meshes: MeshStore, tmp_path: Path, file: str) -> None:
+    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(*SQUARE))
+    damage(tmp_path / "meshes" / mesh_id / file)
+
+    assert code_of(lambda: meshes.open(mesh_id)) == "mesh_damaged"
+    (found,) = meshes.damage(mesh_id)
+    assert f"its array {file.removesuffix('.npy')} is not what was written" in str(found)
+
+
+@pytest.mark.parametrize("content", [b"", b"[]", b"{}", b'{"id": "of another"}'])
+def test_a_broken_manifest_is_noticed(meshes: MeshStore, tmp_path: Path, content: bytes) -> None:
+    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(*SQUARE))
+    (tmp_path / "meshes" / mesh_id / "manifest.json").write_bytes(content)
+
+    assert code_of(lambda: meshes.manifest(mesh_id)) == "mesh_damaged"
+    (found,) = meshes.damage(mesh_id)
+    assert "its manifest" in str(found)
+
+
+def test_a_missing_array_is_noticed(meshes: MeshStore, tmp_path: Path) -> None:
+    mesh_id = store_mesh(tmp_path, gc.TriangleMesh(*SQUARE))
+    (tmp_path / "meshes" / mesh_id / "faces.npy").unlink()
+
+    assert code_of(lambda: meshes.open(mesh_id)) == "mesh_damaged"
+
+
+def test_a_mesh_under_the_name_of_another_is_noticed(meshes: MeshStore, tmp_path: Path) -> None:
+    """Checksums are right, but what results are named by is not."""
+    vertices, faces = SQUARE
+    ids = [store_mesh(tmp_path, gc.TriangleMesh(vertices * scale, faces)) for scale in (1, 2)]
+    assert [list(meshes.damage(mesh_id)) for mesh_id in ids] == [[], []]
+    manifests = [tmp_path / "meshes" / mesh_id / "manifest.json" for mesh_id in ids]
+    manifests[0].write_bytes(manifests[1].read_bytes().replace(ids[1].encode(), ids[0].encode()))
+    for array in manifests[0].parent.glob("*.npy"):
+        array.write_bytes((manifests[1].parent / array.name).read_bytes())
+
+    (found,) = meshes.damage(ids[0])
+    assert "its name is not that of its content" in str(found)
+
+
+@pytest.mark.parametrize("mesh_id", ["", "..", "0" * 32, "../meshes", "G" * 32])
+def test_unknown_ids(meshes: MeshStore, mesh_id: str) -> None:
+    assert code_of(lambda: meshes.manifest(mesh_id)) == "mesh_not_found"
+    assert code_of(lambda: meshes.array_file(mesh_id, "faces")) == "mesh_not_found"
+
+
+# Results
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> ResultStore:
+    store = ResultStore(tmp_path / "results", 100, memory=0)
+    store.prepare()
+    return store
+
+
+def write(root: Path, name: str, size: int = 40, *, is_cheap: bool = False):
+    parts = [b"x" * size]
+    return write_result(root / "results", name, parts, {"A": "b"}, "code", is_cheap=is_cheap)
+
+
+def put(results: ResultStore, root: Path, name: str, size: int = 40, **how: bool) -> None:
+    results.give_back(results.take_new(name, write(root, name, size, **how)))
+
+
+def find(results: ResultStore, name: str):
+    found = anyio.run(results.find, name)
+    if found is not None:
+        results.give_back(found)
+    return found
+
+
+def test_a_result_comes_back(results: ResultStore, tmp_path: Path) -> None:
+    put(results, tmp_path, "m/a")
+
+    found = find(results, "m/a")
+
+    assert found is not None
+    assert found.path.read_bytes() == b"x" * 40
+    assert found.written.seal.headers == {"A": "b"}
+    assert found.key == "a"
+
+
+def test_the_least_recently_used_go_first(results: ResultStore, tmp_path: Path) -> None:
+    put(results, tmp_path, "m/a")
+    put(results, tmp_path, "m/b")
+    find(results, "m/a")
+    put(results, tmp_path, "m/c")
+
+    assert [find(results, f"m/{key}") is not None for key in "abc"] == [True, False, True]
+    assert len(list((tmp_path / "results" / "m").iterdir())) == 4
+
+
+def test_what_is_being_sent_stays(results: ResultStore, tmp_path: Path) -> None:
+    sent = results.take_new("m/a", write(tmp_path, "m/a", 90))
+    put(results, tmp_path, "m/b")
+
+    assert sent.path.exists()
+    results.give_back(sent)
+    put(results, tmp_path, "m/c")
+    assert not sent.path.exists()
+
+
+def test_a_changed_result_is_not_served(results: ResultStore, tmp_path: Path) -> None:
+    put(results, tmp_path, "m/a")
+    damage(tmp_path / "results" / "m" / "a.body")
+
+    assert find(results, "m/a") is None
+    assert find(results, "m/a") is None
+
+
+def test_a_broken_seal_is_not_served(results: ResultStore, tmp_path: Path) -> None:
+    put(results, tmp_path, "m/a")
+    (tmp_path / "results" / "m" / "a.json").write_bytes(b"{")
+
+    assert find(results, "m/a") is None
+
+
+def test_results_survive_a_restart(results: ResultStore, tmp_path: Path) -> None:
+    for key, second in (("old", 1), ("new", 2)):
+        put(results, tmp_path, f"m/{key}")
+        os.utime(tmp_path / "results" / "m" / f"{key}.body", (second, second))
+    (tmp_path / "results" / "m" / "unsealed.body").write_bytes(b"x")
+    (tmp_path / "results" / "m" / "tmpabc").write_bytes(b"x")
+
+    restarted = ResultStore(tmp_path / "results", 50, memory=0)
+    restarted.prepare()
+
+    assert find(restarted, "m/old") is None
+    assert find(restarted, "m/new") is not None
+    names = sorted(path.name for path in (tmp_path / "results" / "m").iterdir())
+    assert names == ["new.body", "new.json"]
+
+
+def test_results_of_a_mesh_are_forgotten(results: ResultStore, tmp_path: Path) -> None:
+    put(results, tmp_path, "m/a")
+    put(results, tmp_path, "n/a")
+
+    results.forget_mesh("m")
+
+    assert find(results, "m/a") is None
+    assert find(results, "n/a") is not None
+
+
+def test_small_results_are_in_memory_as_far_as_they_fit(tmp_path: Path) -> None:
+    results = ResultStore(tmp_path / "results", 10**6, memory=100)
+    results.prepare()
+    for key in "abc":
+        put(results, tmp_path, f"m/{key}")
+    put(results, tmp_path, "m/large", 2**17)
+
+    found = {key: find(results, f"m/{key}").written.body for key in ("c", "b", "large", "a")}
+    assert found == {"c": b"x" * 40, "b": b"x" * 40, "large": None, "a": b"x" * 40}
+    damage(tmp_path / "results" / "m" / "a.body")
+    assert find(results, "m/a").written.body == b"x" * 40, "read a moment ago"
+    results.forget_mesh("m")
+    assert find(results, "m/a") is None
+
+
+def test_what_is_held_stays_until_it_is_released(results: ResultStore, tmp_path: Path) -> None:
+    put(results, tmp_path, "m/a")
+    results.hold("m/a")
+    assert results.has_room_to_hold("m/a")
+    other = results.take_new("m/b", write(tmp_path, "m/b", 61))
+    assert not results.has_room_to_hold("m/b")
+    results.give_back(other)
+    results.forget_mesh("m")
+
+    assert find(results, "m/a") is not None
+    assert find(results, "m/b") is None
+    results.release("m/a")
+    put(results, tmp_path, "m/c", 61)
+    assert find(results, "m/a") is None
+
+
+@pytest.mark.usefixtures("results")
+def test_a_failed_result_leaves_nothing(tmp_path: Path) -> None:
+    parts: list = [b"x" * 2**17, None]
+    with pytest.raises(TypeError):
+        write_result(tmp_path / "results", "m/a", parts, {}, "code", is_cheap=False)
+    assert not list((tmp_path / "results").glob("m/*"))
+
+
+@pytest.fixture
+def roomy(tmp_path: Path) -> ResultStore:
+    store = ResultStore(tmp_path / "results", 10**6, memory=100)
+    store.prepare()
+    return store
+
+
+def test_what_is_small_and_found_at_once_has_no_files(roomy: ResultStore, tmp_path: Path) -> None:
+    put(roomy, tmp_path, "m/small", is_cheap=True)
+    put(roomy, tmp_path, "m/large", 2**17, is_cheap=True)
+
+    assert find(roomy, "m/small").written.body == b"x" * 40
+    assert roomy.nbytes == 2**17
+    names = sorted(path.name for path in (tmp_path / "results").glob("m/*"))
+    assert names == ["large.body", "large.json"]
+    for key in "ab":
+        put(roomy, tmp_path, f"m/{key}", is_cheap=True)
+    assert find(roomy, "m/small") is None, "memory is bounded, too"
+    roomy.forget_mesh("m")
+    assert find(roomy, "m/a") is None
+
+
+@pytest.mark.parametrize("is_kept", [True, False])
+def test_files_come_when_they_are_needed(roomy: ResultStore, tmp_path: Path, is_kept: bool) -> None:
+    written = write(tmp_path, "m/a", is_cheap=True)
+    taken = roomy.take_new("m/a", written, is_kept=is_kept)
+
+    filed = anyio.run(roomy.with_files, taken)
+    roomy.hold("m/a")
+    roomy.give_back(filed)
+
+    assert filed.path.read_bytes() == b"x" * 40
+    assert filed.written.seal == taken.written.seal
+    assert anyio.run(roomy.with_files, filed) is filed
+    restarted = ResultStore(tmp_path / "results", 10**6, memory=0)
+    restarted.prepare()
+    assert find(restarted, "m/a").written.body == b"x" * 40
+
+
+def test_what_gets_no_files_is_given_back(roomy: ResultStore, tmp_path: Path) -> None:
+    taken = roomy.take_new("m/a", write(tmp_path, "m/a", is_cheap=True))
+    (tmp_path / "results" / "m").write_bytes(b"in the way")
+
+    with pytest.raises(FileExistsError):
+        anyio.run(roomy.with_files, taken)
+    assert not roomy._taken

@@ -1,0 +1,1016 @@
+"""The command line, as its users meet it: what it prints, what it writes, how it fails."""
+
+import csv
+import json
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+import trimesh
+import uvicorn
+from fastapi import FastAPI
+from scipy.sparse import load_npz
+
+import geodesic_core as gc
+from app import __version__
+from app.cli import main
+from app.settings import Settings, variable_of
+from tests.support.paths import ROOT
+
+
+class Ran:
+    """Exit code and output of a command."""
+
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code, self.out, self.err = code, out, err
+
+    def figure(self, name: str) -> str:
+        """Return what is printed after a name at the start of a line."""
+        return next(
+            row.removeprefix(name).strip() for row in self.out.splitlines() if row.startswith(name)
+        )
+
+
+Run = Callable[..., Ran]
+
+
+@pytest.fixture(autouse=True)
+def sigint_as_in_a_terminal() -> Iterator[None]:
+    """A shell that starts its commands in the background has them ignore Ctrl-C."""
+    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, inherited)
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Run ``geodesic`` with arguments, in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> Ran:
+        monkeypatch.setattr(sys, "argv", ["geodesic", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        printed = capsys.readouterr()
+        return Ran(int(ended.value.code or 0), printed.out, printed.err)
+
+    return run
+
+
+@pytest.fixture
+def plane(run: Run) -> Path:
+    ran = run("sample", "plane", "--faces", 200, "plane.ply")
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("mesh") == "121 vertices, 200 faces"
+    return Path("plane.ply")
+
+
+def error_line(ran: Ran) -> str:
+    assert ran.out == ""
+    assert ran.err.startswith("error: ")
+    assert ran.err.count("\n") == 1
+    return ran.err
+
+
+@pytest.mark.parametrize("name", gc.samples.SAMPLES)
+def test_a_sample_is_written_as_it_is(run: Run, name: str) -> None:
+    assert run("sample", name, "--faces", 600, "mesh.ply").code == 0
+    mesh = gc.load_mesh("mesh.ply")
+    vertices, faces = gc.samples.SAMPLES[name](600)
+    assert mesh.vertices.tolist() == vertices.tolist()
+    assert mesh.faces.tolist() == faces.tolist()
+
+
+def test_info_tells_what_is_in_a_mesh(run: Run, plane: Path) -> None:
+    ran = run("info", plane)
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("vertices") == "121"
+    assert ran.figure("faces") == "200"
+    assert ran.figure("boundary loops") == "1"
+    assert ran.figure("euler characteristic") == "1"
+    assert ran.figure("bounds") == "(0.0, 0.0, 0.0) to (1.0, 1.0, 0.0)"
+    assert ran.figure("inconsistent orientation") == "no"
+    assert ran.figure("read in").endswith(" s")
+    assert "warning" not in ran.out
+
+
+def test_info_names_elements_and_warns(run: Run) -> None:
+    rows = ["v 0 0 0", "v 1 0 0", "v 0 1 0"] + ["v 5 5 5"] * 12 + ["f 1 2 3"]
+    Path("lonely.obj").write_text("\n".join(rows))
+    ran = run("info", "lonely.obj")
+    assert ran.figure("isolated vertices") == "12 (3, 4, 5, 6, 7, 8, 9, 10, 11, 12, …)"
+    assert "unreachable" in ran.figure("warning:")
+
+
+def test_info_tells_of_polygons_and_of_what_is_left_out(run: Run) -> None:
+    rows = ["v 0 0 0", "v 1 0 0", "v 1 1 0", "v 0 1 0", "f 1 2 3 4", "f 1 2", "l 3 4"]
+    Path("quad.obj").write_text("\n".join(rows))
+    ran = run("info", "quad.obj")
+    assert ran.figure("faces") == "3"
+    assert ran.figure("triangulated polygons") == "1"
+    assert ran.figure("repeated vertex faces") == "1 (2)"
+    assert "left out" in ran.figure("warning:")
+    assert "no part of the surface" in ran.out
+
+
+def test_distance_writes_npy_csv_and_json(run: Run, plane: Path) -> None:
+    expected = gc.exact_distance(gc.load_mesh(plane), [0, 120])
+    for name in ("d.npy", "d.csv", "d.json"):
+        ran = run("distance", plane, "--source", 0, "--source", 120, "--out", name)
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.figure("reached") == "121 of 121 vertices"
+        assert ran.figure("written") == name
+    assert np.load("d.npy").tolist() == expected.distances.tolist()
+    table = np.loadtxt("d.csv", delimiter=",", skiprows=1)
+    assert table[:, 0].tolist() == list(range(121))
+    assert table[:, 1].tolist() == expected.distances.tolist()
+    assert table[:, 2].tolist() == expected.nearest_source.tolist()
+    answer = json.loads(Path("d.json").read_text())
+    assert [source["vertex"] for source in answer["sources"]] == [0, 120]
+    assert answer["distances"] == expected.distances.tolist()
+    assert answer["nearest_source"] == expected.nearest_source.tolist()
+    farthest = int(np.argmax(expected.distances))
+    assert ran.figure("farthest") == f"vertex {farthest} at {float(expected.distances.max())!r}"
+
+
+def rows_of(name: str) -> list[dict[str, str]]:
+    return list(csv.DictReader(Path(name).read_text().splitlines()))
+
+
+def test_distances_on_the_mesh(run: Run, plane: Path) -> None:
+    expected = gc.exact_distance(gc.load_mesh(plane), 0, 0.35).distances
+    args = ("--source", 0, "--max-distance", 0.35)
+    assert run("distance", plane, *args, "--out", "d.PLY").code == 0
+    mesh = trimesh.load("d.PLY", process=False)
+    assert mesh.faces.tolist() == gc.load_mesh(plane).faces.tolist()
+    assert mesh.metadata["_ply_raw"]["vertex"]["data"]["distance"].tolist() == expected.tolist()
+    assert run("distance", plane, *args, "--out", "d.csv").code == 0
+    rows = rows_of("d.csv")
+    reached = np.isfinite(expected)
+    assert [bool(row["distance"]) for row in rows] == reached.tolist()
+    assert [float(row["distance"]) for row in rows if row["distance"]] == expected[reached].tolist()
+
+
+def test_lines_in_each_format(run: Run, knot: Path) -> None:
+    """What the formats hold is checked over HTTP: the encoders are the same."""
+    commands = {
+        "path": ["--source", 3, "--target", 700],
+        "paths": ["--source", 3, "--target", 700, "--target", 20],
+        "isolines": ["--source", 3, "--level", 2.5],
+    }
+    for command, arguments in commands.items():
+        for suffix in ("csv", "svg", "geojson"):
+            assert run(command, knot, *arguments, "--out", f"{command}.{suffix}").code == 0
+        features = json.loads(Path(f"{command}.geojson").read_text())["features"]
+        rows = rows_of(f"{command}.csv")
+        lines = [feature["geometry"]["coordinates"] for feature in features]
+        closed = [feature["properties"].get("closed", False) for feature in features]
+        points = [
+            p
+            for line, is_closed in zip(lines, closed, strict=True)
+            for p in line[: len(line) - is_closed]
+        ]
+        assert [[float(row[x]) for x in "xyz"] for row in rows] == points
+        drawn = [*ET.parse(f"{command}.svg").getroot()][1:]  # noqa: S314 - our own
+        assert len(drawn) == len(lines) > 0
+    path = gc.shortest_path(gc.load_mesh(knot), 3, 700)
+    assert json.loads(Path("path.geojson").read_text())["features"][0]["geometry"] == {
+        "type": "LineString",
+        "coordinates": path.points.tolist(),
+    }
+    assert run("path", knot, *commands["path"], "--out", "p.npy").code == 0
+    assert np.load("p.npy").tolist() == path.points.tolist()
+
+
+def test_distance_stops_at_max_distance(run: Run, plane: Path) -> None:
+    ran = run("distance", plane, "--source", 0, "--max-distance", 0.35, "--out", "d.json")
+    expected = gc.exact_distance(gc.load_mesh(plane), 0, 0.35).distances
+    reached = np.isfinite(expected)
+    assert 0 < reached.sum() < 121
+    assert ran.figure("reached") == f"{reached.sum()} of 121 vertices"
+    answer = json.loads(Path("d.json").read_text())["distances"]
+    assert answer == [d if np.isfinite(d) else None for d in expected.tolist()]
+
+
+@pytest.fixture
+def knot(run: Run) -> Path:
+    """A curved mesh, on which windows merge."""
+    assert run("sample", "knot", "--faces", 3000, "knot.ply").code == 0
+    return Path("knot.ply")
+
+
+@pytest.mark.parametrize(
+    ("options", "errors", "bound"),
+    [
+        ("", {}, "0.001 (relative, guaranteed)"),
+        ("--relative-error 0.05", {"relative_error": 0.05}, "0.05 (relative, guaranteed)"),
+        (
+            "--absolute-error 0.02",
+            {"relative_error": None, "absolute_error": 0.02},
+            "0.02 (absolute, guaranteed)",
+        ),
+        (
+            "--relative-error 0.05 --absolute-error 0.02",
+            {"relative_error": 0.05, "absolute_error": 0.02},
+            "0.05 (relative, guaranteed)",
+        ),
+    ],
+)
+def test_approximate_distances_are_the_library_s(
+    run: Run, knot: Path, options: str, errors: dict[str, Any], bound: str
+) -> None:
+    mesh = gc.load_mesh(knot)
+    sources = ["--source", 3, "--source", 700]
+    ran = run(
+        "distance", knot, *sources, "--method", "approximate", *options.split(), "--out", "d.json"
+    )
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("error bound") == bound
+    answer = json.loads(Path("d.json").read_text())
+    expected = gc.approximate_distance(mesh, [3, 700], **errors)
+    assert answer["distances"] == expected.distances.tolist()
+    assert answer["error_bound"] == asdict(expected.error_bound)
+    exact = gc.exact_distance(mesh, [3, 700]).distances
+    share = errors.get("relative_error", 1e-3) or 1.0
+    assert (expected.distances <= exact * (1 + 1e-9)).all()
+    assert (exact - expected.distances <= share * exact).all()
+    assert (exact - expected.distances <= errors.get("absolute_error", np.inf)).all()
+
+
+def test_exact_distances_have_no_error(run: Run, plane: Path) -> None:
+    for options in ([], ["--method", "exact"]):
+        ran = run("distance", plane, "--source", 0, *options, "--out", "d.json")
+        assert ran.figure("error bound") == "0.0 (relative, guaranteed)"
+        assert json.loads(Path("d.json").read_text())["error_bound"]["value"] == 0
+
+
+def test_approximate_distances_stop_at_max_distance(run: Run, knot: Path) -> None:
+    options = ["--method", "approximate", "--relative-error", 0.05, "--max-distance", 2]
+    ran = run("distance", knot, "--source", 3, *options, "--out", "d.npy")
+    assert ran.code == 0
+    exact = gc.exact_distance(gc.load_mesh(knot), 3).distances
+    reached = np.isfinite(np.load("d.npy"))
+    assert 0 < reached.sum() < len(reached)
+    assert reached[exact <= 2].all()
+    assert (exact[reached] <= 2 / 0.95).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "errors"),
+    [
+        ("", {}),
+        ("--relative-error 0.05", {"relative_error": 0.05}),
+        ("--absolute-error 0.1", {"relative_error": None, "absolute_error": 0.1}),
+    ],
+)
+def test_an_approximate_path_reports_its_own_bound(
+    run: Run, knot: Path, options: str, errors: dict[str, Any]
+) -> None:
+    ends = ["--source", 3, "--target", 700]
+    ran = run("path", knot, *ends, "--method", "approximate", *options.split(), "--out", "p.json")
+    assert (ran.code, ran.err) == (0, "")
+    mesh = gc.load_mesh(knot)
+    expected = gc.approximate_distance(mesh, 3, **errors, keep_windows=True).path_to(700)
+    assert ran.figure("length") == repr(expected.length)
+    value = expected.error_bound.value
+    assert ran.figure("error bound") == f"{value!r} (relative, guaranteed)"
+    answer = json.loads(Path("p.json").read_text())
+    assert answer["points"] == expected.points.tolist()
+    assert answer["error_bound"] == asdict(expected.error_bound)
+    exact = gc.shortest_path(mesh, 3, 700).length
+    assert exact * (1 - 1e-9) <= expected.length <= exact * (1 + value + 1e-9)
+
+
+def test_path_writes_a_polyline_and_json(run: Run, plane: Path) -> None:
+    expected = gc.shortest_path(gc.load_mesh(plane), 0, 115)
+    for name in ("p.obj", "p.json"):
+        ran = run("path", plane, "--source", 0, "--target", 115, "--out", name)
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.figure("length") == repr(expected.length)
+        assert ran.figure("error bound") == "0.0 (relative, guaranteed)"
+    rows = [row.split() for row in Path("p.obj").read_text().splitlines()]
+    points = [[float(x) for x in row[1:]] for row in rows if row[0] == "v"]
+    assert points == expected.points.tolist()
+    assert rows[-1] == ["l", *map(str, range(1, len(points) + 1))]
+    answer = json.loads(Path("p.json").read_text())
+    assert answer["points"] == points
+    assert answer["length"] == expected.length
+    assert answer["faces"] == expected.faces.tolist()
+    assert len(answer["locations"]) == len(points)
+
+
+def test_a_path_by_way_of_others_tells_its_steps(run: Run, plane: Path) -> None:
+    ends = ["--source", 0, "--target", 115]
+    expected = gc.shortest_path(gc.load_mesh(plane), 0, 115, [60, 7], explain=True)
+    assert expected.steps is not None
+
+    ran = run("path", plane, *ends, "--via", 60, "--via", 7, "--explain", "--out", "p.json")
+
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("length") == repr(expected.length)
+    told = [row for row in ran.out.splitlines() if row.startswith("leg ")]
+    assert len(told) == len(expected.steps) == 18
+    for row, step in zip(told, expected.steps, strict=True):
+        assert row.startswith(f"leg {step.leg}, {step.name} ")
+        assert row.endswith(
+            f"bound {step.bound!r}, {step.windows} windows, {len(step.faces)} faces"
+        )
+    answer = json.loads(Path("p.json").read_text())
+    assert answer["points"] == expected.points.tolist()
+    assert [step["faces"] for step in answer["steps"]] == [
+        step.faces.tolist() for step in expected.steps
+    ]
+
+
+@pytest.mark.parametrize("method", ["exact", "approximate"])
+def test_paths_between_points_that_are_no_vertices(run: Run, knot: Path, method: str) -> None:
+    mesh = gc.load_mesh(knot)
+    start, end = mesh.faces[900, :2].tolist()
+    source, target = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), mesh.point_on_edge(start, end, 0.3)
+    if method == "exact":
+        expected = gc.shortest_path(mesh, source, target)
+    else:
+        field = gc.approximate_distance(mesh, source, targets=[target], keep_windows=True)
+        expected = field.path_to(target)
+
+    ends = ["--source", "f40:0.2,0.3,0.5", "--target", f"e{start}-{end}:0.3"]
+    ran = run("path", knot, *ends, "--method", method, "--out", "p.json")
+
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("length") == repr(expected.length)
+    assert json.loads(Path("p.json").read_text())["points"] == expected.points.tolist()
+
+
+def test_all_spellings_of_a_point_give_one_answer(run: Run, knot: Path) -> None:
+    mesh = gc.load_mesh(knot)
+    start, end = mesh.faces[900, :2].tolist()
+    at_start = ",".join(map(repr, mesh.vertices[start].tolist()))
+    one = ["--out", "d.json", "--source", "f40:0.2,0.3,0.5", "--source"]
+    answers, paths = set(), set()
+    for text in (start, f"v{start}", f"e{start}-{end}:0", f"e{end}-{start}:1", f"p{at_start}"):
+        assert run("distance", knot, *one, text).code == 0
+        answer = json.loads(Path("d.json").read_text())
+        del answer["stats"]["seconds"]
+        answers.add(json.dumps(answer))
+        stops = ["--source", text, "--target", 7, "--via", "v30", "--via", text]
+        assert run("path", knot, *stops, "--out", "p.obj").code == 0
+        paths.add(Path("p.obj").read_text())
+    assert (len(answers), len(paths)) == (1, 1)
+    place = {"vertex": start, "position": mesh.vertices[start].tolist(), "start_distance": 0.0}
+    assert answer["sources"][1] == place
+    assert answer["sources"][0]["face"] == 40
+    assert answer["sources"][0]["barycentric"] == [0.2, 0.3, 0.5]
+    sources = [gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), start]
+    assert answer["distances"] == gc.exact_distance(mesh, sources).distances.tolist()
+
+
+def test_locate_prints_a_point_that_others_take(run: Run, knot: Path) -> None:
+    mesh = gc.load_mesh(knot)
+    for at in ("1,2,0.5", "-1e1,.5,+2", ",".join(map(repr, mesh.vertices[5].tolist()))):
+        ran = run("locate", knot, "--at", at)
+        assert (ran.code, ran.err) == (0, "")
+        position = np.array([float(x) for x in at.split(",")])
+        place = mesh.locate(position)
+        found = mesh.position(place)
+        assert [float(x) for x in ran.figure("position").split(",")] == found.tolist()
+        assert float(ran.figure("distance")) == np.linalg.norm(found - position)
+        ends = ["--source", ran.figure("point"), "--target", 7]
+        path = run("path", knot, *ends, "--out", "p.obj")
+        assert path.figure("length") == repr(gc.shortest_path(mesh, place, 7).length)
+    assert ran.figure("point") == "v5"
+    assert float(ran.figure("distance")) == 0
+
+
+def point_options(option: str, *points: object) -> list[object]:
+    return [each for point in points for each in (option, point)]
+
+
+def test_paths_are_written_with_those_that_are_not_there(run: Run, knot: Path) -> None:
+    mesh = gc.load_mesh(knot)
+    face = int(np.flatnonzero((mesh.faces == 20).any(axis=1))[0])
+    inside = gc.SurfacePoint.face(face, (0.2, 0.3, 0.5))
+    field = gc.exact_distance(mesh, 3, 4.0, [700, inside])
+    targets = point_options("--target", 700, f"f{face}:0.2,0.3,0.5", "v3", 20)
+    assert np.isinf(field.distances[700])
+    ends = ["--source", 3, *targets, "--max-distance", 4]
+
+    ran = run("paths", knot, *ends, "--out", "p.json")
+
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("no path") == "to 700: beyond_max_distance"
+    answer = json.loads(Path("p.json").read_text())["paths"]
+    reason = answer[0]["status"], answer[0]["reason"], answer[0]["points"]
+    assert reason == ("no_path", "beyond_max_distance", None)
+    for found, target in zip(answer[1:], (inside, 3, 20), strict=True):
+        path = field.path_to(target)
+        assert (found["status"], found["length"]) == ("ok", path.length)
+        assert found["points"] == path.points.tolist()
+        assert repr(path.length) in ran.out
+    assert run("paths", knot, *ends, "--out", "p.obj").code == 0
+    rows = [row.split() for row in Path("p.obj").read_text().splitlines()]
+    points = [row for row in rows if row[0] == "v"]
+    elements = [row[1:] for row in rows if row[0] in "lp"]
+    assert [row[0] for row in rows if row[0] in "lp"] == ["l", "p", "l"]
+    assert [len(each) for each in elements] == [len(found["points"]) for found in answer[1:]]
+    numbers = [number for each in elements for number in each]
+    assert numbers == list(map(str, range(1, len(points) + 1)))
+
+
+def test_approximate_paths_report_their_own_bounds(run: Run, knot: Path) -> None:
+    errors = ["--method", "approximate", "--relative-error", 0.05]
+    targets = point_options("--target", 700, 20)
+    ran = run("paths", knot, "--source", 3, *targets, *errors, "--out", "p.json")
+    field = gc.approximate_distance(gc.load_mesh(knot), 3, 0.05, keep_isolines=True)
+    assert ran.code == 0
+    for found, target in zip(
+        json.loads(Path("p.json").read_text())["paths"], (700, 20), strict=True
+    ):
+        assert found["error_bound"] == asdict(field.path_to(target).error_bound)
+
+
+@pytest.mark.parametrize("limit", [None, 4.0])
+def test_matrices_are_the_library_s(run: Run, knot: Path, limit: float | None) -> None:
+    mesh = gc.load_mesh(knot)
+    inside = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5))
+    expected = gc.distance_matrix(mesh, [3, inside], [700, 3, 20], limit)
+    sources = point_options("--source", 3, "f40:0.2,0.3,0.5")
+    ends = [*sources, *point_options("--target", 700, 3, 20)]
+    ends += [] if limit is None else ["--max-distance", limit]
+    rows = [(i, j, expected[i, j]) for i in range(2) for j in range(3)]
+    near = [row for row in rows if np.isfinite(row[2])]
+
+    for layout, names in (("dense", "npy csv json"), ("sparse", "npz csv json")):
+        for name in names.split():
+            ran = run("matrix", knot, *ends, "--layout", layout, "--out", f"{layout}.{name}")
+            assert (ran.code, ran.err) == (0, "")
+            assert ran.figure("reached") == f"{len(near)} of 6 distances"
+            assert ran.figure("written") == f"{layout}.{name}"
+    assert np.load("dense.npy").tolist() == expected.tolist()
+    answer = json.loads(Path("dense.json").read_text())["distances"]
+    assert answer == [[d if np.isfinite(d) else None for d in row] for row in expected.tolist()]
+    for layout, cells in (("dense", rows), ("sparse", near)):
+        table = np.genfromtxt(f"{layout}.csv", delimiter=",", skip_header=1, filling_values=np.inf)
+        assert [tuple(row) for row in table.tolist()] == cells
+    table = load_npz("sparse.npz").tocoo()
+    assert list(zip(table.row, table.col, table.data, strict=True)) == near
+    answer = json.loads(Path("sparse.json").read_text())
+    assert answer["shape"] == [2, 3]
+    columns = answer["rows"], answer["columns"], answer["distances"]
+    assert list(zip(*columns, strict=True)) == near
+
+
+def test_pairs(run: Run, knot: Path) -> None:
+    expected = gc.distance_matrix(gc.load_mesh(knot), [3, 9], [700, 20], layout="pairs")
+    ends = [*point_options("--source", 3, 9), *point_options("--target", 700, 20)]
+    for name in ("d.npy", "d.csv", "d.json"):
+        ran = run("matrix", knot, *ends, "--layout", "pairs", "--out", name)
+        assert ran.figure("reached") == "2 of 2 distances"
+    assert np.load("d.npy").tolist() == expected.tolist()
+    assert json.loads(Path("d.json").read_text())["distances"] == expected.tolist()
+    rows = [row.split(",") for row in Path("d.csv").read_text().splitlines()]
+    assert rows[0] == ["source", "target", "distance"]
+    found = [(int(i), int(j), float(d)) for i, j, d in rows[1:]]
+    assert found == [(i, i, d) for i, d in enumerate(expected.tolist())]
+
+
+def test_nearest_prints_candidates_as_they_were_written(run: Run, knot: Path) -> None:
+    texts = ["700", "f40:0.2,0.3,0.5", "v20", "9"]
+    places = [700, gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), 20, 9]
+    mesh = gc.load_mesh(knot)
+    expected = gc.nearest(mesh, 3, places, 3)
+    candidates = point_options("--candidate", *texts)
+
+    ran = run("nearest", knot, "--source", 3, *candidates, "-k", 3)
+
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.figure("found") == "3 of 3"
+    told = [row.split() for row in ran.out.splitlines() if row.startswith("nearest")]
+    assert [(row[1], float(row[3])) for row in told] == [
+        (texts[i], away)
+        for i, away in zip(expected.indices, expected.distances.tolist(), strict=True)
+    ]
+    limit = ["--max-distance", expected.distances[0]]
+    ran = run("nearest", knot, "--source", 3, *candidates, "-k", 3, *limit)
+    assert ran.figure("found") == "1 of 3"
+
+
+def test_curves_are_sources(run: Run, knot: Path) -> None:
+    """The points of a path, as they are written, in each command that takes curves."""
+    mesh = gc.load_mesh(knot)
+    line = gc.shortest_path(mesh, 3, 700).locations
+    written = "/".join(
+        f"f{place.face_index}:{','.join(map(repr, place.barycentric))}" for place in line
+    )
+    field = gc.exact_distance(mesh, [gc.Curve(line), 40])
+    along = gc.exact_distance(mesh, gc.Curve(line))
+
+    sources = point_options("--source", written, 40)
+    assert run("distance", knot, *sources, "--out", "d.npy").code == 0
+    np.testing.assert_array_equal(np.load("d.npy"), field.distances)
+    assert run("distance", knot, *sources, "--out", "d.json").code == 0
+    curve, point = json.loads(Path("d.json").read_text())["sources"]
+    assert len(curve["polyline"]) == len(line)
+    assert point["vertex"] == 40
+    ran = run("paths", knot, "--source", written, "--target", 900, "--out", "p.json")
+    assert repr(along.path_to(900).length) in ran.out
+    ran = run("isolines", knot, *sources, "--level", 0.5, "--out", "l.json")
+    drawn = json.loads(Path("l.json").read_text())["isolines"][0]["lines"]
+    assert [each["length"] for each in drawn] == [each.length for each in field.isolines([0.5])[0]]
+
+
+@pytest.mark.parametrize("method", ["exact", "approximate"])
+def test_gradients_are_written_beside_distances(run: Run, knot: Path, method: str) -> None:
+    mesh = gc.load_mesh(knot)
+    solve = gc.exact_distance if method == "exact" else gc.approximate_distance
+    field = solve(mesh, 3, max_distance=4.0)
+    arguments = "distance", knot, "--source", 3, "--max-distance", 4, "--method", method
+    expected = np.column_stack([field.distances, field.gradient])
+    assert np.isinf(expected).any()
+
+    for out in ("g.npy", "g.csv", "g.json", "g.ply"):
+        assert run(*arguments, "--gradient", "--out", out).code == 0
+
+    np.testing.assert_array_equal(np.load("g.npy"), expected)
+    with Path("g.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    names = "distance", "gradient_x", "gradient_y", "gradient_z"
+    cells = [[float(row[name] or "nan") for name in names] for row in rows]
+    np.testing.assert_array_equal(cells, np.where(np.isfinite(expected), expected, np.nan))
+    told = json.loads(Path("g.json").read_text())["gradient"]
+    np.testing.assert_array_equal(np.array(told, float), expected[:, 1:])
+    assert b"property double gradient_z" in Path("g.ply").read_bytes()
+    assert run(*arguments, "--out", "d.npy").code == 0
+    np.testing.assert_array_equal(np.load("d.npy"), field.distances)
+
+
+@pytest.mark.parametrize("method", ["exact", "approximate"])
+def test_a_path_stops_at_max_distance(run: Run, knot: Path, method: str) -> None:
+    length = gc.exact_distance(gc.load_mesh(knot), 3).distances[700]
+    ends = "path", knot, "--source", 3, "--target", 700, "--out", "p.obj", "--method", method
+
+    beyond = run(*ends, "--max-distance", 0.99 * length)
+    within = run(*ends, "--max-distance", length)
+
+    assert beyond.code == 1
+    assert "max_distance" in error_line(beyond)
+    assert float(within.figure("length")) == pytest.approx(length, rel=1e-3)
+
+
+def test_a_path_to_its_own_source_is_a_point(run: Run, plane: Path) -> None:
+    assert run("path", plane, "--source", 7, "--target", 7, "--out", "p.obj").code == 0
+    assert Path("p.obj").read_text().splitlines()[-1] == "p 1"
+
+
+def test_merge_joins_a_cut_mesh(run: Run) -> None:
+    rows = ["v 0 0 0", "v 1 0 0", "v 1 1 0", "v 0 0 0", "v 1 1 0", "v 0 1 0", "f 1 2 3", "f 4 5 6"]
+    Path("cut.obj").write_text("\n".join(rows))
+    assert run("info", "cut.obj").figure("components") == "2"
+    assert run("info", "cut.obj", "--merge", "exact").figure("components") == "1"
+    apart = run("path", "cut.obj", "--source", 1, "--target", 5, "--out", "p.obj")
+    assert apart.code == 1
+    assert "component" in error_line(apart)
+    assert not Path("p.obj").exists()
+    joined = run(
+        "path", "cut.obj", "--merge", "exact", "--source", 1, "--target", 3, "--out", "p.obj"
+    )
+    assert joined.code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("info nowhere.ply", "cannot read nowhere.ply"),
+        ("info plane.xyz", "unknown mesh file type 'xyz'"),
+        ("info plane.stl", "STL"),
+        ("distance plane.ply --source -1 --out d.npy", "-1"),
+        ("distance plane.ply --source 121 --out d.npy", "121"),
+        ("distance plane.ply --source 0 --max-distance -2 --out d.npy", "max_distance"),
+        ("distance plane.ply --source 0 --max-distance nan --out d.npy", "max_distance"),
+        ("path plane.ply --source 0 --target 999 --out p.obj", "target"),
+        ("path plane.ply --method approximate --source 0 --target 999 --out p.obj", "target"),
+        *(
+            (f"path plane.ply {option} {text} {others} --out p.obj", f"{option} {text}: {message}")
+            for option, others in (
+                ("--source", "--target 1"),
+                ("--target", "--source 1"),
+                ("--via", "--source 1 --target 2"),
+            )
+            for text, message in (
+                ("-1", "the point is vertex -1, but vertices are numbered 0 to 120"),
+                ("v121", "the point is vertex 121"),
+                ("e0-120:0.5", "no edge joins the vertices 0 and 120"),
+                ("e0-121:0.5", "the end of the edge is vertex 121"),
+                ("e0-1:1.5", "t is 1.5"),
+                ("f200:1,0,0", "the point is face 200"),
+                ("f0:1,1,0", "the point has the weights (1.0, 1.0, 0.0) in face 0"),
+                ("p0,0,1e99", "the position is"),
+            )
+        ),
+        (
+            "paths plane.ply --source 0 --target 1 --target 121 --out p.obj",
+            "--target 121: the point is vertex 121",
+        ),
+        (
+            "paths plane.ply --source 0 --target 1 --max-distance -1 --out p.json",
+            "max_distance",
+        ),
+        (
+            "matrix plane.ply --source 0 --target v-1 --out m.npy",
+            "--target v-1: the point is vertex -1",
+        ),
+        (
+            "matrix plane.ply --source e0-120:0.5 --target 1 --out m.npy",
+            "--source e0-120:0.5: no edge joins",
+        ),
+        ("matrix plane.ply --source 0 --target 1 --max-distance nan --out m.npy", "max_distance"),
+        (
+            "nearest plane.ply --source 0 --candidate f200:1,0,0",
+            "--candidate f200:1,0,0: the point is face 200",
+        ),
+        ("nearest plane.ply --source 0 --candidate 1 --max-distance -1", "max_distance"),
+        ("path plane.ply --source 0 --target 1 --max-distance -1 --out p.obj", "max_distance"),
+        (
+            "distance plane.ply --source 0/120 --out d.npy",
+            "--source 0/120: the points 0 and 1 of the curve",
+        ),
+        ("paths plane.ply --source 0/999 --target 1 --out p.obj", "--source 999: the point is"),
+        ("locate plane.ply --at 0,0,-1e99", "--at 0,0,-1e99: the position is"),
+        ("locate nowhere.ply --at 0,0,0", "cannot read nowhere.ply"),
+        *(
+            (f"{command} --method approximate {option} {value}", f"{name} is")
+            for command in (
+                "distance plane.ply --source 0 --out d.npy",
+                "path plane.ply --source 0 --target 1 --out p.obj",
+            )
+            for option, name, value in (
+                ("--relative-error", "relative_error", "0"),
+                ("--relative-error", "relative_error", "1"),
+                ("--relative-error", "relative_error", "-0.1"),
+                ("--relative-error", "relative_error", "nan"),
+                ("--absolute-error", "absolute_error", "0"),
+                ("--absolute-error", "absolute_error", "inf"),
+            )
+        ),
+        ("sample knot --faces 3 small.ply", "faces is 3"),
+    ],
+)
+def test_what_fails_says_why_in_one_line(
+    run: Run, plane: Path, arguments: str, message: str
+) -> None:
+    Path("plane.stl").write_bytes(plane.read_bytes())
+    before = sorted(Path().iterdir())
+    ran = run(*arguments.split())
+    assert ran.code == 1
+    assert message in error_line(ran)
+    assert sorted(Path().iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("", "command"),
+        ("fly", "fly"),
+        ("info", "MESH"),
+        ("info plane.ply --quick", "--quick"),
+        ("info plane.ply --merge some", "some"),
+        ("distance plane.ply --out d.npy", "--source"),
+        ("distance plane.ply --source 0", "--out"),
+        ("distance plane.ply --source x --out d.npy", "'--source': 'x' is not a point: write a"),
+        ("distance plane.ply --source f0:1,0 --out d.npy", "'f0:1,0' is not a point"),
+        ("distance plane.ply --source 1.5 --out d.npy", "'1.5' is not a point"),
+        ("path plane.ply --source 0 --target p1,2 --out p.obj", "'--target': 'p1,2' is not"),
+        ("path plane.ply --source 0 --target 1 --via 1-2 --out p.obj", "'--via': '1-2' is not"),
+        ("path plane.ply --source p0,0,1e999 --target 1 --out p.obj", "1e999 is too large"),
+        ("locate plane.ply", "--at"),
+        ("locate plane.ply --at 1,2", "'1,2' is not a position: write it as x,y,z"),
+        ("locate plane.ply --at 1,2,nan", "'1,2,nan' is not a position"),
+        ("distance plane.ply --source 0 --out d.txt", "must end in .npy, .csv, .json or .ply"),
+        ("distance plane.ply --source 0 --out no/d.npy", "folder"),
+        ("path plane.ply --source 0 --target 1 --out p.ply", ".json or .npy"),
+        ("distance plane.ply --source 0 --out d.npy --method heat", "heat"),
+        ("distance plane.ply --source 0 --out d.npy --relative-error much", "--relative-error"),
+        (
+            "distance plane.ply --source 0 --out d.npy --relative-error 0.1",
+            "--relative-error goes with --method approximate only",
+        ),
+        (
+            "path plane.ply --source 0 --target 1 --out p.obj --method exact --absolute-error 1",
+            "--absolute-error goes with --method approximate only",
+        ),
+        (
+            "path plane.ply --source 0 --target 1 --out p.obj --method approximate --via 3",
+            "--via goes with --method exact only",
+        ),
+        (
+            "path plane.ply --source 0 --target 1 --out p.obj --method approximate --explain",
+            "--explain goes with --method exact only",
+        ),
+        ("distance plane.ply --source 0/x --out d.npy", "'x' is not a point"),
+        ("matrix plane.ply --source 0/1 --target 1 --out m.npy", "'0/1' is not a point"),
+        ("paths plane.ply --source 0 --out p.obj", "--target"),
+        ("paths plane.ply --source 0 --target 1 --out p.npy", ".geojson or .json"),
+        (
+            "paths plane.ply --source 0 --target 1 --out p.obj --relative-error 0.1",
+            "--relative-error goes with --method approximate only",
+        ),
+        ("matrix plane.ply --source 0 --target 1 --out m.txt", "m.txt must end in .npy, .npz"),
+        ("matrix plane.ply --source 0 --target 1 --out m.npz", ".npz does not go with --layout d"),
+        (
+            "matrix plane.ply --source 0 --target 1 --out m.npy --layout sparse",
+            ".npy does not go with --layout sparse",
+        ),
+        ("matrix plane.ply --source 0 --target 1 --out m.npy --layout rows", "rows"),
+        (
+            "matrix plane.ply --source 0 --target 1 --target 2 --out m.npy --layout pairs",
+            "there are 1 sources and 2 targets; pairs need as many",
+        ),
+        ("matrix plane.ply --source 0 --target 1", "--out"),
+        ("isolines plane.ply --source 0 --out l.obj", "give --count, or --level"),
+        ("isolines plane.ply --source 0 --out l.obj --count 2 --level 1", "not both"),
+        ("isolines plane.ply --source 0 --out l.obj --count 0", "--count"),
+        ("isolines plane.ply --source 0 --out l.npy --count 1", ".geojson or .json"),
+        ("path plane.ply --source 0 --target 1 --out p.obj --barriers 3;4", "'3;4' is not a list"),
+        ("nearest plane.ply --source 0 --candidate 1 --barriers -3", "--barriers"),
+        ("nearest plane.ply --source 0", "--candidate"),
+        ("nearest plane.ply --source 0 --candidate 1 -k 2", "-k is 2, but there are only 1"),
+        ("nearest plane.ply --source 0 --candidate 1 -k 0", "-k"),
+        ("nearest plane.ply --source 0 --candidate x", "'x' is not a point"),
+        ("sample cube c.ply", "cube"),
+        ("sample knot c.obj", ".ply"),
+        ("serve --port 70000", "--port"),
+    ],
+)
+def test_a_wrong_command_line_says_so_in_one_line(
+    run: Run, plane: Path, arguments: str, message: str
+) -> None:
+    ran = run(*arguments.split())
+    assert ran.code == 2
+    assert message in error_line(ran)
+    assert list(Path().iterdir()) == [plane]
+
+
+def test_isolines_are_drawn(run: Run, plane: Path) -> None:
+    field = gc.exact_distance(gc.load_mesh(plane), 60)
+    for name in ("lines.obj", "lines.json"):
+        ran = run("isolines", plane, "--source", 60, "--level", 0.3, "--level", 0.6, "--out", name)
+        assert (ran.code, ran.err) == (0, "")
+        assert ran.figure("level       0.3").startswith(": 1 closed, 0 open, 1.88")
+        assert ran.figure("level       0.6").startswith(": 0 closed, 4 open")
+        assert ran.figure("written") == name
+    expected = field.isolines([0.3, 0.6])
+    drawn = json.loads(Path("lines.json").read_text())["isolines"]
+    assert [level["level"] for level in drawn] == [0.3, 0.6]
+    for level, lines in zip(drawn, expected, strict=True):
+        assert [line["points"] for line in level["lines"]] == [i.points.tolist() for i in lines]
+        assert [line["closed"] for line in level["lines"]] == [i.closed for i in lines]
+    rows = Path("lines.obj").read_text().splitlines()
+    groups = [row for row in rows if row.startswith("g")]
+    assert groups == ["g level_0.3", "g level_0.6"]
+    circle, *arcs = ([int(i) for i in row.split()[1:]] for row in rows if row.startswith("l"))
+    assert circle[0] == circle[-1] == 1
+    assert len(circle) - 1 == len(expected[0][0].points)
+    joined = [i for indices in (circle[:-1], *arcs) for i in indices]
+    assert joined == list(range(1, len(joined) + 1)), "each vertex in turn, and none twice"
+    spaced = run("isolines", plane, "--source", 60, "--count", 2, "--out", "lines.json")
+    assert spaced.out.count("level ") == 2
+    rough = run(
+        *("isolines", plane, "--source", 60, "--count", 2, "--out", "lines.json"),
+        *("--method", "approximate", "--chord-error", 0.01),
+    )
+    assert rough.figure("error bound") == "0.001 (relative, guaranteed)"
+
+
+def test_barriers_are_in_the_way(run: Run, plane: Path) -> None:
+    walled = gc.load_mesh(plane).with_barriers(range(100, 116))
+    ends = ("--source", 0, "--target", 10)
+    block = ("--barriers", "100,101-114,115")
+    assert run("path", plane, *ends, "--out", "p.json", *block).code == 0
+    length = json.loads(Path("p.json").read_text())["length"]
+    assert length == gc.shortest_path(walled, 0, 10).length > 1.9
+    assert (
+        run("paths", plane, *ends, "--out", "ps.json", *block)
+        .figure("path")
+        .endswith(f"{length!r}, error bound 0.0 (relative, guaranteed)")
+    )
+    run("matrix", plane, *ends, "--out", "m.npy", *block)
+    assert np.load("m.npy") == pytest.approx(length, rel=1e-12)
+    run("distance", plane, "--source", 0, "--out", "d.npy", *block)
+    assert np.load("d.npy")[10] == pytest.approx(length, rel=1e-12)
+    near = ("--candidate", 10, "--candidate", 110)
+    assert run("nearest", plane, "--source", 0, *near, *block).figure("nearest").startswith("110 ")
+
+
+def test_barriers_that_are_no_faces(run: Run, plane: Path) -> None:
+    for faces, message in (("3,200", "face 200"), ("0-199", "block every face")):
+        ran = run("distance", plane, "--source", 0, "--out", "d.npy", "--barriers", faces)
+        assert ran.code == 1
+        assert message in error_line(ran)
+    assert list(Path().iterdir()) == [plane]
+
+
+def test_an_output_that_cannot_be_written_is_an_error(run: Run, plane: Path) -> None:
+    Path("d.npy").mkdir()
+    ran = run("distance", plane, "--source", 0, "--out", "d.npy")
+    assert ran.code == 1
+    assert "cannot write d.npy" in error_line(ran)
+    assert sorted(Path().iterdir()) == [Path("d.npy"), plane]
+
+
+def test_ctrl_c_stops_the_sweep_and_leaves_nothing(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve = gc.exact_distance
+
+    def press_ctrl_c_at_the_first_look(
+        *arguments: Any, cancel: Callable[[], bool], **_: Any
+    ) -> Any:
+        def press_and_look() -> bool:
+            signal.raise_signal(signal.SIGINT)
+            return cancel()
+
+        return solve(*arguments, cancel=press_and_look)
+
+    monkeypatch.setattr(
+        "geodesic_core.fields.sweep._FIRST_BUDGET", 10
+    )  # looks soon, on so small a mesh
+    monkeypatch.setattr(gc, "exact_distance", press_ctrl_c_at_the_first_look)
+    ran = run("distance", plane, "--source", 0, "--out", "d.npy")
+    assert (ran.code, ran.out, ran.err) == (130, "", "error: interrupted\n")
+    assert list(Path().iterdir()) == [plane]
+
+
+def test_ctrl_c_while_a_mesh_is_read_takes_effect_after_it(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    load = gc.load_mesh
+    usual = signal.getsignal(signal.SIGINT)
+
+    def press_ctrl_c(*arguments: Any, **options: Any) -> Any:
+        signal.raise_signal(signal.SIGINT)
+        return load(*arguments, **options)
+
+    monkeypatch.setattr(gc, "load_mesh", press_ctrl_c)
+    ran = run("info", plane)
+    assert (ran.code, ran.out, ran.err) == (130, "", "error: interrupted\n")
+    assert signal.getsignal(signal.SIGINT) is usual
+
+
+def test_ctrl_c_pressed_twice_does_not_wait(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def press_ctrl_c_twice(*_: Any, **__: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
+        pytest.fail("must not get here")
+
+    monkeypatch.setattr(gc, "load_mesh", press_ctrl_c_twice)
+    assert run("info", plane).code == 130
+
+
+def test_ctrl_c_while_the_output_is_written_leaves_nothing(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def press_ctrl_c(*_: Any, **__: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(csv, "writer", press_ctrl_c)
+    assert run("distance", plane, "--source", 0, "--out", "d.csv").code == 130
+    assert list(Path().iterdir()) == [plane]
+
+
+def test_an_error_of_the_program_itself_is_not_hidden(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def break_down(*_: Any, **__: Any) -> None:
+        raise gc.errors.InternalError("the sweep is broken")
+
+    monkeypatch.setattr(gc, "exact_distance", break_down)
+    with pytest.raises(gc.errors.InternalError):
+        run("distance", plane, "--source", 0, "--out", "d.npy")
+
+
+def test_version_and_help(run: Run) -> None:
+    assert run("--version").out == f"geodesic {__version__}\n"
+    usage = run("--help")
+    assert usage.code == 0
+    for command in (
+        "serve",
+        "info",
+        "distance",
+        "path",
+        "paths",
+        "isolines",
+        "matrix",
+        "nearest",
+        "locate",
+        "sample",
+    ):
+        assert command in usage.out
+        assert "--help" in run(command, "--help").out
+
+
+def test_help_needs_no_numbers() -> None:
+    script = (
+        "import sys; sys.argv[1:] = ['--help']\n"
+        "from app.cli import main\n"
+        "try: main()\n"
+        "except SystemExit: print(sorted({'numpy', 'numba', 'fastapi'} & set(sys.modules)))"
+    )
+    ran = subprocess.run(  # noqa: S603 - our own script
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert ran.stdout.endswith("[]\n")
+
+
+@pytest.fixture
+def served(monkeypatch: pytest.MonkeyPatch) -> list[uvicorn.Config]:
+    """With what servers would have run."""
+    configs: list[uvicorn.Config] = []
+
+    def note(server: uvicorn.Server) -> None:
+        configs.append(server.config)
+        server.started = True
+
+    monkeypatch.setattr(uvicorn.Server, "run", note)
+    return configs
+
+
+def test_serve_runs_the_application(
+    run: Run, served: list[uvicorn.Config], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("GEODESIC_DRAIN_S", "7.5")
+    assert run("serve", "--host", "127.0.0.9", "--port", 8123).code == 0
+    (config,) = served
+    assert isinstance(config.app, FastAPI)
+    assert (config.host, config.port) == ("127.0.0.9", 8123)
+    assert config.timeout_graceful_shutdown == 8
+
+
+def test_a_service_that_cannot_start_fails(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uvicorn.Server, "run", lambda _: None)
+    assert run("serve").code == 1
+
+
+def test_serve_refuses_wrong_settings(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uvicorn.Server, "run", lambda _: pytest.fail("must not start"))
+    monkeypatch.setenv("GEODESIC_WORKERS", "none")
+    ran = run("serve")
+    assert ran.code == 2
+    assert "GEODESIC_WORKERS" in error_line(ran)
+    assert "GEODESIC_WORKER_MEMORY" not in error_line(ran)
+    monkeypatch.delenv("GEODESIC_WORKERS")
+    monkeypatch.setenv("GEODESIC_WORKER", "2")
+    ran = run("serve")
+    assert ran.code == 2
+    assert "GEODESIC_WORKER" in error_line(ran)
+
+
+@pytest.mark.parametrize("host", ["0.0.0.0", "::", "10.0.0.7", "example.org", "", "127.0.0.1.x"])  # noqa: S104
+def test_serve_on_other_addresses_asks_for_keys(
+    run: Run, served: list[uvicorn.Config], monkeypatch: pytest.MonkeyPatch, host: str
+) -> None:
+    ran = run("serve", "--host", host)
+    assert ran.code == 2
+    assert "GEODESIC_API_KEYS" in error_line(ran)
+    assert "GEODESIC_AUTH=off" in error_line(ran)
+    assert not served
+
+    monkeypatch.setenv("GEODESIC_API_KEYS", "alice:0123456789abcdef")
+    assert run("serve", "--host", host).code == 0
+    monkeypatch.setenv("GEODESIC_AUTH", "off")
+    ran = run("serve", "--host", host)
+    assert ran.code == 2
+    assert "GEODESIC_AUTH is off, but GEODESIC_API_KEYS has keys" in error_line(ran)
+    monkeypatch.delenv("GEODESIC_API_KEYS")
+    assert run("serve", "--host", host).code == 0
+    assert [config.host for config in served] == [host, host]
+
+
+@pytest.mark.parametrize("host", ["127.0.0.1", "127.8.9.10", "::1", "localhost"])
+def test_serve_on_this_machine_needs_none(
+    run: Run, served: list[uvicorn.Config], host: str
+) -> None:
+    assert run("serve", "--host", host).code == 0
+    assert [config.host for config in served] == [host]
+
+
+def test_serve_shows_no_key_that_it_refuses(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEODESIC_API_KEYS", "alice:0123456789abcdef,0123456789abcdef")
+    ran = run("serve")
+    assert ran.code == 2
+    assert "GEODESIC_API_KEYS" in error_line(ran)
+    assert "0123456789" not in ran.err + ran.out
+
+
+def test_the_manual_names_every_setting_and_no_other() -> None:
+    manual = (ROOT / "docs" / "operations.md").read_text()
+    named = set(re.findall(r"^\| `(GEODESIC_\w+)`", manual, re.MULTILINE))
+    assert named == {variable_of(field) for field in Settings.model_fields}

@@ -1,0 +1,265 @@
+"""Progress, and stopping: on request, in time, within memory. Nothing is left behind."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from tests.support import zoo
+
+pytestmark = pytest.mark.jit
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    """Large enough for several slices of a sweep."""
+    gc.warm_up()
+    return gc.TriangleMesh(*zoo.icosphere(6))
+
+
+@pytest.fixture(scope="module")
+def distances(mesh):
+    return gc.exact_distance(mesh, 0).distances
+
+
+def check_usable(mesh, distances):
+    np.testing.assert_array_equal(gc.exact_distance(mesh, 0).distances, distances)
+
+
+def repeat_sweeps(mesh, cancel):
+    """Sweep until told to stop, however fast the machine is."""
+    while True:
+        gc.exact_distance(mesh, 0, cancel=cancel)
+
+
+@pytest.mark.parametrize("arguments", [{}, {"max_distance": 1.0}])
+def test_progress_grows_from_zero_to_one(mesh, arguments):
+    seen = []
+    gc.exact_distance(mesh, 0, progress=seen.append, **arguments)
+    assert len(seen) >= 2
+    assert all(0 <= value <= 1 for value in seen)
+    assert seen == sorted(seen)
+    assert seen[-1] == 1
+
+
+def test_progress_is_spread_over_the_sweep(mesh):
+    """A true fraction: no jump over most of the bar, measured against the clock."""
+    seen = []
+    start = time.perf_counter()
+    gc.exact_distance(mesh, 0, progress=lambda value: seen.append((time.perf_counter(), value)))
+    total = time.perf_counter() - start
+    steps = np.diff([0.0, *(value for _, value in seen)])
+    assert steps.max() < 0.8
+    assert total < 5
+
+
+@pytest.mark.parametrize("vertex", ["far", "isolated"])
+def test_progress_ends_at_one_however_little_there_is_to_do(vertex):
+    case = zoo.SMALL["isolated_vertices"]
+    seen = []
+    source = 0 if vertex == "isolated" else int(case.faces[0, 0])
+    gc.exact_distance(gc.TriangleMesh(case.vertices, case.faces), source, progress=seen.append)
+    assert seen[-1] == 1
+
+
+def test_cancel_at_once(mesh, distances):
+    with pytest.raises(gc.errors.Cancelled):
+        gc.exact_distance(mesh, 0, cancel=lambda: True)
+    check_usable(mesh, distances)
+
+
+def test_cancel_is_asked_again_and_again(mesh, distances):
+    asked = []
+
+    def cancel():
+        asked.append(time.perf_counter())
+        return len(asked) == 3
+
+    with pytest.raises(gc.errors.Cancelled):
+        gc.exact_distance(mesh, 0, cancel=cancel)
+    assert len(asked) == 3
+    check_usable(mesh, distances)
+
+
+def test_cancel_from_another_thread_stops_within_two_slices(mesh, distances):
+    stop, stopped_at = threading.Event(), []
+
+    def cancel():
+        return stop.is_set()
+
+    def press():
+        stopped_at.append(time.perf_counter())
+        stop.set()
+
+    timer = threading.Timer(0.06, press)
+    timer.start()
+    with pytest.raises(gc.errors.Cancelled):
+        repeat_sweeps(mesh, cancel)
+    assert time.perf_counter() - stopped_at[0] < 0.3
+    timer.join()
+    check_usable(mesh, distances)
+
+
+def test_a_false_cancel_changes_nothing(mesh, distances):
+    np.testing.assert_array_equal(
+        gc.exact_distance(mesh, 0, cancel=lambda: False, deadline_s=600.0).distances, distances
+    )
+
+
+@pytest.mark.parametrize("seconds", [1e-9, 0.05])
+def test_deadline(mesh, distances, seconds):
+    start = time.perf_counter()
+    with pytest.raises(gc.errors.DeadlineExceeded):
+        gc.exact_distance(mesh, 0, deadline_s=seconds)
+    assert time.perf_counter() - start < seconds + 0.3
+    check_usable(mesh, distances)
+
+
+@pytest.mark.parametrize("limit", [1, 1000, 1_000_000])
+def test_memory_limit(mesh, distances, limit):
+    with pytest.raises(gc.errors.MemoryLimitExceeded, match=r"\d"):
+        gc.exact_distance(mesh, 0, memory_limit=limit)
+    check_usable(mesh, distances)
+
+
+def test_memory_limit_is_what_the_sweep_needs(mesh, distances):
+    stats = gc.exact_distance(mesh, 0).stats
+    field = gc.exact_distance(mesh, 0, memory_limit=stats.peak_bytes)
+    np.testing.assert_array_equal(field.distances, distances)
+    with pytest.raises(gc.errors.MemoryLimitExceeded):
+        gc.exact_distance(mesh, 0, memory_limit=stats.peak_bytes // 2)
+
+
+def test_peak_memory_is_at_most_six_tenths_of_the_mesh(mesh):
+    assert gc.exact_distance(mesh, 0).stats.peak_bytes <= 0.6 * mesh.nbytes
+
+
+@pytest.mark.parametrize("stop", ["progress", "cancel"])
+def test_an_exception_in_a_callback_comes_out_as_it_is(mesh, distances, stop):
+    def fail(*_):
+        raise LookupError("the caller's own")
+
+    with pytest.raises(LookupError, match="the caller's own"):
+        gc.exact_distance(mesh, 0, **{stop: fail})
+    check_usable(mesh, distances)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        ({"cancel": lambda: True}, gc.errors.Cancelled),
+        ({"deadline_s": 1e-9}, gc.errors.DeadlineExceeded),
+        ({"memory_limit": 1}, gc.errors.MemoryLimitExceeded),
+    ],
+)
+def test_shortest_path_stops_too(mesh, arguments, error):
+    with pytest.raises(error):
+        gc.shortest_path(mesh, 0, len(mesh.vertices) - 1, **arguments)
+
+
+def test_other_threads_run_while_a_sweep_does(mesh):
+    """The kernels let go of the interpreter."""
+    ticks, done = [], threading.Event()
+
+    def tick():
+        while not done.wait(0.001):
+            ticks.append(time.perf_counter())
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    try:
+        start = time.perf_counter()
+        for _ in range(3):
+            gc.exact_distance(mesh, 0)
+        seconds = time.perf_counter() - start
+    finally:
+        done.set()
+        thread.join()
+    assert len(ticks) > 20 * seconds
+
+
+# Approximate sweeps -----------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def approximate(mesh):
+    return gc.approximate_distance(mesh, 0).distances
+
+
+def check_still_usable(mesh, approximate):
+    np.testing.assert_array_equal(gc.approximate_distance(mesh, 0).distances, approximate)
+
+
+@pytest.mark.parametrize(
+    "arguments", [{}, {"max_distance": 1.0}, {"keep_windows": True}, {"relative_error": 1e-6}]
+)
+def test_progress_of_approximate_sweeps_grows_to_one(mesh, arguments):
+    seen = []
+    gc.approximate_distance(mesh, 0, progress=seen.append, **arguments)
+    assert len(seen) >= 2
+    assert all(0 <= value <= 1 for value in seen)
+    assert seen == sorted(seen)
+    assert seen[-1] == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        ({"cancel": lambda: True}, gc.errors.Cancelled),
+        ({"deadline_s": 1e-9}, gc.errors.DeadlineExceeded),
+        ({"memory_limit": 1}, gc.errors.MemoryLimitExceeded),
+        ({"memory_limit": 1_000_000}, gc.errors.MemoryLimitExceeded),
+    ],
+)
+@pytest.mark.parametrize("keep_windows", [True, False])
+def test_approximate_sweeps_stop_too(mesh, approximate, arguments, error, keep_windows):
+    with pytest.raises(error):
+        gc.approximate_distance(mesh, 0, keep_windows=keep_windows, **arguments)
+    check_still_usable(mesh, approximate)
+
+
+def test_approximate_sweeps_are_stopped_under_way(mesh, approximate):
+    asked = []
+
+    def cancel():
+        asked.append(1)
+        return len(asked) == 2
+
+    with pytest.raises(gc.errors.Cancelled):
+        repeat_approximate_sweeps(mesh, cancel)
+    assert len(asked) == 2
+    check_still_usable(mesh, approximate)
+
+
+def repeat_approximate_sweeps(mesh, cancel):
+    while True:
+        gc.approximate_distance(mesh, 0, 1e-6, cancel=cancel)
+
+
+@pytest.mark.parametrize("keep_windows", [True, False])
+def test_memory_limit_is_what_an_approximate_sweep_needs(mesh, approximate, keep_windows):
+    stats = gc.approximate_distance(mesh, 0, keep_windows=keep_windows).stats
+    enough = {"keep_windows": keep_windows, "memory_limit": stats.peak_bytes}
+    field = gc.approximate_distance(mesh, 0, **enough)
+    np.testing.assert_array_equal(field.distances, approximate)
+    with pytest.raises(gc.errors.MemoryLimitExceeded):
+        gc.approximate_distance(mesh, 0, **(enough | {"memory_limit": stats.peak_bytes // 2}))
+
+
+def test_what_is_merged_counts_as_memory(mesh):
+    """What is enough without paths is not with them."""
+    lean = gc.approximate_distance(mesh, 0).stats.peak_bytes
+    with pytest.raises(gc.errors.MemoryLimitExceeded):
+        gc.approximate_distance(mesh, 0, keep_windows=True, memory_limit=lean)
+
+
+def test_an_exception_in_a_callback_of_an_approximate_sweep_comes_out(mesh, approximate):
+    def fail(*_):
+        raise LookupError("the caller's own")
+
+    for stop in ("progress", "cancel"):
+        with pytest.raises(LookupError, match="the caller's own"):
+            gc.approximate_distance(mesh, 0, **{stop: fail})
+    check_still_usable(mesh, approximate)

@@ -1,0 +1,338 @@
+"""Isolines: at their level, complete, joined, and as long as geometry says."""
+
+import math
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from geodesic_core.errors import InvalidArgument
+from geodesic_core.tolerances import CROSSING, LEVEL
+from tests.conftest import WITHOUT_JIT
+from tests.core.fields.test_points import mesh_of, random_points
+from tests.support import zoo
+from tests.support.isoline_checks import (
+    check_crossings,
+    check_ends,
+    check_found_again,
+    check_pieces,
+    check_points,
+    some_levels,
+)
+from tests.support.paths import real_mesh
+
+FINE = 1e-6
+"""Chord error of what is compared with a closed form."""
+
+
+def total_length(lines):
+    return sum(line.length for line in lines)
+
+
+def check_all(mesh, sources, field, levels, *, crossings=True):
+    for level, lines in zip(levels, field.isolines(levels), strict=True):
+        for line in lines:
+            check_pieces(mesh, line)
+            check_ends(mesh, line)
+        if lines:
+            check_points(mesh, sources, level, lines)
+        if crossings:
+            check_crossings(mesh, sources, level, lines)
+
+
+@pytest.mark.jit
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
+def test_all_of_each_level_is_found(case):
+    mesh = mesh_of(case)
+    for source in random_points(mesh, 3, seed=41)[1:]:
+        field = gc.exact_distance(mesh, source, keep_windows=True)
+        check_all(mesh, source, field, some_levels(field, 41, 2))
+
+
+@pytest.mark.jit
+@zoo.each(zoo.KNOWN)
+def test_points_lie_at_the_level_on_slivers_too(case):
+    mesh = mesh_of(case)
+    for source in random_points(mesh, 3, seed=42):
+        field = gc.exact_distance(mesh, source, keep_windows=True)
+        check_all(mesh, source, field, some_levels(field, 42, 2), crossings=False)
+
+
+@zoo.each(zoo.SMALL)
+def test_levels_of_vertices(case):
+    """A level passes through its vertex, or has all around it within."""
+    mesh = mesh_of(case)
+    field = gc.exact_distance(mesh, 0, keep_windows=True)
+    vertices = np.flatnonzero(np.isfinite(field.distances) & (field.distances > 0.0))[:6]
+    levels = field.distances[vertices].tolist()
+    check_all(mesh, 0, field, levels, crossings=False)
+
+
+LEVELS = pytest.mark.parametrize("share", [-3.0, -0.5, 0.0, 0.5, 3.0])
+"""By how much of LEVEL a level is off the distance of a vertex or an edge: as rounding may be."""
+
+
+@LEVELS
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+def test_lines_along_edges_are_one_and_whole(share, scale):
+    """Of a curve along a column of edges, lines run along others, or a hair beside them."""
+    points, faces = zoo.grid(6, 3)
+    turned = scale * points @ zoo.rotation(8).T
+    mesh = gc.TriangleMesh(turned, faces)
+    column = [int(v) for v in np.flatnonzero(points[:, 0] == 2.0)]
+    field = gc.exact_distance(mesh, gc.Curve(column), keep_windows=True)
+    for away, sides in ((1.0, 2), (2.0, 2), (3.0, 1)):
+        level = scale * away * (1.0 + share * LEVEL)
+        (lines,) = field.isolines([level])
+        if away == 2.0:  # the rim itself is within, or a line lies just before it
+            lines = [line for line in lines if (line.points @ zoo.rotation(8))[0, 0] > scale]
+        assert len(lines) == (1 if away == 2.0 else sides)
+        for line in lines:
+            assert not line.closed
+            assert line.length == pytest.approx(3.0 * scale, rel=1e-11)
+            places = line.points @ zoo.rotation(8) / scale
+            np.testing.assert_allclose(np.abs(places[:, 0] - 2.0), away, rtol=2 * CROSSING)
+            check_pieces(mesh, line)
+
+
+@LEVELS
+def test_lines_through_vertices_are_one_and_whole(share):
+    """On a grid, circles through vertices, and along none of their edges."""
+    points, faces = zoo.grid(8, 8)
+    mesh = gc.TriangleMesh(points @ zoo.rotation(9).T, faces)
+    centre = int(np.flatnonzero((points == (4, 4, 0)).all(axis=1))[0])
+    field = gc.exact_distance(mesh, centre)
+    for distance in (1.0, math.sqrt(2.0), 3.0):
+        level = distance * (1.0 + share * LEVEL)
+        (line,) = field.isolines([level], FINE)[0]
+        assert line.closed
+        assert line.length == pytest.approx(2 * math.pi * level, rel=4 * FINE / level)
+        check_pieces(mesh, line)
+
+
+@pytest.mark.parametrize(("share", "lines"), [(-1e4, 1), (-0.5, 0), (0.0, 0), (0.5, 0), (1e4, 0)])
+def test_the_farthest_vertex_is_within_its_own_level(share, lines):
+    points, faces = zoo.grid(5, 4)
+    mesh = gc.TriangleMesh(points @ zoo.rotation(10).T, faces)
+    level = math.hypot(5.0, 4.0) * (1.0 + share * LEVEL)
+    assert len(gc.exact_distance(mesh, 0).isolines([level])[0]) == lines
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_circles_in_the_plane(seed):
+    points, faces = zoo.grid(8, 8, seed=seed, jitter=0.2)
+    mesh = gc.TriangleMesh(points @ zoo.rotation(seed).T, faces)
+    face = int(np.argmin(np.linalg.norm(points[faces].mean(axis=1) - (4, 4, 0), axis=1)))
+    for source in (gc.SurfacePoint.face(face, (0.2, 0.3, 0.5)), gc.SurfacePoint.edge(face, 1, 0.3)):
+        centre = mesh.position(source)
+        field = gc.exact_distance(mesh, source, keep_windows=True)
+        for level, lines in zip(
+            (0.01, 1.0, 2.9), field.isolines([0.01, 1.0, 2.9], FINE), strict=True
+        ):
+            (line,) = lines
+            assert line.closed
+            away = np.linalg.norm(line.points - centre, axis=1)
+            np.testing.assert_allclose(away, level, rtol=1e-12)
+            assert line.length == pytest.approx(2 * math.pi * level, rel=4 * FINE / level)
+
+
+def test_arcs_behind_a_corner():
+    """In a square without its upper right quarter: light from one arm bends into the other."""
+    points, faces = zoo.grid(4, 4)
+    cells = [(x, y) for x in (2, 3) for y in (2, 3)]
+    points, faces = zoo.drop_unused(points, zoo.without_cells(faces, 4, cells))
+    mesh = gc.TriangleMesh(points, faces)
+    source, corner = np.array([4.0, 1.0]), np.array([2.0, 2.0])
+    field = gc.exact_distance(mesh, mesh.locate([*source, 0.0]), keep_windows=True)
+    for level, lines in zip((3.0, 3.6), field.isolines([3.0, 3.6], FINE), strict=True):
+        (line,) = lines
+        assert not line.closed
+        p = line.points[:, :2]
+        turn = (corner - source)[0] * (p - source)[:, 1] - (corner - source)[1] * (p - source)[:, 0]
+        direct = np.linalg.norm(p - source, axis=1)
+        bent = math.dist(source, corner) + np.linalg.norm(p - corner, axis=1)
+        shadow = (turn < 0) & (p[:, 1] > 2)
+        assert shadow.any()
+        np.testing.assert_allclose(np.where(shadow, bent, direct), level, rtol=1e-12)
+
+
+@pytest.mark.parametrize("bulge", [-0.6, 0.0, 0.7, 2.0])
+def test_circles_around_the_tip_of_a_cone(bulge):
+    vertices, faces, _, _ = zoo.cone(12, 1.0)
+    vertices = vertices * (1, 1, 1 + bulge)
+    mesh = gc.TriangleMesh(vertices, faces)
+    degree = np.bincount(faces.ravel())
+    tip = int(np.argmax(degree))
+    arms = vertices[faces[(faces == tip).any(axis=1)]]
+    angle = 0.0
+    for corners, ids in zip(arms, faces[(faces == tip).any(axis=1)].tolist(), strict=True):
+        i = ids.index(tip)
+        u, v = corners[(i + 1) % 3] - corners[i], corners[(i + 2) % 3] - corners[i]
+        angle += math.acos(u @ v / np.linalg.norm(u) / np.linalg.norm(v))
+    field = gc.exact_distance(mesh, tip)
+    level = 0.3 * np.linalg.norm(arms - vertices[tip], axis=2).max()
+    (line,) = field.isolines([level], FINE)[0]
+    assert line.closed
+    assert line.length == pytest.approx(angle * level, rel=1e-5)
+
+
+def test_circles_on_a_cube():
+    mesh = mesh_of(zoo.SMALL["cube"])
+    lengths = [
+        total_length(lines) for lines in gc.exact_distance(mesh, 0).isolines([0.3, 1.0], FINE)
+    ]
+    # Three right angles meet at a corner. Of level 1 the three quarters meet the far edges' ends.
+    np.testing.assert_allclose(lengths, [1.5 * math.pi * 0.3, 1.5 * math.pi], rtol=2e-5)
+
+
+@pytest.mark.jit
+@zoo.each({name: zoo.SMALL[name] for name in ("hills", "annulus", "crumpled_torus", "box_1x2x3")})
+def test_several_sources_with_start_distances(case):
+    mesh = mesh_of(case)
+    points = random_points(mesh, 3, seed=43)
+    sources = [gc.Source(point, 0.05 * i * mesh.diagonal) for i, point in enumerate(points)]
+    field = gc.exact_distance(mesh, sources, keep_windows=True)
+    check_all(mesh, sources, field, some_levels(field, 43, 3))
+
+
+@pytest.mark.jit
+@zoo.each(zoo.SMALL)
+def test_max_distance_and_what_is_kept_change_no_line_within(case):
+    mesh = mesh_of(case)
+    (source,) = random_points(mesh, 1, seed=44)
+    full = gc.exact_distance(mesh, source)
+    levels = some_levels(full, 44, 3)
+    limit = sorted(levels)[1]
+    near = gc.exact_distance(mesh, source, max_distance=limit, keep_windows=True)
+    for level, ours, theirs in zip(
+        levels, near.isolines(levels), full.isolines(levels), strict=True
+    ):
+        if level > limit:
+            assert ours == []
+        else:
+            assert total_length(ours) == pytest.approx(total_length(theirs), rel=1e-9)
+            assert sorted(line.closed for line in ours) == sorted(line.closed for line in theirs)
+
+
+@pytest.mark.jit
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
+def test_windows_kept_or_found_again_draw_the_same_lines(case):
+    mesh = mesh_of(case)
+    point, other = random_points(mesh, 2, seed=46)
+    for sources in (point, [gc.Source(point, 0.1 * mesh.diagonal), other]):
+        check_found_again(mesh, sources, seed=46)
+
+
+@pytest.mark.jit
+@zoo.each(zoo.SMALL)
+def test_approximate_lines_keep_to_the_error(case):
+    mesh = mesh_of(case)
+    (source,) = random_points(mesh, 1, seed=45)
+    error = 0.02
+    for keep in (True, False):
+        field = gc.approximate_distance(mesh, source, error, keep_isolines=keep)
+        for level, lines in zip(
+            levels := some_levels(field, 45, 2), field.isolines(levels), strict=True
+        ):
+            for line in lines:
+                check_pieces(mesh, line)
+                check_ends(mesh, line)
+                positions = line.points[:: max(len(line.points) // 10, 1)]
+                exact = gc.exact_distance(mesh, source, keep_windows=True)
+                found = np.array([exact.distance_at(mesh.locate(p)) for p in positions])
+                assert (found >= level * (1 - 1e-9)).all()
+                assert (found <= level / (1 - error)).all()
+
+
+@pytest.mark.parametrize("chord_error", [1e-2, 1e-4])
+def test_chord_error_is_how_far_chords_stray(chord_error):
+    points, faces = zoo.grid(4, 4)
+    mesh = gc.TriangleMesh(points, faces)
+    (line,) = gc.exact_distance(mesh, 12).isolines([1.7], chord_error)[0]
+    middles = 0.5 * (line.points + np.roll(line.points, -1, axis=0))
+    sagitta = 1.7 - np.linalg.norm(middles - points[12], axis=1)
+    assert 0.3 * chord_error < sagitta.max() <= chord_error * (1 + 1e-9)
+    with_default = gc.exact_distance(mesh, 12).isolines([1.7])[0][0]
+    middles = 0.5 * (with_default.points + np.roll(with_default.points, -1, axis=0))
+    assert (1.7 - np.linalg.norm(middles - points[12], axis=1)).max() < 2e-3
+
+
+def test_levels_are_spaced_evenly():
+    mesh = mesh_of(zoo.SMALL["two_components"])
+    field = gc.exact_distance(mesh, 0)
+    largest = field.distances[np.isfinite(field.distances)].max()
+    np.testing.assert_allclose(field.levels(3), largest * np.array([0.25, 0.5, 0.75]))
+    assert all(field.isolines(field.levels(3)))
+    for count in (0, -1, 1.0, True, "3", None):
+        with pytest.raises(InvalidArgument, match="count of levels"):
+            field.levels(count)
+
+
+def test_there_are_no_levels_where_nothing_is_away():
+    mesh = mesh_of(zoo.SMALL["two_components"])
+    for source in (0, gc.SurfacePoint.face(0, (0.2, 0.3, 0.5))):
+        field = gc.exact_distance(mesh, source, max_distance=1e-6)
+        with pytest.raises(InvalidArgument, match="only sources are reached"):
+            field.levels(3)
+        assert field.isolines([1e-7, 9.0])[1] == []
+
+
+def test_levels_in_their_order_and_more_than_once():
+    mesh = mesh_of(zoo.SMALL["octahedron"])
+    first, second, none, again = gc.exact_distance(mesh, 0).isolines([0.9, 0.2, 99.0, 0.9])
+    assert none == []
+    assert len(first) == len(second) == len(again) == 1
+    np.testing.assert_array_equal(first[0].points, again[0].points)
+    assert first[0].length > second[0].length
+    assert gc.exact_distance(mesh, 0).isolines([]) == []
+
+
+@pytest.mark.parametrize(
+    ("levels", "message"),
+    [
+        (0.5, "sequence of distances"),
+        ("0.5", "sequence of distances"),
+        (None, "sequence of distances"),
+        ([0.5, 0.0], "level 1 is 0.0"),
+        ([-1.0], "level 0 is -1.0"),
+        ([math.inf], "level 0 is inf"),
+        ([math.nan], "level 0 is nan"),
+        ([True], "level 0 is True"),
+        (["1"], "level 0 is '1'"),
+    ],
+)
+def test_levels_that_are_none(levels, message):
+    field = gc.exact_distance(mesh_of(zoo.SMALL["octahedron"]), 0)
+    with pytest.raises(InvalidArgument, match=message):
+        field.isolines(levels)
+
+
+@pytest.mark.parametrize("chord_error", [0.0, -1.0, 1e-12, math.inf, math.nan, "1", True])
+def test_chord_errors_that_are_none(chord_error):
+    field = gc.exact_distance(mesh_of(zoo.SMALL["octahedron"]), 0)
+    with pytest.raises(InvalidArgument, match="chord_error"):
+        field.isolines([0.5], chord_error)
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("name", ["cow.obj", "spot.obj", "alligator.obj", "fandisk10k.ply"])
+def test_real_meshes(name):
+    mesh = gc.load_mesh(real_mesh(name))
+    field = gc.exact_distance(mesh, 0, keep_windows=True)
+    levels = field.levels(5)
+    for level, lines in zip(levels, field.isolines(levels), strict=True):
+        assert lines
+        check_points(mesh, 0, level, lines)
+        for line in lines:
+            check_ends(mesh, line)
+
+
+def test_nothing_is_shared_between_calls():
+    mesh = mesh_of(zoo.SMALL["hills"])
+    field = gc.exact_distance(mesh, 0, keep_windows=not WITHOUT_JIT)
+    first = field.isolines(field.levels(2))
+    for lines, others in zip(first, field.isolines(field.levels(2)), strict=True):
+        for line, other in zip(lines, others, strict=True):
+            np.testing.assert_array_equal(line.points, other.points)
+            line.points[:] = 0.0
+            assert other.points.any()

@@ -1,0 +1,357 @@
+"""Points anywhere on the surface, as sources and as targets."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from tests.conftest import WITHOUT_JIT
+from tests.support import zoo
+from tests.support.certificates import check_path
+from tests.support.oracles import unfolding
+from tests.support.splitting import split_at
+
+EXACT = 1e-9
+"""Relative error allowed against an oracle."""
+
+SAME = 1e-11
+"""Relative difference allowed between two ways to one exact distance."""
+
+
+def mesh_of(case: zoo.Case) -> gc.TriangleMesh:
+    return gc.TriangleMesh(case.vertices, case.faces)
+
+
+def random_points(mesh: gc.TriangleMesh, count: int, seed: int = 0) -> list[gc.SurfacePoint]:
+    """Points inside faces, on edges and at vertices, by turns."""
+    rng = np.random.default_rng(seed)
+    points = []
+    for i, face in enumerate(rng.integers(0, len(mesh.faces), count).tolist()):
+        u, v, w = rng.dirichlet(np.ones(3)).tolist()
+        points.append(
+            [
+                gc.SurfacePoint.face(face, (u, v, w)),
+                gc.SurfacePoint.edge(face, int(rng.integers(3)), float(u)),
+                gc.SurfacePoint.vertex(int(mesh.faces[face, 0])),
+            ][i % 3]
+        )
+    return [mesh.point(point) for point in points]
+
+
+# Where many sheets lie near each other the oracle has too many ways to look at.
+ORACLE = zoo.SMALL | {
+    name: zoo.IRREGULAR[name]
+    for name in ("three_faces_at_an_edge", "flipped_face", "moebius", "book_of_3")
+}
+
+
+@pytest.mark.jit
+@zoo.each(ORACLE)
+def test_distances_are_those_of_a_mesh_with_vertices_there(case):
+    """By the unfolding oracle, which knows vertices only."""
+    mesh = mesh_of(case)
+    points = random_points(mesh, 6, seed=1)
+    vertices, faces, at = split_at(mesh, points)
+    matrix = unfolding.distance_matrix(vertices, faces)
+    for source, v in zip(points, at, strict=True):
+        field = gc.exact_distance(mesh, source, targets=points)
+        np.testing.assert_allclose(
+            field.distances, matrix[v, : len(mesh.vertices)], rtol=EXACT, atol=1e-12
+        )
+        found = [field.distance_at(target) for target in points]
+        np.testing.assert_allclose(found, matrix[v, at], rtol=EXACT, atol=1e-12)
+
+
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
+def test_all_ways_to_a_distance_agree(case):
+    """Swept forth and back, on the way and afterwards, between two points, as a path."""
+    mesh = mesh_of(case)
+    points = random_points(mesh, 4 if WITHOUT_JIT else 9, seed=2)
+    solver = gc.Solver(mesh)
+    fields = [gc.exact_distance(mesh, source, targets=points) for source in points]
+    for i, j in itertools.product(range(len(points)), repeat=2):
+        source, target = points[i], points[j]
+        distance = fields[i].distance_at(target)
+        assert fields[j].distance_at(source) == pytest.approx(distance, rel=SAME, abs=1e-14)
+        later = gc.exact_distance(mesh, source)
+        assert later.distance_at(target) == pytest.approx(distance, rel=SAME, abs=1e-14)
+        if math.isinf(distance):
+            with pytest.raises(gc.errors.NoPath) as caught:
+                solver.shortest_path(source, target)
+            assert caught.value.reason == "disconnected"
+            continue
+        for path in (
+            fields[i].path_to(target),
+            later.path_to(target),
+            solver.shortest_path(source, target),
+        ):
+            check_path(mesh, path, source, target, distance)
+
+
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
+def test_approximate_distances_of_points_keep_to_the_bound(case):
+    mesh = mesh_of(case)
+    points = random_points(mesh, 3 if WITHOUT_JIT else 6, seed=3)
+    for source in points:
+        exact = gc.exact_distance(mesh, source, targets=points)
+        for error in (1e-3, 0.05):
+            field = gc.approximate_distance(mesh, source, error, targets=points, keep_windows=True)
+            assert (field.distances <= exact.distances * (1 + 1e-9)).all()
+            assert (field.distances >= exact.distances * (1 - error)).all()
+            for target in points:
+                distance = exact.distance_at(target)
+                assert field.distance_at(target) <= distance * (1 + 1e-9)
+                assert field.distance_at(target) >= distance * (1 - error)
+                if math.isfinite(distance):
+                    path = field.path_to(target)
+                    assert path.length >= distance * (1 - 1e-9)
+                    assert path.length <= distance * (1 + error)
+
+
+@pytest.mark.parametrize("t", [0.3, 1 / 3, 0.5, 1e-5, 0.7])
+def test_all_spellings_of_a_point_on_an_edge_are_one(t):
+    mesh = mesh_of(zoo.SMALL["icosphere"] if "icosphere" in zoo.SMALL else zoo.SMALL["octahedron"])
+    a, b, c = mesh.faces[0].tolist()
+    other = next(f for f, face in enumerate(mesh.faces.tolist()) if f > 0 and {a, b} <= set(face))
+    corner = next(i for i in range(3) if mesh.faces[other, i] == b)
+    place = (1 - t) * mesh.vertices[a] + t * mesh.vertices[b]
+    spellings = [
+        mesh.point(gc.SurfacePoint.edge(0, 0, t)),
+        mesh.point(gc.SurfacePoint.edge(other, corner, 1 - t)),
+        mesh.point(gc.SurfacePoint.face(0, (1 - t, t, 0.0))),
+        mesh.point(gc.SurfacePoint.face(0, (1 - t, t, -5e-17))),
+        mesh.point(gc.SurfacePoint.face(0, (1 - t, t - 1e-16, 1e-16))),
+        mesh.locate(place),
+        mesh.locate(place * (1 + 1e-15)),
+    ]
+    assert set(spellings) == {spellings[0]}
+    assert mesh.point(spellings[0]) == spellings[0]
+    assert c not in mesh.faces[spellings[0].face_index][np.array(spellings[0].barycentric) > 0]
+
+
+def test_all_spellings_of_a_vertex_are_one():
+    mesh = mesh_of(zoo.SMALL["octahedron"])
+    spellings = [mesh.point(4), mesh.point(np.int32(4)), mesh.point(gc.SurfacePoint.vertex(4))]
+    for face, corners in enumerate(mesh.faces.tolist()):
+        if 4 in corners:
+            i = corners.index(4)
+            weights = [0.0, 0.0, 0.0]
+            weights[i], weights[i - 1] = 1 + 5e-17, -5e-17
+            spellings += [
+                mesh.point(gc.SurfacePoint.edge(face, i, 0.0)),
+                mesh.point(gc.SurfacePoint.edge(face, (i + 2) % 3, 1 - 1e-16)),
+                mesh.point(gc.SurfacePoint.face(face, tuple(weights))),
+            ]
+    spellings += [mesh.locate(mesh.vertices[4]), mesh.locate(mesh.vertices[4] * (1 + 1e-15))]
+    assert set(spellings) == {spellings[0]}
+    assert spellings[0].vertex_index == 4
+    assert spellings[0].face_index == min(np.flatnonzero((mesh.faces == 4).any(axis=1)))
+
+
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
+def test_located_positions_are_where_they_were(case):
+    mesh = mesh_of(case)
+    for point in random_points(mesh, 12, seed=4):
+        place = mesh.position(point)
+        found = mesh.locate(place)
+        np.testing.assert_allclose(mesh.position(found), place, rtol=0, atol=1e-12 * mesh.diagonal)
+        assert mesh.point(found) == found
+
+
+def test_locating_stops_at_max_distance():
+    mesh = mesh_of(zoo.SMALL["octahedron"])
+    away = 0.25 * np.linalg.norm(mesh.vertices[2])
+    outside = mesh.vertices[2] * 1.25
+    assert mesh.locate(outside, 1.001 * away) == mesh.point(2)
+    with pytest.raises(gc.errors.InvalidPoint, match=f"{away:g} away .* max_distance"):
+        mesh.locate(outside, 0.999 * away)
+
+
+@pytest.mark.parametrize("position", [(1, 2), "here", (1, 2, math.nan), (1, math.inf, 0), None])
+def test_positions_that_are_none(position):
+    with pytest.raises(gc.errors.InvalidPoint, match="three finite numbers"):
+        mesh_of(zoo.SMALL["octahedron"]).locate(position)
+
+
+@pytest.mark.parametrize(
+    "point",
+    [
+        gc.SurfacePoint.face(0, (0.5, 0.6, -0.1)),
+        gc.SurfacePoint.face(0, (0.5, 0.4, 0.0)),
+        gc.SurfacePoint.face(0, (0.5, math.nan, 0.5)),
+        gc.SurfacePoint.face(0, (0.5, 0.5)),
+        gc.SurfacePoint.face(0, "abc"),
+        gc.SurfacePoint.face(8, (0.5, 0.5, 0.0)),
+        gc.SurfacePoint.face(-1, (0.5, 0.5, 0.0)),
+        gc.SurfacePoint.face(True, (0.5, 0.5, 0.0)),
+        gc.SurfacePoint.edge(0, 1, 1.5),
+        gc.SurfacePoint.edge(0, 1, -0.1),
+    ],
+)
+def test_points_that_are_not_on_the_mesh(point):
+    mesh = mesh_of(zoo.SMALL["octahedron"])
+    field = gc.exact_distance(mesh, 0)
+    for ask, name in (
+        (lambda: gc.exact_distance(mesh, [1, point]), "source 1"),
+        (lambda: gc.exact_distance(mesh, 0, targets=[point]), "target 0"),
+        (lambda: gc.shortest_path(mesh, 0, point), "target"),
+        (lambda: gc.shortest_path(mesh, 0, 1, [2, point]), "waypoint 1"),
+        (lambda: field.path_to(point), "target"),
+        (lambda: field.distance_at(point), "point"),
+    ):
+        with pytest.raises(gc.errors.InvalidPoint, match=name):
+            ask()
+
+
+def test_corners_that_there_are_not():
+    with pytest.raises(gc.errors.InvalidPoint, match="corner of face 7 is 3"):
+        gc.SurfacePoint.edge(7, 3, 0.5)
+
+
+def test_two_points_of_one_face_have_the_segment_between_them():
+    mesh = mesh_of(zoo.SMALL["octahedron"])
+    here, there = gc.SurfacePoint.face(3, (0.2, 0.3, 0.5)), gc.SurfacePoint.face(3, (0.6, 0.3, 0.1))
+    path = gc.shortest_path(mesh, here, there)
+    np.testing.assert_array_equal(path.points, [mesh.position(here), mesh.position(there)])
+    assert path.faces.tolist() == [3]
+
+
+def test_several_sources_and_start_distances():
+    mesh = mesh_of(zoo.SMALL["octahedron"])
+    points = random_points(mesh, 6, seed=5)
+    sources = [gc.Source(point, 0.1 * i) for i, point in enumerate(points)]
+    field = gc.exact_distance(mesh, sources, targets=points)
+    single = [gc.exact_distance(mesh, point, targets=points) for point in points]
+    least = np.min([f.distances + 0.1 * i for i, f in enumerate(single)], axis=0)
+    np.testing.assert_allclose(field.distances, least, rtol=SAME)
+    nearest = np.argmin([f.distances + 0.1 * i for i, f in enumerate(single)], axis=0)
+    np.testing.assert_array_equal(field.nearest_source, nearest)
+    plain = gc.exact_distance(mesh, sources)
+    for target in points:
+        expected = min(f.distance_at(target) + 0.1 * i for i, f in enumerate(single))
+        assert field.distance_at(target) == pytest.approx(expected, rel=SAME, abs=1e-15)
+        assert plain.distance_at(target) == pytest.approx(expected, rel=SAME, abs=1e-15)
+
+
+@pytest.mark.jit
+@zoo.each(zoo.KNOWN)
+def test_max_distance_counts_for_points_as_for_vertices(case):
+    mesh = mesh_of(case)
+    source, *targets = random_points(mesh, 12, seed=6)
+    full = gc.exact_distance(mesh, source, targets=targets)
+    known = sorted(full.distance_at(target) for target in targets)
+    limit = 0.5 * (known[4] + known[5])
+    near = gc.exact_distance(mesh, source, limit)
+    told = gc.exact_distance(mesh, source, limit, targets)
+    for target in targets:
+        distance = full.distance_at(target)
+        if distance > limit:
+            assert near.distance_at(target) == told.distance_at(target) == math.inf
+            for field in (near, told):
+                with pytest.raises(gc.errors.NoPath) as caught:
+                    field.path_to(target)
+                assert caught.value.reason in ("beyond_max_distance", "disconnected")
+        else:
+            assert told.distance_at(target) == pytest.approx(distance, rel=SAME, abs=1e-14)
+            assert near.distance_at(target) == pytest.approx(distance, rel=EXACT, abs=1e-14)
+
+
+@zoo.each(zoo.SMALL)
+def test_points_of_an_edge_by_its_ends(case):
+    mesh = mesh_of(case)
+    for face, corners in list(enumerate(mesh.faces.tolist()))[:30]:
+        for corner in range(3):
+            start, end = corners[corner], corners[(corner + 1) % 3]
+            for t in (0.0, 0.3, 1 / 3, 1.0, 1 + 1e-16, -5e-17):
+                point = mesh.point_on_edge(start, end, t)
+                assert point == mesh.point(gc.SurfacePoint.edge(face, corner, t))
+                assert point == mesh.point_on_edge(end, start, 1.0 - t)
+
+
+@pytest.mark.parametrize(
+    ("ends", "t", "message"),
+    [
+        ((0, 5), 0.5, "no edge joins the vertices 0 and 5"),
+        ((0, 0), 0.5, "no edge joins"),
+        ((0, -1), 0.5, "end of the edge is vertex -1"),
+        ((6, 0), 0.5, "end of the edge is vertex 6"),
+        ((0, 1.0), 0.5, "end of the edge is 1.0"),
+        ((0, 1), 1.5, "t is 1.5"),
+        ((0, 1), -1e-6, "t is -1e-06"),
+        ((0, 1), math.nan, "t is nan"),
+        ((0, 1), "0.5", "t is '0.5'"),
+    ],
+)
+def test_edges_and_shares_that_there_are_not(ends, t, message):
+    vertices = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 2, 2], [3, 3, 3]]
+    mesh = gc.TriangleMesh(vertices, [[0, 1, 2], [0, 2, 3]])
+
+    with pytest.raises(gc.errors.InvalidPoint, match=message):
+        mesh.point_on_edge(*ends, t)
+
+
+@zoo.each(zoo.SMALL)
+@pytest.mark.parametrize("approximate", [False, True])
+def test_the_nearest_source_of_points(case, approximate):
+    """By a sweep from each source alone; where two are as near, either will do."""
+    mesh = mesh_of(case)
+    points = random_points(mesh, 4 if WITHOUT_JIT else 8, seed=7)
+    sources = [gc.Source(point, 0.1 * i * mesh.diagonal) for i, point in enumerate(points[:3])]
+    alone = [
+        [source.start_distance + gc.exact_distance(mesh, source.point).distance_at(point)
+         for source in sources]
+        for point in points
+    ]  # fmt: skip
+    solve = gc.approximate_distance if approximate else gc.exact_distance
+    for targets in ((), points):
+        field = solve(mesh, sources, targets=targets)
+        for point, distances in zip(points, alone, strict=True):
+            nearest = field.nearest_source_at(point)
+            if math.isinf(min(distances)):
+                assert nearest == -1
+            else:
+                assert distances[nearest] <= min(distances) * (1 + 3e-3) + 1e-14
+        nearest = [field.nearest_source_at(v) for v in range(len(mesh.vertices))]
+        np.testing.assert_array_equal(nearest, field.nearest_source)
+
+
+@pytest.mark.parametrize("position", [(1e51, 0, 0), (0, -1e160, 0), (0, 0, 1.7e308)])
+def test_positions_too_large_for_vertices(position):
+    with pytest.raises(gc.errors.InvalidPoint, match=r"at most 1e\+50 in size"):
+        mesh_of(zoo.SMALL["octahedron"]).locate(position)
+
+
+@pytest.mark.parametrize("weight", [0.0, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 7e-9, 1e-8, 1e-6])
+def test_points_hard_by_an_irregular_edge_are_found_again(weight):
+    """The line toward them ends just beyond the edge: not before it, as in the other faces."""
+    mesh = mesh_of(zoo.IRREGULAR["three_faces_at_an_edge"])
+    start = gc.SurfacePoint.face(1, (5e-4, 0.9685, 0.031))
+    beside = gc.SurfacePoint.face(2, (0.9765 - weight, 0.0235, weight))
+    there = gc.exact_distance(mesh, start)
+    back = gc.exact_distance(mesh, beside)
+    distance = there.distance_at(beside)
+    assert back.distance_at(start) == pytest.approx(distance, rel=SAME)
+    check_path(mesh, there.path_to(beside), start, beside, distance)
+    check_path(mesh, back.path_to(start), beside, start, distance)
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(3), *(pytest.param(i, marks=pytest.mark.full) for i in range(3, 20))]
+)
+@zoo.each({name: case for name, case in zoo.IRREGULAR.items() if name.startswith("complex")})
+def test_approximate_paths_take_the_right_face_beyond_an_irregular_edge(case, seed):
+    """Where windows were merged, a face that the path did not come from leads nowhere."""
+    mesh, rng = mesh_of(case), np.random.default_rng(seed)
+    for _ in range(12):
+        points = [
+            gc.SurfacePoint.face(int(face), tuple(rng.dirichlet(np.ones(3)).tolist()))
+            for face in rng.integers(len(mesh.faces), size=4)
+        ]
+        exact = gc.exact_distance(mesh, points[:2], targets=points)
+        field = gc.approximate_distance(mesh, points[:2], 1e-3, targets=points, keep_windows=True)
+        for target in [*points, *range(len(mesh.vertices))]:
+            distance = exact.distance_at(target)
+            length = field.path_to(target).length
+            assert distance * (1 - 1e-9) - 1e-15 <= length <= distance * (1 + 1e-3) + 1e-15

@@ -1,0 +1,91 @@
+"""Outcomes of the backtrace beside the path itself, which `tests/core/test_paths.py` checks."""
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from geodesic_core.fields.sweep import Control
+from geodesic_core.kernels.mesh.half_edges import APEX, OPPOSITE
+from geodesic_core.kernels.paths.backtracing import LOST, NO_ROOM, TRACED, Winners, trace_path
+from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources
+from geodesic_core.kernels.sweep.state import ENTRY_EDGE, PREDECESSOR
+from tests.support import zoo
+from tests.support.stepping import finished, started, topology_of
+
+
+def trace(topology, wave, target, room):
+    nodes, faces = np.empty(room, np.int32), np.empty(room, np.int32)
+    nearest = nearest_sources(wave.distance, wave.winner_ints, wave.origin)
+    found = {name: getattr(wave, name) for name in Winners._fields[1:]}
+    winners = Winners(nearest=nearest, **found)
+    outcome, count = trace_path(
+        topology,
+        winners,
+        target,
+        nodes,
+        np.empty(room),
+        faces,
+    )
+    return outcome, nodes[:count], faces[: max(count - 1, 0)]
+
+
+def solved(name, source):
+    topology = topology_of(zoo.SMALL[name])
+    return topology, finished(topology, started(topology, source))
+
+
+@pytest.mark.parametrize("name", ["jittered_grid", "comb", "crumpled_torus"])
+def test_too_little_room_is_told_and_enough_is_enough(name):
+    topology, wave = solved(name, 0)
+    target = int(np.argmax(np.where(np.isfinite(wave.distance), wave.distance, -1)))
+    outcome, nodes, faces = trace(topology, wave, target, 1000)
+    assert outcome == TRACED
+    assert len(nodes) > 4
+    for room in range(1, len(nodes)):
+        assert trace(topology, wave, target, room)[0] == NO_ROOM
+    again, same, crossed = trace(topology, wave, target, len(nodes))
+    assert again == TRACED
+    np.testing.assert_array_equal(same, nodes)
+    np.testing.assert_array_equal(crossed, faces)
+
+
+def broken(name):
+    """A field in which one vertex claims to have been reached from outside, over the boundary."""
+    topology, wave = solved(name, 0)
+    h = int(np.flatnonzero(topology.links[:, OPPOSITE] < 0)[-1])
+    v = int(topology.links[h, APEX])
+    others = np.setdiff1d(np.arange(len(wave.distance)), topology.links[h])
+    wave.winner_ints[v, ENTRY_EDGE], wave.winner_ints[v, PREDECESSOR] = h, others[0]
+    wave.winner[v] = (0.1, -5.0)
+    wave.distance[v] = 0.0  # nothing else lies on the way
+    return topology, wave, v
+
+
+def test_a_line_that_leaves_the_surface_is_lost():
+    topology, wave, v = broken("jittered_grid")
+    outcome, nodes, _ = trace(topology, wave, v, 100)
+    assert outcome == LOST
+    assert nodes.tolist() == [-1 - v]
+
+
+def test_a_lost_line_is_an_internal_error():
+    case = zoo.SMALL["jittered_grid"]
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    field = gc.exact_distance(mesh, 0)
+    _, wave, v = broken("jittered_grid")
+    for name in ("winner", "winner_ints", "distance"):
+        getattr(field._winners.get(Control()), name)[:] = getattr(wave, name)
+    with pytest.raises(gc.errors.InternalError, match="left the surface"):
+        field.path_to(int(mesh.topology.outer_vertex[v]))
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
+def test_long_paths_get_more_room(scale):
+    """More points than a path gets room for at first."""
+    points, faces = zoo.grid(700, 1)
+    mesh = gc.TriangleMesh(points * scale, faces)
+    path = gc.exact_distance(mesh, 0).path_to(len(points) - 2)
+    assert len(path.points) > 256
+    end = np.linalg.norm(points[-2] - points[0])
+    assert path.length == pytest.approx(scale * end, rel=1e-12)

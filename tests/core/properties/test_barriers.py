@@ -1,0 +1,112 @@
+"""What holds of any mesh with any faces blocked."""
+
+import math
+
+import numpy as np
+from hypothesis import given
+
+import geodesic_core as gc
+from tests.core.properties.test_exact import mesh_of, seeds
+from tests.support.certificates import check_path
+from tests.support.oracles import unfolding
+from tests.support.random_meshes import cases
+
+EXACT = 1e-9
+"""Relative error allowed against the oracle."""
+
+
+def blocked_at_random(case, rng):
+    """Random faces, up to half of them, one by one or as a patch; and the faces that are free."""
+    count = int(rng.integers(1, 1 + len(case.faces) // 2))
+    barriers = rng.choice(len(case.faces), count, replace=False)
+    if rng.random() < 0.5:
+        centroids = case.vertices[case.faces].mean(axis=1)
+        away = np.linalg.norm(centroids - centroids[barriers[0]], axis=1)
+        barriers = np.argsort(away, kind="stable")[:count]
+    return barriers, np.setdiff1d(np.arange(len(case.faces)), barriers)
+
+
+def random_points(mesh, free, rng):
+    """Points of free faces, where they may be shared with blocked ones."""
+    for face in rng.choice(free, 4).tolist():
+        u, v, w = rng.dirichlet(np.ones(3)).tolist()
+        yield gc.SurfacePoint.face(face, (u, v, w))
+        yield gc.SurfacePoint.edge(face, int(rng.integers(3)), u)
+        yield int(mesh.faces[face, 0])
+
+
+@given(cases(), seeds)
+def test_agrees_with_the_oracle_of_the_free_faces(case, seed):
+    rng = np.random.default_rng(seed)
+    barriers, free = blocked_at_random(case, rng)
+    mesh = mesh_of(case).with_barriers(barriers)
+    matrix = unfolding.distance_matrix(case.vertices, case.faces[free])
+    for source in rng.integers(0, len(case.vertices), 3).tolist():
+        found = gc.exact_distance(mesh, source).distances
+        np.testing.assert_allclose(found, matrix[source], rtol=EXACT, atol=0)
+
+
+@given(cases(), seeds)
+def test_points_are_as_far_as_on_a_mesh_of_the_free_faces(case, seed):
+    rng = np.random.default_rng(seed)
+    barriers, free = blocked_at_random(case, rng)
+    mesh = mesh_of(case).with_barriers(barriers)
+    alone = gc.TriangleMesh(case.vertices, case.faces[free])
+    points = [mesh.point(point) for point in random_points(mesh, free, rng)]
+    others = [
+        gc.SurfacePoint.face(int(np.searchsorted(free, point.face_index)), point.barycentric)
+        for point in points
+    ]
+    np.testing.assert_array_equal(
+        gc.distance_matrix(mesh, points, points), gc.distance_matrix(alone, others, others)
+    )
+    for solve in (gc.exact_distance, gc.approximate_distance):
+        field, known = solve(mesh, points[0]), solve(alone, others[0])
+        np.testing.assert_array_equal(field.distances, known.distances)
+        found = [field.distance_at(point) for point in points]
+        np.testing.assert_array_equal(found, [known.distance_at(point) for point in others])
+
+
+@given(cases(), seeds)
+def test_paths_keep_to_free_faces(case, seed):
+    rng = np.random.default_rng(seed)
+    barriers, free = blocked_at_random(case, rng)
+    mesh = mesh_of(case).with_barriers(barriers)
+    source, *targets = random_points(mesh, free, rng)
+    field = gc.exact_distance(mesh, source, targets=targets)
+    solver = gc.Solver(mesh)
+    for target in targets:
+        distance = field.distance_at(target)
+        if math.isfinite(distance):
+            check_path(mesh, field.path_to(target), source, target, distance)
+            check_path(mesh, solver.shortest_path(source, target), source, target, distance)
+
+
+@given(cases(), seeds)
+def test_barriers_never_shorten_a_distance(case, seed):
+    rng = np.random.default_rng(seed)
+    barriers, _ = blocked_at_random(case, rng)
+    mesh = mesh_of(case)
+    source = int(rng.integers(len(case.vertices)))
+    distances = gc.exact_distance(mesh, source).distances
+    for some in (barriers[: len(barriers) // 2], barriers):
+        longer = gc.exact_distance(mesh, source, barriers=some).distances
+        assert (longer >= distances * (1 - 1e-12)).all()
+        distances = longer
+
+
+@given(cases(), seeds)
+def test_all_spellings_of_a_point_among_barriers_are_one(case, seed):
+    """From each face of the edge, blocked or free, and by its ends."""
+    rng = np.random.default_rng(seed)
+    barriers, free = blocked_at_random(case, rng)
+    mesh = mesh_of(case).with_barriers(barriers)
+    for face in rng.choice(free, 5).tolist():
+        corner, t = int(rng.integers(3)), float(rng.random())
+        start, end = (int(mesh.faces[face, (corner + i) % 3]) for i in (0, 1))
+        point = mesh.point(gc.SurfacePoint.edge(face, corner, t))
+        assert point.face_index not in barriers
+        assert point == mesh.point_on_edge(end, start, 1 - t)
+        for other in np.flatnonzero(np.isin(mesh.faces, (start, end)).sum(axis=1) == 2).tolist():
+            weights = [{start: 1 - t, end: t}.get(v, 0.0) for v in mesh.faces[other].tolist()]
+            assert mesh.point(gc.SurfacePoint.face(other, tuple(weights))) == point

@@ -1,0 +1,71 @@
+"""What holds of paths between two points on any mesh, and what the oracle says."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+
+import geodesic_core as gc
+from tests.core.properties.test_approximate import split_cases
+from tests.core.properties.test_exact import mesh_of, seeds
+from tests.support.certificates import LENGTH
+from tests.support.oracles import unfolding
+from tests.support.random_meshes import cases
+from tests.support.searches import STEPS, check_search, random_pairs
+
+EXACT = 1e-9
+"""Relative error allowed against the oracle, and where the mesh itself was rounded anew."""
+
+
+@given(cases(), seeds)
+def test_a_solver_agrees_with_the_oracle_again_and_again(case, seed):
+    solver = gc.Solver(mesh_of(case))
+    matrix = unfolding.distance_matrix(case.vertices, case.faces)
+    for source, target in random_pairs(solver.mesh, 12, seed):
+        path = solver.shortest_path(source, target)
+        assert path.length == pytest.approx(matrix[source, target], rel=EXACT, abs=0)
+
+
+@given(split_cases(), seeds)
+def test_paths_are_those_of_the_full_sweep_both_ways(case, seed):
+    solver = gc.Solver(mesh_of(case))
+    for source, target in random_pairs(solver.mesh, 6, seed):
+        distance = gc.exact_distance(solver.mesh, source).distances[target]
+        path = solver.shortest_path(source, target)
+        check_search(solver.mesh, path, source, target, distance)
+        back = solver.shortest_path(target, source)
+        check_search(solver.mesh, back, target, source, distance)
+
+
+@given(split_cases(), seeds)
+def test_no_pair_leaves_anything_behind_for_the_next(case, seed):
+    solver = gc.Solver(mesh_of(case))
+    for source, target in random_pairs(solver.mesh, 8, seed):
+        used = solver.shortest_path(source, target)
+        fresh = gc.shortest_path(solver.mesh, source, target)
+        assert used.length == pytest.approx(fresh.length, rel=1e-12, abs=0)
+
+
+@given(split_cases(), seeds)
+def test_bounds_tighten_and_stay_bounds(case, seed):
+    solver = gc.Solver(mesh_of(case))
+    for source, target in random_pairs(solver.mesh, 5, seed):
+        path = solver.shortest_path(source, target, explain=True)
+        assert [step.name for step in path.steps] == STEPS
+        bounds = np.array([step.bound for step in path.steps])
+        assert (bounds[1:] <= bounds[:-1] * (1 + LENGTH)).all()
+        assert (bounds >= path.length * (1 - LENGTH)).all()
+        assert set(path.faces.tolist()) <= set(path.steps[4].faces.tolist())
+
+
+@given(cases(), seeds)
+def test_waypoints_are_passed_and_a_detour_is_no_shorter(case, seed):
+    mesh = mesh_of(case)
+    source, target = random_pairs(mesh, 1, seed)[0]
+    connected = np.flatnonzero(mesh.components == mesh.components[source])
+    waypoints = np.random.default_rng(seed).choice(connected, 3).tolist()
+    path = gc.shortest_path(mesh, source, target, waypoints)
+    stops = [source, *waypoints, target]
+    matrix = unfolding.distance_matrix(case.vertices, case.faces)
+    assert path.length == pytest.approx(matrix[stops[:-1], stops[1:]].sum(), rel=EXACT, abs=0)
+    assert path.length >= matrix[source, target] * (1 - EXACT)
+    assert set(stops) <= {place.vertex_index for place in path.locations}

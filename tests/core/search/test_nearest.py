@@ -1,0 +1,188 @@
+"""The geodesically nearest of some candidates."""
+
+import math
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from geodesic_core.kernels.sweep import state
+from geodesic_core.search import target_sweep
+from tests.conftest import WITHOUT_JIT
+from tests.core.fields.test_points import EXACT, SAME, mesh_of, random_points
+from tests.support import zoo
+from tests.support.oracles import unfolding
+from tests.support.splitting import split_at
+
+
+def check_nearest(found, distances, k, rtol=SAME, limit=math.inf):
+    """What is found are the k least of the distances that are within the limit."""
+    distances = np.asarray(distances)
+    count = min(k, int((distances <= limit).sum()))
+    assert found.indices.shape == found.distances.shape == (count,)
+    assert len(set(found.indices.tolist())) == count
+    np.testing.assert_allclose(found.distances, distances[found.indices], rtol, 1e-12)
+    np.testing.assert_allclose(found.distances, np.sort(distances)[:count], rtol, 1e-12)
+
+
+@pytest.mark.jit
+@zoo.each(zoo.SMALL)
+def test_the_nearest_are_those_of_the_oracle(case):
+    mesh = mesh_of(case)
+    points = random_points(mesh, 10, seed=31)
+    vertices, faces, at = split_at(mesh, points)
+    expected = unfolding.distance_matrix(vertices, faces)[np.ix_(at, at)]
+    solver = gc.Solver(mesh)
+    for source, distances in zip(points, expected, strict=True):
+        for k in (1, 3, 10):
+            found = gc.nearest(mesh, source, points, k)
+            check_nearest(found, np.where(np.isinf(distances), np.nan, distances), k, EXACT)
+            again = solver.nearest(source, points, k)
+            np.testing.assert_array_equal(again.indices, found.indices)
+            np.testing.assert_array_equal(again.distances, found.distances)
+
+
+@zoo.each({name: zoo.SMALL[name] for name in ("crags", "crumpled_torus", "two_components")})
+def test_the_nearest_are_those_of_a_field(case):
+    mesh = mesh_of(case)
+    points = random_points(mesh, 8, seed=32)
+    source, candidates = points[0], points[1:]
+    field = gc.exact_distance(mesh, source, targets=candidates)
+    distances = [field.distance_at(point) for point in candidates]
+    limit = float(np.sort(distances)[2]) * (1 + 1e-9)
+    reachable = [d if math.isfinite(d) else math.nan for d in distances]
+    for k in (1, 2, 7):
+        check_nearest(gc.nearest(mesh, source, candidates, k), reachable, k)
+        near = gc.nearest(mesh, source, candidates, k, limit)
+        check_nearest(near, reachable, k, limit=limit)
+
+
+def test_equal_distances_go_by_the_lowest_index():
+    """The octahedron's four neighbours of a corner, in any order; rounding does not count."""
+    mesh = mesh_of(zoo.SMALL["octahedron"].moved(zoo.rotation(3), (0.1, 0.7, -0.3)))
+    for candidates in ([1, 2, 3, 4, 5], [5, 4, 1, 3, 2, 0], [4, 4, 2, 4]):
+        distances = [0.0 if c == 0 else math.sqrt(3) if c == 1 else 1.0 for c in candidates]
+        expected = np.argsort(distances, kind="stable")
+        for k in range(1, len(candidates) + 1):
+            found = gc.nearest(mesh, 0, candidates, k)
+            np.testing.assert_array_equal(found.indices, expected[:k])
+            np.testing.assert_allclose(found.distances, np.array(distances)[expected[:k]], SAME)
+
+
+def test_permuted_candidates_are_the_same_points():
+    mesh = mesh_of(zoo.SMALL["hills"])
+    points = random_points(mesh, 12, seed=33)
+    order = np.random.default_rng(33).permutation(11)
+    found = gc.nearest(mesh, points[0], points[1:], 5)
+    mixed = gc.nearest(mesh, points[0], [points[1 + i] for i in order], 5)
+    np.testing.assert_array_equal(order[mixed.indices], found.indices)
+    np.testing.assert_allclose(mixed.distances, found.distances, SAME)
+
+
+def test_what_cannot_be_reached_is_left_out():
+    case = zoo.SMALL["two_components"]
+    mesh = mesh_of(case)
+    here, there = np.flatnonzero(mesh.components == 0), np.flatnonzero(mesh.components == 1)
+    some = gc.nearest(mesh, int(here[0]), [int(there[0]), int(here[1]), int(there[1])], 3)
+    assert some.indices.tolist() == [1]
+    none = gc.nearest(mesh, int(here[0]), there.tolist())
+    assert len(none.indices) == len(none.distances) == 0
+    seen = []
+    gc.nearest(mesh, int(here[0]), there.tolist(), progress=seen.append)
+    assert seen[-1] == 1
+
+
+@pytest.mark.jit
+def test_the_sweep_ends_at_the_last_of_the_nearest(monkeypatch):
+    """It makes hardly more windows than one to the distance, which it could not know."""
+    made = []
+    sweep_nodes = target_sweep.sweep_nodes
+
+    def counted(*arguments):
+        wave = sweep_nodes(*arguments)
+        made.append(int(wave.counters[state.CREATED]))
+        return wave
+
+    monkeypatch.setattr(target_sweep, "sweep_nodes", counted)
+    mesh = gc.TriangleMesh(*zoo.icosphere(6))
+    field = gc.exact_distance(mesh, 0)
+    order = np.argsort(field.distances)
+    candidates = order[np.linspace(1, len(order) - 1, 50).astype(int)].tolist()
+    for k in (1, 3, 10, 25, 50):
+        found = gc.nearest(mesh, 0, candidates, k)
+        within = gc.exact_distance(mesh, 0, max_distance=found.distances[-1])
+        assert made[-1] <= 1.6 * within.stats.windows_created + 1000
+    assert made[0] < 0.01 * field.stats.windows_created
+
+
+BAD = [
+    ({"candidates": []}, "InvalidArgument", "no candidates"),
+    ({"candidates": 3}, "InvalidArgument", "candidates is 3"),
+    ({"candidates": [1, -1]}, "InvalidPoint", "candidate 1 is vertex -1"),
+    ({"candidates": [6]}, "InvalidPoint", "candidate 0 is vertex 6"),
+    ({"source": 6}, "InvalidPoint", "source is vertex 6"),
+    ({"source": [0]}, "InvalidPoint", "source is"),
+    ({"k": 0}, "InvalidArgument", "k is 0; .* from 1 to the number of candidates, 3"),
+    ({"k": 4}, "InvalidArgument", "k is 4"),
+    ({"k": 1.0}, "InvalidArgument", "k is 1.0"),
+    ({"k": True}, "InvalidArgument", "k is True"),
+    ({"max_distance": -1.0}, "InvalidArgument", "max_distance is -1.0"),
+    ({"deadline_s": 0}, "InvalidArgument", "deadline_s is 0"),
+]
+
+
+@pytest.mark.parametrize(("changed", "error", "message"), BAD)
+def test_bad_arguments_are_named(changed, error, message):
+    mesh = mesh_of(zoo.SMALL["octahedron"])
+    arguments = {"source": 0, "candidates": [1, 2, 3]} | changed
+    for ask in (lambda **kwargs: gc.nearest(mesh, **kwargs), gc.Solver(mesh).nearest):
+        with pytest.raises(getattr(gc.errors, error), match=message):
+            ask(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        ({"cancel": lambda: True}, gc.errors.Cancelled),
+        ({"deadline_s": 1e-9}, gc.errors.DeadlineExceeded),
+        ({"memory_limit": 1000}, gc.errors.MemoryLimitExceeded),
+    ],
+)
+def test_it_stops_and_leaves_nothing_behind(arguments, error):
+    mesh = gc.TriangleMesh(*zoo.icosphere(2 if WITHOUT_JIT else 5))
+    solver, candidates = gc.Solver(mesh), random_points(mesh, 9, seed=34)
+    before = solver.nearest(0, candidates, 9)
+    for ask in (solver.nearest, lambda *a, **k: gc.nearest(mesh, *a, **k)):
+        with pytest.raises(error):
+            ask(0, candidates, 9, **arguments)
+    after = solver.nearest(0, candidates, 9)
+    np.testing.assert_array_equal(after.indices, before.indices)
+    np.testing.assert_array_equal(after.distances, before.distances)
+
+
+@pytest.mark.jit
+def test_a_question_that_was_stopped_under_way_leaves_nothing_behind():
+    mesh = gc.TriangleMesh(*zoo.icosphere(6))
+    solver, last = gc.Solver(mesh), len(mesh.vertices) - 1
+    expected = gc.nearest(mesh, 0, [last, 5, 9], 3)
+    for stop_at in (1, 2, 5, 20):
+        asked = []
+
+        def cancel(asked=asked, stop_at=stop_at):
+            asked.append(1)
+            return len(asked) > stop_at
+
+        with pytest.raises(gc.errors.Cancelled):
+            solver.nearest(0, [last], cancel=cancel)
+        found = solver.nearest(0, [last, 5, 9], 3)
+        np.testing.assert_array_equal(found.indices, expected.indices)
+        np.testing.assert_array_equal(found.distances, expected.distances)
+
+
+def test_progress_grows_from_zero_to_one():
+    mesh = mesh_of(zoo.SMALL["cube_in_fours"])
+    seen = []
+    gc.nearest(mesh, 0, [1, 2, 3], 2, progress=seen.append)
+    assert len(seen) >= 2
+    assert seen == sorted(seen)
+    assert seen[-1] == 1

@@ -1,0 +1,129 @@
+"""The page of a service that asks for keys."""
+
+from collections.abc import Iterator
+
+import httpx2
+import pytest
+from playwright.sync_api import Browser, Page, Request
+
+from tests.page.conftest import sample, serving
+from tests.support.viewing import PLAIN, View
+
+KEY = "of-a-page-0123456789"
+BEARER = {"Authorization": f"Bearer {KEY}"}
+
+
+@pytest.fixture(scope="module")
+def service(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:  # noqa: ARG001
+    """A service that has one key; ``view`` goes there."""
+    with serving(tmp_path_factory.mktemp("store"), GEODESIC_API_KEYS=f"page:{KEY}") as address:
+        yield address
+
+
+@pytest.fixture(scope="module")
+def knot(service: str) -> str:
+    return sample(service, "knot", 10_000, **BEARER)
+
+
+@pytest.fixture(scope="module")
+def large(service: str) -> str:
+    """The id of a mesh whose distances take seconds, as an estimate tells."""
+    return sample(service, "knot", 450_000, **BEARER)
+
+
+def give_key(page: Page, key: str) -> None:
+    page.fill("#key", key)
+    page.press("#key", "Enter")
+
+
+def test_a_key_is_asked_for_and_a_wrong_one_refused(view: View) -> None:
+    view.page.goto("/")
+    view.wait("error")
+    assert view.page.is_visible("#key")
+    assert view.page.evaluate("document.activeElement.id") == "key"
+
+    with view.page.expect_response("**/v1") as answer:
+        give_key(view.page, "of-a-page-9876543210")
+    view.wait("error")
+    problem = answer.value.json()
+    assert problem["status"] == 401
+    assert view.text("#error-title") == problem["title"]
+    assert view.text("#error-detail") == problem["detail"]
+    assert problem["request_id"] in view.text("#error-request")
+
+    give_key(view.page, KEY)
+    view.wait()
+    assert not view.page.is_visible("#error")
+    view.page.click("#samples [data-sample=sphere]")
+    view.wait()
+    view.click(0, 0)
+    assert "one piece, closed" in view.text("#report")
+    assert view.page.is_visible("#legend")
+
+
+def test_a_file_is_uploaded_with_the_key(view: View, wedge: str) -> None:
+    view.page.goto("/")
+    view.wait("error")
+    give_key(view.page, KEY)
+    view.wait()
+    view.upload("wedge.obj", wedge)
+
+    assert "5 vertices, 3 faces" in view.text("#report")
+
+
+def test_a_permalink_is_drawn_once_the_key_is_given(view: View, knot: str) -> None:
+    address = f"/?mesh={knot}&source=v0&target=v1000&{PLAIN}"
+    view.page.goto(address)
+    view.wait("error")
+    assert not view.page.is_visible("#readout")
+
+    give_key(view.page, KEY)
+    view.wait()
+    length = view.text("#length")
+    url = f"{view.page.url.split('/?')[0]}/v1/meshes/{knot}/path?from=v0&to=v1000"
+    assert float(length) == pytest.approx(httpx2.get(url, headers=BEARER).json()["length"], 1e-5)
+    assert view.page.is_visible("#legend")
+
+    view.open(address)  # the key is remembered while the tab is open
+    assert view.text("#length") == length
+
+
+def test_a_key_that_no_longer_holds_is_asked_for_anew(view: View, knot: str) -> None:
+    view.page.goto("/")
+    view.wait("error")
+    give_key(view.page, KEY)
+    view.wait()
+    view.page.reload()
+    view.wait()
+    arrays = "**/arrays/**"
+    view.page.context.route(arrays, lambda route: route.continue_(headers={}))
+    with view.page.expect_response(arrays) as answer:
+        view.page.select_option("#meshes", knot)
+    view.wait("error")
+    assert view.text("#error-detail") == answer.value.json()["detail"]
+
+    view.page.context.unroute(arrays)
+    give_key(view.page, KEY)
+    view.wait()
+    assert "one piece, closed" in view.text("#report")
+
+
+def test_progress_is_read_with_the_key(view: View, large: str) -> None:
+    streams: list[Request] = []
+    view.page.on("request", lambda each: streams.append(each) if "/events" in each.url else None)
+    view.page.goto(f"/?mesh={large}&source=v0&{PLAIN}")
+    view.wait("error")
+    give_key(view.page, KEY)
+
+    told = view.page.locator("#progress[value]")
+    told.wait_for()
+    first = float(told.get_attribute("value") or 0)
+    view.page.wait_for_function(
+        "least => document.getElementById('progress').value > least", arg=first
+    )
+    view.wait()
+
+    (stream,) = streams
+    assert stream.resource_type == "fetch"
+    assert stream.headers["authorization"] == BEARER["Authorization"]
+    assert view.page.is_visible("#legend")

@@ -1,0 +1,558 @@
+"""What people do on the page, and what they see."""
+
+import json
+import math
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import httpx2
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Route
+
+from tests.support.paths import ROOT
+from tests.support.viewing import PLAIN, View, angle_at, length_of, query_of
+
+PATH = np.array([230, 0, 92])
+BARRIER = np.array([30, 33, 40])
+
+
+def ramp_at(view: View, share: float, pixels: np.ndarray) -> np.ndarray:
+    """Return the colour that the legend has for a share of the largest distance."""
+    box = view.page.locator("#ramp").bounding_box()
+    assert box is not None
+    x, y = box["x"] + share * (box["width"] - 1), box["y"] + box["height"] / 2
+    return pixels[round(y), round(x)].astype(float)
+
+
+def is_shade_of(seen: np.ndarray, colour: np.ndarray) -> bool:
+    """Whether a colour is another one in some light."""
+    cosine = seen @ colour / np.linalg.norm(seen) / np.linalg.norm(colour)
+    return bool(cosine > 0.99)
+
+
+def seen(view: View, colour: np.ndarray, within: int = 12) -> np.ndarray:
+    """Return where on the mesh a colour is: offsets from the middle, (N, 2)."""
+    rows, columns = np.nonzero(np.abs(view.pixels() - colour).max(axis=2) <= within)
+    places = np.column_stack([columns, rows]) - view.centre
+    return places[np.hypot(*places.T) < 240]  # beyond is text
+
+
+# Load
+
+
+def test_a_sample_is_loaded_and_a_click_colours_it(view: View) -> None:
+    view.open()
+    ground = view.colour(-300, -300)
+    view.page.click("#samples [data-sample=sphere]")
+    view.wait()
+    assert "one piece, closed" in view.text("#report")
+    assert view.page.is_visible("#hint")
+    clay = view.colour()
+    assert np.ptp(clay) < 40
+    assert np.abs(clay - ground).max() > 20
+
+    view.click(0, 0)
+
+    assert query_of(view)["source"][0].startswith("f")
+    assert np.ptp(view.colour(60, 60)) > 40
+    assert not view.page.is_visible("#hint")
+
+
+def test_a_file_is_dropped(view: View, wedge: str) -> None:
+    view.open()
+    with view.page.expect_response("**/v1/meshes?format=obj"):
+        view.page.evaluate(
+            """text => {
+                const files = new DataTransfer();
+                files.items.add(new File([text], "wedge.obj"));
+                document.dispatchEvent(new DragEvent("dragover", {dataTransfer: files}));
+                document.dispatchEvent(new DragEvent("drop", {dataTransfer: files}));
+            }""",
+            wedge,
+        )
+    view.wait()
+
+    assert "5 vertices, 3 faces" in view.text("#report")
+    assert "wedge.obj" in view.text("#meshes option:checked")
+
+
+def test_a_long_list_of_meshes_goes_on(view: View, sphere: str, knot: str) -> None:
+    """Listed one by one, so that two are many."""
+
+    def one_at_a_time(route: Route) -> None:
+        route.continue_(url=route.request.url.replace("limit=100", "limit=1"))
+
+    view.page.route("**/v1/meshes?*", one_at_a_time)
+    view.open()
+    listed = "[...document.getElementById('meshes').options].map(option => option.value)"
+    ids = view.page.evaluate(listed)[1:]
+    assert ids[1:] == ["more"]
+    while ids[-1] == "more":
+        with view.page.expect_response("**/v1/meshes?*"):
+            view.page.select_option("#meshes", "more")
+        view.page.wait_for_function(
+            f"{listed}.length != {len(ids) + 1} || !{listed}.includes('more')"
+        )
+        ids = view.page.evaluate(listed)[1:]
+
+    assert ids == sorted(set(ids))
+    assert {sphere, knot} <= set(ids)
+    view.page.select_option("#meshes", knot)
+    view.wait()
+    assert query_of(view)["mesh"] == [knot]
+
+
+WATCH_PROGRESS = """
+    window.told = [];
+    addEventListener('DOMContentLoaded', () => {
+        const bar = document.getElementById('progress');
+        const words = document.getElementById('waiting-for');
+        new MutationObserver(() => window.told.push({
+            share: bar.hasAttribute('value') ? bar.value : null,
+            words: words.textContent,
+            state: document.documentElement.dataset.state,
+            isSeen: getComputedStyle(bar).visibility === 'visible',
+        })).observe(bar, {attributeFilter: ['value']});
+    });
+"""
+
+
+def test_an_upload_shows_its_progress(view: View, wedge: str) -> None:
+    file = wedge + "\n" + "# as large as files are\n" * 30_000
+    view.page.add_init_script(WATCH_PROGRESS)
+    view.open()
+    view.throttle_uploads(500_000)
+    view.upload("wedge.obj", file)
+
+    told = view.page.evaluate("window.told")
+    assert {(each["words"], each["state"]) for each in told} == {
+        ("Uploading wedge.obj…", "loading")
+    }
+    *shares, last = [each["share"] for each in told]
+    assert len(shares) > 2
+    assert shares == sorted(shares)
+    assert 0 < shares[0] < 0.5 < shares[-1] < 1
+    assert told[-1]["isSeen"]
+    assert last is None, "how much of it the service has read, nobody knows"
+    assert "5 vertices, 3 faces" in view.text("#report")
+
+
+def test_an_upload_can_be_cancelled(view: View, wedge: str) -> None:
+    view.open()
+    view.throttle_uploads(20_000)
+    file = wedge + "\n" + "# never sent\n" * 50_000
+    view.page.set_input_files(
+        "#file", {"name": "wedge.obj", "mimeType": "", "buffer": file.encode()}
+    )
+    view.wait("loading")
+    with view.page.expect_event("requestfailed"):
+        view.page.click("#cancel")
+    view.wait()
+
+    assert not view.page.is_visible("#error")
+    assert view.text("#report") == ""
+
+
+def test_an_empty_file(view: View) -> None:
+    view.open()
+    view.page.set_input_files("#file", {"name": "empty.obj", "mimeType": "", "buffer": b""})
+    view.wait("error")
+
+    assert view.text("#error-request").startswith("Request ")
+
+
+def test_faults_are_marked(view: View, wedge: str) -> None:
+    view.open()
+    view.upload("wedge.obj", wedge)
+    red = np.array([217, 26, 26])
+    assert len(seen(view, red)) == 0
+
+    view.page.click("text=Show >> nth=0")
+    view.wait()
+
+    assert "edge of three or more faces" in view.text("#report")
+    assert len(seen(view, red)) > 20
+
+
+def test_a_refused_file_is_told_in_the_service_s_words(view: View) -> None:
+    view.open()
+    nonsense = {"name": "nonsense.ply", "mimeType": "", "buffer": b"ply\nnonsense"}
+    view.page.set_input_files("#file", nonsense)
+    view.wait("error")
+
+    with view.page.expect_response("**/v1/meshes?format=ply") as answer:
+        view.page.set_input_files("#file", nonsense)
+    view.wait("error")
+
+    problem = answer.value.json()
+    assert view.text("#error-title") == problem["title"]
+    assert view.text("#error-detail") == problem["detail"]
+    assert problem["request_id"] in view.text("#error-request")
+    view.page.click("#error-close")
+    view.wait()
+
+
+# Ask
+
+
+def test_colours_are_those_of_the_distance(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(0, 0)
+
+    pixels = view.pixels()
+    for away in [(40, 0), (-90, 0), (0, 110), (100, -100), (0, -160)]:
+        share = angle_at(view, math.hypot(*away)) / math.pi
+        colour = view.colour(*away, pixels)
+        assert is_shade_of(colour, ramp_at(view, share, pixels)), away
+        assert not is_shade_of(colour, ramp_at(view, share + 0.3, pixels)), away
+
+
+def test_the_ramp_grows_lighter_evenly(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&source=v0&{PLAIN}")
+    pixels = view.pixels()
+    linear = np.array([ramp_at(view, t, pixels) / 255 for t in np.linspace(0.01, 0.99, 25)]) ** 2.2
+    luminance = linear @ [0.2126, 0.7152, 0.0722]
+    steps = np.diff(np.cbrt(luminance))
+
+    assert (steps > 0).all()
+    assert steps.max() < 2.5 * steps.min()
+
+
+def test_the_path_follows_the_pointer(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(-100, 0)
+    view.drag((-100, 0), (0, 60), (100, 40))
+
+    angle = angle_at(view, 100), angle_at(view, math.hypot(100, 40))
+    directions = math.pi - math.atan2(40, 100)
+    chord = math.cos(angle[0]) * math.cos(angle[1]) + math.sin(angle[0]) * math.sin(
+        angle[1]
+    ) * math.cos(directions)
+    assert length_of(view) == pytest.approx(math.acos(chord), rel=0.01)
+    assert "exact" in view.text("#length-note")
+    path = seen(view, PATH)
+    assert path[:, 0].min() < -90 < 90 < path[:, 0].max()
+    assert view.page.get_attribute("#readout", "data-target") == query_of(view)["target"][0]
+
+    view.drag((100, 40), (0, 40))  # the target itself
+    assert seen(view, PATH)[:, 0].max() < 20
+
+
+SLOW_PATHS = """
+    window.aborted = 0;
+    const real = window.fetch;
+    window.fetch = (address, init) => !String(address).endsWith('/path') ? real(address, init)
+        : new Promise((resolve, reject) => {
+            const due = setTimeout(() => real(address, init).then(resolve, reject), 700);
+            init.signal.addEventListener('abort', () => {
+                window.aborted += 1;
+                clearTimeout(due);
+                reject(new DOMException('', 'AbortError'));
+            });
+        });
+"""
+
+
+def test_of_targets_the_newest_wins_and_the_superseded_is_aborted(view: View, sphere: str) -> None:
+    view.page.add_init_script(SLOW_PATHS)
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(-100, 0)
+    view.drag((-100, 0), (0, 100), (60, 60), (100, 0), steps=6)
+
+    assert view.page.evaluate("window.aborted") >= 1
+    assert view.page.get_attribute("#readout", "data-target") == query_of(view)["target"][0]
+    assert length_of(view) == pytest.approx(2 * angle_at(view, 100), rel=0.01)
+
+
+def test_alt_sets_a_target_and_shift_adds_a_source(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(-120, 0)
+    view.click(120, 0, "Shift")
+    view.click(60, 0, "Alt")
+
+    query = query_of(view)
+    assert len(query["source"]) == 2
+    assert length_of(view) == pytest.approx(
+        angle_at(view, 120) - angle_at(view, 60), rel=0.01
+    )  # from the nearer of them
+
+    view.page.click("#shades >> text=Territories")
+    view.wait()
+    left, right = view.colour(-60, 60), view.colour(60, 60)
+    assert left[0] > left[2], "orange"
+    assert right[2] > right[0], "sky blue"
+    assert view.page.locator("#territories li").count() == 2
+
+
+def test_waypoints_and_barriers(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(-100, 0)
+    view.click(100, 0, "Alt")
+    straight = length_of(view)
+    assert len(seen(view, BARRIER, 20)) == 0
+
+    view.page.click("#tools >> text=Barrier")
+    view.drag((0, -60), (0, 60), steps=2)
+    wall = seen(view, BARRIER, 20)
+    assert wall[:, 1].min() < -50 < 50 < wall[:, 1].max()
+    around = length_of(view)
+    assert around > straight * 1.05
+
+    view.page.click("#tools >> text=Via")
+    view.click(0, 150)
+    assert length_of(view) > around
+    assert "via 1" in view.text("#length-note")
+
+    view.page.click("#clear")
+    view.wait()
+    assert not view.page.is_visible("#readout")
+    assert len(seen(view, BARRIER, 20)) == 0
+
+
+def test_exact_and_approximate_side_by_side(view: View, knot: str) -> None:
+    view.open(f"/?mesh={knot}&source=v0&error=0.1")
+    assert view.text("#bound-approximate") == "–"
+
+    view.page.click("#methods >> text=Approximate")
+    view.wait()
+
+    assert view.text("#bound-approximate") == "10 %"
+    assert query_of(view)["method"] == ["approximate"]
+    assert 0 < float(view.text("#measured-approximate").split()[0]) < 10
+    assert view.text("#bound-exact") == "0"
+
+    view.page.click("#shades >> text=Difference")
+    view.wait()
+
+    assert "promised: 10" in view.text("#legend-title")
+    assert view.text("#tick-2") == view.text("#measured-approximate").split()[0]
+
+
+def test_points_can_be_written(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.page.fill("#sources", "v0 p0,0,2")
+    view.page.fill("#target", "f0:0.5,0.5,0")
+    view.page.press("#target", "Enter")
+    view.page.wait_for_selector("#readout:visible")
+    view.wait()
+    assert length_of(view) > 0
+
+    view.page.fill("#target", "v99999999")
+    view.page.press("#target", "Enter")
+    view.wait("error")
+    assert "99999999" in view.text("#error-detail")
+
+    view.page.fill("#target", "nonsense")
+    view.page.press("#target", "Enter")
+    view.page.wait_for_selector("#error-detail:has-text('“nonsense” is no point')")
+
+
+def test_a_largest_distance(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}&max_distance=0.5")
+    view.click(0, 0)
+
+    assert view.text("#tick-2") == "0.5" or float(view.text("#tick-2")) < 0.5
+    assert np.ptp(view.colour(20, 20)) > 40
+    assert np.ptp(view.colour(-160, 0)) < 40
+
+
+# See
+
+
+def test_isolines_are_where_they_should_be(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(0, 0)
+    without = view.pixels()
+    view.page.select_option("#lines", "spacing")
+    view.page.fill("#lines-value", "0.5")
+    view.page.press("#lines-value", "Enter")
+    view.wait()
+
+    changed = np.abs(view.pixels() - without).max(axis=2) > 30
+    x, y = map(round, view.centre)
+    crossings = np.flatnonzero(changed[y, x : x + 190])
+    expected = [
+        away for away in range(190) for k in (1, 2) if abs(angle_at(view, away) - 0.5 * k) < 0.006
+    ]
+    assert len(crossings) > 0
+    assert all(np.abs(crossings - away).min() <= 2 for away in expected)
+    assert all(np.abs(np.array(expected) - crossing).min() <= 4 for crossing in crossings)
+
+
+def test_the_search_step_by_step(view: View, knot: str) -> None:
+    view.open(f"/?mesh={knot}&source=v0&target=v1000")
+    orange = view.pixels()
+    view.page.click("#explain-start")
+    view.wait()
+    words = []
+    for _ in range(3):
+        words.append(view.text("#step-words"))
+        view.page.press("#step", "ArrowRight")
+    view.wait()
+
+    assert words[0].startswith("1 of ")
+    assert "Along edges" in words[0]
+    assert "window" in words[2]
+    assert (np.abs(view.pixels() - orange).max(axis=2) > 40).sum() > 500
+    view.page.click("#explain-stop")
+    assert not view.page.is_visible("#steps")
+
+
+def test_wireframe_and_theme(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    plain = view.pixels()
+    view.page.check("#wireframe")
+    view.wait()
+    view.page.wait_for_timeout(200)
+    assert (np.abs(view.pixels() - plain).max(axis=2) > 25).sum() > 2000
+
+    ground = view.colour(-330, -330)
+    view.page.click("#theme")
+    assert np.abs(view.colour(-330, -330) - ground).min() > 100
+
+
+# Wait
+
+
+def test_a_long_query_tells_its_progress_and_can_be_cancelled(view: View, large: str) -> None:
+    view.open(f"/?mesh={large}&{PLAIN}")
+    streams: list[str] = []
+    view.page.on(
+        "request", lambda each: streams.append(each.url) if "/events" in each.url else None
+    )
+    view.page.fill("#sources", "v0")
+    view.page.press("#sources", "Enter")
+    told = view.page.locator("#progress[value]")
+    told.wait_for()
+    first = float(told.get_attribute("value") or 0)
+    while float(told.get_attribute("value") or 0) <= first:
+        view.page.wait_for_timeout(20)
+
+    with view.page.expect_request(lambda each: each.method == "DELETE"):
+        view.page.click("#cancel")
+    view.wait()
+
+    assert len(streams) == 1
+    assert np.ptp(view.colour()) < 40, "not coloured"
+    jobs = httpx2.get(view.page.url.split("/?")[0] + "/v1/jobs").json()["jobs"]
+    assert jobs[0]["status"] == "dismissed"
+
+    view.page.fill("#sources", "v1")
+    view.page.press("#sources", "Enter")
+    told.wait_for()
+    view.page.keyboard.press("Escape")
+    view.wait()
+    assert not view.page.is_visible("#legend")
+
+
+# Take away
+
+
+def test_a_permalink_restores_points_and_view(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}")
+    view.drag((-250, 250), (-150, 200))  # beside the mesh: turns it
+    view.click(-50, 0)
+    view.click(80, 30, "Alt")
+    view.page.click("#copy-link")
+    link = view.page.evaluate("navigator.clipboard.readText()")
+    before, length = view.pixels(), view.text("#length")
+
+    view.open("/")
+    view.open(link)
+
+    assert view.text("#length") == length
+    changed = np.abs(view.pixels() - before).max(axis=2) > 8
+    box = view.page.locator("#canvas").bounding_box()
+    assert box is not None
+    assert changed[100:600, int(box["x"]) :].mean() < 0.001
+
+
+def test_a_permalink_to_nothing(view: View) -> None:
+    view.page.goto("/?mesh=0123456789abcdef")
+    view.wait("error")
+
+    assert view.text("#error-title") == "Mesh not found"
+
+
+def test_downloads(view: View, knot: str, tmp_path: Path) -> None:
+    view.open(f"/?mesh={knot}&source=v0&target=v1000")
+    with view.page.expect_download() as download:
+        view.page.click("#download-distances >> text=NPY")
+    download.value.save_as(tmp_path / "d.npy")
+    distances = np.load(tmp_path / "d.npy")
+    assert distances[0] == 0
+    assert distances[1000] == pytest.approx(length_of(view), rel=1e-5)
+
+    with view.page.expect_download() as download:
+        view.page.click("#picture")
+    assert download.value.suggested_filename == "geodesic.png"
+    download.value.save_as(tmp_path / "p.png")
+    picture = np.asarray(Image.open(tmp_path / "p.png").convert("RGB"), int)
+    assert (np.abs(picture - PATH).max(axis=2) < 12).sum() > 100
+
+    written = set(httpx2.get(view.page.url.split("/?")[0] + "/v1").json()["answer_formats"])
+    for what, formats in {"path": {"obj", "svg", "csv"}, "isolines": {"obj", "svg"}}.items():
+        offered = {text.lower() for text in view.text(f"#download-{what}").split()}
+        assert offered == formats & written
+
+
+def test_copied_programs_run(view: View, knot: str) -> None:
+    view.open(f"/?mesh={knot}&source=v4000&source=v0&target=v1000")
+    length = length_of(view)
+    view.page.click("#copy-curl")
+    command = view.page.evaluate("navigator.clipboard.readText()")
+    view.page.click("#copy-python")
+    program = view.page.evaluate("navigator.clipboard.readText()")
+
+    run = partial(subprocess.run, capture_output=True, text=True, check=True)
+    by_curl = run(["bash", "-c", command]).stdout
+    by_python = run([sys.executable, "-c", program]).stdout
+
+    assert json.loads(by_curl)["length"] == pytest.approx(length, rel=1e-5)
+    assert float(by_python.split()[0]) == pytest.approx(length, rel=1e-5)
+
+
+# For everyone
+
+
+def test_by_keyboard_alone(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    keys = view.page.keyboard
+    view.page.focus("#canvas")
+    keys.press("Enter")
+    view.wait()
+    for _ in range(4):
+        keys.press("ArrowRight")
+    keys.press("t")
+    view.wait()
+    assert length_of(view) == pytest.approx(4 * 0.12 * math.sin(1.2), rel=0.02)
+
+    keys.press("e")
+    view.wait()
+    assert view.page.is_checked("#methods [value=approximate]")
+    keys.press("i")
+    keys.press("w")
+    assert view.page.is_checked("#wireframe")
+    assert "lines" not in query_of(view), "as many as at first"
+    keys.press("f")
+    assert "view" not in query_of(view)
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_no_serious_fault_of_access(view: View, knot: str, theme: str) -> None:
+    axe = ROOT / "app/web/node_modules/axe-core/axe.min.js"
+    view.page.emulate_media(color_scheme="dark" if theme == "dark" else "light")
+    for address in ("/", f"/?mesh={knot}&source=v0&source=v10&target=v1000&shade=territories"):
+        view.open(address)
+        view.page.evaluate(axe.read_text())
+        found = view.page.evaluate("axe.run()")
+        serious = [
+            (each["id"], [node["html"][:120] for node in each["nodes"]])
+            for each in found["violations"]
+            if each["impact"] in ("serious", "critical")
+        ]
+        assert serious == []

@@ -1,0 +1,280 @@
+"""Keys, limits and origins, as clients meet them."""
+
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from app.main import create_app
+from app.settings import Settings
+from tests.support.service import TWO_TRIANGLES, check_problem, serving, wait_until
+
+ALICE, BOB = "alice-0123456789", "bob/0123456789=="
+PAGE = "https://example.org"
+
+
+def bearer(secret: str) -> dict[str, str]:
+    return {"Authorization": f"Bearer {secret}"}
+
+
+@pytest.fixture(scope="module")
+def keyed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    """A service that asks for keys; pages of one origin may use it."""
+    keys = f"alice:{ALICE},bob:{BOB}"
+    store = tmp_path_factory.mktemp("keyed")
+    with serving(store, api_keys=keys, cors_origins=PAGE) as client:
+        yield client
+
+
+def limited(store: Path, **settings: Any) -> TestClient:
+    """A service that can answer what needs no worker."""
+    return TestClient(create_app(Settings(store=store, workers=1, **settings)))
+
+
+# Keys
+
+
+@pytest.mark.parametrize("path", ["/", "/livez", "/readyz", "/openapi.json", "/problems/forbidden"])
+def test_open_paths_need_no_key(keyed: TestClient, path: str) -> None:
+    assert keyed.get(path).status_code == 200
+    assert keyed.get(path, headers=bearer("wrong")).status_code == 200
+
+
+@pytest.mark.parametrize(
+    ("method", "path"),
+    [
+        ("GET", "/v1"),
+        ("GET", "/v1/meshes"),
+        ("POST", "/v1/meshes?sample=plane"),
+        ("DELETE", "/v1/meshes/0"),
+        ("GET", "/metrics"),
+        ("GET", "/nowhere"),
+        ("GET", "/problems"),
+        ("GET", "http://testserver//livez"),
+        ("GET", "/livez/"),
+        ("GET", "/livez/../v1"),
+        ("GET", "/LIVEZ"),
+        ("OPTIONS", "/v1"),
+    ],
+)
+def test_all_else_needs_one(keyed: TestClient, method: str, path: str) -> None:
+    response = keyed.request(method, path)
+
+    check_problem(response, 401, "unauthorized")
+    assert response.headers["www-authenticate"] == "Bearer"
+
+
+def test_every_operation_needs_a_key_or_is_open(keyed: TestClient) -> None:
+    for template, path in keyed.get("/openapi.json").json()["paths"].items():
+        for method, operation in path.items():
+            url = template.replace("{code}", "forbidden")
+            has_passed = keyed.request(method, url).status_code != 401
+            assert has_passed == ("security" not in operation), (method, template)
+            assert ("401" in operation["responses"]) == ("security" in operation)
+            assert ("429" in operation["responses"]) == ("security" in operation)
+
+
+@pytest.mark.parametrize("scheme", ["Bearer", "bearer", "BEARER", "Bearer  "])
+@pytest.mark.parametrize("secret", [ALICE, BOB, BOB + " \t"])
+def test_any_of_the_keys_opens(keyed: TestClient, scheme: str, secret: str) -> None:
+    assert keyed.get("/v1", headers={"Authorization": f"{scheme} {secret}"}).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        b"",
+        b"Bearer",
+        b"Bearer ",
+        b"Bearer wrong",
+        b"Basic " + ALICE.encode(),
+        b"Bearer" + ALICE.encode(),
+        b"Bearer\t" + ALICE.encode(),
+        b"Bearer " + ALICE.encode() + b" x",
+        b"Bearer " + ALICE.encode() + b"\x00",
+        b"Bearer " + ALICE.encode()[:-1],
+        b"Bearer " + ALICE.upper().encode(),
+        b"Bearer " + ALICE.encode() + b"=",
+        b"Bearer " + ALICE.encode() + b", Bearer " + BOB.encode(),
+        b"Bearer " + ALICE.encode("utf-16"),
+        b"Bearer " + ALICE.replace("a", "\u0430").encode(),
+        b"Bearer \xff\xfe",
+        b"Bearer alice:" + ALICE.encode(),
+        b"Bearer " + b"x" * 60_000,
+        ALICE.encode(),
+    ],
+)
+def test_anything_else_does_not(keyed: TestClient, given: bytes) -> None:
+    response = keyed.get("/v1", headers=[(b"Authorization", given)])
+
+    problem = check_problem(response, 401, "unauthorized")
+    assert response.headers["www-authenticate"] == 'Bearer error="invalid_token"'
+    assert response.headers["cache-control"] == "no-store"
+    assert "0123456789" not in response.text
+    assert "Authorization: Bearer" in problem["hint"]
+
+
+def test_two_keys_are_none(keyed: TestClient) -> None:
+    both = [(b"Authorization", f"Bearer {secret}".encode()) for secret in (ALICE, BOB)]
+
+    check_problem(keyed.get("/v1", headers=both), 401, "unauthorized")
+
+
+def test_a_key_elsewhere_is_none(keyed: TestClient) -> None:
+    check_problem(keyed.get("/v1", params={"access_token": ALICE}), 401, "unauthorized")
+    check_problem(
+        keyed.get("/v1", headers={"Cookie": f"Authorization={ALICE}"}), 401, "unauthorized"
+    )
+
+
+def test_without_keys_any_or_none_will_do(client: TestClient) -> None:
+    assert client.get("/v1").status_code == 200
+    assert client.get("/v1", headers=bearer("whatever")).status_code == 200
+
+
+def test_a_mesh_is_shared_but_its_owner_s_to_delete(keyed: TestClient) -> None:
+    alice, bob = bearer(ALICE), bearer(BOB)
+    first = keyed.post("/v1/meshes", json=TWO_TRIANGLES, headers=alice)
+    again = keyed.post("/v1/meshes", json=TWO_TRIANGLES, headers=bob)
+    assert (first.status_code, again.status_code) == (201, 200)
+    assert again.json() == first.json()
+    link = first.headers["location"]
+
+    assert keyed.get(link, headers=bob).json() == first.json()
+    assert "alice" not in first.text
+    problem = check_problem(keyed.delete(link, headers=bob), 403, "forbidden")
+    assert "alice" not in problem["detail"]
+    assert keyed.get(link, headers=bob).status_code == 200
+
+    assert keyed.delete(link, headers=alice).status_code == 204
+    check_problem(keyed.delete(link, headers=bob), 404, "mesh_not_found")
+    assert keyed.post("/v1/meshes", json=TWO_TRIANGLES, headers=bob).status_code == 201
+    assert keyed.delete(link, headers=bob).status_code == 204
+
+
+def test_a_sample_has_an_owner_too_but_no_longer_when_its_manifest_is_damaged(
+    keyed: TestClient,
+) -> None:
+    sample = {"sample": "plane", "faces": 50}
+    link = keyed.post("/v1/meshes", params=sample, headers=bearer(ALICE)).headers["location"]
+    check_problem(keyed.delete(link, headers=bearer(BOB)), 403, "forbidden")
+
+    app: Any = keyed.app
+    folder = app.state.service.settings.store / "meshes" / Path(link).name
+    (folder / "manifest.json").write_bytes(b"{")
+
+    assert keyed.delete(link, headers=bearer(BOB)).status_code == 204
+
+
+def test_openapi_declares_the_scheme(keyed: TestClient) -> None:
+    document = keyed.get("/openapi.json").json()
+
+    scheme = document["components"]["securitySchemes"]["apiKey"]
+    assert (scheme["type"], scheme["scheme"]) == ("http", "bearer")
+    assert document["paths"]["/v1/meshes"]["post"]["security"] == [{"apiKey": []}, {}]
+
+
+# Limits of a caller
+
+
+def test_rate_limit(tmp_path: Path) -> None:
+    client = limited(tmp_path, rate_limit=2)
+
+    assert client.get("/v1").json()["limits"]["GEODESIC_RATE_LIMIT"] == 2
+    assert client.get("/v1").status_code == 200
+    response = client.get("/v1")
+    problem = check_problem(response, 429, "rate_limited")
+    assert (problem["limit"], problem["setting"]) == (2, "GEODESIC_RATE_LIMIT")
+    assert 1 <= int(response.headers["retry-after"]) <= 30
+    for _ in range(5):
+        assert client.get("/livez").status_code == 200
+        assert client.get("/readyz").status_code == 503
+
+
+def test_addresses_have_rates_of_their_own(tmp_path: Path) -> None:
+    app = create_app(Settings(store=tmp_path, workers=1, rate_limit=1))
+    one, other = (TestClient(app, client=(host, 1)) for host in ("10.0.0.1", "10.0.0.2"))
+
+    assert [one.get("/v1").status_code for _ in range(2)] == [200, 429]
+    forged = {"X-Forwarded-For": "10.9.9.9", "Forwarded": "for=10.9.9.9"}
+    assert one.get("/v1", headers=forged).status_code == 429
+    assert other.get("/v1").status_code == 200
+
+
+def test_keys_have_rates_of_their_own_wherever_they_come_from(tmp_path: Path) -> None:
+    keys = f"alice:{ALICE},bob:{BOB},alice:{'n' * 16}"
+    app = create_app(Settings(store=tmp_path, workers=1, rate_limit=1, api_keys=keys))
+    one, other = (TestClient(app, client=(host, 1)) for host in ("10.0.0.1", "10.0.0.2"))
+
+    assert one.get("/v1", headers=bearer(ALICE)).status_code == 200
+    assert one.get("/v1", headers=bearer(BOB)).status_code == 200
+    assert other.get("/v1", headers=bearer(ALICE)).status_code == 429
+    assert other.get("/v1", headers=bearer("n" * 16)).status_code == 429
+    assert other.get("/v1").status_code == 401
+
+
+def test_requests_at_the_same_time(tmp_path: Path) -> None:
+    with limited(tmp_path, max_concurrent=1) as client, ThreadPoolExecutor(1) as pool:
+        engine = client.app.state.service.engine  # type: ignore[attr-defined]
+        asked = pool.submit(client.post, "/v1/meshes", params={"sample": "plane", "faces": 8})
+        wait_until(lambda: len(engine._waiting) == 1)  # for the worker, which starts
+
+        response = client.get("/v1")
+        problem = check_problem(response, 429, "rate_limited")
+        assert (problem["limit"], problem["actual"]) == (1, 2)
+        assert problem["setting"] == "GEODESIC_MAX_CONCURRENT"
+        assert response.headers["retry-after"] == "1"
+        assert client.get("/livez").status_code == 200
+
+        assert asked.result().status_code == 201
+        assert client.get("/v1").status_code == 200
+
+
+# Pages of other origins
+
+
+def test_pages_of_no_other_origin_unless_set(client: TestClient) -> None:
+    ask = {"Origin": PAGE, "Access-Control-Request-Method": "POST"}
+
+    assert not any("access-control" in n for n in client.get("/v1", headers=ask).headers)
+    preflight = client.options("/v1/meshes", headers=ask)
+    assert preflight.status_code == 405
+    assert not any("access-control" in name for name in preflight.headers)
+
+
+@pytest.mark.parametrize("method", ["GET", "POST", "DELETE"])
+def test_preflight_needs_no_key(keyed: TestClient, method: str) -> None:
+    wanted = "authorization,content-type,idempotency-key,prefer,x-timeout-ms"
+    ask = {
+        "Origin": PAGE,
+        "Access-Control-Request-Method": method,
+        "Access-Control-Request-Headers": wanted,
+    }
+    response = keyed.options("/v1/meshes", headers=ask)
+
+    assert response.status_code == 200
+    assert response.headers["access-control-allow-origin"] == PAGE
+    assert response.headers["access-control-allow-headers"] == wanted
+    assert method in response.headers["access-control-allow-methods"]
+
+
+def test_pages_read_answers_and_refusals_with_all_headers(keyed: TestClient) -> None:
+    for headers, status in ((bearer(ALICE), 200), (bearer("wrong"), 401)):
+        response = keyed.get("/v1", headers={"Origin": PAGE, **headers})
+        assert response.status_code == status
+        assert response.headers["access-control-allow-origin"] == PAGE
+        assert response.headers["access-control-expose-headers"] == "*"
+        assert "access-control-allow-credentials" not in response.headers
+        assert "Origin" in response.headers["vary"]
+
+
+@pytest.mark.parametrize("origin", ["https://example.org.evil", "http://example.org", "null"])
+def test_pages_of_other_origins_do_not(keyed: TestClient, origin: str) -> None:
+    response = keyed.get("/v1", headers={"Origin": origin, **bearer(ALICE)})
+
+    assert "access-control-allow-origin" not in response.headers
+    ask = {"Origin": origin, "Access-Control-Request-Method": "GET"}
+    assert "access-control-allow-origin" not in keyed.options("/v1", headers=ask).headers

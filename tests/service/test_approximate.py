@@ -1,0 +1,321 @@
+"""Approximate answers: what they promise, and how they differ from exact ones."""
+
+import json
+from io import BytesIO
+from typing import Any
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+import geodesic_core as gc
+from app.queries import PathQuery, result_key
+from app.schemas.service import PathRequest, VertexPoint
+from tests.support.service import NPY, check_problem, distances, mesh_of, upload_sample
+
+ROUNDING = 1e-9
+SOURCES = [{"vertex": 3}, {"vertex": 400, "start_distance": 0.25}]
+ENDS = {"source": {"vertex": 3}, "target": {"vertex": 700}}
+WRITTEN_ENDS = "from=v3&to=v700"
+
+
+@pytest.fixture(scope="module")
+def knot(client: TestClient) -> str:
+    """The id of a curved mesh, on which windows merge."""
+    return upload_sample(client, "knot", 3000)
+
+
+def approximate(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
+    return distances(client, mesh_id, headers, method="approximate", **body)
+
+
+def path(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
+    return client.post(f"/v1/meshes/{mesh_id}/path", json=ENDS | body, headers=headers)
+
+
+# Distances
+
+
+def test_distances_are_the_library_s(client: TestClient, knot: str) -> None:
+    field = gc.approximate_distance(mesh_of(client, knot), 3, relative_error=0.01)
+
+    answer = approximate(client, knot, sources=[{"vertex": 3}], relative_error=0.01).json()
+
+    np.testing.assert_array_equal(answer["distances"], field.distances)
+    assert (answer["method"], answer["exact"]) == ("approximate", False)
+    assert answer["error_bound"] == {"type": "relative", "value": 0.01, "kind": "guaranteed"}
+    assert answer["stats"]["windows_kept"] == field.stats.windows_kept
+
+
+@pytest.mark.parametrize("sources", [SOURCES[:1], SOURCES], ids=["one", "two"])
+@pytest.mark.parametrize(
+    ("errors", "bound"),
+    [
+        ({}, ("relative", 1e-3)),
+        ({"relative_error": 0.05}, ("relative", 0.05)),
+        ({"absolute_error": 0.02}, ("absolute", 0.02)),
+        ({"relative_error": None, "absolute_error": 0.02}, ("absolute", 0.02)),
+        ({"relative_error": 0.05, "absolute_error": 0.02}, ("relative", 0.05)),
+    ],
+)
+def test_distances_fall_short_by_no_more_than_the_bound(
+    client: TestClient, knot: str, sources: list, errors: dict, bound: tuple[str, float]
+) -> None:
+    body = {"sources": sources, "include": ["nearest_source"]}
+    exact = distances(client, knot, **body).json()
+    answer = approximate(client, knot, **body, **errors).json()
+
+    assert answer["error_bound"] == {"type": bound[0], "value": bound[1], "kind": "guaranteed"}
+    ours, theirs = np.array(answer["distances"]), np.array(exact["distances"])
+    assert (ours <= theirs * (1 + ROUNDING)).all()
+    granted = errors or {"relative_error": 1e-3}
+    if share := granted.get("relative_error"):
+        assert (ours >= theirs * (1 - share)).all()
+    if length := granted.get("absolute_error"):
+        assert (ours >= theirs - length).all()
+    assert answer["stats"]["windows_kept"] < exact["stats"]["windows_kept"]
+    assert set(answer["nearest_source"]) == set(exact["nearest_source"])
+    assert answer["sources"] == exact["sources"]
+
+
+def test_max_distance_loses_no_vertex_that_is_near_enough(client: TestClient, knot: str) -> None:
+    body = {"sources": SOURCES, "max_distance": 2.0}
+    exact = np.load(BytesIO(distances(client, knot, NPY, **body).content))
+    answer = approximate(client, knot, **body, relative_error=0.05).json()
+    ours = np.array(answer["distances"], float)  # null becomes NaN
+
+    reached = np.isfinite(ours)
+    assert 0 < reached.sum() < len(ours)
+    assert reached[np.isfinite(exact)].all()
+    assert (ours[reached] <= 2.0).all()
+    whole = np.array(distances(client, knot, sources=SOURCES).json()["distances"])
+    assert (ours[reached] >= whole[reached] * 0.95).all()
+    missed = np.count_nonzero(~reached)
+    assert answer["unreachable"] == {"disconnected": 0, "beyond_max_distance": missed}
+
+
+def test_targets_only(client: TestClient, knot: str) -> None:
+    targets = [{"vertex": 700}, {"vertex": 3}]
+    everywhere = approximate(client, knot, sources=SOURCES).json()["distances"]
+
+    answer = approximate(client, knot, sources=SOURCES, targets=targets).json()
+
+    assert answer["distances"] == [everywhere[700], everywhere[3]]
+
+
+@pytest.mark.parametrize("name", ["npy", "octets"])
+def test_headers_of_binary_distances(client: TestClient, knot: str, name: str) -> None:
+    body = {"sources": [{"vertex": 3}], "method": "approximate", "absolute_error": 0.5}
+    link = f"/v1/meshes/{knot}/distances"
+    answer = client.post(link, json=body).json()
+
+    response = client.post(link, params={"format": name}, json=body)
+
+    headers = response.headers
+    assert headers["geodesic-method"] == "approximate"
+    assert headers["geodesic-exact"] == "false"
+    bound = {"type": "absolute", "value": 0.5, "kind": "guaranteed"}
+    assert json.loads(headers["geodesic-error-bound"]) == answer["error_bound"] == bound
+    values = np.frombuffer(response.content[-8 * len(answer["distances"]) :], "<f8")
+    np.testing.assert_array_equal(values, answer["distances"])
+
+
+# Kept results
+
+
+def test_each_method_and_error_has_a_result_of_its_own(client: TestClient, knot: str) -> None:
+    exact = {"sources": [{"vertex": 42}]}
+    bodies = [
+        exact,
+        exact | {"method": "approximate"},
+        exact | {"method": "approximate", "relative_error": 0.02},
+        exact | {"method": "approximate", "absolute_error": 0.02},
+        exact | {"method": "approximate", "relative_error": 0.02, "absolute_error": 0.02},
+    ]
+    first = [distances(client, knot, **body) for body in bodies]
+    again = [distances(client, knot, **body) for body in bodies]
+
+    assert len({response.headers["etag"] for response in first}) == len(bodies)
+    for fresh, kept in zip(first, again, strict=True):
+        assert "compute" in fresh.headers["server-timing"]
+        assert kept.headers["server-timing"] == "kept"
+        assert kept.content == fresh.content
+    bounds = [response.json()["error_bound"]["value"] for response in again]
+    assert bounds == [0, 1e-3, 0.02, 0.02, 0.02]
+
+
+def test_the_usual_error_is_one_result_with_its_spelling(client: TestClient, knot: str) -> None:
+    bare = approximate(client, knot, sources=[{"vertex": 43}])
+    spelt = approximate(client, knot, sources=[{"vertex": 43}], relative_error=0.001)
+
+    assert spelt.headers["server-timing"] == "kept"
+    assert spelt.headers["etag"] == bare.headers["etag"]
+
+
+def test_keys_tell_methods_and_errors_apart() -> None:
+    granted: list[dict[str, Any]] = [
+        {},
+        {"method": "approximate", "relative_error": 1e-3},
+        {"method": "approximate", "absolute_error": 1e-3},
+        {"method": "approximate", "relative_error": 0.1, "absolute_error": 1e-3},
+    ]
+
+    ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
+    keys = {result_key(PathQuery("m", PathRequest(**ends, **errors)), "a/b") for errors in granted}
+
+    assert len(keys) == len(granted)
+
+
+# Paths
+
+
+def test_paths_are_the_library_s(client: TestClient, knot: str) -> None:
+    mesh = mesh_of(client, knot)
+    field = gc.approximate_distance(mesh, 3, relative_error=0.05, keep_windows=True)
+    expected = field.path_to(700)
+
+    answer = path(client, knot, method="approximate", relative_error=0.05).json()
+
+    assert (answer["status"], answer["method"], answer["exact"]) == ("ok", "approximate", False)
+    assert answer["length"] == expected.length
+    np.testing.assert_array_equal(answer["points"], expected.points)
+    np.testing.assert_array_equal(answer["faces"], expected.faces)
+    assert answer["error_bound"] == {
+        "type": "relative",
+        "value": expected.error_bound.value,
+        "kind": "guaranteed",
+    }
+
+
+@pytest.mark.parametrize("errors", [{}, {"relative_error": 0.05}, {"absolute_error": 0.1}])
+def test_a_path_carries_its_own_certificate(client: TestClient, knot: str, errors: dict) -> None:
+    exact = path(client, knot).json()["length"]
+    targets = [ENDS["target"]]
+    field = approximate(client, knot, sources=[ENDS["source"]], targets=targets, **errors).json()
+
+    answer = path(client, knot, method="approximate", **errors).json()
+
+    bound, (distance,) = answer["error_bound"], field["distances"]
+    assert (bound["type"], bound["kind"]) == ("relative", "guaranteed")
+    assert bound["value"] == pytest.approx((answer["length"] - distance) / distance, abs=1e-15)
+    assert answer["length"] >= exact * (1 - ROUNDING)
+    assert answer["length"] <= exact * (1 + bound["value"] + ROUNDING)
+
+
+def test_get_answers_as_post_and_is_cached(client: TestClient, knot: str) -> None:
+    link = f"/v1/meshes/{knot}/path?{WRITTEN_ENDS}"
+    asked = f"{link}&method=approximate&relative_error=0.05&absolute_error=2"
+    body = {"method": "approximate", "relative_error": 0.05, "absolute_error": 2}
+
+    got = client.get(asked)
+
+    assert got.json() == path(client, knot, **body).json()
+    assert client.get(asked, headers={"If-None-Match": got.headers["etag"]}).status_code == 304
+    for other in (link, f"{link}&method=exact", f"{link}&method=approximate"):
+        response = client.get(other, headers={"If-None-Match": got.headers["etag"]})
+        assert response.status_code == 200
+        assert response.headers["etag"] != got.headers["etag"]
+
+
+def test_headers_of_a_binary_path(client: TestClient, knot: str) -> None:
+    body = {"method": "approximate", "relative_error": 0.05}
+    answer = path(client, knot, **body).json()
+
+    npy = path(client, knot, NPY, **body)
+
+    np.testing.assert_array_equal(np.load(BytesIO(npy.content)), answer["points"])
+    assert (npy.headers["geodesic-method"], npy.headers["geodesic-exact"]) == (
+        "approximate",
+        "false",
+    )
+    assert json.loads(npy.headers["geodesic-error-bound"]) == answer["error_bound"]
+
+
+def test_a_path_to_its_own_source_has_no_error(client: TestClient, knot: str) -> None:
+    answer = path(client, knot, method="approximate", target=ENDS["source"]).json()
+
+    assert (answer["length"], len(answer["points"])) == (0, 1)
+    assert answer["error_bound"]["value"] == 0
+
+
+def test_no_path_is_an_answer(client: TestClient, apart: str) -> None:
+    answer = client.get(f"/v1/meshes/{apart}/path?from=v0&to=v4&method=approximate").json()
+
+    assert (answer["method"], answer["exact"]) == ("approximate", False)
+    assert (answer["status"], answer["reason"]) == ("no_path", "disconnected")
+    assert answer["points"] is None
+    assert answer["error_bound"]["kind"] == "guaranteed"
+
+
+# Refusals
+
+REFUSED = [
+    *(
+        ({"method": "approximate", "relative_error": value}, ["relative_error"])
+        for value in (0, -1e-3, 1, 1.5, 1e308, "much", [0.1])
+    ),
+    *(
+        ({"method": "approximate", "absolute_error": value}, ["absolute_error"])
+        for value in (0, -1, "much", {})
+    ),
+    (
+        {"method": "approximate", "relative_error": 2, "absolute_error": -2},
+        ["relative_error", "absolute_error"],
+    ),
+    ({"relative_error": 0.01}, ["relative_error"]),
+    ({"method": "exact", "absolute_error": 0.01}, ["absolute_error"]),
+    (
+        {"method": "exact", "relative_error": 0.01, "absolute_error": 0.01},
+        ["relative_error", "absolute_error"],
+    ),
+    ({"method": "Approximate"}, ["method"]),
+    ({"method": None}, ["method"]),
+    ({"method": "approximate", "error": 0.01}, ["error"]),
+]
+
+
+@pytest.mark.parametrize(("body", "names"), REFUSED)
+def test_refused_errors(client: TestClient, knot: str, body: dict, names: list[str]) -> None:
+    for response in (distances(client, knot, **body), path(client, knot, **body)):
+        problem = check_problem(response, 422, "invalid_request")
+        assert [fault["pointer"] for fault in problem["errors"]] == [f"/{name}" for name in names]
+        assert problem["detail"].startswith(f"/{names[0]}: ")
+
+
+@pytest.mark.parametrize(
+    ("query", "name"),
+    [
+        ("method=approximate&relative_error=0", "relative_error"),
+        ("method=approximate&relative_error=nan", "relative_error"),
+        ("method=approximate&relative_error=", "relative_error"),
+        ("method=approximate&absolute_error=inf", "absolute_error"),
+        ("method=approximate&absolute_error=-1", "absolute_error"),
+        ("relative_error=0.01", "relative_error"),
+        ("method=exact&absolute_error=0.01", "absolute_error"),
+        ("method=heat", "method"),
+    ],
+)
+def test_refused_errors_of_a_get(client: TestClient, knot: str, query: str, name: str) -> None:
+    response = client.get(f"/v1/meshes/{knot}/path?{WRITTEN_ENDS}&{query}")
+
+    problem = check_problem(response, 422, "invalid_request")
+    assert [fault["pointer"] for fault in problem["errors"]] == [f"/query/{name}"]
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity", "1e999"])
+@pytest.mark.parametrize("name", ["relative_error", "absolute_error"])
+def test_errors_that_are_not_finite(client: TestClient, knot: str, name: str, number: str) -> None:
+    response = client.post(
+        f"/v1/meshes/{knot}/distances",
+        content=f'{{"sources": [{{"vertex": 0}}], "method": "approximate", "{name}": {number}}}',
+        headers={"Content-Type": "application/json"},
+    )
+
+    problem = check_problem(response, 422, "invalid_request")
+    assert [fault["pointer"] for fault in problem["errors"]] == [f"/{name}"]
+
+
+def test_exact_refuses_an_error_with_a_reason(client: TestClient, knot: str) -> None:
+    problem = distances(client, knot, relative_error=0.01).json()
+
+    assert "method 'approximate' only" in problem["detail"]

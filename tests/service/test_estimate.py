@@ -1,0 +1,275 @@
+"""What a query would take, against what it takes."""
+
+import math
+import pickle
+import tracemalloc
+from typing import Any
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+import geodesic_core as gc
+from app.encoding import JSON, Representation
+from app.queries import (
+    DistancesQuery,
+    IsolinesQuery,
+    LocateQuery,
+    MatrixQuery,
+    NearestQuery,
+    PathQuery,
+    PathsQuery,
+    Query,
+    estimate,
+)
+from app.schemas.service import StrictModel
+from app.store.meshes import OpenMesh
+from tests.support.service import check_problem, granted, mesh_of, upload_sample
+
+MESHES = {"knot": 8000, "sphere": 5000, "plane": 10_000}
+_RNG = np.random.default_rng(8)
+SOME, MANY = ([{"vertex": i} for i in _RNG.integers(0, 2000, n).tolist()] for n in (40, 700))
+INSIDE = {"face": 1040, "barycentric": [0.2, 0.3, 0.5]}
+CORNER = {"face": 1040, "barycentric": [1, 0, 0]}
+ROUGH = {"method": "approximate", "relative_error": 0.01}
+PAIRS = {"layout": "pairs"}
+JSON_ONLY: tuple[str, ...] = ("json",)
+
+# The body, the formats, by which factor the response may be off
+QUERIES: dict[str, tuple[str, dict[str, Any], tuple[str, ...], float]] = {
+    "all": ("distances", {"sources": [INSIDE]}, ("json", "octets", "csv", "ply"), 1.05),
+    "near": ("distances", {"sources": SOME[:3], "max_distance": 0.3}, ("json", "npy"), 1.15),
+    "rough": ("distances", {"sources": SOME[:2], **ROUGH}, JSON_ONLY, 1.05),
+    "named": ("distances", {"sources": SOME[:9], "include": ["nearest_source"]}, JSON_ONLY, 1.05),
+    "slopes": ("distances", {"sources": SOME[:2], "include": ["gradient"]}, JSON_ONLY, 1.1),
+    "some": ("distances", {"sources": SOME[:1], "targets": MANY}, ("json", "npy"), 1.05),
+    "dense": ("matrix", {"sources": SOME, "targets": MANY}, ("json", "npy", "octets"), 1.05),
+    "sparse": ("matrix", {"sources": SOME, "targets": MANY, "layout": "sparse"}, ("json",), 1.05),
+    "npz": ("matrix", {"sources": SOME, "targets": MANY, "layout": "sparse"}, ("npz",), 1.05),
+    "pairs": ("matrix", {"sources": MANY[:40], "targets": SOME, **PAIRS}, ("json",), 1.05),
+    "hub": ("matrix", {"sources": [INSIDE] * 40, "targets": SOME, **PAIRS}, ("npy",), 1.05),
+    "nearest": ("nearest", {"source": INSIDE, "candidates": MANY, "k": 50}, ("json", "csv"), 1.05),
+    "path": ("path", {"source": INSIDE, "target": {"vertex": 1900}}, ("json", "npy", "csv"), 3),
+    "legs": ("path", {"source": INSIDE, "target": SOME[0], "waypoints": SOME[1:4]}, JSON_ONLY, 3),
+    "rough path": ("path", {"source": INSIDE, "target": {"vertex": 1900}, **ROUGH}, JSON_ONLY, 3),
+    "lines": ("isolines", {"sources": [INSIDE], "count": 10}, ("json", "obj", "svg"), 3),
+    "some lines": ("isolines", {"sources": SOME[:2], "levels": [0.2, 0.3]}, JSON_ONLY, 3),
+    "rough lines": ("isolines", {"sources": SOME[:2], "count": 5, **ROUGH}, JSON_ONLY, 3),
+    "fine": ("isolines", {"sources": [INSIDE], "count": 3, "chord_error": 1e-6}, JSON_ONLY, 3),
+    "paths": ("paths", {"source": INSIDE, "targets": MANY}, ("json", "geojson"), 3),
+    "rough paths": ("paths", {"source": INSIDE, "targets": SOME, **ROUGH}, JSON_ONLY, 3),
+    "curve": ("distances", {"sources": [{"polyline": [CORNER] * 9}]}, JSON_ONLY, 1.05),
+    "curve paths": ("paths", {"source": {"polyline": [CORNER]}, "targets": SOME}, JSON_ONLY, 3),
+    "locate": ("locate", {"points": [[0.1 * i, 0.3, 0.2] for i in range(30)]}, JSON_ONLY, 1.15),
+}  # fmt: skip
+KINDS: dict[str, type[Query[Any]]] = {
+    "distances": DistancesQuery,
+    "isolines": IsolinesQuery,
+    "locate": LocateQuery,
+    "matrix": MatrixQuery,
+    "nearest": NearestQuery,
+    "path": PathQuery,
+    "paths": PathsQuery,
+}
+
+
+def query_of(name: str) -> Query[Any]:
+    operation, body, _, _ = QUERIES[name]
+    kind = KINDS[operation]
+    request: StrictModel = kind.model.model_validate(body)
+    return kind("m", kind.normal(request))
+
+
+@pytest.fixture(scope="module")
+def ids(client: TestClient) -> dict[str, str]:
+    return {name: upload_sample(client, name, faces) for name, faces in MESHES.items()}
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+@pytest.mark.parametrize("name", QUERIES)
+def test_bytes_of_the_response(
+    client: TestClient, ids: dict[str, str], name: str, mesh: str
+) -> None:
+    operation, body, formats, factor = QUERIES[name]
+    link = f"/v1/meshes/{ids[mesh]}/{operation}"
+    for written in formats:
+        told = client.post(f"{link}?format={written}&estimate=true", json=body).json()
+        real = client.post(f"{link}?format={written}", json=body)
+
+        assert real.status_code == 200
+        assert told["media_type"] == real.headers["content-type"].partition(";")[0]
+        assert told["is_estimate"] is True
+        assert told["mesh_id"] == ids[mesh]
+        assert 1 / factor <= told["response_bytes"] / len(real.content) <= factor
+
+
+_ENDS = [{"vertex": i} for i in range(6)]
+
+
+@pytest.mark.parametrize(
+    ("operation", "body"),
+    [
+        ("distances", {"sources": _ENDS[:1], "max_distance": 0.5}),
+        ("distances", {"sources": _ENDS[:1], "targets": _ENDS}),
+        ("path", {"source": {"vertex": 0}, "target": {"vertex": 4}}),
+        ("path", {"source": {"vertex": 0}, "target": {"vertex": 4}, "method": "approximate"}),
+        ("paths", {"source": {"vertex": 0}, "targets": _ENDS, "max_distance": 0.5}),
+        *(
+            ("matrix", {"sources": _ENDS, "targets": _ENDS[::-1], **limit, "layout": layout})
+            for layout in ("dense", "sparse", "pairs")
+            for limit in ({}, {"max_distance": 0.5})
+        ),
+        ("matrix", {"sources": _ENDS[:1] * 12, "targets": _ENDS * 2, **PAIRS}),
+        ("nearest", {"source": {"vertex": 0}, "candidates": _ENDS[3:]}),
+        ("nearest", {"source": {"vertex": 0}, "candidates": _ENDS, "k": 5, "max_distance": 0.5}),
+        ("locate", {"points": [[0, 0, 9]] * 9, "max_distance": 1}),
+    ],
+)
+def test_what_is_out_of_reach_is_not_counted(
+    client: TestClient, apart: str, operation: str, body: dict[str, Any]
+) -> None:
+    link = f"/v1/meshes/{apart}/{operation}"
+
+    told = client.post(f"{link}?estimate=true", json=body).json()
+
+    size = len(client.post(link, json=body).content)
+    assert 1 / 1.1 <= told["response_bytes"] / size <= 1.1
+
+
+# Positions are looked for without any state; what is said of paths comes on top of it.
+STATEFUL = [name for name, (operation, *_) in QUERIES.items() if operation != "locate"]
+ALLOCATED = [name for name in STATEFUL if QUERIES[name][0] != "paths"]
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+@pytest.mark.parametrize("name", ALLOCATED)
+def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mesh: str) -> None:
+    opened = OpenMesh(("", b""), gc.Solver(mesh_of(client, ids[mesh])), [])
+    query = query_of(name)
+    told = estimate(query, Representation(JSON), opened, lambda: False)
+    tracemalloc.start()
+    try:
+        query.answer(opened, granted())
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+
+    assert 1 / 3 <= told.memory_bytes / peak <= 3
+
+
+@pytest.mark.parametrize("name", STATEFUL)
+def test_memory_that_suffices(
+    client: TestClient, ids: dict[str, str], name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three times the estimate does, a third does not."""
+    for module in ("app.queries.matrix", "geodesic_core.search.matrix"):
+        monkeypatch.setattr(f"{module}.available_cores", lambda: 1)
+    opened = OpenMesh(("", b""), gc.Solver(mesh_of(client, ids["sphere"])), [])
+    query = query_of(name)
+    told = estimate(query, Representation(JSON), opened, lambda: False)
+
+    with pytest.raises(gc.errors.MemoryLimitExceeded):
+        query.answer(opened, granted(memory=told.memory_bytes // 3))
+    query.answer(opened, granted(memory=3 * told.memory_bytes))
+
+
+def test_seconds_grow_with_the_work(client: TestClient, ids: dict[str, str]) -> None:
+    def seconds(mesh: str, operation: str, **body: Any) -> float:
+        link = f"/v1/meshes/{ids[mesh]}/{operation}?estimate=true"
+        answer = client.post(link, json=body).json()
+        assert answer["seconds"] > 0
+        return float(answer["seconds"])
+
+    large = upload_sample(client, "knot", 32_000)
+    ids = ids | {"large": large}
+    one = {"sources": SOME[:1]}
+    everywhere = seconds("knot", "distances", **one)
+    assert 4 * everywhere <= seconds("large", "distances", **one) <= 8 * everywhere
+    assert seconds("knot", "distances", **one, max_distance=0.1) < everywhere / 4
+    assert seconds("large", "distances", **one, **ROUGH) < seconds("large", "distances", **one)
+    row = seconds("large", "matrix", **one, targets=SOME)
+    assert 5 * row <= seconds("large", "matrix", sources=MANY, targets=SOME) <= 40 * row
+    ends = {"source": INSIDE, "target": {"vertex": 1900}}
+    leg = seconds("large", "path", **ends)
+    assert leg < seconds("large", "path", **ends, waypoints=SOME[:5]) <= 8 * leg
+    few = seconds("large", "nearest", source=INSIDE, candidates=MANY, k=1)
+    assert few < seconds("large", "nearest", source=INSIDE, candidates=MANY, k=len(MANY))
+
+
+def test_seconds_are_of_the_right_order(client: TestClient, ids: dict[str, str]) -> None:
+    """A machine may well be some times faster or slower; not a hundred."""
+    link = f"/v1/meshes/{ids['plane']}/distances"
+    told, took = [], []
+    for source in range(5):
+        body = {"sources": [{"vertex": 4000 + source}]}
+        told.append(client.post(f"{link}?estimate=true", json=body).json()["seconds"])
+        timing = client.post(link, json=body).headers["server-timing"]
+        took.append(float(timing.partition("compute;dur=")[2].partition(",")[0]) / 1e3)
+
+    assert abs(math.log10(min(told) / min(took))) < 2
+
+
+def test_an_estimate_is_not_kept_and_computes_nothing(
+    client: TestClient, ids: dict[str, str]
+) -> None:
+    body = {"sources": [{"vertex": 77, "start_distance": 0.125}]}
+    link = f"/v1/meshes/{ids['knot']}/distances"
+
+    told = client.post(f"{link}?estimate=true", json=body)
+    real = client.post(link, json=body)
+
+    assert told.headers["cache-control"] == "no-store"
+    assert told.headers["content-type"] == "application/json"
+    assert "etag" not in told.headers
+    assert "compute" in real.headers["server-timing"], "no result was there"
+    assert client.post(f"{link}?estimate=false", json=body).headers["server-timing"] == "kept"
+    assert client.post(f"{link}?estimate=true", json=body).json() == told.json()
+
+
+def test_a_get_is_estimated_as_its_post(client: TestClient, ids: dict[str, str]) -> None:
+    link = f"/v1/meshes/{ids['knot']}/path"
+    body = {"source": {"vertex": 3}, "target": {"vertex": 700}}
+
+    got = client.get(f"{link}?from=v3&to=v700&estimate=true")
+
+    assert got.headers["cache-control"] == "no-store"
+    assert got.json() == client.post(f"{link}?estimate=true", json=body).json()
+    for query, code, place in (
+        ("from=v3&to=v-7&estimate=true", "invalid_point", "/query/to"),
+        ("from=v3&to=e0-1400:0.5&estimate=true", "invalid_point", "/query/to"),
+        ("from=v3&to=v7&estimate=perhaps", "invalid_request", "/query/estimate"),
+        ("from=v3&to=v7&estimate=true&via=7", "invalid_point", "/query/via/0"),
+    ):
+        problem = check_problem(client.get(f"{link}?{query}"), 422, code)
+        assert [fault["pointer"] for fault in problem["errors"]] == [place]
+
+
+def test_estimates_are_refused_as_answers_are(client: TestClient, ids: dict[str, str]) -> None:
+    for operation, body, status, code in (
+        ("distances", {"sources": []}, 422, "invalid_request"),
+        ("distances", {"sources": [{"vertex": 10**6}]}, 422, "invalid_point"),
+        ("distances", {"sources": [{"position": [0, 0, 1e60]}]}, 422, "invalid_point"),
+        ("locate", {"points": [[0, 0, 0], [0, 0, 1e60]]}, 422, "invalid_point"),
+        ("locate", {"points": []}, 422, "invalid_request"),
+    ):
+        for query in ("", "?estimate=true"):
+            link = f"/v1/meshes/{ids['knot']}/{operation}{query}"
+            check_problem(client.post(link, json=body), status, code)
+    link = f"/v1/meshes/{ids['knot']}/distances?format=npy&estimate=true"
+    body = {"sources": [{"vertex": 0}], "include": ["nearest_source"]}
+    check_problem(client.post(link, json=body), 422, "invalid_request")
+    link = f"/v1/meshes/{ids['knot']}/nearest?format=npy&estimate=true"
+    body = {"source": INSIDE, "candidates": SOME}
+    check_problem(client.post(link, json=body), 406, "not_acceptable")
+    link = f"/v1/meshes/{'0' * 32}/distances?estimate=true"
+    check_problem(client.post(link, json={"sources": SOME}), 404, "mesh_not_found")
+
+
+@pytest.mark.parametrize("name", QUERIES)
+def test_queries_reach_workers_as_they_are(name: str) -> None:
+    query = query_of(name)
+
+    revived = pickle.loads(pickle.dumps(query))  # noqa: S301 - our own
+
+    assert revived == query
+    assert type(revived) is type(query)

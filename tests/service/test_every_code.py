@@ -1,0 +1,270 @@
+"""Every code of the error table, met by a client of a service that runs."""
+
+import errno
+import os
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import orjson
+import pytest
+from starlette.routing import compile_path
+from starlette.testclient import TestClient
+
+from app.errors import CODES
+from app.main import create_app
+from app.settings import Settings
+from tests.service.test_process import Server
+from tests.support.service import TWO_TRIANGLES, check_problem, serving, upload_sample, wait_until
+
+ALICE, BOB = ({"Authorization": f"Bearer {name}-0123456789abc"} for name in ("alice", "bob"))
+ASYNC = {"Prefer": "respond-async"}
+DEADLINE = {"X-Timeout-Ms": "2000"}
+TARGET = [{"vertex": 1}]
+
+
+class Site:
+    """A service with low limits, a small mesh and a large one; Alice stored them."""
+
+    def __init__(self, client: TestClient, store: Path) -> None:
+        client.headers.update(ALICE)
+        self.client, self.store = client, store
+        self.small = upload_sample(client, "plane", 200)
+        self.slow = upload_sample(client, "sphere", 300_000)
+        self._starts = count(1)
+        self.patch = pytest.MonkeyPatch()
+
+    @property
+    def engine(self) -> Any:
+        return self.client.app.state.service.engine
+
+    def ask(self, mesh_id: str, headers: Any = None, **body: Any) -> Any:
+        """Ask for distances that nobody has asked for before."""
+        body.setdefault("sources", [{"vertex": 0, "start_distance": next(self._starts)}])
+        return self.client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
+
+    def send(self, content: str, media_type: str = "application/json") -> Any:
+        link, headers = f"/v1/meshes/{self.small}/distances", {"Content-Type": media_type}
+        return self.client.post(link, content=content, headers=headers)
+
+    @contextmanager
+    def job(self) -> Iterator[str]:
+        """Run a job that takes seconds, while inside."""
+        response = self.ask(self.slow, ASYNC, targets=TARGET)
+        assert response.status_code == 202, response.text
+        link = response.headers["location"]
+        yield link
+        self.client.delete(link)
+
+    def is_running(self, link: str) -> bool:
+        return bool(self.client.get(link).json()["status"] == "running")
+
+    def reset(self) -> None:
+        """Leave nothing running, nothing patched."""
+        self.patch.undo()
+        for job in self.client.get("/v1/jobs").json()["jobs"]:
+            self.client.delete(f"/v1/jobs/{job['id']}")
+        wait_until(lambda: self.engine.load.idle == 2)
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    store = tmp_path_factory.mktemp("site")
+    limits = {
+        "api_keys": "alice:alice-0123456789abc,bob:bob-0123456789abc",
+        "max_concurrent": 2,
+        "queue_size": 1,
+        "max_query_bytes": 2000,
+        "max_json_values": 5000,
+        "max_sources": 2,
+        "query_memory_bytes": 50_000_000,
+    }
+    with serving(store, **limits) as client:
+        yield Site(client, store)
+
+
+def not_finished(site: Site) -> Any:
+    with site.job() as job:
+        return site.client.get(f"{job}/results")
+
+
+def dismissed(site: Site) -> Any:
+    with site.job() as job:
+        site.client.delete(job)
+        return site.client.get(f"{job}/results")
+
+
+def too_large(site: Site) -> Any:
+    mesh_id = upload_sample(site.client, "sphere", 600_000)
+    return site.ask(mesh_id, targets=TARGET)
+
+
+def limited(site: Site) -> Any:
+    with ThreadPoolExecutor() as threads:
+        for _ in range(2):
+            threads.submit(site.ask, site.slow, BOB | DEADLINE, targets=TARGET)
+        wait_until(lambda: site.engine.load.busy + site.engine.load.waiting == 2)
+        return site.client.get("/v1", headers=BOB)
+
+
+def full(site: Site) -> Any:
+    with site.job() as first:
+        wait_until(lambda: site.is_running(first))
+        with site.job():
+            wait_until(lambda: site.engine.load.waiting == 1)
+            return site.ask(site.slow, targets=TARGET)
+
+
+def defect(site: Site) -> Any:
+    site.patch.setattr("app.http.routes.about.About", None)
+    return site.client.get("/v1")
+
+
+def killed(site: Site) -> Any:
+    with site.job() as job:
+        # Work that its worker had not taken up yet goes to another one, and succeeds.
+        wait_until(lambda: site.client.get(job).json()["progress"] > 0)
+        (busy,) = site.engine._open - set(site.engine._idle)
+        os.kill(busy._process.pid, signal.SIGKILL)
+        wait_until(lambda: not site.is_running(job))
+        return site.client.get(f"{job}/results")
+
+
+def damaged(site: Site) -> Any:
+    mesh_id = upload_sample(site.client, "plane", 300)
+    path = site.store / "meshes" / mesh_id / "vertices.npy"
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
+    return site.ask(mesh_id)
+
+
+def no_disk(site: Site) -> Any:
+    async def write(*_: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    site.patch.setattr("app.http.uploads._write", write)
+    return site.client.post("/v1/meshes", json=TWO_TRIANGLES)
+
+
+def not_started(site: Site) -> Any:
+    with TestClient(create_app(Settings(store=site.store / "other", workers=1))) as client:
+        return client.get("/readyz")
+
+
+def draining(site: Site) -> Any:
+    """Tell a service to stop while it works, and then end a query that had begun to arrive."""
+    server = Server(site.store / "process")
+    try:
+        small = upload_sample(server.client, "plane", 200)
+        slow = upload_sample(server.client, "sphere", 200_000)
+        link, body = f"/v1/meshes/{small}/distances", b'{"sources": [{"vertex": 0}]}'
+        head = (
+            f"POST {link} HTTP/1.1\r\nHost: x\r\n"
+            f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
+        )
+        with (
+            socket.create_connection(server.address) as arriving,
+            server.begin_slow_query(slow),
+        ):
+            arriving.sendall(head.encode() + body[:9])
+            wait_until(server.listens)
+            server.process.send_signal(signal.SIGTERM)
+            wait_until(lambda: not server.listens())
+            arriving.sendall(body[9:])
+            return response_of(arriving, link)
+    finally:
+        server.close()
+
+
+def response_of(connection: socket.socket, path: str) -> Any:
+    head, _, body = b"".join(iter(lambda: connection.recv(65536), b"")).partition(b"\r\n\r\n")
+    lines = head.decode().split("\r\n")
+    return SimpleNamespace(
+        status_code=int(lines[0].split()[1]),
+        headers={name.lower(): value for name, value in (line.split(": ") for line in lines[1:])},
+        text=body.decode(),
+        json=lambda: orjson.loads(body),
+        url=SimpleNamespace(path=path),
+        request=SimpleNamespace(method="POST"),
+    )
+
+
+MANY = [{"vertex": 0}] * 3
+BROKEN = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 3]]}
+
+PROVOKED: dict[str, Callable[[Site], Any]] = {
+    "malformed_body": lambda site: site.send("{"),
+    "unauthorized": lambda site: site.client.get("/v1", headers={"Authorization": "Bearer no"}),
+    "forbidden": lambda site: site.client.delete(f"/v1/meshes/{site.small}", headers=BOB),
+    "not_found": lambda site: site.client.get("/nowhere"),
+    "mesh_not_found": lambda site: site.client.get("/v1/meshes/nonsense"),
+    "job_not_found": lambda site: site.client.get("/v1/jobs/nonsense"),
+    "method_not_allowed": lambda site: site.client.put("/v1/meshes"),
+    "not_acceptable": lambda site: site.ask(site.small, {"Accept": "image/png"}),
+    "job_not_finished": not_finished,
+    "job_dismissed": dismissed,
+    "upload_too_large": lambda site: site.send(" " * 2001),
+    "result_too_large": lambda site: site.ask(site.slow),
+    "unsupported_media_type": lambda site: site.send("{}", "text/plain"),
+    "range_not_satisfiable": lambda site: site.client.get(
+        f"/v1/meshes/{site.small}/arrays/faces", headers={"Range": "bytes=99999999-"}
+    ),
+    "invalid_request": lambda site: site.ask(site.small, colour="red"),
+    "invalid_mesh": lambda site: site.client.post("/v1/meshes", json=BROKEN),
+    "invalid_point": lambda site: site.ask(site.small, sources=[{"vertex": -1}]),
+    "limit_exceeded": lambda site: site.ask(site.small, sources=MANY),
+    "memory_limit": too_large,
+    "rate_limited": limited,
+    "internal_error": defect,
+    "worker_died": killed,
+    "mesh_damaged": damaged,
+    "queue_full": full,
+    "engine_unavailable": not_started,
+    "draining": draining,
+    "deadline_exceeded": lambda site: site.ask(site.slow, {"X-Timeout-Ms": "100"}, targets=TARGET),
+    "storage_full": no_disk,
+}
+
+
+def test_the_table_is_whole() -> None:
+    assert list(PROVOKED) == list(CODES)
+
+
+@pytest.mark.parametrize("code", list(CODES)[: len(CODES) // 2])
+def test_requests_that_cannot_be_met(site: Site, code: str) -> None:
+    check_provoked(site, code)
+
+
+@pytest.mark.parametrize("code", list(CODES)[len(CODES) // 2 :])
+def test_requests_that_could_be_met_elsewhere_or_later(site: Site, code: str) -> None:
+    check_provoked(site, code)
+
+
+def check_provoked(site: Site, code: str) -> None:
+    """Check that a code is answered, by an operation that is documented to."""
+    try:
+        response = PROVOKED[code](site)
+        check_problem(response, CODES[code].status, code)
+        if code != "method_not_allowed":
+            check_documented(site, response, code)
+        if CODES[code].status in (409, 429, 503):
+            assert int(response.headers["retry-after"]) >= 1
+    finally:
+        site.reset()
+
+
+def check_documented(site: Site, response: Any, code: str) -> None:
+    method = response.request.method.lower()
+    for template, path in site.client.get("/openapi.json").json()["paths"].items():
+        if compile_path(template)[0].match(response.url.path) and method in path:
+            described = path[method]["responses"][str(response.status_code)]["description"]
+            assert code in described.split(", ")
+            return
+    assert response.url.path == "/nowhere"

@@ -1,0 +1,304 @@
+"""Queries that are answered whether their client waits or not."""
+
+import json
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from tests.support.service import check_problem, serving, upload_sample, wait_until
+
+ASYNC = {"Prefer": "respond-async"}
+
+
+@pytest.fixture(scope="module")
+def one(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    with serving(tmp_path_factory.mktemp("jobs"), queue_size=4) as client:
+        yield client
+
+
+@pytest.fixture(scope="module")
+def small(one: TestClient) -> str:
+    return upload_sample(one, "plane", 200)
+
+
+@pytest.fixture(scope="module")
+def slow(one: TestClient) -> str:
+    return upload_sample(one, "sphere", 400_000)
+
+
+@pytest.fixture(autouse=True)
+def _stop_what_runs(one: TestClient) -> Iterator[None]:
+    yield
+    for job in one.get("/v1/jobs").json()["jobs"]:
+        if job["finished"] is None:
+            one.delete(f"/v1/jobs/{job['id']}")
+    engine = one.app.state.service.engine
+    wait_until(lambda: len(engine._idle) == 2)
+
+
+_starts = count()
+
+
+def submit(client: TestClient, mesh_id: str, headers: Any = (), **body: Any) -> Any:
+    """Ask for what nobody has asked for before."""
+    body = {"sources": [{"vertex": 0, "start_distance": next(_starts)}]} | body
+    headers = {**ASYNC, **dict(headers)}
+    return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
+
+
+def job_of(response: Any) -> str:
+    assert response.status_code == 202, response.text
+    return f"/v1/jobs/{response.json()['id']}"
+
+
+def wait_for(client: TestClient, job: str, status: str) -> dict[str, Any]:
+    wait_until(lambda: client.get(job).json()["status"] == status)
+    document: dict[str, Any] = client.get(job).json()
+    return document
+
+
+def test_a_job_from_its_beginning_to_its_end(one: TestClient, small: str) -> None:
+    asked = {"sources": [{"vertex": 5}], "targets": [{"vertex": 9}]}
+    response = one.post(f"/v1/meshes/{small}/distances", json=asked, headers=ASYNC)
+
+    assert response.headers["preference-applied"] == "respond-async"
+    assert response.headers["location"] == job_of(response)
+    job = wait_for(one, job_of(response), "successful")
+    assert job["progress"] == 1.0
+    assert job["created"] <= job["started"] <= job["finished"]
+    assert (job["kind"], job["mesh_id"]) == ("distances", small)
+    assert "problem" not in job
+    answer = one.get(job["links"]["results"])
+    assert answer.status_code == 200
+    assert answer.json() == one.post(f"/v1/meshes/{small}/distances", json=asked).json()
+
+
+def test_every_query_can_be_a_job(one: TestClient, small: str) -> None:
+    ends = {"source": {"vertex": 0}, "target": {"vertex": 9}}
+    bodies = {
+        "distances": {"sources": [{"vertex": 0}]},
+        "path": ends,
+        "paths": {"source": {"vertex": 0}, "targets": [{"vertex": 9}]},
+        "isolines": {"sources": [{"vertex": 0}], "count": 2},
+        "matrix": {"sources": [{"vertex": 0}], "targets": [{"vertex": 9}]},
+        "nearest": {"source": {"vertex": 0}, "candidates": [{"vertex": 9}]},
+        "locate": {"points": [[0.1, 0.1, 0.0]]},
+    }
+    for kind, body in bodies.items():
+        job = job_of(one.post(f"/v1/meshes/{small}/{kind}", json=body, headers=ASYNC))
+        assert wait_for(one, job, "successful")["kind"] == kind
+        now = one.post(f"/v1/meshes/{small}/{kind}", json=body).json()
+        assert one.get(f"{job}/results").json() == now
+
+    job = job_of(one.get(f"/v1/meshes/{small}/path?from=v0&to=v9", headers=ASYNC))
+    wait_for(one, job, "successful")
+    assert one.get(f"{job}/results").json()["length"] > 0
+
+
+def test_a_job_answers_in_the_format_that_was_asked_for(one: TestClient, small: str) -> None:
+    job = job_of(submit(one, small, {"Accept": "application/x-npy"}))
+    wait_for(one, job, "successful")
+
+    answer = one.get(f"{job}/results")
+    assert answer.headers["content-type"] == "application/x-npy"
+    assert answer.headers["geodesic-dtype"] == "<f8"
+    again = one.get(f"{job}/results", headers={"If-None-Match": answer.headers["etag"]})
+    assert again.status_code == 304
+
+
+def test_what_is_wrong_is_told_at_once(one: TestClient, small: str) -> None:
+    check_problem(submit(one, small, sources=[{"vertex": 10**6}]), 422, "invalid_point")
+    check_problem(submit(one, "0" * 32), 404, "mesh_not_found")
+
+
+def test_a_failed_job_answers_with_its_own_problem(one: TestClient, small: str) -> None:
+    far = {"position": [99, 99, 99], "max_distance": 0.1}
+    job = job_of(submit(one, small, sources=[far]))
+    document = wait_for(one, job, "failed")
+
+    assert document["problem"]["code"] == "invalid_point"
+    problem = check_problem(one.get(f"{job}/results"), 422, "invalid_point")
+    assert problem["errors"] == document["problem"]["errors"]
+
+
+def test_an_answer_that_is_not_there_yet(one: TestClient, slow: str) -> None:
+    job = job_of(submit(one, slow))
+
+    response = one.get(f"{job}/results")
+    check_problem(response, 409, "job_not_finished")
+    assert int(response.headers["retry-after"]) > 0
+
+
+def test_progress_never_falls(one: TestClient, slow: str) -> None:
+    job = job_of(submit(one, slow))
+    seen = [one.get(job).json()]
+    while seen[-1]["finished"] is None:
+        time.sleep(0.02)
+        seen.append(one.get(job).json())
+
+    shares = [document["progress"] for document in seen]
+    assert shares == sorted(shares)
+    assert len(set(shares)) > 5
+    assert seen[-1]["status"] == "successful"
+
+
+def test_dismissing_stops_running_work(one: TestClient, slow: str) -> None:
+    job = job_of(submit(one, slow))
+    wait_for(one, job, "running")
+    engine = one.app.state.service.engine
+
+    response = one.delete(job)
+    start = time.monotonic()
+    wait_until(lambda: len(engine._idle) == 2)
+
+    assert time.monotonic() - start < 0.2, "the worker is free"
+    assert (response.status_code, response.json()["status"]) == (200, "dismissed")
+    assert one.get(job).json()["status"] == "dismissed"
+    check_problem(one.get(f"{job}/results"), 410, "job_dismissed")
+
+
+def test_deleting_a_finished_job_removes_it(one: TestClient, small: str) -> None:
+    job = job_of(submit(one, small))
+    wait_for(one, job, "successful")
+
+    assert one.delete(job).status_code == 200
+    for response in (one.get(job), one.delete(job), one.get(f"{job}/results")):
+        check_problem(response, 404, "job_not_found")
+
+
+@pytest.mark.parametrize("job_id", ["0" * 32, "x", "\u1234", "9" * 999])
+def test_jobs_that_are_not_there(one: TestClient, job_id: str) -> None:
+    for path in (f"/v1/jobs/{job_id}", f"/v1/jobs/{job_id}/results", f"/v1/jobs/{job_id}/events"):
+        assert one.get(path).json()["code"] in ("job_not_found", "not_found")
+
+
+def test_jobs_are_listed_the_newest_first(one: TestClient, small: str) -> None:
+    ids = [job_of(submit(one, small)).rpartition("/")[2] for _ in range(5)]
+    found, cursor = [], None
+    while len(found) < 5:
+        page = one.get("/v1/jobs", params={"limit": 2} | ({"cursor": cursor} if cursor else {}))
+        found += [job["id"] for job in page.json()["jobs"]]
+        cursor = page.json()["next_cursor"]
+
+    assert found[:5] == ids[::-1]
+    check_problem(one.get("/v1/jobs?cursor=x"), 422, "invalid_request")
+
+
+def test_one_key_is_one_job(one: TestClient, small: str) -> None:
+    body = {"sources": [{"vertex": 3}]}
+    with ThreadPoolExecutor(4) as pool:
+        keyed = {"Idempotency-Key": "k1"}
+        jobs = {job_of(r) for r in pool.map(lambda _: submit(one, small, keyed, **body), range(8))}
+
+    (job,) = jobs
+    wait_for(one, job, "successful")
+    assert job_of(submit(one, small, keyed, **body)) == job
+    problem = check_problem(submit(one, small, keyed), 422, "invalid_request")
+    assert problem["errors"][0]["pointer"] == "/header/Idempotency-Key"
+    assert job_of(submit(one, small, {"Idempotency-Key": "k2"}, **body)) != job
+
+
+def test_the_key_of_a_dismissed_job_can_be_sent_again(one: TestClient, slow: str) -> None:
+    body = {"sources": [{"vertex": 3}]}
+    job = job_of(submit(one, slow, {"Idempotency-Key": "k3"}, **body))
+    one.delete(job)
+
+    assert job_of(submit(one, slow, {"Idempotency-Key": "k3"}, **body)) != job
+
+
+def test_a_full_queue_takes_no_jobs(one: TestClient, slow: str) -> None:
+    jobs = [job_of(submit(one, slow)) for _ in range(5)]
+    assert one.get(jobs[-1]).json()["status"] == "accepted"
+
+    response = submit(one, slow)
+    check_problem(response, 503, "queue_full")
+    assert int(response.headers["retry-after"]) > 0
+    one.delete(jobs[-1])
+    job_of(submit(one, slow))
+
+
+def events_of(client: TestClient, job: str, **headers: str) -> list[tuple[int, dict[str, Any]]]:
+    """Return the ids and documents of all events until the stream ends."""
+    found, data = [], None
+    with client.stream("GET", f"{job}/events", headers=headers) as response:
+        assert response.status_code == 200
+        assert response.headers["content-type"].startswith("text/event-stream")
+        for line in response.iter_lines():
+            if line.startswith("data: "):
+                data = json.loads(line[6:])
+            elif line.startswith("id: ") and data is not None:
+                found.append((int(line[4:]), data))
+    return found
+
+
+def test_events_lead_to_the_end(one: TestClient, slow: str) -> None:
+    job = job_of(submit(one, slow))
+    events = events_of(one, job)
+
+    ids = [number for number, _ in events]
+    assert ids == sorted(set(ids))
+    assert [document["status"] for _, document in events][-1] == "successful"
+    assert events[-1][1] == one.get(job).json()
+
+
+def test_events_go_on_where_a_client_left(one: TestClient, small: str) -> None:
+    job = job_of(submit(one, small))
+    wait_for(one, job, "successful")
+    ((last, document),) = events_of(one, job)
+
+    assert events_of(one, job, **{"Last-Event-ID": str(last)}) == []
+    assert events_of(one, job, **{"Last-Event-ID": str(last - 1)}) == [(last, document)]
+    assert events_of(one, job, **{"Last-Event-ID": "none of ours"}) == [(last, document)]
+
+
+def test_a_job_is_one_computation_with_who_waits(one: TestClient, slow: str) -> None:
+    """A client that waits for what a job computes gets the same, and the job goes on without it."""
+    body = {"sources": [{"vertex": 77}], "targets": [{"vertex": 5}]}
+    job = job_of(submit(one, slow, **body))
+    wait_for(one, job, "running")
+
+    response = one.post(f"/v1/meshes/{slow}/distances", json=body, headers={"X-Timeout-Ms": "100"})
+    check_problem(response, 504, "deadline_exceeded")
+    assert one.get(job).json()["status"] == "running"
+    answer = one.post(f"/v1/meshes/{slow}/distances", json=body).json()
+
+    wait_for(one, job, "successful")
+    assert one.get(f"{job}/results").json() == answer
+
+
+def test_a_job_has_a_deadline_of_its_own(tmp_path: Path) -> None:
+    with serving(tmp_path, job_deadline_s=0.3) as client:
+        job = job_of(submit(client, upload_sample(client, "sphere", 400_000)))
+        problem = wait_for(client, job, "failed")["problem"]
+
+        assert problem["code"] == "deadline_exceeded"
+        assert (problem["limit"], problem["setting"]) == (0.3, "GEODESIC_JOB_DEADLINE_S")
+
+
+def test_jobs_are_forgotten_after_a_while(tmp_path: Path) -> None:
+    with serving(tmp_path, job_ttl=0.5, results_bytes=1) as client:
+        job = job_of(submit(client, upload_sample(client, "plane", 50)))
+        assert wait_for(client, job, "failed")["problem"]["code"] == "storage_full"
+        wait_until(lambda: client.get(job).status_code == 404, seconds=5)
+
+
+def test_answers_of_jobs_outlive_those_that_are_only_kept(tmp_path: Path) -> None:
+    with serving(tmp_path, results_bytes=20_000, results_memory_bytes=1) as client:
+        mesh_id = upload_sample(client, "plane", 200)
+        job = job_of(submit(client, mesh_id))
+        wait_for(client, job, "successful")
+        answer = client.get(f"{job}/results").content
+        for vertex in range(20):
+            client.post(f"/v1/meshes/{mesh_id}/distances", json={"sources": [{"vertex": vertex}]})
+        assert client.delete(f"/v1/meshes/{mesh_id}").status_code == 204
+
+        assert client.get(f"{job}/results").content == answer
+        (found,) = (tmp_path / "results").rglob("*.body")
+        found.write_bytes(b"other")
+        check_problem(client.get(f"{job}/results"), 500, "mesh_damaged")

@@ -1,0 +1,439 @@
+from io import BytesIO
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+from app.cli.arguments import SampleName
+from app.schemas import service
+from app.settings import Settings
+from geodesic_core import samples
+from tests.support.service import check_problem, mesh_of, serving, upload_sample
+
+TETRAHEDRON = {
+    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "faces": [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+}
+OBJ = "".join(f"v {x} {y} {z}\n" for x, y, z in TETRAHEDRON["vertices"]) + "".join(
+    f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in TETRAHEDRON["faces"]
+)
+OFF = "OFF\n4 4 0\n" + "".join(
+    " ".join(map(str, row)) + "\n"
+    for row in [*TETRAHEDRON["vertices"], *([3, *face] for face in TETRAHEDRON["faces"])]
+)
+TYPE_OBJ = {"Content-Type": "model/obj"}
+
+
+def test_upload_answers_with_a_report(client: TestClient) -> None:
+    response = client.post("/v1/meshes", json=TETRAHEDRON)
+
+    assert response.status_code in (200, 201)
+    report = response.json()
+    assert response.headers["location"] == f"/v1/meshes/{report['id']}"
+    assert "load;dur=" in response.headers["server-timing"]
+    assert (report["vertices"], report["faces"], report["edges"]) == (4, 4, 6)
+    assert report["euler_characteristic"] == 2
+    assert report["boundary_loops"] == 0
+    assert report["bounds"] == [[0, 0, 0], [1, 1, 1]]
+    assert client.get(response.headers["location"]).json() == report
+
+
+@pytest.mark.parametrize(
+    "upload",
+    [
+        {"json": TETRAHEDRON},
+        {"content": OBJ, "params": {"format": "obj"}},
+        {"content": OBJ, "headers": TYPE_OBJ},
+        {"content": OFF, "params": {"format": "off"}},
+        {"content": OFF, "params": {"format": "off"}, "headers": TYPE_OBJ},
+        {"content": iter([OBJ.encode()]), "headers": TYPE_OBJ},
+        {"files": {"file": ("tetrahedron.OBJ", OBJ)}},
+        {"files": {"mesh": ("tetrahedron", OBJ, "model/obj")}},
+        {"files": {"mesh": ("tetrahedron", OBJ)}, "params": {"format": "obj"}},
+    ],
+)
+def test_all_spellings_of_a_mesh_are_one(client: TestClient, upload: dict) -> None:
+    mesh_id = client.post("/v1/meshes", json=TETRAHEDRON).json()["id"]
+
+    response = client.post("/v1/meshes", **upload)
+
+    assert response.status_code == 200
+    assert response.json()["id"] == mesh_id
+
+
+def test_new_is_201_and_known_is_200(client: TestClient) -> None:
+    mesh = {**TETRAHEDRON, "vertices": [[0, 0, 0], [7, 0, 0], [0, 7, 0], [0, 0, 7]]}
+
+    assert [client.post("/v1/meshes", json=mesh).status_code for _ in range(2)] == [201, 200]
+
+
+def test_samples_have_the_same_names_everywhere(client: TestClient) -> None:
+    names = list(samples.SAMPLES)
+
+    assert list(get_args(service.SampleName)) == names
+    assert list(SampleName) == names, "the command line's"
+    assert client.get("/v1").json()["samples"] == names
+
+
+@pytest.mark.parametrize("name", samples.SAMPLES)
+def test_samples(client: TestClient, name: str) -> None:
+    mesh_id = upload_sample(client, name, 500)
+
+    vertices, faces = samples.SAMPLES[name](500)
+    mesh = mesh_of(client, mesh_id)
+    np.testing.assert_array_equal(mesh.vertices, vertices)
+    np.testing.assert_array_equal(mesh.faces, faces)
+
+
+@pytest.mark.parametrize(("name", "fewest"), [("knot", 500), ("terrain", 200), ("obstacles", 500)])
+def test_a_sample_of_too_few_faces_is_refused_with_the_fewest(
+    client: TestClient, name: str, fewest: int
+) -> None:
+    response = client.post("/v1/meshes", params={"sample": name, "faces": fewest - 1})
+
+    assert f"{fewest} to" in check_problem(response, 422, "invalid_request")["detail"]
+
+
+def test_merging_gives_a_vertex_map(client: TestClient) -> None:
+    soup = {
+        "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
+        "faces": [[0, 1, 2], [3, 4, 5]],
+    }
+
+    apart = client.post("/v1/meshes", json=soup).json()
+    joined = client.post("/v1/meshes", params={"merge": "exact"}, json=soup).json()
+
+    assert (apart["components"], joined["components"]) == (2, 1)
+    assert any("merge" in warning for warning in apart["warnings"])
+    vertex_map = np.load(BytesIO(client.get(joined["arrays"]["vertex_map"]).content))
+    np.testing.assert_array_equal(vertex_map, [0, 1, 2, 1, 3, 2])
+    missing = client.get(f"/v1/meshes/{apart['id']}/arrays/vertex_map")
+    check_problem(missing, 404, "not_found")
+
+
+QUADS = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 1 9 0\nf 1 2 3 4\nf 1 1 2\nf 4 3 5\nl 1 2"
+
+
+def test_polygons_get_a_map_back(client: TestClient) -> None:
+    report = client.post("/v1/meshes", content=QUADS, headers=TYPE_OBJ).json()
+
+    assert (report["faces"], report["triangulated_polygons"]) == (4, 1)
+    assert report["repeated_vertex_faces"] == {"count": 1, "ids": [2]}
+    assert "1 lines" in report["warnings"][0]
+    face_map = np.load(BytesIO(client.get(report["arrays"]["face_map"]).content))
+    np.testing.assert_array_equal(face_map, [0, 0, 1, 2])
+    faces = client.get(f"/v1/meshes/{report['id']}/arrays/faces").content
+    np.testing.assert_array_equal(np.load(BytesIO(faces))[2], [0, 0, 1])
+    plain = client.post("/v1/meshes", json=TETRAHEDRON).json()
+    missing = client.get(f"/v1/meshes/{plain['id']}/arrays/face_map")
+    check_problem(missing, 404, "not_found")
+
+
+def test_the_report_names_what_a_mesh_is_made_of(client: TestClient) -> None:
+    soup = {
+        "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [5, 5, 5]],
+        "faces": [[0, 1, 2], [3, 4, 5], [2, 1, 0], [6, 6, 0]],
+    }
+    report = client.post("/v1/meshes", json=soup).json()
+
+    assert report["component_vertices"] == {"count": 2, "ids": [0, 3]}
+    assert report["duplicate_vertices"] == {"count": 2, "ids": [3, 5]}
+    assert report["duplicate_faces"] == {"count": 1, "ids": [2]}
+    assert report["isolated_vertices"] == {"count": 1, "ids": [6]}
+    assert report["repeated_vertex_faces"] == {"count": 1, "ids": [3]}
+    assert len(report["warnings"]) == 5
+
+
+def test_edges_of_no_length_are_told_of_and_their_ends_are_one_place(client: TestClient) -> None:
+    needle = {
+        "vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0]],
+        "faces": [[0, 1, 2], [0, 2, 4], [4, 2, 3]],
+    }
+    report = client.post("/v1/meshes", json=needle).json()
+
+    assert report["zero_length_edges"] == {"count": 1, "ids": [[0, 4]]}
+    assert report["collapsed_faces"] == {"count": 1, "ids": [1]}
+    assert "(0, 4)" in report["warnings"][0]
+    queries = f"/v1/meshes/{report['id']}/distances"
+    spellings: list[dict[str, object]] = [
+        {"vertex": 0},
+        {"vertex": 4},
+        {"edge": [4, 0], "t": 0.5},
+        {"face": 1, "barycentric": [0.5, 0, 0.5]},
+    ]
+    answers = [client.post(queries, json={"sources": [one]}).json() for one in spellings]
+    assert [answer["distances"][4] for answer in answers] == [0, 0, 0, 0]
+    for answer in answers:
+        assert answer["sources"] == answers[0]["sources"]
+        assert answer["distances"] == answers[0]["distances"]
+
+
+# Refusals
+
+
+def faults(problem: dict) -> list[str]:
+    return [fault["pointer"] for fault in problem["errors"]]
+
+
+@pytest.mark.parametrize(
+    ("faces", "places"),
+    [
+        ([[0, 1, 2], [0, 1, 4]], ["/faces/1"]),
+        ([[0, 1, -1]], ["/faces/0"]),
+        ([[0, 1, 1]], ["/faces/0"]),
+    ],
+)
+def test_bad_faces(client: TestClient, faces: list, places: list[str] | None) -> None:
+    response = client.post("/v1/meshes", json={**TETRAHEDRON, "faces": faces})
+
+    problem = check_problem(response, 422, "invalid_mesh")
+    assert places is None or faults(problem) == places
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
+def test_coordinates_that_are_not_finite(client: TestClient, number: str) -> None:
+    content = OBJ.replace("v 1 0 0", f"v 1 {number} 0")
+
+    response = client.post("/v1/meshes", content=content, headers=TYPE_OBJ)
+
+    check_problem(response, 422, "invalid_mesh")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"\0" * 100, b"ply\nformat ascii 1.0\nelement vertex 9\n", b"\xff" * 1000],
+)
+@pytest.mark.parametrize("file_format", ["obj", "off", "ply", "stl", "glb"])
+def test_nonsense_of_every_format(client: TestClient, content: bytes, file_format: str) -> None:
+    response = client.post("/v1/meshes", params={"format": file_format}, content=content)
+
+    check_problem(response, 422, "invalid_mesh")
+
+
+def test_a_truncated_file(client: TestClient) -> None:
+    response = client.post("/v1/meshes", params={"format": "off"}, content=OFF[:60])
+
+    check_problem(response, 422, "invalid_mesh")
+
+
+def test_nothing_is_left_of_a_refused_upload(client: TestClient) -> None:
+    store: Path = client.app.state.service.settings.store
+    before = sorted(store.rglob("*"))
+
+    client.post("/v1/meshes", content="v 0 0 nonsense", headers=TYPE_OBJ)
+
+    assert sorted(store.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("upload", "status", "code"),
+    [
+        ({"content": b"x"}, 415, "unsupported_media_type"),
+        (
+            {"content": b"x", "headers": {"Content-Type": "image/png"}},
+            415,
+            "unsupported_media_type",
+        ),
+        ({"files": {"file": ("mesh.xyz", b"x")}}, 415, "unsupported_media_type"),
+        ({"data": {"a": "b"}}, 415, "unsupported_media_type"),
+        (
+            {"content": b"x", "headers": {"Content-Type": "multipart/form-data"}},
+            400,
+            "malformed_body",
+        ),
+        (
+            {"content": b"--b--", "headers": {"Content-Type": "multipart/form-data; boundary=b"}},
+            400,
+            "malformed_body",
+        ),
+        ({"content": b"{", "headers": {"Content-Type": "application/json"}}, 400, "malformed_body"),
+        ({"json": {"vertices": []}}, 422, "invalid_request"),
+        ({"json": {**TETRAHEDRON, "name": "x"}}, 422, "invalid_request"),
+        ({"content": OBJ, "params": {"format": "fbx"}}, 422, "invalid_request"),
+        ({"content": OBJ, "params": {"format": "obj", "colour": 1}}, 422, "invalid_request"),
+        ({"content": OBJ, "params": {"format": "obj", "faces": 9}}, 422, "invalid_request"),
+        ({"params": {"sample": "cube"}}, 422, "invalid_request"),
+        ({"params": {"sample": "knot", "faces": 0}}, 422, "invalid_request"),
+        ({"params": {"sample": "knot", "faces": 5_000_001}}, 422, "limit_exceeded"),
+        ({"params": {"sample": "knot"}, "headers": {"X-Timeout-Ms": "0"}}, 422, "invalid_request"),
+    ],
+)
+def test_refused_uploads(client: TestClient, upload: dict, status: int, code: str) -> None:
+    check_problem(client.post("/v1/meshes", **upload), status, code)
+
+
+def test_limits_of_uploads(tmp_path: Path) -> None:
+    with serving(tmp_path, max_faces=3, max_upload_bytes=200, max_query_bytes=20) as client:
+        many = check_problem(
+            client.post("/v1/meshes", params={"format": "off"}, content=OFF), 422, "limit_exceeded"
+        )
+        assert (many["limit"], many["actual"]) == (3, 4)
+        assert many["setting"] == "GEODESIC_MAX_FACES"
+        assert client.get("/v1/meshes").json()["meshes"] == []
+
+        large = OFF + "#" * 200
+        declared = client.post("/v1/meshes", params={"format": "off"}, content=large)
+        problem = check_problem(declared, 413, "upload_too_large")
+        assert (problem["limit"], problem["actual"]) == (200, len(large))
+        assert problem["setting"] == "GEODESIC_MAX_UPLOAD_BYTES"
+
+        chunks = iter([large.encode()[:100], large.encode()[100:]])
+        streamed = client.post("/v1/meshes", params={"format": "off"}, content=chunks)
+        assert check_problem(streamed, 413, "upload_too_large")["limit"] == 200
+
+        body = {"sources": [{"vertex": 0}]}
+        query = client.post(f"/v1/meshes/{'0' * 32}/distances", json=body)
+        problem = check_problem(query, 413, "upload_too_large")
+        assert problem["setting"] == "GEODESIC_MAX_QUERY_BYTES"
+
+
+# Reading
+
+
+def test_arrays(client: TestClient, plane: str) -> None:
+    report = client.get(f"/v1/meshes/{plane}").json()
+    arrays = {
+        name: np.load(BytesIO(client.get(link).content)) for name, link in report["arrays"].items()
+    }
+
+    assert arrays["vertices"].shape == (report["vertices"], 3)
+    assert arrays["faces"].shape == (report["faces"], 3)
+    assert arrays["vertices"].dtype == np.float64
+    assert set(arrays["components"]) == {0}
+
+
+def test_arrays_are_immutable_and_cached(client: TestClient, plane: str) -> None:
+    link = f"/v1/meshes/{plane}/arrays/faces"
+    response = client.get(link)
+
+    assert "immutable" in response.headers["cache-control"]
+    again = client.get(link, headers={"If-None-Match": response.headers["etag"]})
+    assert (again.status_code, again.content) == (304, b"")
+
+
+@pytest.mark.parametrize(
+    ("asked", "expected"),
+    [
+        ("bytes=0-9", slice(0, 10)),
+        ("bytes=6-", slice(6, None)),
+        ("bytes=-5", slice(-5, None)),
+    ],
+)
+def test_ranges(client: TestClient, plane: str, asked: str, expected: slice) -> None:
+    link = f"/v1/meshes/{plane}/arrays/vertices"
+    whole = client.get(link).content
+
+    part = client.get(link, headers={"Range": asked})
+
+    assert part.status_code == 206
+    assert part.content == whole[expected]
+
+
+@pytest.mark.parametrize("asked", ["bytes=9-2", "bytes=x", "bytes=", "lines=0-9", "bytes=-"])
+def test_ranges_that_make_no_sense_are_ignored(client: TestClient, plane: str, asked: str) -> None:
+    link = f"/v1/meshes/{plane}/arrays/vertices"
+
+    assert client.get(link, headers={"Range": asked}).content == client.get(link).content
+
+
+def test_ranges_outside(client: TestClient, plane: str) -> None:
+    link = f"/v1/meshes/{plane}/arrays/vertices"
+    response = client.get(link, headers={"Range": "bytes=999999-"})
+
+    check_problem(response, 416, "range_not_satisfiable")
+    assert response.headers["content-range"].startswith("bytes */")
+
+
+def test_unknown_array(client: TestClient, plane: str) -> None:
+    check_problem(client.get(f"/v1/meshes/{plane}/arrays/links"), 404, "not_found")
+
+
+@pytest.mark.parametrize("mesh_id", ["0" * 32, "x", "%2e%2e%2fmeshes", "0" * 500])
+def test_unknown_mesh(client: TestClient, mesh_id: str) -> None:
+    for path in ("", "/arrays/faces", "/path?from=v0&to=v1"):
+        response = client.get(f"/v1/meshes/{mesh_id}{path}")
+        assert response.status_code == 404
+        assert response.json()["code"] in ("mesh_not_found", "not_found")
+    check_problem(client.get(f"/v1/meshes/{'0' * 32}"), 404, "mesh_not_found")
+
+
+def test_a_report_is_revalidated(client: TestClient, plane: str) -> None:
+    link = f"/v1/meshes/{plane}"
+    etag = client.get(link).headers["etag"]
+
+    assert client.get(link, headers={"If-None-Match": f'"x", W/{etag}'}).status_code == 304
+    assert client.get(link, headers={"If-None-Match": '"x"'}).status_code == 200
+
+
+def test_list_in_parts(tmp_path: Path) -> None:
+    with serving(tmp_path) as client:
+        ids = {upload_sample(client, "plane", faces) for faces in (50, 100, 200, 400, 800)}
+        found, cursor, parts = [], None, 0
+        while parts == 0 or cursor:
+            params = {"limit": 2} | ({"cursor": cursor} if cursor else {})
+            part = client.get("/v1/meshes", params=params).json()
+            found += [mesh["id"] for mesh in part["meshes"]]
+            cursor, parts = part["next_cursor"], parts + 1
+
+        assert parts == 3
+        assert found == sorted(ids)
+
+
+@pytest.mark.parametrize("params", [{"limit": 0}, {"limit": 1001}, {"page": 2}])
+def test_list_with_bad_parameters(client: TestClient, params: dict) -> None:
+    check_problem(client.get("/v1/meshes", params=params), 422, "invalid_request")
+
+
+def test_delete(client: TestClient) -> None:
+    mesh_id = upload_sample(client, "plane", 32)
+    query = {"sources": [{"vertex": 0}]}
+    assert client.post(f"/v1/meshes/{mesh_id}/distances", json=query).status_code == 200
+
+    response = client.delete(f"/v1/meshes/{mesh_id}")
+
+    assert (response.status_code, response.content) == (204, b"")
+    check_problem(client.delete(f"/v1/meshes/{mesh_id}"), 404, "mesh_not_found")
+    check_problem(client.get(f"/v1/meshes/{mesh_id}"), 404, "mesh_not_found")
+    after = client.post(f"/v1/meshes/{mesh_id}/distances", json=query)
+    check_problem(after, 404, "mesh_not_found")
+    settings: Settings = client.app.state.service.settings
+    assert not list((settings.store / "results").glob(f"{mesh_id}/*"))
+
+
+def test_a_damaged_mesh_does_not_hide_the_others(tmp_path: Path) -> None:
+    with serving(tmp_path) as client:
+        damaged, whole = (upload_sample(client, "plane", faces) for faces in (50, 100))
+        (tmp_path / "meshes" / damaged / "manifest.json").write_bytes(b"{")
+
+        assert [mesh["id"] for mesh in client.get("/v1/meshes").json()["meshes"]] == [whole]
+        check_problem(client.get(f"/v1/meshes/{damaged}"), 500, "mesh_damaged")
+
+
+def test_damage_is_told(tmp_path: Path) -> None:
+    with serving(tmp_path) as client:
+        mesh_id = upload_sample(client, "plane", 100)
+        array = tmp_path / "meshes" / mesh_id / "vertices.npy"
+        array.write_bytes(array.read_bytes()[:-1] + b"!")
+
+        query = {"sources": [{"vertex": 0}]}
+        response = client.post(f"/v1/meshes/{mesh_id}/distances", json=query)
+
+        problem = check_problem(response, 500, "mesh_damaged")
+        assert "vertices" in problem["detail"]
+        assert "upload it again" in problem["hint"]
+
+
+def test_meshes_and_results_survive_a_restart(tmp_path: Path) -> None:
+    query = {"sources": [{"vertex": 0}]}
+    with serving(tmp_path) as client:
+        mesh_id = upload_sample(client, "plane", 45_000)  # the answer is more than memory keeps
+        first = client.post(f"/v1/meshes/{mesh_id}/distances", json=query)
+
+    with serving(tmp_path) as client:
+        assert [mesh["id"] for mesh in client.get("/v1/meshes").json()["meshes"]] == [mesh_id]
+        again = client.post(f"/v1/meshes/{mesh_id}/distances", json=query)
+
+    assert again.content == first.content
+    assert again.headers["server-timing"] == "kept"

@@ -1,0 +1,151 @@
+"""A running service: real worker processes, a real store."""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import anyio
+import numpy as np
+import pytest
+from starlette.testclient import TestClient
+
+import geodesic_core as gc
+from app.main import create_app
+from app.queries import ExecutionContext, FieldCache
+from app.settings import Settings
+from app.store.fields import FieldStore
+from app.store.layout import owned
+from app.store.mesh_catalog import MeshCatalog
+from app.store.meshes import MeshStore
+from tests.support.paths import real_mesh
+
+NPY = {"Accept": "application/x-npy"}
+TWO_TRIANGLES = {
+    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [9, 0, 0], [8, 0, 0], [9, 1, 0]],
+    "faces": [[0, 1, 2], [3, 4, 5]],
+}
+
+Serve = Callable[..., AbstractContextManager[TestClient]]
+
+
+def wait_until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
+    """Wait for something that happens in another thread or process."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.02)
+
+
+def processor_time(pid: int) -> Counter[int]:
+    """Return the nanoseconds that the threads of a process have had, by niceness."""
+    taken: Counter[int] = Counter()
+    for thread in Path(f"/proc/{pid}/task").iterdir():
+        niceness = int((thread / "stat").read_text().rpartition(")")[2].split()[16])
+        taken[niceness] += int((thread / "schedstat").read_text().split()[0])
+    return taken
+
+
+def is_ready(client: Any) -> bool:
+    return bool(client.get("/readyz").status_code == 200)
+
+
+@contextmanager
+def serving(store: Path, **settings: Any) -> Iterator[TestClient]:
+    """Run the service in this process, with workers of its own."""
+    app = create_app(Settings(store=store, **{"workers": 1} | settings))
+    with TestClient(app, raise_server_exceptions=False) as client:
+        wait_until(lambda: is_ready(client))
+        yield client
+
+
+@pytest.fixture(scope="session")
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    """A service that many tests share; they leave it as they found it, but for meshes."""
+    with serving(tmp_path_factory.mktemp("store")) as client:
+        yield client
+
+
+@pytest.fixture(scope="session")
+def plane(client: TestClient) -> str:
+    """The id of a small flat mesh."""
+    return upload_sample(client, "plane", 200)
+
+
+@pytest.fixture(scope="session")
+def apart(client: TestClient) -> str:
+    """The id of a mesh of two components."""
+    return str(client.post("/v1/meshes", json=TWO_TRIANGLES).json()["id"])
+
+
+def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> str:
+    """Put a mesh into a store on which no service runs."""
+    store = MeshStore(root)
+    books = MeshCatalog(root, store, 2**60, evicts=False)
+
+    async def keep() -> str:
+        async with books.scratch_folder() as folder:
+            written = store.write_aside(mesh, folder / "mesh", owner)
+            await books.keep(written)
+            return written.mesh_id
+
+    with owned(root):
+        books.prepare()
+        return anyio.run(keep)
+
+
+def upload_sample(client: TestClient, name: str, faces: int) -> str:
+    response = client.post("/v1/meshes", params={"sample": name, "faces": faces})
+    assert response.status_code in (200, 201), response.text
+    return str(response.json()["id"])
+
+
+def distances(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
+    """Ask for distances, from vertex 0 where ``body`` names no sources."""
+    body.setdefault("sources", [{"vertex": 0}])
+    return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
+
+
+def new_fields(room: int = 10**9, store: Path = Path("nowhere")) -> FieldCache:
+    """Return no fields yet, but those of a store, if there is one."""
+    return FieldCache(room, FieldStore(store, 10**9), "this code")
+
+
+def granted(
+    cancel: Callable[[], bool] = lambda: False,
+    memory: int = 2**40,
+    fields: FieldCache | None = None,
+) -> ExecutionContext:
+    """Return a grant that nobody reads the progress of, by default with no field known."""
+    known = new_fields() if fields is None else fields
+    return ExecutionContext(cancel, lambda _: None, known, memory, 10**7, 10**7)
+
+
+def mesh_of(client: TestClient, mesh_id: str) -> gc.TriangleMesh:
+    """Return what is stored under an id, as the library has it."""
+    load = lambda name: np.load(  # noqa: E731
+        BytesIO(client.get(f"/v1/meshes/{mesh_id}/arrays/{name}").content)
+    )
+    return gc.TriangleMesh(load("vertices"), load("faces"))
+
+
+@pytest.fixture
+def horse() -> bytes:
+    return real_mesh("horse97k.ply").read_bytes()
+
+
+def check_problem(response: Any, status: int, code: str) -> dict[str, Any]:
+    """Check that a response is the problem it should be, with all that every problem has."""
+    assert response.status_code == status, response.text
+    assert response.headers["content-type"] == "application/problem+json"
+    problem: dict[str, Any] = response.json()
+    assert problem["code"] == code
+    assert problem["status"] == status
+    assert problem["type"] == f"/problems/{code}"
+    assert problem["instance"] == response.url.path
+    assert problem["request_id"] == response.headers["x-request-id"]
+    assert problem["detail"]
+    return problem
