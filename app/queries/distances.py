@@ -59,7 +59,7 @@ class DistancesQuery(Query[service.DistancesRequest]):
         once = request.model_copy(update={"include": list(dict.fromkeys(request.include))})
         return with_its_error(once)
 
-    def problem(self, settings: Settings) -> None:
+    def refuse(self, settings: Settings) -> None:
         """Refuse too many sources."""
         refuse_more("sources", point_count(*self.request.sources), settings, "max_sources")
 

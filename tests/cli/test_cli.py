@@ -6,7 +6,7 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -21,48 +21,9 @@ from scipy.sparse import load_npz
 
 import geodesic_core as gc
 from app import __version__
-from app.cli import main
 from app.settings import Settings, variable_of
+from tests.support.commands import Run, error_line
 from tests.support.paths import ROOT
-
-
-class Ran:
-    """Exit code and output of a command."""
-
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
-
-    def figure(self, name: str) -> str:
-        """Return what is printed after a name at the start of a line."""
-        return next(
-            row.removeprefix(name).strip() for row in self.out.splitlines() if row.startswith(name)
-        )
-
-
-Run = Callable[..., Ran]
-
-
-@pytest.fixture(autouse=True)
-def sigint_as_in_a_terminal() -> Iterator[None]:
-    """A shell that starts its commands in the background has them ignore Ctrl-C."""
-    inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, inherited)
-
-
-@pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
-    """Run ``geodesic`` with arguments, in an empty folder."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: object) -> Ran:
-        monkeypatch.setattr(sys, "argv", ["geodesic", *map(str, arguments)])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        printed = capsys.readouterr()
-        return Ran(int(ended.value.code or 0), printed.out, printed.err)
-
-    return run
 
 
 @pytest.fixture
@@ -71,13 +32,6 @@ def plane(run: Run) -> Path:
     assert (ran.code, ran.err) == (0, "")
     assert ran.figure("mesh") == "121 vertices, 200 faces"
     return Path("plane.ply")
-
-
-def error_line(ran: Ran) -> str:
-    assert ran.out == ""
-    assert ran.err.startswith("error: ")
-    assert ran.err.count("\n") == 1
-    return ran.err
 
 
 @pytest.mark.parametrize("name", gc.samples.SAMPLES)

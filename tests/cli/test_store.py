@@ -14,7 +14,7 @@ from app.queries import code_version
 from app.store.fields import FieldStore
 from app.store.layout import owned
 from app.store.results import ResultManifest
-from tests.cli.test_cli import Run, error_line
+from tests.support.commands import Run, error_line
 from tests.support.service import serving, upload_sample, wait_until
 
 KEYS = {"alice": "alice-alice-alice", "bob": "bob-bob-bob-bob-bob"}

@@ -12,7 +12,6 @@ from app.encoding import Representation, encode
 from app.engine.worker import Signals, Worker
 from app.queries import DistancesQuery, FieldCache, IsolinesQuery, PathsQuery
 from app.store.meshes import OpenMesh
-from geodesic_core.fields import whole_sweep
 from tests.service.test_engine import asked, config
 from tests.support.service import granted, new_fields, store_mesh
 
@@ -22,19 +21,6 @@ APPROXIMATE = {"method": "approximate", "relative_error": 0.01}
 @pytest.fixture
 def opened() -> OpenMesh:
     return OpenMesh(("id", b""), gc.Solver(gc.TriangleMesh(*gc.samples.knot(2000))), [])
-
-
-@pytest.fixture
-def sweeps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Grows by one with each sweep."""
-    run, ran = whole_sweep.RepeatableSweep.run, []
-
-    def counted(self: Any, *arguments: Any, **options: Any) -> Any:
-        ran.append(1)
-        return run(self, *arguments, **options)
-
-    monkeypatch.setattr(whole_sweep.RepeatableSweep, "run", counted)
-    return ran
 
 
 def ask(opened: OpenMesh, fields: FieldCache, kind: Any, **body: Any) -> bytes:

@@ -9,7 +9,7 @@ import pytest
 from scipy.sparse import csr_array
 
 import geodesic_core as gc
-from geodesic_core.search import matrix, threads
+from geodesic_core.search import matrix, path_search, threads
 from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_points import EXACT, SAME, mesh_of, random_points
 from tests.support import zoo
@@ -171,9 +171,9 @@ def test_pairs_with_a_point_in_common_are_swept(monkeypatch):
     points = random_points(mesh, 12, seed=28)
     hub, others = points[0], points[1:]
     calls = []
-    find = gc.path_search.PathSearch.find
+    find = path_search.PathSearch.find
     monkeypatch.setattr(
-        gc.path_search.PathSearch, "find", lambda *a, **k: calls.append(a) or find(*a, **k)
+        path_search.PathSearch, "find", lambda *a, **k: calls.append(a) or find(*a, **k)
     )
     out = gc.distance_matrix(mesh, [hub] * 11, others, layout="pairs")
     back = gc.distance_matrix(mesh, others, [hub] * 11, layout="pairs")
@@ -311,7 +311,7 @@ def test_an_exception_in_a_thread_comes_out_as_it_is(mesh, monkeypatch):
     def fail(*_):
         raise LookupError("a thread's own")
 
-    monkeypatch.setattr(matrix.Sweeper, "distances", fail)
+    monkeypatch.setattr(matrix.TargetSweep, "distances", fail)
     with pytest.raises(LookupError, match="a thread's own"):
         gc.distance_matrix(mesh, [0, 1, 2], [3, 4, 5], threads=2)
 
