@@ -214,3 +214,12 @@ CROSSING = 1e-11
 
 PIECE = 1e-9
 """Share of a level below which a piece of its isoline is left out: rounding, at ends of arcs."""
+
+LARGEST_COORDINATE = 1e50
+"""Mesh units up to which a coordinate may be: sixth powers of lengths do not overflow."""
+
+SHORTEST_EDGE = 1e-50
+"""Mesh units that an edge must have at least: sixth powers of lengths do not vanish.
+
+Edges of no length at all are contracted before.
+"""

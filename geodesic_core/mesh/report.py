@@ -8,8 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.kernels.mesh import half_edges as kernels
-from geodesic_core.kernels.mesh.half_edges import Topology
+from geodesic_core.kernels.mesh.build import count_boundary_loops
+from geodesic_core.kernels.mesh.half_edges import (
+    BOUNDARY,
+    FANS,
+    SADDLE,
+    SEAM,
+    SIN_LEFT,
+    Topology,
+)
 from geodesic_core.mesh.degeneracies import edges_of_no_length, of_three_vertices
 from geodesic_core.mesh.equal_rows import repeated
 
@@ -111,7 +118,7 @@ def report_of(
     is_place = lowest_joined == np.arange(len(vertices))
     used = np.flatnonzero(is_used & is_place)
     flags = np.where(is_place, topology.flags[inner], 0)
-    flat = topology.geometry[::3, kernels.SIN_LEFT] == 0.0
+    flat = topology.geometry[::3, SIN_LEFT] == 0.0
     surface = np.sort(topology.outer_face)
     corners = lowest_joined[faces[surface]]
     outside = np.setdiff1d(np.arange(len(faces)), surface)
@@ -128,13 +135,11 @@ def report_of(
         triangulated_polygons=int(np.count_nonzero(polygons > 1)),
         components=len(lowest),
         component_vertices=Sample.of(np.sort(lowest)),
-        boundary_loops=int(kernels.count_boundary_loops(topology.links)),
+        boundary_loops=int(count_boundary_loops(topology.links)),
         euler_characteristic=len(used) - len(edges) + len(surface),
-        saddle_vertices=int(np.count_nonzero(flags & kernels.SADDLE)),
-        boundary_vertices=int(np.count_nonzero(flags & kernels.BOUNDARY)),
-        bow_tie_vertices=Sample.of(
-            np.flatnonzero(flags & (kernels.FANS | kernels.SEAM) == kernels.FANS)
-        ),
+        saddle_vertices=int(np.count_nonzero(flags & SADDLE)),
+        boundary_vertices=int(np.count_nonzero(flags & BOUNDARY)),
+        bow_tie_vertices=Sample.of(np.flatnonzero(flags & (FANS | SEAM) == FANS)),
         isolated_vertices=Sample.of(np.flatnonzero(~is_used)),
         duplicate_vertices=Sample.of(used[repeated(vertices[used])]),
         repeated_vertex_faces=Sample.of(outside[~of_three_vertices(faces[outside])]),

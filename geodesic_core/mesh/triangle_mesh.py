@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
-from geodesic_core.kernels.mesh import half_edges as kernels
+from geodesic_core.kernels.mesh import build
 from geodesic_core.kernels.mesh.half_edges import Topology
 from geodesic_core.mesh import canonical
 from geodesic_core.mesh.closest_point import NearestFace
@@ -18,7 +18,7 @@ from geodesic_core.mesh.equal_rows import merged
 from geodesic_core.mesh.report import NAMED, MeshReport, report_of, warnings_of
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangulation import triangulated
-from geodesic_core.tolerances import SNAP, WEIGHT_ERROR
+from geodesic_core.tolerances import LARGEST_COORDINATE, SHORTEST_EDGE, SNAP, WEIGHT_ERROR
 from geodesic_core.validation import as_barriers, as_limit, is_number
 
 Merge = Literal["none", "exact"]
@@ -107,8 +107,8 @@ class TriangleMesh:
         merge: Merge,
         notes: Sequence[str],
     ) -> None:
-        outcome, _ = kernels.check_arrays(points, triangles)
-        if outcome != kernels.SOUND:
+        outcome, _ = build.check_arrays(points, triangles)
+        if outcome != build.SOUND:
             _refuse_bad_vertices(points)
             _refuse_out_of_range(triangles.reshape(-1), np.full(len(triangles), 3), len(points))
         vertex_map: Longs | None = None
@@ -264,11 +264,10 @@ class TriangleMesh:
             place = np.asarray(position, dtype=np.float64)
         except (TypeError, ValueError):
             place = np.empty(0)
-        largest = kernels.LARGEST_COORDINATE
-        if place.shape != (3,) or not (np.abs(place) <= largest).all():
+        if place.shape != (3,) or not (np.abs(place) <= LARGEST_COORDINATE).all():
             raise InvalidPoint(
                 f"the position is {position!r}; it must be three finite numbers, at most "
-                f"{largest:g} in size"
+                f"{LARGEST_COORDINATE:g} in size"
             )
         limit = as_limit(max_distance)
         face, point, distance = self._nearest_face(place)
@@ -368,7 +367,7 @@ class TriangleMesh:
     @cached_property
     def edge_count(self) -> int:
         """Number of edges."""
-        return int(kernels.count_edges(self.topology.links))
+        return int(build.count_edges(self.topology.links))
 
     @cached_property
     def report(self) -> MeshReport:
@@ -452,11 +451,11 @@ def _as_polygons(corners: ArrayLike, sizes: ArrayLike) -> tuple[Longs, Longs]:
 
 def _refuse_bad_vertices(vertices: Floats) -> None:
     with np.errstate(invalid="ignore"):
-        bad = np.flatnonzero(~(np.abs(vertices) <= kernels.LARGEST_COORDINATE).all(axis=1))
+        bad = np.flatnonzero(~(np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1))
     if len(bad):
         raise InvalidMesh(
             f"vertex {bad[0]} is at {vertices[bad[0]].tolist()}: coordinates must be finite and at "
-            f"most {kernels.LARGEST_COORDINATE:g} in size{_and_more(bad)}",
+            f"most {LARGEST_COORDINATE:g} in size{_and_more(bad)}",
             kind="vertex",
             elements=bad[:NAMED].tolist(),
         )
@@ -480,17 +479,17 @@ def _refuse_out_of_range(corners: Longs, sizes: Longs, vertex_count: int) -> Non
 def _prepare(vertices: Floats, faces: Ints, kept: Longs) -> Topology:
     """Return the topology of some of the faces."""
     topology, outcome, bad = _built(vertices, faces, kept)
-    if outcome == kernels.TOO_SHORT:
+    if outcome == build.TOO_SHORT:
         joined = lowest_joined(len(vertices), edges_of_no_length(vertices, faces[kept]))
         topology, outcome, bad = _built(vertices, joined[faces].astype(np.int32), kept)
         topology.inner_vertex[:] = topology.inner_vertex[joined]
         # The numbers of those that joined others are left out.
         topology.component[:] = np.unique(topology.component[joined], return_inverse=True)[1]
-    if outcome == kernels.TOO_SHORT:
+    if outcome == build.TOO_SHORT:
         face = int(topology.outer_face[bad])
         raise InvalidMesh(
             f"face {face} is {faces[face].tolist()} and has an edge shorter than "
-            f"{kernels.SHORTEST_EDGE:g}: scale the mesh, or merge the edge's vertices",
+            f"{SHORTEST_EDGE:g}: scale the mesh, or merge the edge's vertices",
             kind="face",
             elements=[face],
         )
@@ -506,8 +505,8 @@ def _built(vertices: Floats, faces: Ints, kept: Longs) -> tuple[Topology, int, i
             kind="face",
             elements=kept[:NAMED].tolist(),
         )
-    topology = kernels.empty_topology(len(vertices), len(surface))
-    outcome, bad = kernels.build_topology(vertices, faces[surface], topology)
+    topology = build.empty_topology(len(vertices), len(surface))
+    outcome, bad = build.build_topology(vertices, faces[surface], topology)
     topology.outer_face[:] = surface[topology.outer_face]
     return topology, outcome, bad
 

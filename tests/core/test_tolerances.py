@@ -60,6 +60,7 @@ from geodesic_core.tolerances import (
     GAP,
     GRAZING,
     LANDMARK_ERROR,
+    LARGEST_COORDINATE,
     LOCAL_SHARE,
     LOOSE_OVERLAP,
     LOWER_BOUND,
@@ -72,6 +73,7 @@ from geodesic_core.tolerances import (
     SEARCH_SLACK,
     SECTOR_MARGIN,
     SHARP,
+    SHORTEST_EDGE,
     SLACK,
     SLANT,
     SNAP,
@@ -97,6 +99,34 @@ def test_each_tolerance_is_tested():
     tested = [name.removeprefix("test_") for name in globals() if name.startswith("test_")]
     for name in names:
         assert any(test.startswith(name.lower()) for test in tested), name
+
+
+# Coordinates -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("share", "is_taken"), [(1.0, True), (1.01, False)])
+def test_largest_coordinate_is_the_most_that_is_taken(share, is_taken):
+    points, faces = zoo.octahedron()
+    points = points / np.abs(points).max()
+    vertices = share * LARGEST_COORDINATE * points
+    if is_taken:
+        distance = gc.exact_distance(gc.TriangleMesh(vertices, faces), 0).distances
+        expected = gc.exact_distance(gc.TriangleMesh(points, faces), 0).distances
+        np.testing.assert_allclose(distance / LARGEST_COORDINATE, expected, rtol=1e-14)
+    else:
+        with pytest.raises(gc.errors.InvalidMesh, match="at most"):
+            gc.TriangleMesh(vertices, faces)
+
+
+@pytest.mark.parametrize(("share", "is_taken"), [(1.01, True), (0.99, False)])
+def test_shortest_edge_is_the_least_that_is_taken(share, is_taken):
+    vertices = share * SHORTEST_EDGE * np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], float)
+    if is_taken:
+        distance = gc.exact_distance(gc.TriangleMesh(vertices, [(0, 1, 2)]), 1).distances
+        np.testing.assert_allclose(distance / vertices[1, 0], [1, 0, math.sqrt(2)], rtol=1e-14)
+    else:
+        with pytest.raises(gc.errors.InvalidMesh, match="shorter than"):
+            gc.TriangleMesh(vertices, [(0, 1, 2)])
 
 
 # Pinched faces -----------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-r"""Half-edge topology of a triangle mesh and the flat geometry of its faces, in one pass.
+r"""Half-edges: their columns, their frames, and the steps from one to another.
 
 Half-edge ``h = 3 f + i`` runs along face f from its corner i, the *tail*, to the next corner, the
 *head*; the third vertex is its *apex*. Its frame has the tail at the origin, the head on the
@@ -11,28 +11,23 @@ positive x axis and the face on y > 0::
           tail +--------+ head
                  length
 
-Two half-edges of one edge that belong to neighbouring faces are opposite each other. An edge of
-three faces or more, or of two that run it the same way, is *irregular*: it has no opposites, but
-its half-edges form a cycle, in which a bit tells whether the next one runs the same way. Faces are
-turned over, inside, so that only a one-sided surface has an irregular edge of two faces.
+The two half-edges of an edge between two faces are opposite each other. An edge of three faces or
+more is *irregular*, and so is one that both its faces run the same way. It has no opposites. Its
+half-edges form a cycle instead, in which a bit tells whether the next one runs the same way. Faces
+are turned over by `build`, so that only a one-sided surface has an irregular edge of two faces.
 
-Faces of no area, and those around a tip as sharp as a needle's, are *pinched*. Their edges have
-opposites as others have, but are crossed as irregular ones: around them windows would wind without
-end, or nearly so, if what passed was not kept (`passed`).
+Faces of no area are *pinched*, and so are those around a tip as sharp as a needle's. Their edges
+have opposites, but are crossed as irregular ones. Around them windows would wind almost without
+end, if their crossings were not recorded (`irregular_edges`).
 
-Inside, vertices are numbered along a Morton curve and faces by their lowest vertex: what is near on
-the surface is near in memory, which makes the sweep 5 to 20 % faster on scanned meshes. `Topology`
-holds the way back; corners keep their place in their face.
+Vertices and faces have inner numbers, see `build`. `Topology` holds the way back; a corner keeps
+its place in its face.
 """
 
-import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from geodesic_core.arrays import Flags, Floats, Ints, Longs, aligned_rows
+from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.jit import kernel
-from geodesic_core.tolerances import NO_AREA, SADDLE_EXCESS, SHARP
 
 # Columns of Topology.geometry, a row per half-edge: the triangle as seen from the half-edge
 LENGTH = 0  # |tail head|, mesh units
@@ -42,7 +37,7 @@ LENGTH_LEFT = 3  # |tail apex|
 COS_RIGHT = 4  # of the angle at the head
 SIN_RIGHT = 5
 LENGTH_RIGHT = 6  # |head apex|
-APEX_ANGLE = 7  # where the side toward the tail leaves the apex, in its unfolded fan; radians
+APEX_ANGLE = 7  # direction of the side toward the tail in the apex's unfolded fan, radians
 
 # Columns of Topology.links, a row per half-edge
 OUT_LEFT = 0  # the half-edge across (tail, apex), in the neighbour; or NO_FACE, or IRREGULAR
@@ -50,53 +45,38 @@ OUT_RIGHT = 1  # the same across (apex, head)
 APEX = 2
 TAIL = 3
 HEAD = 4
-OPPOSITE = 5  # the same across this edge, also where it is crossed as an irregular one
+OPPOSITE = 5  # the same across this edge; a pinched face has its opposites here
 AROUND = 6  # of an irregular edge: the next half-edge h around it, 2 h + 1 if it runs the same way
 SPARE = 7  # fills the row, half a cache line
 
 NO_FACE = -1  # across a boundary edge
-IRREGULAR = -2  # across an edge of several neighbours, one that lies the other way, or pinched
+IRREGULAR = -2  # across an edge of several neighbours, of one that disagrees, or of a pinched face
 
-ROW = 8  # columns of both
+ROW = 8  # columns of both arrays: a row of geometry is a cache line of 64 bytes
 
 # Vertex flags
 BOUNDARY = 1
 SADDLE = 2  # the total angle exceeds 2π
-FANS = 4  # the link is neither one circle nor one path: several fans of faces meet
-SEAM = 8  # the vertex lies on an edge of several faces, or one that lies the other way round
+FANS = 4  # several fans of faces meet: the link is neither one circle nor one path
+SEAM = 8  # the vertex is an end of an edge of three faces or more, or of two that disagree
 PINCHED = 16  # the vertex is a corner of a pinched face
-
-# Outcomes
-SOUND = 0
-NOT_FINITE = 1
-OUT_OF_RANGE = 2
-REPEATED_VERTEX = 3
-TOO_SHORT = 4
-TOO_LARGE = 5
-
-LARGEST_COORDINATE = 1e50
-SHORTEST_EDGE = 1e-50
-"""Mesh units; between the two, sixth powers of lengths neither overflow nor vanish.
-
-Edges of no length at all are contracted before; see `contraction`.
-"""
 
 
 class Topology(NamedTuple):
-    """What the sweep needs to know of a mesh, in inner numbering; read-only once built."""
+    """Connectivity and flat geometry of a mesh, in inner numbering; read-only once built."""
 
     positions: Floats
-    """(V, 3): of the vertices, mesh units"""
+    """(V, 3): the vertices, mesh units"""
     geometry: Floats
     """(3F, 8): LENGTH … APEX_ANGLE"""
     links: Ints
     """(3F, 8): OUT_LEFT … SPARE"""
     first_corner: Ints
-    """(V + 1,): where in `corners` those of each vertex start; the next vertex's follow"""
+    """(V + 1,): start of each vertex's run in `corners`; it ends where the next one starts"""
     corners: Ints
     """(3F,): the half-edges that leave a vertex, counter-clockwise, fan after fan"""
     corner_angles: Floats
-    """(3F,): where each of `corners` leaves in the unfolded fan of its vertex, radians"""
+    """(3F,): direction of each of `corners` in the unfolded fan of its vertex, radians"""
     total_angle: Floats
     """(V,): sum of the angles at the vertex, radians"""
     flags: Flags
@@ -104,9 +84,9 @@ class Topology(NamedTuple):
     component: Ints
     """(V,): connected component, by the *caller's* vertex; isolated vertices have one each"""
     inner_vertex: Ints
-    """(V,): the caller's vertex → inner vertex; one for all that edges of no length join"""
+    """(V,): the caller's vertex → inner vertex; the same for all that edges of no length join"""
     outer_vertex: Ints
-    """(V,): inner vertex → the caller's; of several the lowest, while the others' inner vertices
+    """(V,): inner vertex → the caller's, the lowest of several; the inner vertices of the others
     are in no face"""
     outer_face: Ints
     """(F,): inner face → the caller's"""
@@ -126,7 +106,7 @@ def following(h: int) -> int:
 
 @kernel
 def point_in_frame(geometry: Floats, h: int, weights: Floats) -> tuple[float, float]:
-    """Where the point of a face with these barycentric weights lies in the frame of h."""
+    """Position in the frame of h of the point of its face with these barycentric weights."""
     along, up = weights[(h + 1) % 3], weights[(h + 2) % 3]
     reach = up * geometry[h, LENGTH_LEFT]
     x = along * geometry[h, LENGTH] + reach * geometry[h, COS_LEFT]
@@ -135,7 +115,7 @@ def point_in_frame(geometry: Floats, h: int, weights: Floats) -> tuple[float, fl
 
 @kernel
 def weights_in_frame(geometry: Any, weights: Any, first: int, h: int) -> tuple[float, float]:
-    """Do the same by raw pointers, for the weights that begin at ``first``."""
+    """Position as `point_in_frame` has it, by raw pointers; the weights begin at ``first``."""
     row, i = ROW * h, h % 3
     along, up = weights[first + (i + 1) % 3], weights[first + (i + 2) % 3]
     reach = up * geometry[row + LENGTH_LEFT]
@@ -163,426 +143,3 @@ def next_around(links: Ints, h: int) -> int:
     if links[h, OPPOSITE] == IRREGULAR:
         return links[h, AROUND] >> 1
     return links[h, OPPOSITE]
-
-
-@kernel
-def check_arrays(vertices: Floats, faces: Ints | Longs) -> tuple[int, int]:
-    """Return (outcome, id of the first element at fault)."""
-    for v in range(vertices.shape[0]):
-        for axis in range(3):
-            if not math.isfinite(vertices[v, axis]):
-                return NOT_FINITE, v
-            if abs(vertices[v, axis]) > LARGEST_COORDINATE:
-                return TOO_LARGE, v
-    count = vertices.shape[0]
-    for f in range(faces.shape[0]):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        if a < 0 or a >= count or b < 0 or b >= count or c < 0 or c >= count:
-            return OUT_OF_RANGE, f
-        if a in (b, c) or b == c:
-            return REPEATED_VERTEX, f
-    return SOUND, 0
-
-
-_MORTON_BITS = 10  # per axis: a thousand cells are as fine as the caches care for
-_RADIX_BITS = 10
-
-
-@kernel
-def morton_codes(vertices: Floats) -> Ints:
-    """Interleave the bits of each vertex's cell in a cubic grid over the bounding box."""
-    low, size = np.empty(3), 0.0
-    for axis in range(3):
-        low[axis] = vertices[:, axis].min()
-        size = max(size, vertices[:, axis].max() - low[axis])
-    scale = ((1 << _MORTON_BITS) - 1) / size if size > 0.0 else 0.0
-    codes = np.empty(len(vertices), np.int32)
-    for v in range(len(vertices)):
-        code = 0
-        for axis in range(3):
-            bits = int((vertices[v, axis] - low[axis]) * scale)
-            # Spread the bits two places apart, by halves
-            bits = (bits | (bits << 16)) & 0x030000FF
-            bits = (bits | (bits << 8)) & 0x0300F00F
-            bits = (bits | (bits << 4)) & 0x030C30C3
-            bits = (bits | (bits << 2)) & 0x09249249
-            code |= bits << axis
-        codes[v] = code
-    return codes
-
-
-@kernel
-def counting_sort(keys: Ints, key_count: int, order: Ints, sorted_order: Ints) -> None:
-    """Sort ``order`` stably by ``keys[order[i]]`` < key_count into ``sorted_order``."""
-    start = np.zeros(key_count + 1, np.int32)
-    for key in keys:
-        start[key + 1] += 1
-    for key in range(key_count):
-        start[key + 1] += start[key]
-    for item in order:
-        key = keys[item]
-        sorted_order[start[key]] = item
-        start[key] += 1
-
-
-@kernel
-def renumber(
-    vertices: Floats,
-    faces: Ints,
-    inner_vertex: Ints,
-    outer_vertex: Ints,
-    outer_face: Ints,
-    positions: Floats,
-) -> Ints:
-    """Fill the three maps and the positions; return the faces in inner numbering; O(V + F)."""
-    codes = morton_codes(vertices)
-    digits = np.empty(len(vertices), np.int32)
-    order, previous_order = outer_vertex, np.empty(len(vertices), np.int32)
-    order[:] = np.arange(len(vertices))
-    for shift in range(0, 3 * _MORTON_BITS, _RADIX_BITS):
-        previous_order[:] = order
-        for v in range(len(vertices)):
-            digits[v] = (codes[v] >> shift) & ((1 << _RADIX_BITS) - 1)
-        counting_sort(digits, 1 << _RADIX_BITS, previous_order, order)
-    for v in range(len(vertices)):
-        inner_vertex[order[v]] = v
-        for axis in range(3):
-            positions[v, axis] = vertices[order[v], axis]
-    lowest = np.empty(len(faces), np.int32)
-    for f in range(len(faces)):
-        a, b, c = inner_vertex[faces[f, 0]], inner_vertex[faces[f, 1]], inner_vertex[faces[f, 2]]
-        lowest[f] = min(a, b, c)
-    counting_sort(lowest, len(vertices), np.arange(len(faces)).astype(np.int32), outer_face)
-    inner_faces = np.empty_like(faces)
-    for f in range(len(faces)):
-        for i in range(3):
-            inner_faces[f, i] = inner_vertex[faces[outer_face[f], i]]
-    return inner_faces
-
-
-@kernel
-def link_around(faces: Ints, vertex_count: int) -> Ints:
-    """Return the cycle of half-edges around each edge, as in AROUND; -1 where there is only one.
-
-    O(V + F), even where a hundred thousand faces share a vertex: half-edges are sorted by their
-    lower vertex, and those of one lower vertex find each other at their higher one.
-    """
-    flat = faces.reshape(-1)
-    count = len(flat)
-    lower = np.empty(count, np.int32)
-    for i in range(count):
-        lower[i] = min(flat[i], flat[following(i)])
-    order = np.empty(count, np.int32)
-    counting_sort(lower, vertex_count, np.arange(count).astype(np.int32), order)
-    around = np.full(count, -1, np.int32)
-    first, last = np.empty(vertex_count, np.int32), np.full(vertex_count, -1, np.int32)
-    for i in range(count):
-        h = order[i]
-        higher = max(flat[h], flat[following(h)])
-        g = last[higher]
-        if g >= 0 and lower[g] == lower[h]:  # an edge seen before: h joins its cycle
-            start = first[higher]
-            around[g] = 2 * h + (flat[g] == flat[h])
-            around[h] = 2 * start + (flat[h] == flat[start])
-        else:
-            first[higher] = h
-        last[higher] = h
-    return around
-
-
-@kernel
-def is_pair(around: Ints, h: int) -> bool:
-    """Whether the edge of h has two faces."""
-    return around[h] >= 0 and around[around[h] >> 1] >> 1 == h
-
-
-@kernel
-def orient_faces(faces: Ints, around: Ints) -> int:
-    """Turn faces over so that neighbours agree, where that can be; return how many; O(F).
-
-    Each face follows the lowest that it hangs together with, over edges of two faces.
-    """
-    turned, state = 0, np.zeros(len(faces), np.uint8)  # 1 as it is, 2 turned over
-    stack = np.empty(len(faces), np.int32)
-    for start in range(len(faces)):
-        if state[start]:
-            continue
-        state[start], stack[0], size = 1, start, 1
-        while size > 0:
-            size -= 1
-            f = stack[size]
-            for h in range(3 * f, 3 * f + 3):
-                code = around[h]
-                if is_pair(around, h) and not state[(code >> 1) // 3]:
-                    g = (code >> 1) // 3
-                    state[g] = state[f] if code & 1 == 0 else 3 - state[f]
-                    stack[size] = g
-                    size += 1
-    for f in range(len(faces)):
-        if state[f] == 2:
-            faces[f, 1], faces[f, 2] = faces[f, 2], faces[f, 1]
-            turned += 1
-    return turned
-
-
-@kernel
-def link_opposites(faces: Ints, vertex_count: int) -> tuple[Ints, Ints]:
-    """Return each half-edge's OPPOSITE and AROUND; faces that disagree are turned over before."""
-    around = link_around(faces, vertex_count)
-    agree = True
-    for h in range(len(around)):
-        if around[h] >= 0 and around[h] & 1 and is_pair(around, h):
-            agree = False
-    if not agree and orient_faces(faces, around) > 0:
-        around = link_around(faces, vertex_count)
-    opposite = np.empty(len(around), np.int32)
-    for h in range(len(around)):
-        if around[h] < 0:
-            opposite[h] = NO_FACE
-        elif around[h] & 1 == 0 and is_pair(around, h):
-            opposite[h] = around[h] >> 1
-        else:
-            opposite[h] = IRREGULAR
-    return opposite, around
-
-
-@kernel
-def fill_geometry(
-    vertices: Floats, faces: Ints, geometry: Floats, angles: Floats, pinched: Flags
-) -> int:
-    """Fill the geometry but for APEX_ANGLE, and the angle at each half-edge's tail, radians.
-
-    Mark the faces of no area as pinched. Returns a face with too short an edge, or -1.
-    """
-    for f in range(faces.shape[0]):
-        for i in range(3):
-            h = 3 * f + i
-            tail, head, apex = faces[f, i], faces[f, (i + 1) % 3], faces[f, (i + 2) % 3]
-            ux = vertices[head, 0] - vertices[tail, 0]
-            uy = vertices[head, 1] - vertices[tail, 1]
-            uz = vertices[head, 2] - vertices[tail, 2]
-            wx = vertices[apex, 0] - vertices[tail, 0]
-            wy = vertices[apex, 1] - vertices[tail, 1]
-            wz = vertices[apex, 2] - vertices[tail, 2]
-            length = math.sqrt(ux * ux + uy * uy + uz * uz)
-            if length < SHORTEST_EDGE:
-                return f
-            cx, cy, cz = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
-            # Cosine and sine from products, not from the law of cosines, which loses all digits on
-            # slivers; normalised to each other so that a rotation stays one.
-            dot = ux * wx + uy * wy + uz * wz
-            cross = math.sqrt(cx * cx + cy * cy + cz * cz)
-            norm = math.sqrt(dot * dot + cross * cross)
-            if norm == 0.0:  # the side toward the apex has no length
-                return f
-            geometry[h, LENGTH] = length
-            geometry[h, COS_LEFT] = dot / norm
-            geometry[h, SIN_LEFT] = cross / norm
-            angles[h] = angle_of(dot / norm, cross / norm)
-            if cross <= NO_AREA * norm:
-                pinched[f] = 1
-        for i in range(3):
-            h, n, p = 3 * f + i, 3 * f + (i + 1) % 3, 3 * f + (i + 2) % 3
-            geometry[h, LENGTH_LEFT] = geometry[p, LENGTH]
-            geometry[h, LENGTH_RIGHT] = geometry[n, LENGTH]
-            geometry[h, COS_RIGHT] = geometry[n, COS_LEFT]
-            geometry[h, SIN_RIGHT] = geometry[n, SIN_LEFT]
-    return -1
-
-
-@kernel
-def crossings(faces: Ints, opposite: Ints, pinched: Flags, flags: Flags) -> Ints:
-    """Return what windows meet across each half-edge, and flag the corners of pinched faces.
-
-    It is what is opposite, but for the edges of those faces.
-    """
-    if not pinched.any():
-        return opposite
-    across = opposite.copy()
-    for h in range(len(opposite)):
-        if pinched[h // 3]:
-            flags[faces[h // 3, h % 3]] |= PINCHED
-            if opposite[h] >= 0:
-                across[h] = across[opposite[h]] = IRREGULAR
-    return across
-
-
-@kernel
-def fill_links(faces: Ints, opposite: Ints, across: Ints, around: Ints, links: Ints) -> None:
-    """Fill the links."""
-    for f in range(faces.shape[0]):
-        for i in range(3):
-            h, n, p = 3 * f + i, (i + 1) % 3, (i + 2) % 3
-            links[h, OUT_LEFT] = across[3 * f + p]
-            links[h, OUT_RIGHT] = across[3 * f + n]
-            links[h, APEX], links[h, TAIL], links[h, HEAD] = faces[f, p], faces[f, i], faces[f, n]
-            links[h, OPPOSITE], links[h, AROUND] = opposite[h], around[h]
-            links[h, SPARE] = 0
-
-
-@kernel
-def angle_of(cosine: float, sine: float) -> float:
-    """Angle in [0, π] of its cosine and sine ≥ 0, radians: by an arctangent that is cheap."""
-    half = math.atan(sine / (1.0 + abs(cosine)))
-    return 2.0 * half if cosine >= 0.0 else math.pi - 2.0 * half
-
-
-@kernel
-def unfold_fans(faces: Ints, opposite: Ints, angles: Floats, pinched: Flags, topology: Any) -> None:
-    """Order the corners around each vertex, lay their angles out and classify the vertex.
-
-    Mark the faces around a sharp tip as pinched.
-
-    A fan starts at its clockwise boundary where it has one. The walk reads ``opposite`` and
-    ``angles`` alone, which fit the caches; the rows of the topology do not.
-    """
-    corners, corner_angles = topology.corners, topology.corner_angles
-    first_corner, total_angle, flags = topology.first_corner, topology.total_angle, topology.flags
-    flat = faces.reshape(-1)
-    first_corner[:] = 0
-    for h in range(len(flat)):
-        first_corner[flat[h] + 1] += 1
-    for v in range(len(total_angle)):
-        first_corner[v + 1] += first_corner[v]
-    free = first_corner.copy()
-    seen = np.zeros(len(flat), np.uint8)
-    for at_boundary in (True, False):  # open fans first: a walk must not start in their middle
-        for start in range(len(flat)):
-            if seen[start] or (at_boundary and opposite[start] >= 0):
-                continue
-            v = flat[start]
-            place, angle, corner = free[v], total_angle[v], start
-            if place > first_corner[v]:
-                flags[v] |= FANS
-            if opposite[start] == IRREGULAR:
-                flags[v] |= FANS | SEAM
-            while True:
-                seen[corner] = 1
-                corners[place], corner_angles[place] = corner, angle
-                topology.geometry[following(corner), APEX_ANGLE] = angle
-                place += 1
-                angle += angles[corner]
-                across = opposite[previous(corner)]
-                if across < 0 or seen[across]:
-                    break
-                corner = across
-            if across == NO_FACE or opposite[start] == NO_FACE:
-                flags[v] |= BOUNDARY
-            if across == IRREGULAR:
-                flags[v] |= FANS | SEAM
-            if across >= 0 and angle - total_angle[v] < SHARP:  # the fan is closed
-                for i in range(free[v], place):
-                    pinched[corners[i] // 3] = 1
-            free[v], total_angle[v] = place, angle
-    for v in range(len(total_angle)):
-        if not flags[v] & (BOUNDARY | SEAM) and total_angle[v] > 2.0 * math.pi + SADDLE_EXCESS:
-            flags[v] |= SADDLE
-
-
-@kernel
-def label_components(faces: Ints, vertex_count: int) -> Ints:
-    """Label the vertices by connected component, numbered by first appearance; O(V + F)."""
-    parent = np.arange(vertex_count).astype(np.int32)
-    for f in range(faces.shape[0]):
-        root = faces[f, 0]
-        while parent[root] != root:
-            parent[root] = parent[parent[root]]
-            root = parent[root]
-        for i in range(1, 3):
-            other = faces[f, i]
-            while parent[other] != other:
-                parent[other] = parent[parent[other]]
-                other = parent[other]
-            if other != root:
-                low, high = min(root, other), max(root, other)
-                parent[high] = low
-                root = low
-    label = np.empty(vertex_count, np.int32)
-    count = 0
-    for v in range(vertex_count):
-        # A parent is never a higher vertex than its child: its label is there already.
-        if parent[v] == v:
-            label[v] = count
-            count += 1
-        else:
-            label[v] = label[parent[v]]
-    return label
-
-
-@kernel
-def count_boundary_loops(links: Ints) -> int:
-    """Count the closed loops of boundary half-edges."""
-    seen = np.zeros(links.shape[0], np.uint8)
-    loops = 0
-    for start in range(links.shape[0]):
-        if links[start, OPPOSITE] != NO_FACE or seen[start]:
-            continue
-        loops += 1
-        h = start
-        while not seen[h]:
-            seen[h] = 1
-            # Around the head, clockwise, to the boundary on the other side of the same fan
-            h = following(h)
-            while links[h, OPPOSITE] >= 0:
-                h = following(links[h, OPPOSITE])
-            if links[h, OPPOSITE] == IRREGULAR:
-                break
-    return loops
-
-
-@kernel
-def count_edges(links: Ints) -> int:
-    """Count the edges, each once however many faces it has."""
-    count = 0
-    for h in range(links.shape[0]):
-        lowest = True
-        if links[h, OPPOSITE] == IRREGULAR:
-            g = links[h, AROUND] >> 1
-            while g != h:
-                lowest = lowest and h < g
-                g = links[g, AROUND] >> 1
-        else:
-            lowest = links[h, OPPOSITE] < h
-        count += lowest
-    return count
-
-
-@kernel
-def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[int, int]:
-    """Fill the arrays of a Topology in O(V + F); return (outcome, inner face at fault)."""
-    inner_faces = renumber(
-        vertices,
-        faces,
-        topology.inner_vertex,
-        topology.outer_vertex,
-        topology.outer_face,
-        topology.positions,
-    )
-    opposite, around = link_opposites(inner_faces, len(vertices))
-    angles, pinched = np.empty(len(opposite)), np.zeros(len(inner_faces), np.uint8)
-    face = fill_geometry(topology.positions, inner_faces, topology.geometry, angles, pinched)
-    if face >= 0:
-        return TOO_SHORT, face
-    unfold_fans(inner_faces, opposite, angles, pinched, topology)
-    across = crossings(inner_faces, opposite, pinched, topology.flags)
-    fill_links(inner_faces, opposite, across, around, topology.links)
-    topology.component[:] = label_components(faces, len(vertices))
-    return SOUND, -1
-
-
-def empty_topology(vertex_count: int, face_count: int) -> Topology:
-    """Allocate the arrays that `build_topology` fills."""
-    return Topology(
-        positions=np.empty((vertex_count, 3)),
-        geometry=aligned_rows(3 * face_count, ROW, np.float64),
-        links=aligned_rows(3 * face_count, ROW, np.int32),
-        first_corner=np.empty(vertex_count + 1, np.int32),
-        corners=np.empty(3 * face_count, np.int32),
-        corner_angles=np.empty(3 * face_count, np.float64),
-        total_angle=np.zeros(vertex_count, np.float64),
-        flags=np.zeros(vertex_count, np.uint8),
-        component=np.empty(vertex_count, np.int32),
-        inner_vertex=np.empty(vertex_count, np.int32),
-        outer_vertex=np.empty(vertex_count, np.int32),
-        outer_face=np.empty(face_count, np.int32),
-    )

@@ -9,6 +9,15 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.kernels.mesh.build import (
+    count_boundary_loops,
+    empty_topology,
+    fill_geometry,
+    fill_links,
+    link_around,
+    link_opposites,
+    unfold_fans,
+)
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     APEX_ANGLE,
@@ -30,15 +39,8 @@ from geodesic_core.kernels.mesh.half_edges import (
     SIN_RIGHT,
     TAIL,
     Topology,
-    count_boundary_loops,
-    empty_topology,
-    fill_geometry,
-    fill_links,
     following,
-    link_around,
-    link_opposites,
     previous,
-    unfold_fans,
 )
 from geodesic_core.mesh.canonical import half_edges_around
 from geodesic_core.tolerances import SADDLE_EXCESS
