@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from app.encoding import Representation
 from app.errors import Problem
 from app.queries import Estimate, Query
-from app.schemas.service import Merge
+from app.schemas.meshes import Merge
 from app.store.meshes import WrittenMesh
 from app.store.results import Written
 

@@ -17,7 +17,7 @@ from app.access import Caller
 from app.encoding import Representation, negotiate, negotiate_coding
 from app.encoding.form import ARRAYS, TEXTS
 from app.errors import Fault, problem
-from app.schemas.service import AnswerParameters
+from app.schemas.requests import AnswerParameters
 from app.service.service import RequestContext, Service
 
 T = TypeVar("T")

@@ -13,7 +13,7 @@ from starlette.routing import compile_path
 from app.errors import Fault, Problem, ProblemError, pointer, problem_of_status
 from app.http.middleware.request_id import body_too_large
 from app.http.responses import problem_response
-from app.schemas.service import POINT_TAGS
+from app.schemas.points import POINT_TAGS
 from app.settings import Settings
 
 

@@ -10,7 +10,7 @@ from starlette.datastructures import UploadFile
 from starlette.requests import Request
 
 from app.errors import problem
-from app.schemas.service import MeshFormat
+from app.schemas.meshes import MeshFormat
 
 FORMATS = get_args(MeshFormat)
 _FORMAT_OF_TYPE = {

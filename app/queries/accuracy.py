@@ -10,10 +10,11 @@ import geodesic_core as gc
 from app.errors import pointer
 from app.queries.base import ExecutionContext, Query
 from app.queries.validation import refuse_places
-from app.schemas import service
+from app.schemas.points import Origin, Source, StrictModel
+from app.schemas.requests import Accuracy
 from app.store.meshes import OpenMesh
 
-A = TypeVar("A", bound=service.Accuracy)
+A = TypeVar("A", bound=Accuracy)
 
 _ERRORS = ("relative_error", "absolute_error")
 
@@ -35,14 +36,14 @@ def with_its_error(request: A) -> A:
     return request
 
 
-def errors_of(request: service.Accuracy) -> dict[str, float | None]:
+def errors_of(request: Accuracy) -> dict[str, float | None]:
     """Return the errors that are granted."""
     return {name: getattr(request, name) for name in _ERRORS}
 
 
 def solve_field(
     opened: OpenMesh,
-    request: service.Accuracy,
+    request: Accuracy,
     sources: Sequence[gc.Source],
     grant: ExecutionContext,
     *,
@@ -72,9 +73,7 @@ def solve_field(
     return grant.fields.find(opened, question, solve)
 
 
-def topics_of(
-    query: Query[Any], sources: Sequence[service.Source | service.Origin]
-) -> tuple[str, ...]:
+def topics_of(query: Query[Any], sources: Sequence[Source | Origin]) -> tuple[str, ...]:
     """Return what is known of the field that a query needs before its mesh is open."""
     request = query.request
     rest = request.model_dump(include={"method", "max_distance", "barriers", *_ERRORS})
@@ -82,17 +81,17 @@ def topics_of(
     return hashlib.blake2b(written, digest_size=8).hexdigest(), query.mesh_id
 
 
-def _as_source(point: service.StrictModel) -> dict[str, Any]:
+def _as_source(point: StrictModel) -> dict[str, Any]:
     # Some queries have sources without start distances; as JSON they are to look the same.
     return {"start_distance": 0.0, **vars(point)}
 
 
-def method_of(request: service.Accuracy) -> dict[str, Any]:
+def method_of(request: Accuracy) -> dict[str, Any]:
     """Return what answers say of their method."""
     return {"method": request.method, "exact": request.method == "exact"}
 
 
-def likely_bound(request: service.Accuracy) -> Mapping[str, Any]:
+def likely_bound(request: Accuracy) -> Mapping[str, Any]:
     """Return about the same as `bound_of` for a field that is not there yet."""
     return {"type": "relative", "value": request.relative_error or 0.0, "kind": "guaranteed"}
 

@@ -26,7 +26,8 @@ from app.queries.validation import (
     refuse_outside,
     refuse_places,
 )
-from app.schemas import service
+from app.schemas.points import Point, StrictModel
+from app.schemas.requests import AmongBarriers
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 from geodesic_core.kernels.jit import sources_digest
@@ -36,7 +37,7 @@ VALUES_OF_POINT = 8
 
 SMALL_SECONDS = 0.05
 
-R = TypeVar("R", bound=service.StrictModel)
+R = TypeVar("R", bound=StrictModel)
 
 
 @dataclass(frozen=True)
@@ -91,13 +92,13 @@ class Query(ABC, Generic[R]):
 
     kind: ClassVar[str]
     """As clients call it"""
-    model: ClassVar[type[service.StrictModel]]
+    model: ClassVar[type[StrictModel]]
     """Of the request"""
 
     @classmethod
     def ask(cls, mesh_id: str, size: MeshSize, request: R, settings: Settings) -> Self:
         """Return the query that ``request`` asks of a mesh of this ``size``, or refuse it."""
-        if isinstance(request, service.AmongBarriers):
+        if isinstance(request, AmongBarriers):
             refuse_barriers_outside(request.barriers, size)
             request = request.model_copy(update={"barriers": sorted(set(request.barriers))})
         query = cls(mesh_id, cls.normal(request))
@@ -127,7 +128,7 @@ class Query(ABC, Generic[R]):
     def barriers(self) -> NDArray[np.int64]:
         """The faces that are blocked, ascending."""
         request = self.request
-        blocked = request.barriers if isinstance(request, service.AmongBarriers) else ()
+        blocked = request.barriers if isinstance(request, AmongBarriers) else ()
         return np.array(blocked, np.int64)
 
     # What a kind says of itself
@@ -233,6 +234,6 @@ def fingerprint(query: Query[Any], form: Representation) -> str:
     return digest.hexdigest()
 
 
-def numbered(where: str, written: Sequence[service.Point]) -> Iterator[tuple[str, service.Point]]:
+def numbered(where: str, written: Sequence[Point]) -> Iterator[tuple[str, Point]]:
     """Yield the points of a list, each with its place."""
     return ((f"{where}/{i}", point) for i, point in enumerate(written))

@@ -18,7 +18,7 @@ from scipy.spatial.distance import cdist
 import geodesic_core as gc
 from app.queries.places import Places, components_of, positions_of
 from app.queries.validation import MeshSize
-from app.schemas.service import Accuracy
+from app.schemas.requests import Accuracy
 
 # Seconds
 PER_POINT = 12e-6

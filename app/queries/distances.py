@@ -33,7 +33,7 @@ from app.queries.sources import named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
 from app.queries.validation import MeshSize, Named, refuse_more, refuse_places
 from app.queries.views import columns_of, surface_of, table_of_distances
-from app.schemas import service
+from app.schemas.requests import DistancesRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
@@ -41,14 +41,14 @@ _VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3}
 """Values of JSON for each distance"""
 
 
-class DistancesQuery(Query[service.DistancesRequest]):
+class DistancesQuery(Query[DistancesRequest]):
     """Distances from ``sources`` to all vertices, or to ``targets`` only."""
 
     kind = "distances"
-    model = service.DistancesRequest
+    model = DistancesRequest
 
     @classmethod
-    def normal(cls, request: service.DistancesRequest) -> service.DistancesRequest:
+    def normal(cls, request: DistancesRequest) -> DistancesRequest:
         """Name the error that is granted, and what is included once.
 
         The gradient is known at vertices only.

@@ -39,7 +39,7 @@ from app.queries.sources import named_sources, point_count, starts_of
 from app.queries.stats import likely_stats, stats_of
 from app.queries.validation import MeshSize, Named, refuse_large_json, refuse_more, refuse_places
 from app.queries.views import lines_of
-from app.schemas import service
+from app.schemas.requests import Accuracy, IsolinesRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 from geodesic_core.fields.isolines import as_chord_error, spaced_levels
@@ -48,16 +48,16 @@ _VALUES_OF_POINT, _VALUES_OF_LEVEL = 4, 1
 """What the JSON of a point has: position, and the face of its piece; and what each level adds."""
 
 
-class IsolinesQuery(Query[service.IsolinesRequest]):
+class IsolinesQuery(Query[IsolinesRequest]):
     """The points at some distances from ``sources``, as polylines."""
 
     kind = "isolines"
-    model = service.IsolinesRequest
+    model = IsolinesRequest
     offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
     hint = "ask for fewer levels at once, or grant a larger chord_error"
 
     @classmethod
-    def normal(cls, request: service.IsolinesRequest) -> service.IsolinesRequest:
+    def normal(cls, request: IsolinesRequest) -> IsolinesRequest:
         """Name the error that is granted; refuse levels that are told twice or not at all."""
         if request.levels is None and request.count is None:
             raise refuse_places(["/levels"], "give levels, or count for some evenly spaced")
@@ -210,7 +210,7 @@ def _straight_line(mesh: gc.TriangleMesh, level: float, faces: NDArray[np.int32]
 
 def _pieces(
     mesh: gc.TriangleMesh,
-    request: service.Accuracy,
+    request: Accuracy,
     levels: NDArray[np.float64],
     chord_error: float,
 ) -> NDArray[np.float64]:

@@ -14,15 +14,15 @@ from app.queries.places import Places, checkpoint
 from app.queries.points import described
 from app.queries.validation import MeshSize, refuse_points
 from app.queries.views import places_of, table_of_places
-from app.schemas import service
+from app.schemas.requests import LocateRequest
 from app.store.meshes import OpenMesh
 
 
-class LocateQuery(Query[service.LocateRequest]):
+class LocateQuery(Query[LocateRequest]):
     """The points of the surface nearest to positions, where they are near enough."""
 
     kind = "locate"
-    model = service.LocateRequest
+    model = LocateRequest
     offers: Sequence[str] = (JSON, CSV, GEOJSON)
     hint = "ask for fewer points at once"
 

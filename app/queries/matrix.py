@@ -29,7 +29,7 @@ from app.queries.places import Places, components_of
 from app.queries.points import described
 from app.queries.validation import MeshSize, Named, refuse_more, refuse_places
 from app.queries.views import table_of_matrix, table_of_sparse
-from app.schemas import service
+from app.schemas.requests import MatrixRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 from geodesic_core.search.matrix import SWEEP_FROM
@@ -40,14 +40,14 @@ _AT_A_TIME = 2**20
 """Straight distances that are worked on at a time."""
 
 
-class MatrixQuery(Query[service.MatrixRequest]):
+class MatrixQuery(Query[MatrixRequest]):
     """Distances from each of N sources to each of M targets, or from each to one target."""
 
     kind = "matrix"
-    model = service.MatrixRequest
+    model = MatrixRequest
 
     @classmethod
-    def normal(cls, request: service.MatrixRequest) -> service.MatrixRequest:
+    def normal(cls, request: MatrixRequest) -> MatrixRequest:
         """Refuse pairs of which one end is missing."""
         sources, targets = len(request.sources), len(request.targets)
         if request.layout == "pairs" and sources != targets:

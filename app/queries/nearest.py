@@ -22,20 +22,20 @@ from app.queries.places import Places, components_of, unreachable
 from app.queries.points import described
 from app.queries.validation import MeshSize, Named, refuse_places
 from app.queries.views import places_of, table_of_places
-from app.schemas import service
+from app.schemas.requests import NearestRequest
 from app.store.meshes import OpenMesh
 
 
-class NearestQuery(Query[service.NearestRequest]):
+class NearestQuery(Query[NearestRequest]):
     """The ``k`` candidates that are geodesically nearest to a point."""
 
     kind = "nearest"
-    model = service.NearestRequest
+    model = NearestRequest
     offers: Sequence[str] = (JSON, CSV, GEOJSON)
     hint = "ask for a smaller k"
 
     @classmethod
-    def normal(cls, request: service.NearestRequest) -> service.NearestRequest:
+    def normal(cls, request: NearestRequest) -> NearestRequest:
         """Refuse to find more candidates than there are."""
         k, count = request.k, len(request.candidates)
         if k > count:

@@ -37,20 +37,21 @@ from app.queries.validation import (
     refuse_points,
 )
 from app.queries.views import line_of
-from app.schemas import service
+from app.schemas.points import Point
+from app.schemas.requests import Accuracy, PathParameters, PathRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
 
-class PathQuery(Query[service.PathRequest]):
+class PathQuery(Query[PathRequest]):
     """The shortest path between two points, past ``waypoints`` in their order."""
 
     kind = "path"
-    model = service.PathRequest
+    model = PathRequest
     offers: Sequence[str] = (JSON, NPY, OCTETS, OBJ, CSV, SVG, GEOJSON)
 
     @classmethod
-    def normal(cls, request: service.PathRequest) -> service.PathRequest:
+    def normal(cls, request: PathRequest) -> PathRequest:
         """Name the error that is granted."""
         request = with_its_error(request)
         if request.method == "approximate":
@@ -157,15 +158,15 @@ class PathQuery(Query[service.PathRequest]):
 # As a GET
 
 
-def written_request(parameters: service.PathParameters) -> service.PathRequest:
+def written_request(parameters: PathParameters) -> PathRequest:
     """Return the body of the ``POST`` that asks the same as the parameters of a ``GET``."""
-    return service.PathRequest(
+    return PathRequest(
         source=_parsed("/source", parameters.source),
         target=_parsed("/target", parameters.target),
         waypoints=[_parsed(pointer("waypoints", i), text) for i, text in enumerate(parameters.via)],
         max_distance=parameters.max_distance,
         explain=parameters.explain,
-        **parameters.model_dump(include=set(service.Accuracy.model_fields)),
+        **parameters.model_dump(include=set(Accuracy.model_fields)),
     )
 
 
@@ -183,7 +184,7 @@ def naming_parameters() -> Iterator[None]:
         ) from None
 
 
-def _parsed(place: str, text: str) -> service.Point:
+def _parsed(place: str, text: str) -> Point:
     try:
         return point_text.parse(text)
     except ValueError as error:

@@ -25,7 +25,7 @@ from app.queries.sources import named_origin, origin_of, point_count
 from app.queries.stats import likely_stats, stats_of
 from app.queries.validation import MeshSize, Named, refuse_large_json, refuse_more
 from app.queries.views import line_of
-from app.schemas import service
+from app.schemas.requests import PathsRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
@@ -33,16 +33,16 @@ _TRIED = 64
 """Targets to which a straight path is laid for an estimate, about."""
 
 
-class PathsQuery(Query[service.PathsRequest]):
+class PathsQuery(Query[PathsRequest]):
     """The shortest paths from a point to each of some targets."""
 
     kind = "paths"
-    model = service.PathsRequest
+    model = PathsRequest
     offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
     hint = "ask for fewer targets at once"
 
     @classmethod
-    def normal(cls, request: service.PathsRequest) -> service.PathsRequest:
+    def normal(cls, request: PathsRequest) -> PathsRequest:
         """Name the error that is granted."""
         return with_its_error(request)
 

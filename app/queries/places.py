@@ -9,7 +9,7 @@ import geodesic_core as gc
 from app.errors import Fault
 from app.queries.points import described, resolve
 from app.queries.validation import FAULTS_SHOWN, Named, refuse_points
-from app.schemas import service
+from app.schemas.points import EdgePoint, FacePoint, Point
 from geodesic_core.fields.sources import component_of
 
 Places = Sequence[gc.SurfacePoint]
@@ -58,11 +58,11 @@ def unreachable(missed: NDArray[np.bool_], connected: NDArray[np.bool_]) -> dict
     }
 
 
-def _at_fault(point: service.Point) -> str:
+def _at_fault(point: Point) -> str:
     """Return the member that is wrong with a point whose indices are sound."""
     match point:
-        case service.EdgePoint():
+        case EdgePoint():
             return "edge"
-        case service.FacePoint():
+        case FacePoint():
             return "barycentric"
     return "position"

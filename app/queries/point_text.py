@@ -10,7 +10,7 @@
 
 import re
 
-from app.schemas.service import EdgePoint, FacePoint, Point, PositionPoint, VertexPoint
+from app.schemas.points import EdgePoint, FacePoint, Point, PositionPoint, VertexPoint
 
 _INDEX, _NUMBER = r"(-?[0-9]{1,18})", r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
 _THREE = ",".join([_NUMBER] * 3)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import geodesic_core as gc
-from app.schemas.service import EdgePoint, FacePoint, Point, PositionPoint, VertexPoint
+from app.schemas.points import EdgePoint, FacePoint, Point, PositionPoint, VertexPoint
 
 
 def resolve(mesh: gc.TriangleMesh, point: Point) -> gc.SurfacePoint:

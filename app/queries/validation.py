@@ -5,13 +5,13 @@ from itertools import islice
 from typing import NamedTuple
 
 from app.errors import Fault, ProblemError, over_limit, problem
-from app.schemas import service
+from app.schemas.points import EdgePoint, FacePoint, Point, VertexPoint
 from app.settings import Settings
 from geodesic_core.tolerances import WEIGHT_ERROR
 
 FAULTS_SHOWN = 10
 
-Named = Iterator[tuple[str, service.Point]]
+Named = Iterator[tuple[str, Point]]
 """Points, each with the place in the body that it was written at."""
 
 
@@ -73,16 +73,16 @@ def detail_of(faults: Sequence[Fault]) -> str:
     return f"{faults[0].pointer}: {faults[0].message}"
 
 
-def _faults(place: str, point: service.Point, size: MeshSize) -> Iterator[Fault]:
+def _faults(place: str, point: Point, size: MeshSize) -> Iterator[Fault]:
     match point:
-        case service.VertexPoint(vertex=vertex):
+        case VertexPoint(vertex=vertex):
             yield from _outside(f"{place}/vertex", "vertex", vertex, size.vertices)
-        case service.EdgePoint(edge=ends, t=t):
+        case EdgePoint(edge=ends, t=t):
             for i, vertex in enumerate(ends):
                 yield from _outside(f"{place}/edge/{i}", "vertex", vertex, size.vertices)
             if not -WEIGHT_ERROR <= t <= 1.0 + WEIGHT_ERROR:
                 yield Fault(f"{place}/t", f"t is {t!r}; it must be a number from 0 to 1")
-        case service.FacePoint(face=face):
+        case FacePoint(face=face):
             yield from _outside(f"{place}/face", "face", face, size.faces)
 
 

@@ -10,7 +10,8 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.queries import PathQuery, result_key
-from app.schemas.service import PathRequest, VertexPoint
+from app.schemas.points import VertexPoint
+from app.schemas.requests import PathRequest
 from tests.support.service import NPY, check_problem, distances, mesh_of, upload_sample
 
 ROUNDING = 1e-9

@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.queries import DistancesQuery, MeshSize, result_key
-from app.schemas.service import DistancesRequest
+from app.schemas.requests import DistancesRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 from tests.support.service import check_problem, distances, mesh_of, serving, upload_sample

@@ -25,7 +25,8 @@ from app.engine.worker import Clock, Signals, Worker, WorkerConfig
 from app.errors import Problem
 from app.main import create_app
 from app.queries import DistancesQuery, PathQuery
-from app.schemas.service import DistancesRequest, PathRequest, VertexPoint
+from app.schemas.points import VertexPoint
+from app.schemas.requests import DistancesRequest, PathRequest
 from app.settings import Settings
 from geodesic_core import TriangleMesh, samples
 from tests.support.service import (

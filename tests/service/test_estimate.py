@@ -22,7 +22,7 @@ from app.queries import (
     Query,
     estimate,
 )
-from app.schemas.service import StrictModel
+from app.schemas.points import StrictModel
 from app.store.meshes import OpenMesh
 from tests.support.service import check_problem, granted, mesh_of, upload_sample
 

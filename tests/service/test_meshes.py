@@ -7,7 +7,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.cli.arguments import SampleName
-from app.schemas import service
+from app.schemas import meshes as schemas
 from app.settings import Settings
 from geodesic_core import samples
 from tests.support.service import check_problem, mesh_of, serving, upload_sample
@@ -72,7 +72,7 @@ def test_new_is_201_and_known_is_200(client: TestClient) -> None:
 def test_samples_have_the_same_names_everywhere(client: TestClient) -> None:
     names = list(samples.SAMPLES)
 
-    assert list(get_args(service.SampleName)) == names
+    assert list(get_args(schemas.SampleName)) == names
     assert list(SampleName) == names, "the command line's"
     assert client.get("/v1").json()["samples"] == names
 

@@ -10,7 +10,9 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.queries import PathQuery, result_key
-from app.schemas.service import PathRequest, StepName, VertexPoint
+from app.schemas.answers import StepName
+from app.schemas.points import VertexPoint
+from app.schemas.requests import PathRequest
 from tests.support.service import NPY, check_problem, mesh_of, serving, upload_sample
 
 _ENDS = {"source": {"vertex": 0}, "target": {"vertex": 60}}

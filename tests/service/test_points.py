@@ -18,16 +18,14 @@ from app.queries import (
     Query,
     result_key,
 )
-from app.schemas.service import (
+from app.schemas.points import FacePoint, VertexPoint, VertexSource
+from app.schemas.requests import (
     DistancesRequest,
-    FacePoint,
     LocateRequest,
     MatrixRequest,
     NearestRequest,
     PathRequest,
     PathsRequest,
-    VertexPoint,
-    VertexSource,
 )
 from app.store.meshes import OpenMesh
 from tests.support.service import check_problem, distances, granted, mesh_of, upload_sample

@@ -8,7 +8,7 @@ from starlette.testclient import TestClient
 
 import geodesic_core as gc
 from app.queries import DistancesQuery, result_key
-from app.schemas.service import DistancesRequest
+from app.schemas.requests import DistancesRequest
 from tests.support.service import NPY, check_problem, distances, mesh_of, serving, upload_sample
 
 

@@ -13,7 +13,9 @@ from app.http.dependencies import ServiceDep
 from app.http.metrics import Metrics
 from app.http.responses import UNSTORED, documented, problems
 from app.http.uploads import FORMATS as MESH_FORMATS
-from app.schemas.service import About, Health, Index, Method, ProblemCode, SampleName
+from app.schemas.meshes import SampleName
+from app.schemas.requests import Method
+from app.schemas.service import About, Health, Index, ProblemCode
 from app.settings import variable_of
 
 router = APIRouter(tags=["service"])

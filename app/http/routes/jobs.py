@@ -22,7 +22,8 @@ from app.http.responses import (
     result_response,
 )
 from app.jobs import Job
-from app.schemas.service import JobDocument, JobList, ListParameters
+from app.schemas.meshes import ListParameters
+from app.schemas.service import JobDocument, JobList
 from app.service.service import Answered
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])

@@ -23,7 +23,7 @@ from app.http.responses import (
     server_timing,
 )
 from app.http.uploads import spool
-from app.schemas.service import ListParameters, MeshDocument, MeshList, UploadParameters
+from app.schemas.meshes import ListParameters, MeshDocument, MeshList, UploadParameters
 from app.service.service import Added, RequestContext, Service
 
 router = APIRouter(prefix="/meshes", tags=["meshes"])

@@ -21,27 +21,29 @@ from app.queries import (
     naming_parameters,
     written_request,
 )
-from app.schemas.service import (
-    AnswerParameters,
+from app.schemas.answers import (
     DistancesAnswer,
-    DistancesRequest,
     Estimate,
     IsolinesAnswer,
-    IsolinesRequest,
-    JobDocument,
     LocateAnswer,
-    LocateRequest,
     MatrixAnswer,
-    MatrixRequest,
     NearestAnswer,
-    NearestRequest,
     PathAnswer,
+    PathsAnswer,
+)
+from app.schemas.requests import (
+    AnswerParameters,
+    DistancesRequest,
+    IsolinesRequest,
+    LocateRequest,
+    MatrixRequest,
+    NearestRequest,
     PathAnswerParameters,
     PathParameters,
     PathRequest,
-    PathsAnswer,
     PathsRequest,
 )
+from app.schemas.service import JobDocument
 
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"], route_class=QueryRoute)
 

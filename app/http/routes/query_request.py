@@ -26,7 +26,7 @@ from app.http.responses import (
 )
 from app.http.routes.bodies import offload_if_large
 from app.queries import Query, result_key
-from app.schemas.service import AnswerParameters
+from app.schemas.requests import AnswerParameters
 from app.service.service import RequestContext
 
 

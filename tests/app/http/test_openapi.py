@@ -6,7 +6,7 @@ from starlette.testclient import TestClient
 
 from app.cli.openapi import openapi_text
 from app.errors import PROBLEM_JSON
-from app.schemas import service
+from app.schemas import answers
 from tests.support.paths import ROOT
 
 COMMITTED = ROOT / "openapi" / "openapi.json"
@@ -106,7 +106,7 @@ def test_answers_are_what_is_described(
 
     for name, query in zip(names, ("", "?estimate=true"), strict=True):
         answer = client.post(link + query, json=body).json()
-        model: type[BaseModel] = getattr(service, name)
+        model: type[BaseModel] = getattr(answers, name)
         assert set(answer) <= set(model.model_fields)
         read = model.model_validate(answer).model_dump(mode="json", exclude_unset=True)
         assert read == answer

@@ -3,7 +3,7 @@
 import pytest
 
 from app.queries.point_text import parse
-from app.schemas.service import EdgePoint, FacePoint, PositionPoint, VertexPoint
+from app.schemas.points import EdgePoint, FacePoint, PositionPoint, VertexPoint
 
 
 @pytest.mark.parametrize(
