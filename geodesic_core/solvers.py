@@ -18,7 +18,8 @@ from geodesic_core.fields.sources import component_of, disconnected
 from geodesic_core.fields.sweep import Control
 from geodesic_core.fields.whole_sweep import RepeatableSweep, peak_bytes
 from geodesic_core.kernels.sweep import state
-from geodesic_core.kernels.sweep.state import Bounds, Wavefront
+from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
+from geodesic_core.kernels.sweep.state import Wavefront
 from geodesic_core.mesh.curve import Curve, Polyline, polyline_of
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -81,7 +82,7 @@ def exact_distance(
     arrays, since windows are given back as soon as they are propagated, unless they are kept.
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    bounds = state.exact_bounds(as_limit(max_distance))
+    bounds = exact_bounds(as_limit(max_distance))
     mesh, control = _among(mesh, barriers, control)
     return _solve(mesh, sources, targets, bounds, EXACT, control, paths=True, windows=keep_windows)
 
@@ -138,7 +139,7 @@ def approximate_distance(
     control = Control(progress, cancel, deadline_s, memory_limit)
     relative, absolute = _as_errors(relative_error, absolute_error)
     limit = as_limit(max_distance)
-    bounds = state.merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
+    bounds = merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
     mesh, control = _among(mesh, barriers, control)
     if math.isfinite(relative):
         promise = ErrorBound("relative", relative, "guaranteed")

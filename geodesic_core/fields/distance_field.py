@@ -30,7 +30,7 @@ from geodesic_core.fields.sweep import Control
 from geodesic_core.fields.whole_sweep import RepeatableSweep, SweepResult
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep.state import exact_bounds, merging_bounds, with_parallel_windows
+from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
 from geodesic_core.mesh.curve import Curve, Polyline
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -171,8 +171,8 @@ class DistanceField:
         sweep, bounds, found = self._sweep, self._sweep.bounds, self._found
         if found.winners is not None and found.windows is not None and not bounds.merging:
             return Lazy(sweep.find_ways, (found.winners, found.windows))
-        if bounds.strips:  # a sweep back from a point ends at points, not on curves
-            exact = with_parallel_windows(exact_bounds(bounds.max_distance), bounds.first_piece)
+        if bounds.parallel:  # a sweep back from a point ends at points, not on curves
+            exact = with_parallel_windows(exact_bounds(bounds.max_distance), bounds.first_segment)
             return Lazy(replace(sweep, bounds=exact).find_ways)
         return None
 

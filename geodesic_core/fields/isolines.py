@@ -134,14 +134,14 @@ class Drawing:
         """
         sites = nodes.sites
         site_rows = np.argsort(sites.ints[: nodes.first_target, FACE], kind="stable")
-        piece_rows = np.argsort(sites.piece_ints[:, FACE], kind="stable")
+        piece_rows = np.argsort(sites.segment_ints[:, FACE], kind="stable")
         field = Field(
             kept=kept,
             distance=distances,
             site_ints=sites.ints[site_rows],
             site_weights=sites.weights[site_rows],
-            piece_ints=sites.piece_ints[piece_rows],
-            piece_ends=sites.piece_ends[piece_rows],
+            piece_ints=sites.segment_ints[piece_rows],
+            piece_ends=sites.segment_ends[piece_rows],
             first_piece=nodes.first_piece,
         )
         count = len(mesh.topology.links) // 3

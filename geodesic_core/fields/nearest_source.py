@@ -15,7 +15,7 @@ from geodesic_core.fields.path import EXACT, GeodesicPath, reversed_path, traced
 from geodesic_core.fields.sources import corners_of, nodes_of
 from geodesic_core.fields.sweep import Control, sweep_nodes, winners_of
 from geodesic_core.kernels.sweep import state
-from geodesic_core.kernels.sweep.state import Bounds, pruning_toward
+from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, pruning_toward
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import SEARCH_SLACK, TIE
@@ -61,14 +61,14 @@ def find_nearest_source(
     goal = pruning_toward(np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
     wave = state.new_wavefront(mesh.topology, nodes.sites, pruned=True)
     control.check_memory(state.bytes_of(wave))
-    backward = state.exact_bounds(math.inf, goal)
+    backward = exact_bounds(math.inf, goal)
     wave = sweep_nodes(mesh, wave, nodes, np.zeros(1), backward, control, lambda _: 0.0)
-    totals = wave.distance[nodes.targets] + start_distances
+    totals = wave.vertices.distance[nodes.targets] + start_distances
     distance = float(totals.min())
     if distance > bounds.max_distance:
         return NearestSource(-1, math.inf, None)
     nearest = int(np.flatnonzero(totals <= distance * (1.0 + TIE))[0])
-    winners = winners_of(wave, np.zeros(len(wave.distance), np.int32))
+    winners = winners_of(wave, np.zeros(len(wave.vertices.distance), np.int32))
     path = traced_path(mesh, winners, nodes, int(nodes.targets[nearest]), EXACT)
     return NearestSource(nearest, float(totals[nearest]), reversed_path(path))
 

@@ -155,10 +155,10 @@ def nodes_of(
             ints=np.array(rows, np.int32).reshape(-1, SITE),
             weights=np.array(weights).reshape(-1, 3),
             windows=sum(_edge_faces(mesh, face) for face in faces),
-            piece_ints=np.array([(k, part.face) for k, part in in_faces], np.int32).reshape(
+            segment_ints=np.array([(k, part.face) for k, part in in_faces], np.int32).reshape(
                 -1, SEGMENT
             ),
-            piece_ends=np.array([part.start + part.end for _, part in in_faces]).reshape(
+            segment_ends=np.array([part.start + part.end for _, part in in_faces]).reshape(
                 -1, SEGMENT_ENDS
             ),
         ),

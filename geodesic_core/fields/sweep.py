@@ -19,6 +19,7 @@ from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep import continuous_dijkstra, state, surface_points
+from geodesic_core.kernels.sweep.bounds import Bounds
 from geodesic_core.kernels.sweep.propagation import (
     MERGES_FULL,
     POOL_FULL,
@@ -26,7 +27,7 @@ from geodesic_core.kernels.sweep.propagation import (
     RUNAWAY,
     SCRATCH_FULL,
 )
-from geodesic_core.kernels.sweep.state import Bounds, Wavefront
+from geodesic_core.kernels.sweep.state import Wavefront
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import RUNS
 from geodesic_core.validation import is_number
@@ -203,21 +204,21 @@ def winners_of(wave: Wavefront, nearest: Ints) -> Winners:
     count = wave.counters[state.MERGES]
     return Winners(
         nearest=nearest,
-        distance=wave.distance,
-        winner=wave.winner,
-        winner_ints=wave.winner_ints,
-        reference=wave.reference,
-        merges=wave.merges[:count],
-        merge_ints=wave.merge_ints[:count],
-        site_ints=wave.site_ints,
-        site_weights=wave.site_weights,
-        piece_ints=wave.piece_ints,
-        piece_ends=wave.piece_ends,
+        distance=wave.vertices.distance,
+        winner=wave.vertices.winner,
+        winner_ints=wave.vertices.winner_ints,
+        reference=wave.vertices.reference,
+        merges=wave.pool.merges[:count],
+        merge_ints=wave.pool.merge_ints[:count],
+        site_ints=wave.sites.ints,
+        site_weights=wave.sites.weights,
+        piece_ints=wave.sites.segment_ints,
+        piece_ends=wave.sites.segment_ends,
     )
 
 
 def _not_converged(mesh: TriangleMesh, wave: Wavefront) -> NotConverged:
-    half_edge = int(np.argmax(wave.runs))
+    half_edge = int(np.argmax(wave.pool.runs))
     ends = mesh.topology.links[half_edge, [TAIL, HEAD]]
     u, v = mesh.topology.outer_vertex[ends]
     return NotConverged(
@@ -232,7 +233,9 @@ def share_of_vertices(reachable: int, limit: float) -> Callable[[Wavefront], flo
     def share(wave: Wavefront) -> float:
         done = float(wave.counters[state.SETTLED_VERTICES]) / reachable
         if math.isfinite(limit) and wave.counters[0] > 0:
-            done = max(done, float(wave.distance[wave.heap[0]]) / limit if limit else 1.0)
+            done = max(
+                done, float(wave.vertices.distance[wave.queues.heap[0]]) / limit if limit else 1.0
+            )
         return min(done, 1.0)
 
     return share

@@ -15,7 +15,8 @@ from geodesic_core.kernels.isolines import face_windows
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
-from geodesic_core.kernels.sweep.state import Bounds, Wavefront, with_parallel_windows
+from geodesic_core.kernels.sweep.bounds import Bounds, with_parallel_windows
+from geodesic_core.kernels.sweep.state import Wavefront
 from geodesic_core.mesh.curve import Polyline
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -101,7 +102,7 @@ class RepeatableSweep:
             mesh, wave, self.nodes, self.start_distances, self.bounds, control, share
         )
         control.check_memory(peak_bytes(wave))
-        wave.distance[wave.distance > limit] = math.inf
+        wave.vertices.distance[wave.vertices.distance > limit] = math.inf
         if control.progress is not None:
             control.progress(1.0)
         return wave
@@ -110,7 +111,7 @@ class RepeatableSweep:
         """Return what a `run` has found, in memory of its own."""
         winners = all_winners(wave)
         return SweepResult(
-            wave.distance,
+            wave.vertices.distance,
             winners.nearest,
             winners if paths else None,
             face_windows.face_windows_of(wave) if windows else None,
@@ -133,7 +134,10 @@ class RepeatableSweep:
 def all_winners(wave: Wavefront) -> Winners:
     """Return what backtracing needs of a sweep over all of a mesh, in memory of its own."""
     found = winners_of(
-        wave, continuous_dijkstra.nearest_sources(wave.distance, wave.winner_ints, wave.origin)
+        wave,
+        continuous_dijkstra.nearest_sources(
+            wave.vertices.distance, wave.vertices.winner_ints, wave.vertices.source_index
+        ),
     )
     # What was recorded of merges is kept, not the room for more.
     return found._replace(merges=found.merges.copy(), merge_ints=found.merge_ints.copy())
@@ -141,4 +145,4 @@ def all_winners(wave: Wavefront) -> Winners:
 
 def peak_bytes(wave: Wavefront) -> int:
     """Return the memory of a sweep that has finished, and of the windows that it kept."""
-    return state.bytes_of(wave) + (face_windows.bytes_of(wave) if len(wave.kept) else 0)
+    return state.bytes_of(wave) + (face_windows.bytes_of(wave) if len(wave.pool.retained) else 0)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
@@ -72,6 +73,18 @@ def _interpreted_pointer(array: NDArray[Any]) -> NDArray[Any]:
     return array.reshape(-1)
 
 
+def _interpreted_pointers(group: Any) -> Any:
+    if isinstance(group, np.ndarray):
+        return group.reshape(-1)
+    if hasattr(group, "_fields"):
+        return type(group)(*map(_interpreted_pointers, group))
+    return group
+
+
+def _interpreted_ints(rows: NDArray[Any]) -> NDArray[Any]:
+    return rows.view(np.int32)
+
+
 @intrinsic
 def _compiled_pointer(typingcontext: Any, array: Any) -> Any:  # noqa: ARG001 - numba's signature
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -79,6 +92,53 @@ def _compiled_pointer(typingcontext: Any, array: Any) -> Any:  # noqa: ARG001 - 
         return context.make_array(array_type)(context, builder, arguments[0]).data
 
     return types.CPointer(array.dtype)(array), codegen  # type: ignore[no-untyped-call]
+
+
+def _type_of_pointers(group: Any) -> Any:
+    if isinstance(group, types.Array):
+        return types.CPointer(group.dtype)  # type: ignore[no-untyped-call]
+    if isinstance(group, types.BaseNamedTuple):
+        parts: Any = group
+        pointers = [_type_of_pointers(part) for part in parts]
+        from_types: Any = types.BaseTuple.from_types
+        return from_types(pointers, parts.instance_class)
+    return group
+
+
+@intrinsic
+def _compiled_pointers(typingcontext: Any, group: Any) -> Any:  # noqa: ARG001
+    def convert(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+        if isinstance(kind, types.Array):
+            return context.make_array(kind)(context, builder, value).data
+        if isinstance(kind, types.BaseNamedTuple):
+            kinds: Any = kind
+            parts = [
+                convert(context, builder, part, builder.extract_value(value, i))
+                for i, part in enumerate(kinds)
+            ]
+            return context.make_tuple(builder, _type_of_pointers(kind), parts)
+        return value
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return convert(context, builder, signature.args[0], arguments[0])
+
+    return _type_of_pointers(group)(group), codegen
+
+
+@intrinsic
+def _compiled_ints(typingcontext: Any, rows: Any) -> Any:  # noqa: ARG001
+    if isinstance(rows, types.Array):  # in tests, which call kernels on arrays
+
+        def view(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            as_view: Any = lambda rows: rows.view(np.int32)  # noqa: E731
+            return context.compile_internal(builder, as_view, signature, arguments)
+
+        return rows.copy(dtype=types.int32)(rows), view
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
+
+    return types.CPointer(types.int32)(rows), codegen  # type: ignore[no-untyped-call]
 
 
 def _interpreted_prefetch(array: Any, index: int) -> None:
@@ -106,6 +166,12 @@ pointer: Any = _interpreted_pointer if _interpreted else _compiled_pointer
 Passing an array from kernel to kernel costs two atomic reference counts that numba does not prune:
 25–40 % of the sweep. A pointer costs nothing.
 """
+
+pointers: Any = _interpreted_pointers if _interpreted else _compiled_pointers
+"""A named tuple with each array in it, at any depth, as a `pointer`; all else as it was."""
+
+as_ints: Any = _interpreted_ints if _interpreted else _compiled_ints
+"""The memory of a pointer to float64 as int32, two for each; free of cost."""
 
 prefetch: Any = _interpreted_prefetch if _interpreted else _compiled_prefetch
 """Ask for the cache line at an index of a `pointer`, to be read soon; without effect otherwise."""

@@ -10,8 +10,13 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints, Singles, aligned_rows
 from geodesic_core.fields.sweep import Control, run_sweep
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
+from geodesic_core.kernels.sweep.bounds import (
+    LANDMARKS,
+    PruningBounds,
+    merging_bounds,
+    pruning_toward,
+)
 from geodesic_core.kernels.sweep.pruning import LEAST, MOST
-from geodesic_core.kernels.sweep.state import LANDMARKS, PruningBounds, pruning_toward
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import LANDMARK_ERROR
 
@@ -59,7 +64,7 @@ class Landmarks:
             chosen = candidates[np.argmax(np.einsum("vk,vk->v", apart, apart))]
         else:
             chosen = candidates[np.argmax(self._nearest[candidates])]
-        bounds = state.merging_bounds(math.inf, LANDMARK_ERROR, math.inf)
+        bounds = merging_bounds(math.inf, LANDMARK_ERROR, math.inf)
         wave = state.new_wavefront(topology, merges=True)
         control.check_memory(state.bytes_of(wave))
         start = np.array([chosen], np.int32)
@@ -69,9 +74,9 @@ class Landmarks:
         wave = run_sweep(mesh, wave, bounds, control, lambda _: 1.0)
         if self.count == 0:
             self.distances = aligned_rows(len(mesh.vertices), LANDMARKS, np.float32)
-        self.distances[:, self.count] = _in_single_precision(wave.distance)
+        self.distances[:, self.count] = _in_single_precision(wave.vertices.distance)
         self.count += 1
-        self._nearest = np.minimum(self._nearest, wave.distance)
+        self._nearest = np.minimum(self._nearest, wave.vertices.distance)
 
 
 def _in_single_precision(distance: Floats) -> Singles:

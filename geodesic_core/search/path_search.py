@@ -34,13 +34,18 @@ from geodesic_core.fields.sweep import Control, sweep_nodes, winners_of
 from geodesic_core.kernels.mesh.half_edges import LENGTH
 from geodesic_core.kernels.paths import edge_dijkstra, funnel
 from geodesic_core.kernels.sweep import pruning, state
+from geodesic_core.kernels.sweep.bounds import (
+    LANDMARKS,
+    Bounds,
+    PruningBounds,
+    exact_bounds,
+    merging_bounds,
+)
 from geodesic_core.kernels.sweep.state import (
     CREATED,
     NO_SITES,
     PREDECESSOR,
     TOUCHED,
-    Bounds,
-    PruningBounds,
     Sites,
     Wavefront,
     new_wavefront,
@@ -137,7 +142,7 @@ class PathSearch:
         """
         count = self._landmarks.count
         due = self._touched >= (count + 1) * len(self.mesh.vertices)
-        if due and count < state.LANDMARKS:
+        if due and count < LANDMARKS:
             with suppress(Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged):
                 corners, _ = corners_of(self.mesh, beside)
                 self._landmarks.add(int(corners[0]), control.holding(self.nbytes))
@@ -151,14 +156,14 @@ class PathSearch:
         first, last = leg.start.nearest_corner, leg.end.nearest_corner
         beside = float(leg.start.reaches.min() + leg.end.reaches.min())
         corner = topology.positions[first].copy(), np.array([first]), np.zeros(1)
-        bounds = state.exact_bounds(math.inf, self._landmarks.goal(*corner, math.inf))
+        bounds = exact_bounds(math.inf, self._landmarks.goal(*corner, math.inf))
         edge_dijkstra.search_edges(topology, wave, bounds, last, first)
         self._touched += int(wave.counters[TOUCHED])
-        upper = float(wave.distance[first])
+        upper = float(wave.vertices.distance[first])
         if math.isinf(upper):
             raise leg.lost("along edges")
         leg.log.add("dijkstra", upper + beside, wave)
-        path = edge_dijkstra.vertices_to(wave.winner_ints[:, PREDECESSOR], first)
+        path = edge_dijkstra.vertices_to(wave.vertices.winner_ints[:, PREDECESSOR], first)
         pruning.forget(topology, wave, bounds)
         # Unfolding rounds: by more than the slack of the searches, where faces are slivers.
         upper = min(upper, funnel.shortened(topology, path) * (1.0 + STRAIGHT)) + beside
@@ -172,12 +177,12 @@ class PathSearch:
     ) -> tuple[float, PruningBounds]:
         """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
         limit = leg.bound(upper) * (1.0 + leg.slack) + self._margin
-        bounds = state.merging_bounds(math.inf, GUIDE_ERROR, math.inf, goal._replace(limit=limit))
+        bounds = merging_bounds(math.inf, GUIDE_ERROR, math.inf, goal._replace(limit=limit))
         nodes = nodes_of(self.mesh, [(leg.end.point,)], [leg.start.point])
         self._toward = with_sites(self._toward, nodes.sites)
         wave = self._toward = self._run(self._toward, nodes, bounds, leg.control, _AFTER_EDGES)
         node = int(nodes.targets[0])
-        if math.isinf(wave.distance[node]):
+        if math.isinf(wave.vertices.distance[node]):
             raise leg.missed("by the merging sweep", upper)
         self._touched += int(wave.counters[TOUCHED])
         leg.log.add("approximate", upper, wave)
@@ -185,18 +190,18 @@ class PathSearch:
         upper = min(upper, guide.length)
         leg.log.add("backtrace", upper)
         tighter = leg.bound(upper) * (1.0 + leg.slack)
-        return upper, goal._replace(limit=tighter, known=wave.distance, ceiling=limit)
+        return upper, goal._replace(limit=tighter, known=wave.vertices.distance, ceiling=limit)
 
     def _sweep_outward(self, leg: "_Leg", upper: float, goal: PruningBounds) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
-        bounds = state.exact_bounds(math.inf, goal)
+        bounds = exact_bounds(math.inf, goal)
         nodes = nodes_of(self.mesh, [(leg.start.point,)], [leg.end.point])
         self._outward = with_sites(self._outward, nodes.sites)
         wave = self._outward = self._run(
             self._outward, nodes, bounds, leg.control, _AFTER_APPROXIMATE
         )
         node = int(nodes.targets[0])
-        distance = float(wave.distance[node])
+        distance = float(wave.vertices.distance[node])
         if not distance <= upper * (1.0 + leg.slack):
             raise leg.missed("by the exact sweep", upper)
         leg.log.add("exact", distance, wave)
@@ -214,9 +219,9 @@ class PathSearch:
 
     def _forget(self) -> None:
         topology = self.mesh.topology
-        merging = state.merging_bounds(math.inf, GUIDE_ERROR, math.inf)
+        merging = merging_bounds(math.inf, GUIDE_ERROR, math.inf)
         pruning.forget(topology, self._toward, merging)
-        pruning.forget(topology, self._outward, state.exact_bounds(math.inf))
+        pruning.forget(topology, self._outward, exact_bounds(math.inf))
 
 
 class _End:
@@ -291,8 +296,8 @@ class _Log:
         faces: Ints = np.empty(0, np.int32)
         if wave is not None:
             visited = np.zeros(len(self._mesh.faces), np.uint8)
-            touched = wave.touched[: wave.counters[TOUCHED]]
-            pruning.mark_visited(self._mesh.topology, wave.distance, touched, visited)
+            touched = wave.vertices.touched[: wave.counters[TOUCHED]]
+            pruning.mark_visited(self._mesh.topology, wave.vertices.distance, touched, visited)
             faces = np.flatnonzero(visited).astype(np.int32)
         windows = 0 if wave is None else int(wave.counters[CREATED])
         self.steps += (SearchStep(0, name, seconds, bound, windows, faces),)

@@ -8,6 +8,7 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.fields.sources import Ends
 from geodesic_core.fields.sweep import Control, share_of_vertices, sweep_nodes
 from geodesic_core.kernels.sweep import pruning, state
+from geodesic_core.kernels.sweep.bounds import exact_bounds
 from geodesic_core.kernels.sweep.state import (
     NO_SITES,
     TOUCHED,
@@ -57,7 +58,7 @@ class TargetSweep:
         """
         nodes = ends.between(source, targets)
         self._make_room(nodes.sites.nodes)
-        bounds = state.exact_bounds(limit)
+        bounds = exact_bounds(limit)
         wave = self._wave = with_sites(self._wave, nodes.sites)
         control.check_memory(self.nbytes)
         share = share_of_vertices(int(self._vertices[nodes.components[0]]), limit)
@@ -66,7 +67,7 @@ class TargetSweep:
             wave = self._wave = sweep_nodes(
                 self.mesh, wave, nodes, np.zeros(1), bounds, control, share, limit_of
             )
-            distances: Floats = wave.distance[nodes.targets]
+            distances: Floats = wave.vertices.distance[nodes.targets]
         finally:
             if _RESET * wave.counters[TOUCHED] < len(self.mesh.vertices):
                 pruning.forget(self.mesh.topology, wave, bounds)
@@ -93,7 +94,9 @@ def _limit_of(
     """
 
     def limit(wave: Wavefront) -> float:
-        known = np.minimum(wave.distance[nodes], (wave.distance[corners] + reaches).min(axis=1))
+        known = np.minimum(
+            wave.vertices.distance[nodes], (wave.vertices.distance[corners] + reaches).min(axis=1)
+        )
         return float(np.partition(known, count - 1)[count - 1]) * (1.0 + SEARCH_SLACK)
 
     return limit

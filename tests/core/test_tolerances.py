@@ -31,21 +31,12 @@ from geodesic_core.kernels.paths.backtracing import Winners, is_on_path
 from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, shortened_part
 from geodesic_core.kernels.planar import bisector
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
+from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
 from geodesic_core.kernels.sweep.merging import accuracy, directionality, merged
 from geodesic_core.kernels.sweep.propagation import reach_apex, trim_list
 from geodesic_core.kernels.sweep.pruning import least_to_start
 from geodesic_core.kernels.sweep.relaxation import precedence
-from geodesic_core.kernels.sweep.state import (
-    FIRST,
-    FRESH,
-    LAST,
-    NO_SITES,
-    SIZE,
-    exact_bounds,
-    merging_bounds,
-    new_wavefront,
-    with_parallel_windows,
-)
+from geodesic_core.kernels.sweep.state import FIRST, FRESH, LAST, NO_SITES, SIZE, new_wavefront
 from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.sweep.window_lists import put_window
 from geodesic_core.mesh.triangulation import triangulated
@@ -249,7 +240,7 @@ def is_trimmed(overlap, difference, scale) -> bool:
     left, right = (0.1 * scale, b + overlap * scale), (b, 0.9 * scale)
     put_list(view, wave, h, [(*left, *source[0]), (*right, *source[1])], 0)
     assert trim_list(view, h) == 2
-    ends = wave.scratch[0, B1], wave.scratch[1, B0]
+    ends = wave.pool.scratch[0, B1], wave.pool.scratch[1, B0]
     return ends != (left[1], right[0])
 
 
@@ -276,9 +267,9 @@ def flat_view(scale):
 
 def put_list(view, wave, h, windows, root):
     slots = [put_window(view, *window, root, 0.0, -1) for window in windows]
-    wave.lists[h, [SIZE, FIRST, LAST]] = len(slots), slots[0], slots[-1]
+    wave.pool.lists[h, [SIZE, FIRST, LAST]] = len(slots), slots[0], slots[-1]
     for slot, after in zip(slots, [*slots[1:], -1], strict=True):
-        wave.windows.view(np.int32)[slot, NEXT] = after
+        wave.pool.windows.view(np.int32)[slot, NEXT] = after
 
 
 @SCALES
@@ -289,8 +280,8 @@ def test_gap_is_the_most_that_is_closed(scale, share, closed):
     source = (0.5 * scale, -scale, 0.0)
     put_list(view, wave, h, [(0.1 * scale, b, *source), (b + gap, 0.9 * scale, *source)], 0)
     assert trim_list(view, h) == 2
-    assert (wave.scratch[1, B0] == b) == closed
-    assert wave.scratch[1, B0] - b <= gap * (1 + 1e-3)
+    assert (wave.pool.scratch[1, B0] == b) == closed
+    assert wave.pool.scratch[1, B0] - b <= gap * (1 + 1e-3)
     # The ray through the closed gap is off by no more than the gap, and so is its length.
     here, there = (math.hypot(x - source[0], source[1]) for x in (b, b + gap))
     assert abs(here - there) <= gap
@@ -302,10 +293,10 @@ def test_gap_is_the_most_that_is_closed(scale, share, closed):
 def test_slack_keeps_windows_that_tie_with_a_vertex(scale, detour, kept, from_tail):
     """At the far end of the window: against the path through the vertex and along the edge."""
     view, wave, h = flat_view(scale)
-    length = view.geometry[ROW * h + LENGTH]
-    tail, head = view.links[ROW * h + TAIL], view.links[ROW * h + HEAD]
-    wave.distance[[tail, head]] = 1e6 * scale  # as good as unreached
-    wave.distance[tail if from_tail else head] = scale
+    length = view.mesh.geometry[ROW * h + LENGTH]
+    tail, head = view.mesh.links[ROW * h + TAIL], view.mesh.links[ROW * h + HEAD]
+    wave.vertices.distance[[tail, head]] = 1e6 * scale  # as good as unreached
+    wave.vertices.distance[tail if from_tail else head] = scale
     b0, b1 = 0.25 * length, 0.75 * length
     far = b1 if from_tail else length - b0
     straight = (scale + far) + detour * SLACK * scale
@@ -319,22 +310,22 @@ def test_slack_keeps_windows_that_tie_with_a_vertex(scale, detour, kept, from_ta
 @SCALES
 def test_bend_is_all_that_a_bent_path_is_surcharged(scale):
     view, wave, h = flat_view(scale)
-    row = view.geometry[ROW * h : ROW * (h + 1)]
+    row = view.mesh.geometry[ROW * h : ROW * (h + 1)]
     ax, ay = row[LENGTH_LEFT] * row[COS_LEFT], row[LENGTH_LEFT] * row[SIN_LEFT]
-    apex = view.links[ROW * h + APEX]
-    wave.distance[apex] = math.inf
+    apex = view.mesh.links[ROW * h + APEX]
+    wave.vertices.distance[apex] = math.inf
     length = row[LENGTH]
     lies_right = ax < 0.5 * length
     b0, b1 = (0.6 * length, 0.8 * length) if lies_right else (0.2 * length, 0.4 * length)
     sx, sy = 0.5 * (b0 + b1), -0.2 * scale
     end = b0 if lies_right else b1
-    wave.scratch[0, [B0, B1, SX, SY, SIGMA]] = b0, b1, sx, sy, 0.0
-    wave.scratch.view(np.int32)[0, ROOT] = view.links[ROW * h + TAIL]
+    wave.pool.scratch[0, [B0, B1, SX, SY, SIGMA]] = b0, b1, sx, sy, 0.0
+    wave.pool.scratch.view(np.int32)[0, ROOT] = view.mesh.links[ROW * h + TAIL]
     nearest, crossing, _ = reach_apex(view, h, 1, ax, ay)
     bent = math.hypot(sx - end, sy) + math.hypot(ax - end, ay)
     assert (nearest, crossing) == (0, end)
-    assert bent < wave.distance[apex] <= bent * (1 + 2 * BEND)
-    assert wave.distance[apex] == pytest.approx(bent * (1 + BEND), rel=2e-16)
+    assert bent < wave.vertices.distance[apex] <= bent * (1 + 2 * BEND)
+    assert wave.vertices.distance[apex] == pytest.approx(bent * (1 + BEND), rel=2e-16)
 
 
 # Sources and paths ------------------------------------------------------------------------------
@@ -392,8 +383,8 @@ def winners(distance, nearest=(0, 0)) -> Winners:
         none,
         NO_SITES.ints,
         NO_SITES.weights,
-        NO_SITES.piece_ints,
-        NO_SITES.piece_ends,
+        NO_SITES.segment_ints,
+        NO_SITES.segment_ends,
     )
 
 
@@ -483,7 +474,7 @@ def test_runs_are_all_that_a_list_is_given(monkeypatch):
 
     def worn_out(*args, **kwargs):
         wave = new_wavefront(*args, **kwargs)
-        wave.runs[:] = RUNS
+        wave.pool.runs[:] = RUNS
         return wave
 
     gc.approximate_distance(mesh, 0)
@@ -691,7 +682,7 @@ def test_slant_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope,
     continuous_dijkstra.start_sweep(
         mesh.topology, wave, nodes.sources, nodes.origins, np.zeros(1), bounds
     )
-    roots = wave.windows[: wave.counters[FRESH]].view(np.int32)[:, ROOT]
+    roots = wave.pool.windows[: wave.counters[FRESH]].view(np.int32)[:, ROOT]
     assert (roots == nodes.sources[-1]).sum() == strips
     found = gc.exact_distance(mesh, gc.Curve(line)).distances
     share = np.clip((mesh.vertices - foot) @ (head - foot) / ((head - foot) @ (head - foot)), 0, 1)

@@ -123,51 +123,55 @@ def check_wavefront(topology, wave, exact: Exact) -> None:
 
 def check_heap(wave) -> None:
     """The heap's order, its inverse, and that it holds what can be in it."""
-    heap = wave.heap[: wave.counters[HEAP_SIZE]]
-    place = np.full(len(wave.heap), -1)
+    heap = wave.queues.heap[: wave.counters[HEAP_SIZE]]
+    place = np.full(len(wave.queues.heap), -1)
     place[heap] = np.arange(len(heap))
     assert len(np.unique(heap)) == len(heap)
-    np.testing.assert_array_equal(wave.heap_place, place)
-    np.testing.assert_array_equal(wave.heap_keys[: len(heap)], wave.distance[heap])
-    keys = [(wave.distance[v], v) for v in heap]
+    np.testing.assert_array_equal(wave.queues.heap_place, place)
+    np.testing.assert_array_equal(wave.queues.heap_keys[: len(heap)], wave.vertices.distance[heap])
+    keys = [(wave.vertices.distance[v], v) for v in heap]
     assert all(keys[(i - 1) // 4] < keys[i] for i in range(1, len(keys)))
-    assert np.isfinite(wave.distance[heap]).all()
-    reached = np.isfinite(wave.distance)
-    assert (place[reached & (wave.status != SETTLED)] >= 0).all(), (
+    assert np.isfinite(wave.vertices.distance[heap]).all()
+    reached = np.isfinite(wave.vertices.distance)
+    assert (place[reached & (wave.vertices.status != SETTLED)] >= 0).all(), (
         "what is reached is done or waits"
     )
-    assert wave.counters[SETTLED_VERTICES] == np.count_nonzero(wave.status == SETTLED)
+    assert wave.counters[SETTLED_VERTICES] == np.count_nonzero(wave.vertices.status == SETTLED)
 
 
 def ring_of(wave) -> np.ndarray:
     places = wave.counters[RING_HEAD] + np.arange(wave.counters[RING_SIZE])
-    return wave.ring[places % len(wave.ring)]
+    return wave.queues.ring[places % len(wave.queues.ring)]
 
 
 def check_ring(topology, wave) -> None:
     """The ring holds what is flagged, each once; and every list with an end that is done."""
-    ring, sizes = ring_of(wave), wave.lists[:, SIZE]
-    np.testing.assert_array_equal(np.sort(ring), np.flatnonzero(wave.lists[:, MARKS] & IN_RING))
+    ring, sizes = ring_of(wave), wave.pool.lists[:, SIZE]
+    np.testing.assert_array_equal(
+        np.sort(ring), np.flatnonzero(wave.pool.lists[:, MARKS] & IN_RING)
+    )
     assert (sizes[ring] > 0).all()
-    ends_done = (wave.status[topology.links[:, [TAIL, HEAD]]] == SETTLED).any(axis=1)
-    assert (wave.lists[(sizes > 0) & ends_done, MARKS] & IN_RING).all(), (
+    ends_done = (wave.vertices.status[topology.links[:, [TAIL, HEAD]]] == SETTLED).any(axis=1)
+    assert (wave.pool.lists[(sizes > 0) & ends_done, MARKS] & IN_RING).all(), (
         "a due list waits for nobody"
     )
-    apex_status = wave.status[topology.links[:, APEX]]
-    assert ((wave.status[topology.links[ring, TAIL]] != FAR) | (apex_status[ring] != FAR)).all()
+    apex_status = wave.vertices.status[topology.links[:, APEX]]
+    assert (
+        (wave.vertices.status[topology.links[ring, TAIL]] != FAR) | (apex_status[ring] != FAR)
+    ).all()
 
 
 def slots_of(wave, h) -> list[int]:
     """The list of h."""
-    slots, slot = [], int(wave.lists[h, FIRST])
-    for _ in range(wave.lists[h, SIZE]):
+    slots, slot = [], int(wave.pool.lists[h, FIRST])
+    for _ in range(wave.pool.lists[h, SIZE]):
         slots.append(slot)
         slot = int(_ints(wave)[slot, NEXT])
     return slots
 
 
 def _ints(wave) -> np.ndarray:
-    return wave.windows.view(np.int32)
+    return wave.pool.windows.view(np.int32)
 
 
 def check_pool(wave) -> None:
@@ -178,40 +182,42 @@ def check_pool(wave) -> None:
         slot = int(_ints(wave)[slot, NEXT])
     assert slot == -1, "the free list ends"
     used = []
-    for h in np.flatnonzero(wave.lists[:, SIZE]):
+    for h in np.flatnonzero(wave.pool.lists[:, SIZE]):
         slots = slots_of(wave, h)
-        assert slots[-1] == wave.lists[h, LAST]
+        assert slots[-1] == wave.pool.lists[h, LAST]
         used += slots
-    for last in wave.passed[wave.passed >= 0].tolist():
+    for last in wave.pool.crossings[wave.pool.crossings >= 0].tolist():
         slot = last
         while slot >= 0:
             used.append(slot)
             slot = int(_ints(wave)[slot, NEXT])
     assert sorted(free + used) == list(range(wave.counters[FRESH]))
-    assert wave.counters[FRESH] <= len(wave.windows)
+    assert wave.counters[FRESH] <= len(wave.pool.windows)
 
 
 def check_vertices(wave, exact: Exact) -> None:
     """No vertex is nearer than it is, nor nearer than its winner makes it."""
-    assert (wave.distance >= exact.vertices * (1 - ROUNDING)).all()
-    reached = np.isfinite(wave.distance)
-    assert (wave.winner_ints[~reached] == -1).all()
-    at_source = reached & (wave.winner_ints[:, ENTRY_EDGE] < 0)
+    assert (wave.vertices.distance >= exact.vertices * (1 - ROUNDING)).all()
+    reached = np.isfinite(wave.vertices.distance)
+    assert (wave.vertices.winner_ints[~reached] == -1).all()
+    at_source = reached & (wave.vertices.winner_ints[:, ENTRY_EDGE] < 0)
     np.testing.assert_array_equal(
-        wave.winner_ints[at_source, PREDECESSOR], np.flatnonzero(at_source)
+        wave.vertices.winner_ints[at_source, PREDECESSOR], np.flatnonzero(at_source)
     )
-    roots = wave.winner_ints[reached, PREDECESSOR]
-    assert (wave.distance[roots] <= wave.distance[reached]).all()
+    roots = wave.vertices.winner_ints[reached, PREDECESSOR]
+    assert (wave.vertices.distance[roots] <= wave.vertices.distance[reached]).all()
 
 
 def straight_distances(topology, wave) -> np.ndarray:
     """(V,): from the source over each vertex's winning pseudosource, straight from there."""
-    found = wave.distance.copy()
-    reached = np.flatnonzero(wave.winner_ints[:, ENTRY_EDGE] >= 0)
-    rows = topology.geometry[wave.winner_ints[reached, ENTRY_EDGE]]
+    found = wave.vertices.distance.copy()
+    reached = np.flatnonzero(wave.vertices.winner_ints[:, ENTRY_EDGE] >= 0)
+    rows = topology.geometry[wave.vertices.winner_ints[reached, ENTRY_EDGE]]
     apex = rows[:, LENGTH_LEFT, None] * rows[:, [COS_LEFT, SIN_LEFT]]
-    onward = np.linalg.norm(apex - wave.winner[reached], axis=1)
-    found[reached] = wave.distance[wave.winner_ints[reached, PREDECESSOR]] + onward
+    onward = np.linalg.norm(apex - wave.vertices.winner[reached], axis=1)
+    found[reached] = (
+        wave.vertices.distance[wave.vertices.winner_ints[reached, PREDECESSOR]] + onward
+    )
     return found
 
 
@@ -233,10 +239,10 @@ class Windows:
 def windows_of(wave, half_edges=None) -> Windows:
     """The windows in the lists of some half-edges, or of all."""
     if half_edges is None:
-        half_edges = np.flatnonzero(wave.lists[:, SIZE])
+        half_edges = np.flatnonzero(wave.pool.lists[:, SIZE])
     slots = [(h, slot) for h in half_edges for slot in slots_of(wave, h)]
     owners, slots = np.array(slots, dtype=np.int64).reshape(-1, 2).T
-    return Windows(owners, wave.windows[slots], _ints(wave)[slots, ROOT])
+    return Windows(owners, wave.pool.windows[slots], _ints(wave)[slots, ROOT])
 
 
 def check_windows(topology, wave, exact: Exact) -> None:
@@ -249,7 +255,7 @@ def check_windows(topology, wave, exact: Exact) -> None:
     assert (b1 <= length).all()
     assert (sy <= ROUNDING * np.hypot(sx, length)).all()
     assert (topology.links[windows.half_edge, OPPOSITE] >= 0).all(), "nothing waits at a boundary"
-    assert (sigma >= wave.distance[windows.root]).all(), "pseudosources only come nearer"
+    assert (sigma >= wave.vertices.distance[windows.root]).all(), "pseudosources only come nearer"
     values = windows.least(exact.shares * length[:, None])
     assert (values >= exact.edges[windows.half_edge] * (1 - ROUNDING)).all()
 
@@ -270,9 +276,9 @@ def check_survivors(topology, wave, h: int, before: Windows, count: int, limit: 
     """
     length = topology.geometry[h, LENGTH]
     places = np.linspace(0.0, length, 33)
-    tail, head = wave.distance[topology.links[h, [TAIL, HEAD]]]
+    tail, head = wave.vertices.distance[topology.links[h, [TAIL, HEAD]]]
     along = np.minimum(tail + places, head + length - places)
-    survivors = Windows(np.full(count, h), wave.scratch[:count], np.zeros(count))
+    survivors = Windows(np.full(count, h), wave.pool.scratch[:count], np.zeros(count))
     promised = before.least(places[None]).min(axis=0)
     kept = np.minimum(survivors.least(places[None]).min(axis=0, initial=math.inf), along)
     asked = promised <= limit
@@ -309,12 +315,12 @@ class Watch:
     def finish(self, wave) -> None:
         """Check that nothing is left to do, and that all answers are there."""
         assert wave.counters[HEAP_SIZE] == wave.counters[RING_SIZE] == 0
-        assert not wave.lists[:, SIZE].any()
+        assert not wave.pool.lists[:, SIZE].any()
         assert wave.counters[FREE_SIZE] == wave.counters[FRESH]
         exact = self.exact.vertices
         near = exact <= self.limit
-        assert (wave.distance[~near] >= exact[~near] * (1.0 - ROUNDING)).all()
-        np.testing.assert_allclose(wave.distance[near], exact[near], rtol=ROUNDING, atol=0)
+        assert (wave.vertices.distance[~near] >= exact[~near] * (1.0 - ROUNDING)).all()
+        np.testing.assert_allclose(wave.vertices.distance[near], exact[near], rtol=ROUNDING, atol=0)
         straight = straight_distances(self.topology, wave)
         np.testing.assert_allclose(straight[near], exact[near], rtol=ROUNDING, atol=0)
         self._check_edges(wave)
@@ -325,7 +331,7 @@ class Watch:
         opposite = links[:, OPPOSITE]
         inside = opposite >= 0  # there are no windows on a boundary edge
         length = self.topology.geometry[:, LENGTH, None]
-        tail, head = (wave.distance[links[:, column], None] for column in (TAIL, HEAD))
+        tail, head = (wave.vertices.distance[links[:, column], None] for column in (TAIL, HEAD))
         along = np.minimum(tail + shares * length, head + (1 - shares) * length)
         found = np.minimum(self.seen, along)
         found[inside] = np.minimum(found[inside], self.seen[opposite[inside], ::-1])

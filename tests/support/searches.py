@@ -8,6 +8,7 @@ import pytest
 import geodesic_core as gc
 from geodesic_core.kernels.paths import edge_dijkstra
 from geodesic_core.kernels.sweep import pruning, state
+from geodesic_core.kernels.sweep.bounds import PruningBounds, exact_bounds
 from geodesic_core.search.landmarks import Landmarks
 from tests.support import zoo
 from tests.support.certificates import LENGTH, check_path
@@ -86,7 +87,7 @@ def goal_at_vertex(
     limit: float = np.inf,
     landmarks: Landmarks | None = None,
     **known: object,
-) -> state.PruningBounds:
+) -> PruningBounds:
     """The goal of paths through inner vertex v."""
     here = mesh.topology.positions[v].copy(), np.array([v]), np.zeros(1)
     return (landmarks or Landmarks(mesh)).goal(*here, limit)._replace(**known)
@@ -98,13 +99,13 @@ def edge_paths(mesh: gc.TriangleMesh, pairs) -> Iterator[tuple[int, int, np.ndar
     wave = state.new_wavefront(topology, pruned=True)
     for start, end in pairs:
         first, last = (int(topology.inner_vertex[v]) for v in (start, end))
-        bounds = state.exact_bounds(np.inf, goal_at_vertex(mesh, first))
+        bounds = exact_bounds(np.inf, goal_at_vertex(mesh, first))
         edge_dijkstra.search_edges(topology, wave, bounds, last, first)
-        length = float(wave.distance[first])
+        length = float(wave.vertices.distance[first])
         yield (
             start,
             end,
-            edge_dijkstra.vertices_to(wave.winner_ints[:, state.PREDECESSOR], first),
+            edge_dijkstra.vertices_to(wave.vertices.winner_ints[:, state.PREDECESSOR], first),
             length,
         )
         pruning.forget(topology, wave, bounds)

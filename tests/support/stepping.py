@@ -8,12 +8,13 @@ import numpy as np
 import geodesic_core as gc
 from geodesic_core.kernels.mesh.half_edges import Topology
 from geodesic_core.kernels.sweep import continuous_dijkstra
+from geodesic_core.kernels.sweep.bounds import exact_bounds
 from geodesic_core.kernels.sweep.propagation import POOL_FULL, SCRATCH_FULL
 from geodesic_core.kernels.sweep.state import (
     View,
     Wavefront,
-    exact_bounds,
     new_wavefront,
+    sizes_of,
     with_larger_pool,
     with_larger_scratch,
 )
@@ -60,36 +61,16 @@ def finished(topology, wave, limit=math.inf, budget=WHOLE) -> Wavefront:
 
 def view_of_arrays(topology, wave, bounds=exact_bounds(math.inf)) -> View:  # noqa: B008
     """The View that kernels see, of flat arrays in place of pointers: so that tests can hold it."""
-    flat = {
-        name: getattr(state, name).reshape(-1)
-        for state in (topology, wave)
-        for name in state._fields
-        if name in View._fields
-    }
-    goal, scalars = bounds.goal, bounds._asdict()
-    del scalars["goal"]
-    return View(
-        **flat,
-        known=goal.known,
-        landmarks=goal.landmarks.reshape(-1),
-        window_ints=wave.windows.view(np.int32).reshape(-1),
-        scratch_ints=wave.scratch.view(np.int32).reshape(-1),
-        kept_ints=wave.kept.view(np.int32).reshape(-1),
-        ring_capacity=len(wave.ring),
-        pool=len(wave.windows),
-        scratch_size=len(wave.scratch),
-        keep_capacity=len(wave.kept),
-        merge_capacity=len(wave.merges),
-        **scalars,
-        pruned=len(wave.heuristic) > 0,
-        irregular=len(wave.passed) > 0,
-        start=goal.position,
-        least=goal.least,
-        most=goal.most,
-        vertex_count=len(topology.total_angle),
-        site_count=len(wave.site_ints),
-        limit=goal.limit,
-        landmark_count=goal.landmark_count,
-        knows=len(goal.known) > 0,
-        ceiling=goal.ceiling,
-    )
+    sizes = getattr(sizes_of, "py_func", sizes_of)(topology, wave, bounds)
+    return _flat(View(mesh=topology, **wave._asdict(), bounds=bounds, sizes=sizes))
+
+
+def with_pool(wave: Wavefront, **arrays) -> Wavefront:
+    """The wavefront with other arrays in its pool."""
+    return wave._replace(pool=wave.pool._replace(**arrays))
+
+
+def _flat(group):
+    if isinstance(group, np.ndarray):
+        return group.reshape(-1)
+    return type(group)(*map(_flat, group)) if hasattr(group, "_fields") else group

@@ -50,9 +50,9 @@ def sort_by_half_edge(rows: Floats, first: Longs, windows: Floats) -> None:
 
 def face_windows_of(wave: Wavefront) -> FaceWindows:
     """Return the windows that a sweep kept, in memory of their own."""
-    rows = wave.kept[: wave.counters[RETAINED_ROWS]]
+    rows = wave.pool.retained[: wave.counters[RETAINED_ROWS]]
     kept = FaceWindows(
-        first=np.empty(len(wave.lists) + 1, np.int64),
+        first=np.empty(len(wave.pool.lists) + 1, np.int64),
         windows=aligned_rows(len(rows), WIDTH, np.float64),
     )
     sort_by_half_edge(rows, kept.first, kept.windows)
@@ -61,7 +61,7 @@ def face_windows_of(wave: Wavefront) -> FaceWindows:
 
 def bytes_of(wave: Wavefront) -> int:
     """Memory that `face_windows_of` takes."""
-    return 8 * (len(wave.lists) + 1 + WIDTH * int(wave.counters[RETAINED_ROWS]))
+    return 8 * (len(wave.pool.lists) + 1 + WIDTH * int(wave.counters[RETAINED_ROWS]))
 
 
 class Reach(NamedTuple):

@@ -26,20 +26,21 @@ to a half of this step's time; 1.3 gains little more here and loses it in the ne
 def search_edges(topology: Any, wavefront: Any, bounds: Any, begin: int, end: int) -> None:
     """Search from ``begin`` until ``end`` is settled; PREDECESSOR holds the vertex before."""
     wave = view_of(topology, wavefront, bounds)
+    mesh, vertices = wave.mesh, wave.vertices
     touch(wave, begin)
-    wave.distance[begin] = 0.0
+    vertices.distance[begin] = 0.0
     push_or_raise(wave, begin, 0.0)
     while wave.counters[HEAP_SIZE] > 0:
         v = pop_nearest(wave)
-        wave.status[v] = SETTLED
+        vertices.status[v] = SETTLED
         if v == end:
             return
-        for c in range(wave.first_corner[v], wave.first_corner[v + 1]):
-            h = wave.corners[c]
+        for c in range(mesh.first_corner[v], mesh.first_corner[v + 1]):
+            h = mesh.corners[c]
             row = ROW * h
-            relax(wave, v, wave.links[row + HEAD], wave.geometry[row + LENGTH])
-            if wave.links[row + OUT_LEFT] < 0:  # the last edge of an open fan
-                relax(wave, v, wave.links[row + APEX], wave.geometry[row + LENGTH_LEFT])
+            relax(wave, v, mesh.links[row + HEAD], mesh.geometry[row + LENGTH])
+            if mesh.links[row + OUT_LEFT] < 0:  # the last edge of an open fan
+                relax(wave, v, mesh.links[row + APEX], mesh.geometry[row + LENGTH_LEFT])
 
 
 @kernel
@@ -48,13 +49,14 @@ def relax(wave: Any, v: int, u: int, length: float) -> None:
 
     To settle vertices anew took 0.5 s on one pair in a hundred, of 1.4 million faces.
     """
-    distance = wave.distance[v] + length
-    if wave.status[u] != SETTLED and distance < wave.distance[u]:
-        if wave.winner_ints[WINNER * u + PREDECESSOR] < 0:
+    vertices = wave.vertices
+    distance = vertices.distance[v] + length
+    if vertices.status[u] != SETTLED and distance < vertices.distance[u]:
+        if vertices.winner_ints[WINNER * u + PREDECESSOR] < 0:
             touch(wave, u)
-        wave.distance[u] = distance
-        wave.winner_ints[WINNER * u + PREDECESSOR] = v
-        push_or_raise(wave, u, distance + ASTAR_WEIGHT * wave.heuristic[u])
+        vertices.distance[u] = distance
+        vertices.winner_ints[WINNER * u + PREDECESSOR] = v
+        push_or_raise(wave, u, distance + ASTAR_WEIGHT * vertices.heuristic[u])
 
 
 @kernel

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.kernels.jit import inlined, kernel, pointer, prefetch
+from geodesic_core.kernels.jit import inlined, kernel, prefetch
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     AROUND,
@@ -73,25 +73,28 @@ def start_sweep(
     ``origins`` are the sources that the nodes belong to, of which each has a start distance.
     """
     wave = view_of(topology, wavefront, bounds)
+    vertices, sites = wave.vertices, wave.sites
     for i in range(len(sources)):
         v, start = sources[i], start_distances[origins[i]]
-        if start >= wave.distance[v]:
+        if start >= vertices.distance[v]:
             continue
-        wave.origin[v] = origins[i]
-        if v < wave.vertex_count:
+        vertices.source_index[v] = origins[i]
+        if v < wave.sizes.vertices:
             if merging(wave):
                 bound_vertex(wave, v, start)
             relax_vertex(wave, v, start, -1, 0.0, 0.0, v, -1 - v)
         else:
-            wave.distance[v], wave.winner_ints[WINNER * v + PREDECESSOR] = start, v
-    for k in range(wave.site_count):
-        if wave.distance[wave.site_ints[SITE * k + NODE]] < math.inf:
+            vertices.distance[v], vertices.winner_ints[WINNER * v + PREDECESSOR] = (
+                start,
+                v,
+            )
+    for k in range(wave.sizes.sites):
+        if vertices.distance[sites.ints[SITE * k + NODE]] < math.inf:
             emit_site(wave, k)
-    if len(wave.strips) > 0:
-        ints, ends = pointer(wavefront.piece_ints), pointer(wavefront.piece_ends)
-        for k in range(len(wavefront.piece_ints)):
-            if wave.distance[ints[SEGMENT * k + NODE]] < math.inf:
-                emit_segment(wave, ints, ends, k)
+    if len(wave.bounds.parallel) > 0:
+        for k in range(wave.sizes.segments):
+            if vertices.distance[sites.segment_ints[SEGMENT * k + NODE]] < math.inf:
+                emit_segment(wave, k)
 
 
 @kernel
@@ -117,33 +120,34 @@ def advance(topology: Any, wavefront: Any, bounds: Any, budget: int) -> int:
 @kernel
 def settle_nearest(wave: Any) -> int:
     """Take the nearest vertex: emit its windows, wake the lists around it."""
-    v = wave.heap[0]
+    mesh, queues, vertices = wave.mesh, wave.queues, wave.vertices
+    v = queues.heap[0]
     emits = is_pseudosource(wave, v)
-    first, last = wave.first_corner[v], wave.first_corner[v + 1]
+    first, last = mesh.first_corner[v], mesh.first_corner[v + 1]
     if emits and room_to_emit(wave, v) > free_windows(wave):
         return POOL_FULL
     pop_nearest(wave)
     if wave.counters[HEAP_SIZE] > 0:
-        ask_ahead(wave, wave.heap[0])
-    if wave.status[v] != SETTLED:
-        wave.status[v] = SETTLED
+        ask_ahead(wave, queues.heap[0])
+    if vertices.status[v] != SETTLED:
+        vertices.status[v] = SETTLED
         wave.counters[SETTLED_VERTICES] += 1
     wave.counters[WORK] += 30
     if emits:
         emit_pseudosource(wave, v)
     for c in range(first, last):
-        row = ROW * wave.corners[c]
-        mark_front(wave, wave.links[row + HEAD])
-        if wave.links[row + OUT_LEFT] < 0:
-            mark_front(wave, wave.links[row + APEX])
+        row = ROW * mesh.corners[c]
+        mark_front(wave, mesh.links[row + HEAD])
+        if mesh.links[row + OUT_LEFT] < 0:
+            mark_front(wave, mesh.links[row + APEX])
     for c in range(first, last):
-        h = wave.corners[c]
+        h = mesh.corners[c]
         queue_list(wave, h)
         queue_list(wave, previous(h))
-        across = wave.links[ROW * h + OUT_RIGHT]
-        if across >= 0 and wave.lists[LIST * across + SIZE] > 0:
-            far = wave.links[ROW * across + APEX]
-            if wave.status[far] != FAR:
+        across = mesh.links[ROW * h + OUT_RIGHT]
+        if across >= 0 and wave.pool.lists[LIST * across + SIZE] > 0:
+            far = mesh.links[ROW * across + APEX]
+            if vertices.status[far] != FAR:
                 queue_list(wave, across)
         elif across == IRREGULAR:
             queue_lists_beyond(wave, following(h))
@@ -153,12 +157,13 @@ def settle_nearest(wave: Any) -> int:
 @kernel
 def room_to_emit(wave: Any, v: int) -> int:
     """How many windows v may emit, at most."""
-    first, last = wave.first_corner[v], wave.first_corner[v + 1]
+    mesh = wave.mesh
+    first, last = mesh.first_corner[v], mesh.first_corner[v + 1]
     room = 6 * (last - first)
-    if wave.flags[v] & (SEAM | PINCHED):
+    if mesh.flags[v] & (SEAM | PINCHED):
         for c in range(first, last):
-            h = wave.corners[c]
-            if wave.links[ROW * h + OUT_RIGHT] == IRREGULAR:
+            h = mesh.corners[c]
+            if mesh.links[ROW * h + OUT_RIGHT] == IRREGULAR:
                 room += 2 * faces_beyond(wave, following(h))
     return room
 
@@ -166,30 +171,33 @@ def room_to_emit(wave: Any, v: int) -> int:
 @kernel
 def queue_lists_beyond(wave: Any, g: int) -> None:
     """Queue the lists beyond the irregular edge of g whose far vertex is in front, or done."""
-    h = wave.links[ROW * g + AROUND] >> 1
+    mesh = wave.mesh
+    h = mesh.links[ROW * g + AROUND] >> 1
     while h != g:
-        if wave.status[wave.links[ROW * h + APEX]] != FAR:
+        if wave.vertices.status[mesh.links[ROW * h + APEX]] != FAR:
             queue_list(wave, h)
-        h = wave.links[ROW * h + AROUND] >> 1
+        h = mesh.links[ROW * h + AROUND] >> 1
 
 
 @inlined
 def ask_ahead(wave: Any, v: int) -> None:
     """Ask for the rows around the vertex that will probably be next: 3 to 6 % of a sweep."""
-    for c in range(wave.first_corner[v], wave.first_corner[v + 1]):
-        h = wave.corners[c]
-        prefetch(wave.links, ROW * h)
-        prefetch(wave.geometry, ROW * h)
-        prefetch(wave.lists, LIST * h)
+    mesh = wave.mesh
+    for c in range(mesh.first_corner[v], mesh.first_corner[v + 1]):
+        h = mesh.corners[c]
+        prefetch(mesh.links, ROW * h)
+        prefetch(mesh.geometry, ROW * h)
+        prefetch(wave.pool.lists, LIST * h)
 
 
 @kernel
 def mark_front(wave: Any, v: int) -> None:
     """Mark a neighbour of a vertex that is done."""
-    if wave.status[v] == FAR:
-        if wave.distance[v] == math.inf:
+    vertices = wave.vertices
+    if vertices.status[v] == FAR:
+        if vertices.distance[v] == math.inf:
             touch(wave, v)
-        wave.status[v] = FRONT
+        vertices.status[v] = FRONT
 
 
 @kernel
@@ -198,12 +206,12 @@ def drain(wave: Any, budget: int) -> int:
     while wave.counters[RING_SIZE] > 0:
         if wave.counters[WORK] >= budget:
             return RUNNING
-        h = wave.ring[wave.counters[RING_HEAD]]
+        h = wave.queues.ring[wave.counters[RING_HEAD]]
         outcome = propagate_list(wave, h)
         if outcome != PROPAGATED:
             return outcome
         ring_pop(wave)
-        wave.lists[LIST * h + MARKS] &= ~IN_RING
+        wave.pool.lists[LIST * h + MARKS] &= ~IN_RING
     return FINISHED
 
 

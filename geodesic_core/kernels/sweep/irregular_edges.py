@@ -15,7 +15,7 @@ What passed is kept in the frame that runs from the lower vertex of the edge to 
 
 from typing import Any
 
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import as_ints, kernel
 from geodesic_core.kernels.mesh.half_edges import AROUND, HEAD, LENGTH, ROW, TAIL
 from geodesic_core.kernels.sweep.state import merging, source_weight
 from geodesic_core.kernels.sweep.trimming import trim, wins_throughout, without
@@ -41,32 +41,37 @@ def trim_against_crossings(wave: Any, g: int, slot: int) -> bool:
 
     Return whether anything is left. O(windows that passed), mostly.
     """
-    w, length = WIDTH * slot, wave.geometry[ROW * g + LENGTH]
-    tail, head = wave.links[ROW * g + TAIL], wave.links[ROW * g + HEAD]
+    mesh, pool, vertices = wave.mesh, wave.pool, wave.vertices
+    w, length = WIDTH * slot, mesh.geometry[ROW * g + LENGTH]
+    tail, head = mesh.links[ROW * g + TAIL], mesh.links[ROW * g + HEAD]
     name, flip = lowest_half_edge(wave, g), tail < head
-    from_tail, from_head = wave.distance[tail], wave.distance[head]
+    from_tail, from_head = vertices.distance[tail], vertices.distance[head]
     if merging(wave):  # only what is surely too long may go
-        from_tail, from_head = wave.upper[tail], wave.upper[head]
+        from_tail, from_head = vertices.upper[tail], vertices.upper[head]
     before = 2.0 * length
-    b0, b1 = wave.windows[w + B0], wave.windows[w + B1]
+    b0, b1 = pool.windows[w + B0], pool.windows[w + B1]
     while b1 > b0 and b1 - b0 < before - GAP * length:  # what one cannot end, another may
         before = b1 - b0
         cut_by(wave, slot, 0.0, length, 0.0, 0.0, from_head, head)
         cut_by(wave, slot, 0.0, length, length, 0.0, from_tail, tail)
-        other = wave.passed[name]
+        other = pool.crossings[name]
         while other >= 0:
             p = WIDTH * other
-            p0, p1, px = wave.windows[p + B0], wave.windows[p + B1], wave.windows[p + SX]
-            py, sigma = wave.windows[p + SY], wave.windows[p + SIGMA]
-            root = wave.window_ints[INTS * other + ROOT]
+            p0, p1, px = (
+                pool.windows[p + B0],
+                pool.windows[p + B1],
+                pool.windows[p + SX],
+            )
+            py, sigma = pool.windows[p + SY], pool.windows[p + SIGMA]
+            root = as_ints(pool.windows)[INTS * other + ROOT]
             if flip:
                 p0, p1 = length - p1, length - p0
                 px, sigma = mirrored(px, source_weight(wave, root), sigma, length)
             if merging(wave):
-                sigma += wave.windows[p + XI]
+                sigma += pool.windows[p + XI]
             cut_by(wave, slot, p0, p1, px, py, sigma, root)
-            other = wave.window_ints[INTS * other + NEXT]
-        c0, c1 = wave.windows[w + B0], wave.windows[w + B1]
+            other = as_ints(pool.windows)[INTS * other + NEXT]
+        c0, c1 = pool.windows[w + B0], pool.windows[w + B1]
         if c1 - c0 < b1 - b0 and c1 - c0 <= GAP * length:
             return False
         b0, b1 = c0, c1
@@ -76,22 +81,24 @@ def trim_against_crossings(wave: Any, g: int, slot: int) -> bool:
 @kernel
 def record_crossing(wave: Any, g: int, slot: int) -> None:
     """Keep a window that went over the irregular edge of g."""
+    mesh, pool = wave.mesh, wave.pool
     name = lowest_half_edge(wave, g)
-    if wave.links[ROW * g + TAIL] < wave.links[ROW * g + HEAD]:
-        mirror(wave, slot, wave.geometry[ROW * g + LENGTH])
-    wave.window_ints[INTS * slot + NEXT] = wave.passed[name]
-    wave.passed[name] = slot
+    if mesh.links[ROW * g + TAIL] < mesh.links[ROW * g + HEAD]:
+        mirror(wave, slot, mesh.geometry[ROW * g + LENGTH])
+    as_ints(pool.windows)[INTS * slot + NEXT] = pool.crossings[name]
+    pool.crossings[name] = slot
 
 
 @kernel
 def mirror(wave: Any, slot: int, length: float) -> None:
     """Turn a window into the frame that runs along its edge the other way."""
+    pool = wave.pool
     w = WIDTH * slot
-    b0, b1 = wave.windows[w + B0], wave.windows[w + B1]
-    wave.windows[w + B0], wave.windows[w + B1] = length - b1, length - b0
-    sw = source_weight(wave, wave.window_ints[INTS * slot + ROOT])
-    sx, sigma = mirrored(wave.windows[w + SX], sw, wave.windows[w + SIGMA], length)
-    wave.windows[w + SX], wave.windows[w + SIGMA] = sx, sigma
+    b0, b1 = pool.windows[w + B0], pool.windows[w + B1]
+    pool.windows[w + B0], pool.windows[w + B1] = length - b1, length - b0
+    sw = source_weight(wave, as_ints(pool.windows)[INTS * slot + ROOT])
+    sx, sigma = mirrored(pool.windows[w + SX], sw, pool.windows[w + SIGMA], length)
+    pool.windows[w + SX], pool.windows[w + SIGMA] = sx, sigma
 
 
 @kernel
@@ -105,19 +112,24 @@ def cut_by(
     wave: Any, slot: int, p0: float, p1: float, px: float, py: float, p_sigma: float, root: int
 ) -> None:
     """Leave of a window what it wins against p, which came before: ties as between sources."""
+    pool, vertices = wave.pool, wave.vertices
     w = WIDTH * slot
-    b0, b1 = wave.windows[w + B0], wave.windows[w + B1]
-    sx, sy, sigma = wave.windows[w + SX], wave.windows[w + SY], wave.windows[w + SIGMA]
-    own_root = wave.window_ints[INTS * slot + ROOT]
+    b0, b1 = pool.windows[w + B0], pool.windows[w + B1]
+    sx, sy, sigma = (
+        pool.windows[w + SX],
+        pool.windows[w + SY],
+        pool.windows[w + SIGMA],
+    )
+    own_root = as_ints(pool.windows)[INTS * slot + ROOT]
     pw, sw = source_weight(wave, root), source_weight(wave, own_root)
-    slack = -SLACK if wave.origin[own_root] < wave.origin[root] else SLACK
+    slack = -SLACK if vertices.source_index[own_root] < vertices.source_index[root] else SLACK
     lo, hi = max(p0, b0), min(p1, b1)
     if lo < hi and is_no_nearer(lo, hi, sx, sy, sigma, sw, px, py, p_sigma, pw, slack):
         b0, b1 = without(b0, b1, lo, hi)
     else:
         p_sigma -= slack * distance_at(b0, sx, sy, sigma, sw)
         p0, p1, b0, b1 = trim(p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, 0.0, 0.0, pw, sw)
-    wave.windows[w + B0], wave.windows[w + B1] = b0, b1
+    pool.windows[w + B0], pool.windows[w + B1] = b0, b1
 
 
 @kernel
@@ -152,7 +164,8 @@ def is_no_nearer(
 @kernel
 def lowest_half_edge(wave: Any, g: int) -> int:
     """Return the half-edge by which the irregular edge of g is known."""
-    lowest, h = g, wave.links[ROW * g + AROUND] >> 1
+    mesh = wave.mesh
+    lowest, h = g, mesh.links[ROW * g + AROUND] >> 1
     while h != g:
-        lowest, h = min(lowest, h), wave.links[ROW * h + AROUND] >> 1
+        lowest, h = min(lowest, h), mesh.links[ROW * h + AROUND] >> 1
     return lowest

@@ -78,7 +78,7 @@ def accuracy(wave: Any, xi: float, local: float, nearest: float) -> bool:
 
     ``nearest`` is the least distance over the merged window: what holds there holds throughout.
     """
-    allowed = min(wave.relative_error * nearest, wave.absolute_error)
+    allowed = min(wave.bounds.relative_error * nearest, wave.bounds.absolute_error)
     return xi <= allowed and local <= LOCAL_SHARE * allowed
 
 

@@ -13,13 +13,13 @@ from typing import Any
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL
+from geodesic_core.kernels.sweep.bounds import LANDMARKS
 from geodesic_core.kernels.sweep.state import (
     COUNTERS,
     ENTRY_EDGE,
     FACE,
     FAR,
     FREE_FIRST,
-    LANDMARKS,
     LIGHT,
     LIST,
     LIT_FROM,
@@ -34,6 +34,7 @@ from geodesic_core.kernels.sweep.state import (
     SIZE,
     TOUCHED,
     WINNER,
+    is_pruned,
     merging,
     view_of,
 )
@@ -47,10 +48,11 @@ MOST = (1.0 + 1e-6) / (1.0 - LANDMARK_ERROR)
 @kernel
 def touch(wave: Any, v: int) -> None:
     """Note that v is no longer as it was at first, and bound the rest of a path from it."""
-    wave.touched[wave.counters[TOUCHED]] = v
+    vertices = wave.vertices
+    vertices.touched[wave.counters[TOUCHED]] = v
     wave.counters[TOUCHED] += 1
-    if wave.pruned:
-        wave.heuristic[v] = lower_bound_to_target(wave, v)
+    if is_pruned(wave):
+        vertices.heuristic[v] = lower_bound_to_target(wave, v)
 
 
 @kernel
@@ -62,17 +64,21 @@ def lower_bound_to_target(wave: Any, v: int) -> float:
     bound that no L exceeds by more than the way from v to it: the steepest.
     """
     straight = straight_to_start(wave, v)
-    if wave.knows:
-        return min(wave.known[v], wave.ceiling - steepest_to_start(wave, v, straight))
+    if wave.sizes.known > 0:
+        return min(
+            wave.bounds.pruning.known[v],
+            wave.bounds.pruning.ceiling - steepest_to_start(wave, v, straight),
+        )
     return least_to_start(wave, v, straight)
 
 
 @inlined
 def straight_to_start(wave: Any, v: int) -> float:
     """Euclidean distance from v to the start."""
-    x = wave.positions[3 * v] - wave.start[0]
-    y = wave.positions[3 * v + 1] - wave.start[1]
-    z = wave.positions[3 * v + 2] - wave.start[2]
+    mesh = wave.mesh
+    x = mesh.positions[3 * v] - wave.bounds.pruning.position[0]
+    y = mesh.positions[3 * v + 1] - wave.bounds.pruning.position[1]
+    z = mesh.positions[3 * v + 2] - wave.bounds.pruning.position[2]
     return math.sqrt(x * x + y * y + z * z)
 
 
@@ -84,11 +90,13 @@ def least_to_start(wave: Any, v: int, straight: float) -> float:
     landmark of another component tells nothing.
     """
     least = straight
-    for i in range(wave.landmark_count):
-        if wave.least[i] == math.inf:
+    for i in range(wave.bounds.pruning.landmark_count):
+        if wave.bounds.pruning.least[i] == math.inf:
             continue
-        here = wave.landmarks[LANDMARKS * v + i]
-        bound = max(LEAST * here - wave.most[i], wave.least[i] - MOST * here)
+        here = wave.bounds.pruning.landmarks[LANDMARKS * v + i]
+        bound = max(
+            LEAST * here - wave.bounds.pruning.most[i], wave.bounds.pruning.least[i] - MOST * here
+        )
         if bound > least:
             least = bound
     return least
@@ -98,11 +106,13 @@ def least_to_start(wave: Any, v: int, straight: float) -> float:
 def steepest_to_start(wave: Any, v: int, straight: float) -> float:
     """Return what `least_to_start`, at any point q, exceeds by the distance of v and q at most."""
     steepest = straight
-    for i in range(wave.landmark_count):
-        if wave.least[i] == math.inf:
+    for i in range(wave.bounds.pruning.landmark_count):
+        if wave.bounds.pruning.least[i] == math.inf:
             continue
-        here = wave.landmarks[LANDMARKS * v + i]
-        bound = max(MOST * here - wave.most[i], wave.least[i] - LEAST * here)
+        here = wave.bounds.pruning.landmarks[LANDMARKS * v + i]
+        bound = max(
+            MOST * here - wave.bounds.pruning.most[i], wave.bounds.pruning.least[i] - LEAST * here
+        )
         if bound > steepest:
             steepest = bound
     return steepest
@@ -111,46 +121,51 @@ def steepest_to_start(wave: Any, v: int, straight: float) -> float:
 @inlined
 def may_pass(wave: Any, v: int) -> bool:
     """Whether a path of allowed length may pass v at its distance."""
-    return not wave.pruned or wave.distance[v] + wave.heuristic[v] <= wave.limit
+    vertices = wave.vertices
+    return (
+        not is_pruned(wave)
+        or vertices.distance[v] + vertices.heuristic[v] <= wave.bounds.pruning.limit
+    )
 
 
 @kernel
 def forget(topology: Any, wavefront: Any, bounds: Any) -> None:
     """Set the wavefront back to how it was at first, in time proportional to what was touched."""
     wave = view_of(topology, wavefront, bounds)
+    mesh, pool, vertices, sites = wave.mesh, wave.pool, wave.vertices, wave.sites
     for i in range(wave.counters[TOUCHED]):
-        v = wave.touched[i]
-        wave.distance[v] = math.inf
-        wave.winner_ints[WINNER * v + ENTRY_EDGE] = -1
-        wave.winner_ints[WINNER * v + PREDECESSOR] = -1
-        wave.status[v] = FAR
-        wave.heap_place[v] = -1
+        v = vertices.touched[i]
+        vertices.distance[v] = math.inf
+        vertices.winner_ints[WINNER * v + ENTRY_EDGE] = -1
+        vertices.winner_ints[WINNER * v + PREDECESSOR] = -1
+        vertices.status[v] = FAR
+        wave.queues.heap_place[v] = -1
         if merging(wave):
-            wave.upper[v] = math.inf
-            wave.reference[v] = -1
+            vertices.upper[v] = math.inf
+            vertices.reference[v] = -1
             row = LIGHT * v
-            wave.light[row + LIT_FROM], wave.light[row + LIT_TO] = 1.0, -1.0
-            wave.light[row + SENT_FROM], wave.light[row + SENT_TO] = 1.0, -1.0
-            wave.light[row + SENT_AT] = math.inf
-        for c in range(wave.first_corner[v], wave.first_corner[v + 1]):
+            vertices.light[row + LIT_FROM], vertices.light[row + LIT_TO] = 1.0, -1.0
+            vertices.light[row + SENT_FROM], vertices.light[row + SENT_TO] = 1.0, -1.0
+            vertices.light[row + SENT_AT] = math.inf
+        for c in range(mesh.first_corner[v], mesh.first_corner[v + 1]):
             # Windows lie only on faces of vertices that were touched.
-            face = wave.corners[c] // 3
+            face = mesh.corners[c] // 3
             for h in range(3 * face, 3 * face + 3):
-                wave.lists[LIST * h + SIZE] = 0
-                wave.lists[LIST * h + MARKS] = 0
-                if wave.flags[v] & (SEAM | PINCHED):
-                    wave.passed[h] = -1
+                pool.lists[LIST * h + SIZE] = 0
+                pool.lists[LIST * h + MARKS] = 0
+                if mesh.flags[v] & (SEAM | PINCHED):
+                    pool.crossings[h] = -1
                 if merging(wave):
-                    wave.runs[h] = 0
-    for k in range(wave.site_count):
-        node, face = wave.site_ints[SITE * k + NODE], wave.site_ints[SITE * k + FACE]
-        wave.distance[node] = math.inf
-        wave.winner_ints[WINNER * node + ENTRY_EDGE] = -1
-        wave.winner_ints[WINNER * node + PREDECESSOR] = -1
+                    pool.runs[h] = 0
+    for k in range(wave.sizes.sites):
+        node, face = sites.ints[SITE * k + NODE], sites.ints[SITE * k + FACE]
+        vertices.distance[node] = math.inf
+        vertices.winner_ints[WINNER * node + ENTRY_EDGE] = -1
+        vertices.winner_ints[WINNER * node + PREDECESSOR] = -1
         if merging(wave):
-            wave.reference[node] = -1
+            vertices.reference[node] = -1
         for h in range(3 * face, 3 * face + 3):
-            wave.lists[LIST * h + MARKS] = 0
+            pool.lists[LIST * h + MARKS] = 0
     for i in range(COUNTERS):
         wave.counters[i] = 0
     wave.counters[FREE_FIRST] = -1

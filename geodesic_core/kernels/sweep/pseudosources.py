@@ -56,8 +56,9 @@ from geodesic_core.tolerances import FLAT, SECTOR_MARGIN
 @kernel
 def is_pseudosource(wave: Any, v: int) -> bool:
     """Whether shortest paths may bend at v (or start there), within the limit."""
-    bends = wave.flags[v] != 0 or wave.winner_ints[WINNER * v + ENTRY_EDGE] < 0
-    return bends and wave.distance[v] <= wave.max_distance and may_pass(wave, v)
+    vertices = wave.vertices
+    bends = wave.mesh.flags[v] != 0 or vertices.winner_ints[WINNER * v + ENTRY_EDGE] < 0
+    return bends and vertices.distance[v] <= wave.bounds.max_distance and may_pass(wave, v)
 
 
 @kernel
@@ -68,16 +69,17 @@ def emit_pseudosource(wave: Any, v: int) -> None:
     that make an angle of π or more with the incoming one on both sides. At a boundary either side
     will do. Where several fans meet, or faces are pinched, v emits all around.
     """
-    total = wave.total_angle[v]
-    if wave.winner_ints[WINNER * v + ENTRY_EDGE] < 0 or wave.flags[v] & (FANS | PINCHED) != 0:
+    mesh, vertices = wave.mesh, wave.vertices
+    total = mesh.total_angle[v]
+    if vertices.winner_ints[WINNER * v + ENTRY_EDGE] < 0 or mesh.flags[v] & (FANS | PINCHED) != 0:
         emit_around(wave, v)
     elif merging(wave):
         emit_shadows(wave, v)
     else:
-        via = wave.winner_ints[WINNER * v + ENTRY_EDGE]
-        weight = source_weight(wave, wave.winner_ints[WINNER * v + PREDECESSOR])
-        lit = incoming_angle(wave, via, wave.winner[2 * v], wave.winner[2 * v + 1], weight)
-        if wave.flags[v] & BOUNDARY:
+        via = vertices.winner_ints[WINNER * v + ENTRY_EDGE]
+        weight = source_weight(wave, vertices.winner_ints[WINNER * v + PREDECESSOR])
+        lit = incoming_angle(wave, via, vertices.winner[2 * v], vertices.winner[2 * v + 1], weight)
+        if mesh.flags[v] & BOUNDARY:
             emit_between(wave, v, lit + math.pi - SECTOR_MARGIN, total)
             emit_between(wave, v, 0.0, lit - math.pi + SECTOR_MARGIN)
         else:
@@ -88,14 +90,15 @@ def emit_pseudosource(wave: Any, v: int) -> None:
 @kernel
 def emit_shadows(wave: Any, v: int) -> None:
     """Emit into the shadows of all directions that v is lit from, but for those emitted before."""
-    row, total = LIGHT * v, wave.total_angle[v]
-    lo, hi = wave.light[row + LIT_FROM], wave.light[row + LIT_TO]
-    sent_lo, sent_hi = wave.light[row + SENT_FROM], wave.light[row + SENT_TO]
-    anew = wave.distance[v] < wave.light[row + SENT_AT] or lo > sent_lo or hi < sent_hi
-    wave.light[row + SENT_FROM], wave.light[row + SENT_TO] = lo, hi
-    wave.light[row + SENT_AT] = wave.distance[v]
+    mesh, vertices = wave.mesh, wave.vertices
+    row, total = LIGHT * v, mesh.total_angle[v]
+    lo, hi = vertices.light[row + LIT_FROM], vertices.light[row + LIT_TO]
+    sent_lo, sent_hi = vertices.light[row + SENT_FROM], vertices.light[row + SENT_TO]
+    anew = vertices.distance[v] < vertices.light[row + SENT_AT] or lo > sent_lo or hi < sent_hi
+    vertices.light[row + SENT_FROM], vertices.light[row + SENT_TO] = lo, hi
+    vertices.light[row + SENT_AT] = vertices.distance[v]
     behind, before = math.pi - SECTOR_MARGIN, SECTOR_MARGIN - math.pi
-    if wave.flags[v] & BOUNDARY:
+    if mesh.flags[v] & BOUNDARY:
         emit_between(wave, v, lo + behind, total if anew else sent_lo + behind)
         emit_between(wave, v, 0.0 if anew else max(sent_hi + before, 0.0), hi + before)
     elif anew:
@@ -108,68 +111,81 @@ def emit_shadows(wave: Any, v: int) -> None:
 @kernel
 def emit_around(wave: Any, v: int) -> None:
     """Emit into every face at v."""
-    for c in range(wave.first_corner[v], wave.first_corner[v + 1]):
-        h, widest = wave.corners[c], corner_end(wave, v, c) - wave.corner_angles[c]
+    mesh = wave.mesh
+    for c in range(mesh.first_corner[v], mesh.first_corner[v + 1]):
+        h, widest = mesh.corners[c], corner_end(wave, v, c) - mesh.corner_angles[c]
         emit_sector(wave, v, h, 0.0, widest, widest)
         relax_edge_ahead(wave, v, h)
-        if wave.links[ROW * h + OUT_LEFT] < 0:
+        if mesh.links[ROW * h + OUT_LEFT] < 0:
             relax_last_edge(wave, v, h)
 
 
 @kernel
 def corner_end(wave: Any, v: int, c: int) -> float:
     """Angle at which the corner at c of the corners ends in the unfolded fan of v."""
-    end: float = wave.total_angle[v]
-    if c + 1 < wave.first_corner[v + 1]:
-        end = wave.corner_angles[c + 1]
+    mesh = wave.mesh
+    end: float = mesh.total_angle[v]
+    if c + 1 < mesh.first_corner[v + 1]:
+        end = mesh.corner_angles[c + 1]
     return end
 
 
 @kernel
 def emit_between(wave: Any, v: int, lo: float, hi: float) -> None:
     """Emit between two angles of the unfolded fan, which at an inner vertex closes to a circle."""
+    mesh = wave.mesh
     if hi <= lo:
         return
     around = -1.0  # where a sector that passes the seam of the fan ends; none does yet
-    if not wave.flags[v] & BOUNDARY:
-        turn = wave.total_angle[v]
+    if not mesh.flags[v] & BOUNDARY:
+        turn = mesh.total_angle[v]
         turns = math.floor(lo / turn)
         lo, hi = lo - turns * turn, hi - turns * turn
         around = hi - turn
-    for c in range(wave.first_corner[v], wave.first_corner[v + 1]):
-        h, start, end = wave.corners[c], wave.corner_angles[c], corner_end(wave, v, c)
+    for c in range(mesh.first_corner[v], mesh.first_corner[v + 1]):
+        h, start, end = mesh.corners[c], mesh.corner_angles[c], corner_end(wave, v, c)
         if lo < end and start < hi:
             emit_sector(wave, v, h, lo - start, hi - start, end - start)
         if start < around:
             emit_sector(wave, v, h, 0.0, around - start, end - start)
         if lo <= start <= hi or start <= around:
             relax_edge_ahead(wave, v, h)
-        if end <= hi and wave.links[ROW * h + OUT_LEFT] < 0:
+        if end <= hi and mesh.links[ROW * h + OUT_LEFT] < 0:
             relax_last_edge(wave, v, h)
 
 
 @kernel
 def relax_edge_ahead(wave: Any, v: int, h: int) -> None:
     """Offer the head of h, which leaves v, the straight path along it."""
+    mesh = wave.mesh
     before = previous(h)  # its apex is the head of h, and it ends at v
-    place = wave.geometry[ROW * before + LENGTH]
-    relax_edge(wave, v, wave.links[ROW * h + HEAD], wave.geometry[ROW * h + LENGTH], before, place)
+    place = mesh.geometry[ROW * before + LENGTH]
+    relax_edge(
+        wave,
+        v,
+        mesh.links[ROW * h + HEAD],
+        mesh.geometry[ROW * h + LENGTH],
+        before,
+        place,
+    )
 
 
 @kernel
 def relax_last_edge(wave: Any, v: int, h: int) -> None:
     """Offer the path along the last edge of an open fan: from the tail of h to its apex."""
-    reach = wave.geometry[ROW * h + LENGTH_LEFT]
-    relax_edge(wave, v, wave.links[ROW * h + APEX], reach, h, 0.0)
+    mesh = wave.mesh
+    reach = mesh.geometry[ROW * h + LENGTH_LEFT]
+    relax_edge(wave, v, mesh.links[ROW * h + APEX], reach, h, 0.0)
 
 
 @kernel
 def relax_edge(wave: Any, v: int, u: int, reach: float, via: int, place: float) -> None:
     """Offer u the path along the edge from v, which lies at ``place`` on the half-edge ``via``."""
-    distance = wave.distance[v] + reach
+    vertices = wave.vertices
+    distance = vertices.distance[v] + reach
     if merging(wave):
-        bound_vertex(wave, u, wave.upper[v] + reach)
-        if wave.flags[u]:
+        bound_vertex(wave, u, vertices.upper[v] + reach)
+        if wave.mesh.flags[u]:
             illuminate_vertex(wave, u, distance, via, place, 0.0, 1.0)
     relax_vertex(wave, u, distance, via, place, 0.0, v, -1 - v)
 
@@ -180,13 +196,14 @@ def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) 
 
     The angles are measured from h; what lies outside of the corner is cut off.
     """
+    mesh, vertices = wave.mesh, wave.vertices
     if hi <= 0.0 or lo >= widest or hi <= lo:
         return
     row = ROW * h
-    across = wave.links[row + OUT_RIGHT]
+    across = mesh.links[row + OUT_RIGHT]
     if across == NO_FACE:
         return
-    length = wave.geometry[row + LENGTH_RIGHT]
+    length = mesh.geometry[row + LENGTH_RIGHT]
     b0, b1 = 0.0, length
     # The frame of the half-edge across starts at the apex: distances count from its far end.
     if lo > 0.0:
@@ -195,29 +212,30 @@ def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) 
         b0 = length - along_far_edge(wave, h, hi)
     if b1 <= b0:
         return
-    sx = length - wave.geometry[row + COS_RIGHT] * wave.geometry[row + LENGTH]
+    sx = length - mesh.geometry[row + COS_RIGHT] * mesh.geometry[row + LENGTH]
     # In a face of no area the apex lies on the edge across, from where no ray would leave.
-    sy = min(-wave.geometry[row + SIN_RIGHT] * wave.geometry[row + LENGTH], -FLAT * length)
-    sigma, xi = wave.distance[v], 0.0
+    sy = min(-mesh.geometry[row + SIN_RIGHT] * mesh.geometry[row + LENGTH], -FLAT * length)
+    sigma, xi = vertices.distance[v], 0.0
     if merging(wave):
-        xi = wave.upper[v] - sigma
+        xi = vertices.upper[v] - sigma
     slot = put_window(wave, b0, b1, sx, sy, sigma, v, xi, -1 - v)
     wave.counters[CREATED] += 1
     if across == IRREGULAR:
         send_across(wave, following(h), slot)
         return
     insert_sorted(wave, across, slot)
-    queue_if_due(wave, across, wave.links[row + HEAD], wave.links[row + APEX])
+    queue_if_due(wave, across, mesh.links[row + HEAD], mesh.links[row + APEX])
 
 
 @kernel
 def along_far_edge(wave: Any, h: int, angle: float) -> float:
     """Where the ray from the tail of h at ``angle`` meets the far edge, from the head of h."""
+    mesh = wave.mesh
     row = ROW * h
     sine, cosine = math.sin(angle), math.cos(angle)
-    far = sine * wave.geometry[row + COS_RIGHT] + cosine * wave.geometry[row + SIN_RIGHT]
-    reach: float = wave.geometry[row + LENGTH_RIGHT]
+    far = sine * mesh.geometry[row + COS_RIGHT] + cosine * mesh.geometry[row + SIN_RIGHT]
+    reach: float = mesh.geometry[row + LENGTH_RIGHT]
     if far <= 0.0:
         return reach
-    place: float = wave.geometry[row + LENGTH] * sine / far
+    place: float = mesh.geometry[row + LENGTH] * sine / far
     return min(place, reach)

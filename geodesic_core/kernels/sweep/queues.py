@@ -25,31 +25,33 @@ def precedes(key: float, v: int, other_key: float, u: int) -> bool:
 @kernel
 def push_or_raise(wave: Any, v: int, key: float) -> None:
     """Put v into the heap, or move it up after its key has decreased."""
-    i = wave.heap_place[v]
+    queues = wave.queues
+    i = queues.heap_place[v]
     if i < 0:
         i = wave.counters[HEAP_SIZE]
         wave.counters[HEAP_SIZE] = i + 1
     while i > 0:
         parent = (i - 1) // _ARITY
-        u, parent_key = wave.heap[parent], wave.heap_keys[parent]
+        u, parent_key = queues.heap[parent], queues.heap_keys[parent]
         if not precedes(key, v, parent_key, u):
             break
-        wave.heap[i], wave.heap_keys[i] = u, parent_key
-        wave.heap_place[u] = i
+        queues.heap[i], queues.heap_keys[i] = u, parent_key
+        queues.heap_place[u] = i
         i = parent
-    wave.heap[i], wave.heap_keys[i] = v, key
-    wave.heap_place[v] = i
+    queues.heap[i], queues.heap_keys[i] = v, key
+    queues.heap_place[v] = i
 
 
 @kernel
 def pop_nearest(wave: Any) -> int:
     """Remove and return the nearest vertex; the heap must not be empty."""
-    nearest = wave.heap[0]
-    wave.heap_place[nearest] = -1
+    queues = wave.queues
+    nearest = queues.heap[0]
+    queues.heap_place[nearest] = -1
     size = wave.counters[HEAP_SIZE] - 1
     wave.counters[HEAP_SIZE] = size
     if size > 0:
-        v, key = wave.heap[size], wave.heap_keys[size]
+        v, key = queues.heap[size], queues.heap_keys[size]
         i = 0
         while True:
             first = _ARITY * i + 1
@@ -58,17 +60,20 @@ def pop_nearest(wave: Any) -> int:
             child = first
             for c in range(first + 1, min(first + _ARITY, size)):
                 if precedes(
-                    wave.heap_keys[c], wave.heap[c], wave.heap_keys[child], wave.heap[child]
+                    queues.heap_keys[c],
+                    queues.heap[c],
+                    queues.heap_keys[child],
+                    queues.heap[child],
                 ):
                     child = c
-            u, child_key = wave.heap[child], wave.heap_keys[child]
+            u, child_key = queues.heap[child], queues.heap_keys[child]
             if not precedes(child_key, u, key, v):
                 break
-            wave.heap[i], wave.heap_keys[i] = u, child_key
-            wave.heap_place[u] = i
+            queues.heap[i], queues.heap_keys[i] = u, child_key
+            queues.heap_place[u] = i
             i = child
-        wave.heap[i], wave.heap_keys[i] = v, key
-        wave.heap_place[v] = i
+        queues.heap[i], queues.heap_keys[i] = v, key
+        queues.heap_place[v] = i
     return nearest
 
 
@@ -76,9 +81,9 @@ def pop_nearest(wave: Any) -> int:
 def ring_push(wave: Any, h: int) -> None:
     """Append half-edge h; the ring has room for every half-edge once."""
     i = wave.counters[RING_HEAD] + wave.counters[RING_SIZE]
-    if i >= wave.ring_capacity:
-        i -= wave.ring_capacity
-    wave.ring[i] = h
+    if i >= wave.sizes.ring:
+        i -= wave.sizes.ring
+    wave.queues.ring[i] = h
     wave.counters[RING_SIZE] += 1
 
 
@@ -86,8 +91,8 @@ def ring_push(wave: Any, h: int) -> None:
 def ring_pop(wave: Any) -> int:
     """Remove and return the oldest half-edge; the ring must not be empty."""
     head = wave.counters[RING_HEAD]
-    h = wave.ring[head]
+    h = wave.queues.ring[head]
     head += 1
-    wave.counters[RING_HEAD] = head if head < wave.ring_capacity else 0
+    wave.counters[RING_HEAD] = head if head < wave.sizes.ring else 0
     wave.counters[RING_SIZE] -= 1
     return h

@@ -46,30 +46,37 @@ def relax_vertex(
 
     Of equal distances that of the lower source wins.
     """
-    known = wave.distance[v]
-    if not precedence(distance, wave.origin[root], known, wave.origin[v]):
+    vertices = wave.vertices
+    known = vertices.distance[v]
+    if not precedence(distance, vertices.source_index[root], known, vertices.source_index[v]):
         return
-    if known == math.inf and wave.status[v] == FAR:
+    if known == math.inf and vertices.status[v] == FAR:
         touch(wave, v)
-    wave.winner[2 * v] = sx
-    wave.winner[2 * v + 1] = sy
-    wave.winner_ints[WINNER * v + ENTRY_EDGE] = via
-    wave.winner_ints[WINNER * v + PREDECESSOR] = root
-    wave.origin[v] = wave.origin[root]
+    vertices.winner[2 * v] = sx
+    vertices.winner[2 * v + 1] = sy
+    vertices.winner_ints[WINNER * v + ENTRY_EDGE] = via
+    vertices.winner_ints[WINNER * v + PREDECESSOR] = root
+    vertices.source_index[v] = vertices.source_index[root]
     if merging(wave):
-        wave.reference[v] = reference
+        vertices.reference[v] = reference
     if distance < known:
-        wave.distance[v] = distance
+        vertices.distance[v] = distance
         push_or_raise(wave, v, distance)
 
 
 @kernel
 def bound_vertex(wave: Any, v: int, upper: float) -> None:
     """Note an upper bound of the exact distance of v."""
-    if upper < wave.upper[v]:
-        if upper < wave.distance[v]:  # whatever reached v so far comes too late for a shortest path
-            wave.light[LIGHT * v + LIT_FROM], wave.light[LIGHT * v + LIT_TO] = 1.0, -1.0
-        wave.upper[v] = upper
+    vertices = wave.vertices
+    if upper < vertices.upper[v]:
+        if (
+            upper < vertices.distance[v]
+        ):  # whatever reached v so far comes too late for a shortest path
+            vertices.light[LIGHT * v + LIT_FROM], vertices.light[LIGHT * v + LIT_TO] = (
+                1.0,
+                -1.0,
+            )
+        vertices.upper[v] = upper
 
 
 @kernel
@@ -82,23 +89,24 @@ def illuminate_vertex(
     may be, by the upper bound, make a range. A vertex that has emitted its windows and sees it
     widen is queued again.
     """
-    if distance > wave.upper[v] * (1.0 + SLACK):
+    mesh, vertices = wave.mesh, wave.vertices
+    if distance > vertices.upper[v] * (1.0 + SLACK):
         return
     angle = incoming_angle(wave, via, sx, sy, sw)
     row = LIGHT * v
-    lo, hi = wave.light[row + LIT_FROM], wave.light[row + LIT_TO]
+    lo, hi = vertices.light[row + LIT_FROM], vertices.light[row + LIT_TO]
     if lo > hi:
         lo, hi = angle, angle
     else:
-        if not wave.flags[v] & (BOUNDARY | PINCHED):  # around a tip there may be no angle at all
-            turn = wave.total_angle[v]
+        if not mesh.flags[v] & (BOUNDARY | PINCHED):  # around a tip there may be no angle at all
+            turn = mesh.total_angle[v]
             angle -= turn * math.floor((angle - 0.5 * (lo + hi)) / turn + 0.5)
         if lo <= angle <= hi:
             return
         lo, hi = min(lo, angle), max(hi, angle)
-    wave.light[row + LIT_FROM], wave.light[row + LIT_TO] = lo, hi
-    if wave.status[v] == SETTLED:
-        push_or_raise(wave, v, wave.distance[v])
+    vertices.light[row + LIT_FROM], vertices.light[row + LIT_TO] = lo, hi
+    if vertices.status[v] == SETTLED:
+        push_or_raise(wave, v, vertices.distance[v])
 
 
 @kernel
@@ -107,14 +115,15 @@ def incoming_angle(wave: Any, via: int, sx: float, sy: float, sw: float) -> floa
 
     The pseudosource is at (sx, sy, sw) in the frame of the half-edge ``via``.
     """
+    mesh = wave.mesh
     row = ROW * via
     # From the apex: toward the tail, and toward the pseudosource
-    ex = -wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
-    ey = -wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
-    hx = ex + wave.geometry[row + LENGTH]
+    ex = -mesh.geometry[row + COS_LEFT] * mesh.geometry[row + LENGTH_LEFT]
+    ey = -mesh.geometry[row + SIN_LEFT] * mesh.geometry[row + LENGTH_LEFT]
+    hx = ex + mesh.geometry[row + LENGTH]
     dx, dy = sx + sw * ex, sy + sw * ey
     if hx * dy - ey * dx > 0.0:  # beyond the head
         dx, dy = hx, ey
     turn = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
-    start: float = wave.geometry[row + APEX_ANGLE]
+    start: float = mesh.geometry[row + APEX_ANGLE]
     return start + max(turn, 0.0)

@@ -40,12 +40,14 @@ def is_segment(ints: Any, node: int) -> bool:
 
 
 @kernel
-def emit_segment(wave: Any, ints: Any, ends: Any, k: int) -> None:
+def emit_segment(wave: Any, k: int) -> None:
     """Send the strips of the piece of row k over the edges of its face, and reach the corners."""
+    mesh, sites = wave.mesh, wave.sites
+    ints, ends = sites.segment_ints, sites.segment_ends
     node, face = ints[SEGMENT * k + NODE], ints[SEGMENT * k + FACE]
     for h in range(3 * face, 3 * face + 3):
-        px, py = weights_in_frame(wave.geometry, ends, SEGMENT_ENDS * k, h)
-        qx, qy = weights_in_frame(wave.geometry, ends, SEGMENT_ENDS * k + SEGMENT_END, h)
+        px, py = weights_in_frame(mesh.geometry, ends, SEGMENT_ENDS * k, h)
+        qx, qy = weights_in_frame(mesh.geometry, ends, SEGMENT_ENDS * k + SEGMENT_END, h)
         reach = math.hypot(qx - px, qy - py)
         dx, dy = (qx - px) / reach, (qy - py) / reach
         if dx < 0.0:
@@ -75,13 +77,14 @@ def emit_parallel_window(
     dy: float,
 ) -> None:
     """Send the strip that leaves pq over the edge of h; (dx, dy) is its direction, dx > 0."""
+    mesh = wave.mesh
     row = ROW * h
-    length = wave.geometry[row + LENGTH]
+    length = mesh.geometry[row + LENGTH]
     b0, b1 = max(px + py * dy / dx, 0.0), min(qx + qy * dy / dx, length)
-    if wave.links[row + OPPOSITE] == NO_FACE or b1 <= b0:
+    if mesh.links[row + OPPOSITE] == NO_FACE or b1 <= b0:
         return
     # The rays run along (dy, -dx). The frame across begins at the other end, and looks that way.
-    sigma = wave.distance[node] + (length - px) * dy + py * dx
+    sigma = wave.vertices.distance[node] + (length - px) * dy + py * dx
     slot = put_window(wave, length - b1, length - b0, dy, -dx, sigma, node, 0.0, -1 - node)
     send_out(wave, h, slot)
 
@@ -94,18 +97,19 @@ def reach_corner(
 
     In a face of no area the apex may lie on the piece itself, and not be an end of it.
     """
+    mesh = wave.mesh
     row = ROW * h
-    x = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT] - px
-    y = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT] - py
+    x = mesh.geometry[row + COS_LEFT] * mesh.geometry[row + LENGTH_LEFT] - px
+    y = mesh.geometry[row + SIN_LEFT] * mesh.geometry[row + LENGTH_LEFT] - py
     height = y * dx - x * dy
     if not 0.0 <= x * dx + y * dy <= reach:
         return
     sx, sy = (dy, -dx) if height >= 0.0 else (-dy, dx)  # against the ray to the apex
-    distance = wave.distance[node] + abs(height)
-    apex = wave.links[row + APEX]
+    distance = wave.vertices.distance[node] + abs(height)
+    apex = mesh.links[row + APEX]
     if merging(wave):
         bound_vertex(wave, apex, distance)
-        if wave.flags[apex]:
+        if mesh.flags[apex]:
             illuminate_vertex(wave, apex, distance, h, sx, sy, 0.0)
     relax_vertex(wave, apex, distance, h, sx, sy, node, -1 - node)
 

@@ -9,7 +9,7 @@ windows that cross its face. No vertex is inserted, so that there are no slivers
 import math
 from typing import Any
 
-from geodesic_core.kernels.jit import kernel, pointer
+from geodesic_core.kernels.jit import as_ints, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
@@ -65,25 +65,26 @@ from geodesic_core.tolerances import BEND, FLAT, GAP
 @kernel
 def emit_site(wave: Any, k: int) -> None:
     """Send windows from the site of row k over all edges of its face, and reach the corners."""
-    node, face = wave.site_ints[SITE * k + NODE], wave.site_ints[SITE * k + FACE]
-    sigma = wave.distance[node]
+    mesh, sites = wave.mesh, wave.sites
+    node, face = sites.ints[SITE * k + NODE], sites.ints[SITE * k + FACE]
+    sigma = wave.vertices.distance[node]
     for h in range(3 * face, 3 * face + 3):
-        x, y = weights_in_frame(wave.geometry, wave.site_weights, 3 * k, h)
+        x, y = weights_in_frame(mesh.geometry, sites.weights, 3 * k, h)
         row = ROW * h
-        length = wave.geometry[row + LENGTH]
+        length = mesh.geometry[row + LENGTH]
         # In a face of no area the point lies on the edge all the same: see `emit_sector`.
-        is_off_edge = wave.site_weights[3 * k + (h + 2) % 3] > 0.0
-        if wave.links[row + OPPOSITE] != NO_FACE and is_off_edge:
+        is_off_edge = sites.weights[3 * k + (h + 2) % 3] > 0.0
+        if mesh.links[row + OPPOSITE] != NO_FACE and is_off_edge:
             sy = min(-y, -FLAT * length)
             slot = put_window(wave, 0.0, length, length - x, sy, sigma, node, 0.0, -1 - node)
             send_out(wave, h, slot)
-        ax = wave.geometry[row + COS_LEFT] * wave.geometry[row + LENGTH_LEFT]
-        ay = wave.geometry[row + SIN_LEFT] * wave.geometry[row + LENGTH_LEFT]
+        ax = mesh.geometry[row + COS_LEFT] * mesh.geometry[row + LENGTH_LEFT]
+        ay = mesh.geometry[row + SIN_LEFT] * mesh.geometry[row + LENGTH_LEFT]
         distance = sigma + math.hypot(ax - x, ay - y)
-        apex = wave.links[row + APEX]
+        apex = mesh.links[row + APEX]
         if merging(wave):
             bound_vertex(wave, apex, distance)
-            if wave.flags[apex]:
+            if mesh.flags[apex]:
                 illuminate_vertex(wave, apex, distance, h, x, y, 1.0)
         relax_vertex(wave, apex, distance, h, x, y, node, -1 - node)
 
@@ -92,22 +93,23 @@ def emit_site(wave: Any, k: int) -> None:
 def watch_sites(topology: Any, wavefront: Any, bounds: Any, first: int) -> None:
     """Have the sites of the rows from ``first`` on reached by whatever crosses their faces."""
     wave = view_of(topology, wavefront, bounds)
-    for k in range(first, wave.site_count):
-        face = wave.site_ints[SITE * k + FACE]
-        marks = wave.lists[LIST * 3 * face + MARKS]
-        wave.site_ints[SITE * k + NEXT_SITE] = (marks >> SITE_SHIFT) - 1
+    pool, sites = wave.pool, wave.sites
+    for k in range(first, wave.sizes.sites):
+        face = sites.ints[SITE * k + FACE]
+        marks = pool.lists[LIST * 3 * face + MARKS]
+        sites.ints[SITE * k + NEXT_SITE] = (marks >> SITE_SHIFT) - 1
         for h in range(3 * face, 3 * face + 3):
-            others = wave.lists[LIST * h + MARKS] & ((1 << SITE_SHIFT) - 1)
-            wave.lists[LIST * h + MARKS] = others | (k + 1) << SITE_SHIFT
+            others = pool.lists[LIST * h + MARKS] & ((1 << SITE_SHIFT) - 1)
+            pool.lists[LIST * h + MARKS] = others | (k + 1) << SITE_SHIFT
 
 
 @kernel
 def reach_sites(wave: Any, h: int, count: int) -> None:
     """Offer the sites in the face of h the windows of scratch."""
-    k = (wave.lists[LIST * h + MARKS] >> SITE_SHIFT) - 1
+    k = (wave.pool.lists[LIST * h + MARKS] >> SITE_SHIFT) - 1
     while k >= 0:
         reach_site(wave, h, count, k)
-        k = wave.site_ints[SITE * k + NEXT_SITE]
+        k = wave.sites.ints[SITE * k + NEXT_SITE]
 
 
 @kernel
@@ -116,15 +118,16 @@ def reach_site(wave: Any, h: int, count: int, k: int) -> None:
 
     Unlike an apex it asks them all: it has no neighbours that would make up for a gap.
     """
-    node = wave.site_ints[SITE * k + NODE]
-    x, y = weights_in_frame(wave.geometry, wave.site_weights, 3 * k, h)
-    gap = GAP * wave.geometry[ROW * h + LENGTH]
+    mesh, pool, sites = wave.mesh, wave.pool, wave.sites
+    node = sites.ints[SITE * k + NODE]
+    x, y = weights_in_frame(mesh.geometry, sites.weights, 3 * k, h)
+    gap = GAP * mesh.geometry[ROW * h + LENGTH]
     for i in range(count):
         w = WIDTH * i
-        sx, sy = wave.scratch[w + SX], wave.scratch[w + SY]
-        b0, b1 = wave.scratch[w + B0], wave.scratch[w + B1]
-        root = wave.scratch_ints[INTS * i + ROOT]
-        sw, sigma = source_weight(wave, root), wave.scratch[w + SIGMA]
+        sx, sy = pool.scratch[w + SX], pool.scratch[w + SY]
+        b0, b1 = pool.scratch[w + B0], pool.scratch[w + B1]
+        root = as_ints(pool.scratch)[INTS * i + ROOT]
+        sw, sigma = source_weight(wave, root), pool.scratch[w + SIGMA]
         relax_site(
             wave,
             node,
@@ -133,7 +136,7 @@ def reach_site(wave: Any, h: int, count: int, k: int) -> None:
             sx,
             sy,
             root,
-            wave.scratch_ints[INTS * i + REFERENCE] if merging(wave) else -1,
+            as_ints(pool.scratch)[INTS * i + REFERENCE] if merging(wave) else -1,
         )
 
 
@@ -164,16 +167,17 @@ def relax_site(
     wave: Any, node: int, distance: float, via: int, sx: float, sy: float, root: int, reference: int
 ) -> None:
     """Offer a site a distance and what gives it; of equal ones that of the lower source wins."""
-    known = wave.distance[node]
-    if not precedence(distance, wave.origin[root], known, wave.origin[node]):
+    vertices = wave.vertices
+    known = vertices.distance[node]
+    if not precedence(distance, vertices.source_index[root], known, vertices.source_index[node]):
         return
-    wave.distance[node] = min(distance, known)
-    wave.winner[2 * node], wave.winner[2 * node + 1] = sx, sy
-    wave.winner_ints[WINNER * node + ENTRY_EDGE] = via
-    wave.winner_ints[WINNER * node + PREDECESSOR] = root
-    wave.origin[node] = wave.origin[root]
+    vertices.distance[node] = min(distance, known)
+    vertices.winner[2 * node], vertices.winner[2 * node + 1] = sx, sy
+    vertices.winner_ints[WINNER * node + ENTRY_EDGE] = via
+    vertices.winner_ints[WINNER * node + PREDECESSOR] = root
+    vertices.source_index[node] = vertices.source_index[root]
     if merging(wave):
-        wave.reference[node] = reference
+        vertices.reference[node] = reference
 
 
 @kernel
@@ -183,26 +187,27 @@ def reach_sites_inside(topology: Any, wavefront: Any, bounds: Any, first: int) -
     They come from the corners of their faces, or from sources and pieces in the same face.
     """
     wave = view_of(topology, wavefront, bounds)
-    for k in range(first, wave.site_count):
-        node, face = wave.site_ints[SITE * k + NODE], wave.site_ints[SITE * k + FACE]
+    mesh, vertices, sites = wave.mesh, wave.vertices, wave.sites
+    for k in range(first, wave.sizes.sites):
+        node, face = sites.ints[SITE * k + NODE], sites.ints[SITE * k + FACE]
         for h in range(3 * face, 3 * face + 3):
-            x, y = weights_in_frame(wave.geometry, wave.site_weights, 3 * k, h)
-            corner = wave.links[ROW * h + TAIL]
-            distance = wave.distance[corner] + math.hypot(x, y)
+            x, y = weights_in_frame(mesh.geometry, sites.weights, 3 * k, h)
+            corner = mesh.links[ROW * h + TAIL]
+            distance = vertices.distance[corner] + math.hypot(x, y)
             if distance < math.inf:
                 relax_site(wave, node, distance, h, 0.0, 0.0, corner, -1 - corner)
         h = 3 * face
-        x, y = weights_in_frame(wave.geometry, wave.site_weights, 3 * k, h)
+        x, y = weights_in_frame(mesh.geometry, sites.weights, 3 * k, h)
         for source in range(first):
-            if wave.site_ints[SITE * source + FACE] == face:
-                root = wave.site_ints[SITE * source + NODE]
-                sx, sy = weights_in_frame(wave.geometry, wave.site_weights, 3 * source, h)
-                distance = wave.distance[root] + math.hypot(x - sx, y - sy)
+            if sites.ints[SITE * source + FACE] == face:
+                root = sites.ints[SITE * source + NODE]
+                sx, sy = weights_in_frame(mesh.geometry, sites.weights, 3 * source, h)
+                distance = vertices.distance[root] + math.hypot(x - sx, y - sy)
                 relax_site(wave, node, distance, h, sx, sy, root, -1 - root)
-        ints, ends = pointer(wavefront.piece_ints), pointer(wavefront.piece_ends)
-        for piece in range(len(wavefront.piece_ints)):
-            if ints[SEGMENT * piece + FACE] == face:
-                root = ints[SEGMENT * piece + NODE]
-                distance = distance_to_segment(wave.geometry, ends, piece, h, x, y)
-                distance += wave.distance[root]
+        for segment in range(wave.sizes.segments):
+            if sites.segment_ints[SEGMENT * segment + FACE] == face:
+                root = sites.segment_ints[SEGMENT * segment + NODE]
+                ends = sites.segment_ends
+                distance = distance_to_segment(mesh.geometry, ends, segment, h, x, y)
+                distance += vertices.distance[root]
                 relax_site(wave, node, distance, h, 0.0, 0.0, root, -1 - root)

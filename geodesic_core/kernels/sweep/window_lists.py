@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from geodesic_core.kernels.jit import kernel, prefetch
+from geodesic_core.kernels.jit import as_ints, kernel, prefetch
 from geodesic_core.kernels.mesh.half_edges import (
     AROUND,
     HEAD,
@@ -52,7 +52,7 @@ from geodesic_core.kernels.sweep.window import (
 @kernel
 def free_windows(wave: Any) -> int:
     """Return the number of windows that can be taken before the pool must grow."""
-    return wave.counters[FREE_SIZE] + wave.pool - wave.counters[FRESH]
+    return wave.counters[FREE_SIZE] + wave.sizes.windows - wave.counters[FRESH]
 
 
 @kernel
@@ -60,7 +60,7 @@ def take_window(wave: Any) -> int:
     """Take a slot from the pool; the caller has checked that there is one."""
     slot = wave.counters[FREE_FIRST]
     if slot >= 0:
-        wave.counters[FREE_FIRST] = wave.window_ints[INTS * slot + NEXT]
+        wave.counters[FREE_FIRST] = as_ints(wave.pool.windows)[INTS * slot + NEXT]
         wave.counters[FREE_SIZE] -= 1
         return slot
     slot = wave.counters[FRESH]
@@ -71,11 +71,12 @@ def take_window(wave: Any) -> int:
 @kernel
 def release_list(wave: Any, h: int) -> None:
     """Give all windows of the list of h back to the pool, in O(1)."""
+    pool = wave.pool
     row = LIST * h
-    wave.window_ints[INTS * wave.lists[row + LAST] + NEXT] = wave.counters[FREE_FIRST]
-    wave.counters[FREE_FIRST] = wave.lists[row + FIRST]
-    wave.counters[FREE_SIZE] += wave.lists[row + SIZE]
-    wave.lists[row + SIZE] = 0
+    as_ints(pool.windows)[INTS * pool.lists[row + LAST] + NEXT] = wave.counters[FREE_FIRST]
+    wave.counters[FREE_FIRST] = pool.lists[row + FIRST]
+    wave.counters[FREE_SIZE] += pool.lists[row + SIZE]
+    pool.lists[row + SIZE] = 0
 
 
 @kernel
@@ -91,15 +92,16 @@ def put_window(
     reference: int,
 ) -> int:
     """Take a slot of the pool and fill it."""
+    pool = wave.pool
     slot = take_window(wave)
     w = WIDTH * slot
-    wave.windows[w + B0], wave.windows[w + B1] = b0, b1
-    wave.windows[w + SX], wave.windows[w + SY] = sx, sy
-    wave.windows[w + SIGMA] = sigma
-    wave.window_ints[INTS * slot + ROOT] = root
+    pool.windows[w + B0], pool.windows[w + B1] = b0, b1
+    pool.windows[w + SX], pool.windows[w + SY] = sx, sy
+    pool.windows[w + SIGMA] = sigma
+    as_ints(pool.windows)[INTS * slot + ROOT] = root
     if merging(wave):
-        wave.windows[w + XI] = xi
-        wave.window_ints[INTS * slot + REFERENCE] = reference
+        pool.windows[w + XI] = xi
+        as_ints(pool.windows)[INTS * slot + REFERENCE] = reference
     return slot
 
 
@@ -109,28 +111,31 @@ def queue_list(wave: Any, h: int) -> None:
 
     Its rows are asked for ahead of its turn: 7 % of an exact sweep, 18 % of a merging one.
     """
-    if wave.lists[LIST * h + SIZE] > 0 and not wave.lists[LIST * h + MARKS] & IN_RING:
-        wave.lists[LIST * h + MARKS] |= IN_RING
-        prefetch(wave.geometry, ROW * h)
-        prefetch(wave.links, ROW * h)
+    mesh, pool = wave.mesh, wave.pool
+    if pool.lists[LIST * h + SIZE] > 0 and not pool.lists[LIST * h + MARKS] & IN_RING:
+        pool.lists[LIST * h + MARKS] |= IN_RING
+        prefetch(mesh.geometry, ROW * h)
+        prefetch(mesh.links, ROW * h)
         ring_push(wave, h)
 
 
 @kernel
 def queue_if_due(wave: Any, h: int, u: int, v: int) -> None:
     """Queue the list of h if an end of its edge (u, v) is done; else it waits for more windows."""
-    if wave.status[u] == SETTLED or wave.status[v] == SETTLED:
+    vertices = wave.vertices
+    if vertices.status[u] == SETTLED or vertices.status[v] == SETTLED:
         queue_list(wave, h)
 
 
 @kernel
 def send_out(wave: Any, h: int, slot: int) -> None:
     """Move a window of a source in the face of h over the edge of h, which is no boundary."""
+    mesh = wave.mesh
     wave.counters[CREATED] += 1
-    if wave.links[ROW * following(h) + OUT_LEFT] == IRREGULAR:
+    if mesh.links[ROW * following(h) + OUT_LEFT] == IRREGULAR:
         send_across(wave, h, slot)
     else:
-        insert_sorted(wave, wave.links[ROW * h + OPPOSITE], slot)
+        insert_sorted(wave, mesh.links[ROW * h + OPPOSITE], slot)
 
 
 @kernel
@@ -140,7 +145,8 @@ def send_across(wave: Any, g: int, slot: int) -> None:
     It comes in the frame of a half-edge that runs the other way than g; where one runs the same
     way, its face is seen in the mirror.
     """
-    links, w = wave.links, WIDTH * slot
+    mesh, pool = wave.mesh, wave.pool
+    links, w = mesh.links, WIDTH * slot
     wave.counters[CREATED] -= 1
     if not trim_against_crossings(wave, g, slot):
         free_window(wave, slot)
@@ -149,17 +155,17 @@ def send_across(wave: Any, g: int, slot: int) -> None:
     while h != g:
         copy = put_window(
             wave,
-            wave.windows[w + B0],
-            wave.windows[w + B1],
-            wave.windows[w + SX],
-            wave.windows[w + SY],
-            wave.windows[w + SIGMA],
-            wave.window_ints[INTS * slot + ROOT],
-            wave.windows[w + XI],
-            wave.window_ints[INTS * slot + REFERENCE],
+            pool.windows[w + B0],
+            pool.windows[w + B1],
+            pool.windows[w + SX],
+            pool.windows[w + SY],
+            pool.windows[w + SIGMA],
+            as_ints(pool.windows)[INTS * slot + ROOT],
+            pool.windows[w + XI],
+            as_ints(pool.windows)[INTS * slot + REFERENCE],
         )
         if links[ROW * h + TAIL] == links[ROW * g + TAIL]:
-            mirror(wave, copy, wave.geometry[ROW * g + LENGTH])
+            mirror(wave, copy, mesh.geometry[ROW * g + LENGTH])
         insert_sorted(wave, h, copy)
         wave.counters[CREATED] += 1
         queue_if_due(wave, h, links[ROW * h + TAIL], links[ROW * h + HEAD])
@@ -170,7 +176,7 @@ def send_across(wave: Any, g: int, slot: int) -> None:
 @kernel
 def free_window(wave: Any, slot: int) -> None:
     """Give a window back to the pool."""
-    wave.window_ints[INTS * slot + NEXT] = wave.counters[FREE_FIRST]
+    as_ints(wave.pool.windows)[INTS * slot + NEXT] = wave.counters[FREE_FIRST]
     wave.counters[FREE_FIRST] = slot
     wave.counters[FREE_SIZE] += 1
 
@@ -178,29 +184,31 @@ def free_window(wave: Any, slot: int) -> None:
 @kernel
 def faces_beyond(wave: Any, g: int) -> int:
     """Return how many other faces the irregular edge of g has."""
-    count, h = 0, wave.links[ROW * g + AROUND] >> 1
+    mesh = wave.mesh
+    count, h = 0, mesh.links[ROW * g + AROUND] >> 1
     while h != g:
         count += 1
-        h = wave.links[ROW * h + AROUND] >> 1
+        h = mesh.links[ROW * h + AROUND] >> 1
     return count
 
 
 @kernel
 def insert_sorted(wave: Any, h: int, slot: int) -> None:
     """Insert a window into the list of h by its left end."""
+    pool = wave.pool
     row = LIST * h
-    size = wave.lists[row + SIZE]
-    before, after, place = -1, wave.lists[row + FIRST], 0
-    left_end = wave.windows[WIDTH * slot + B0]
-    while place < size and wave.windows[WIDTH * after + B0] < left_end:
-        before, after = after, wave.window_ints[INTS * after + NEXT]
+    size = pool.lists[row + SIZE]
+    before, after, place = -1, pool.lists[row + FIRST], 0
+    left_end = pool.windows[WIDTH * slot + B0]
+    while place < size and pool.windows[WIDTH * after + B0] < left_end:
+        before, after = after, as_ints(pool.windows)[INTS * after + NEXT]
         place += 1
     if place > 0:
-        wave.window_ints[INTS * before + NEXT] = slot
+        as_ints(pool.windows)[INTS * before + NEXT] = slot
     else:
-        wave.lists[row + FIRST] = slot
+        pool.lists[row + FIRST] = slot
     if place < size:
-        wave.window_ints[INTS * slot + NEXT] = after
+        as_ints(pool.windows)[INTS * slot + NEXT] = after
     else:
-        wave.lists[row + LAST] = slot
-    wave.lists[row + SIZE] = size + 1
+        pool.lists[row + LAST] = slot
+    pool.lists[row + SIZE] = size + 1

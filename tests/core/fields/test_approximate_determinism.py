@@ -10,6 +10,7 @@ from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.approximation import MERGING
+from tests.support.stepping import with_pool
 
 
 def answer(mesh, source, *, keep_windows=True):
@@ -69,8 +70,9 @@ def test_growing_changes_nothing(name, monkeypatch):
 
     def cramped(*args, **kwargs):
         wave = allocate(*args, **kwargs)
-        paths = 1 if len(wave.merges) else 0
-        return wave._replace(
+        paths = 1 if len(wave.pool.merges) else 0
+        return with_pool(
+            wave,
             windows=np.empty((1, 8)),
             scratch=np.empty((1, 8)),
             merges=np.empty((paths, state.MERGE)),
@@ -78,7 +80,7 @@ def test_growing_changes_nothing(name, monkeypatch):
         )
 
     def counted(wave):
-        grown.append(len(wave.merges))
+        grown.append(len(wave.pool.merges))
         return more_merges(wave)
 
     allocate, more_merges = state.new_wavefront, state.with_more_merges

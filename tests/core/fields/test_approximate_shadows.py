@@ -7,17 +7,11 @@ import pytest
 
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import COS_LEFT, LENGTH_LEFT, SIN_LEFT, following
+from geodesic_core.kernels.sweep.bounds import merging_bounds
 from geodesic_core.kernels.sweep.pseudosources import emit_shadows
 from geodesic_core.kernels.sweep.queues import HEAP_SIZE
 from geodesic_core.kernels.sweep.relaxation import bound_vertex, illuminate_vertex
-from geodesic_core.kernels.sweep.state import (
-    LIT_FROM,
-    LIT_TO,
-    SETTLED,
-    merging_bounds,
-    new_wavefront,
-    view_of,
-)
+from geodesic_core.kernels.sweep.state import LIT_FROM, LIT_TO, SETTLED, new_wavefront, view_of
 from geodesic_core.kernels.sweep.window import B0, B1, SX, SY
 from geodesic_core.tolerances import SECTOR_MARGIN
 from tests.support import zoo
@@ -48,8 +42,8 @@ class Vertex:
         self.view = view_of_arrays(self.topology, self.wave, BOUNDS)
         self.v = int(self.topology.inner_vertex[0])
         self.total = float(self.topology.total_angle[self.v])
-        self.wave.distance[self.v] = self.wave.upper[self.v] = 1.0
-        self.wave.status[self.v] = SETTLED
+        self.wave.vertices.distance[self.v] = self.wave.vertices.upper[self.v] = 1.0
+        self.wave.vertices.status[self.v] = SETTLED
 
     def see(self, angle, distance=1.0):
         """A pseudosource in this direction of the unfolded fan."""
@@ -65,7 +59,7 @@ class Vertex:
         illuminate_vertex(self.view, self.v, distance, via, s.real, s.imag, 1.0)
 
     def lit(self) -> tuple[float, float]:
-        lo, hi = self.wave.light[self.v, [LIT_FROM, LIT_TO]]
+        lo, hi = self.wave.vertices.light[self.v, [LIT_FROM, LIT_TO]]
         return float(lo), float(hi)
 
     def emitted(self) -> float:
@@ -110,9 +104,9 @@ def test_what_is_seen_later_is_added_and_no_more(case, shadow, more):
     assert before == pytest.approx(shadow(vertex), abs=ANGLES)
     assert vertex.emitted() == pytest.approx(before, abs=10 * SECTOR_MARGIN)
     vertex.wave.counters[HEAP_SIZE] = 0
-    vertex.wave.heap_place[:] = -1
+    vertex.wave.queues.heap_place[:] = -1
     vertex.see(more)
-    assert vertex.wave.heap[: vertex.wave.counters[HEAP_SIZE]].tolist() == [vertex.v]
+    assert vertex.wave.queues.heap[: vertex.wave.counters[HEAP_SIZE]].tolist() == [vertex.v]
     assert vertex.emitted() == pytest.approx(shadow(vertex), abs=ANGLES)
 
 
@@ -144,5 +138,5 @@ def test_a_vertex_that_comes_nearer_emits_anew():
     vertex = Vertex(SADDLE)
     vertex.see(2.0)
     before = vertex.emitted()
-    vertex.wave.distance[vertex.v] = 0.5
+    vertex.wave.vertices.distance[vertex.v] = 0.5
     assert vertex.emitted() == pytest.approx(2 * before, abs=ANGLES)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.fields.sweep import Control
+from geodesic_core.fields.sweep import Control, winners_of
 from geodesic_core.kernels.mesh.half_edges import APEX, OPPOSITE
-from geodesic_core.kernels.paths.backtracing import LOST, NO_ROOM, TRACED, Winners, trace_path
+from geodesic_core.kernels.paths.backtracing import LOST, NO_ROOM, TRACED, trace_path
 from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources
 from geodesic_core.kernels.sweep.state import ENTRY_EDGE, PREDECESSOR
 from tests.support import zoo
@@ -15,9 +15,10 @@ from tests.support.stepping import finished, started, topology_of
 
 def trace(topology, wave, target, room):
     nodes, faces = np.empty(room, np.int32), np.empty(room, np.int32)
-    nearest = nearest_sources(wave.distance, wave.winner_ints, wave.origin)
-    found = {name: getattr(wave, name) for name in Winners._fields[1:]}
-    winners = Winners(nearest=nearest, **found)
+    nearest = nearest_sources(
+        wave.vertices.distance, wave.vertices.winner_ints, wave.vertices.source_index
+    )
+    winners = winners_of(wave, nearest)
     outcome, count = trace_path(
         topology,
         winners,
@@ -37,7 +38,9 @@ def solved(name, source):
 @pytest.mark.parametrize("name", ["jittered_grid", "comb", "crumpled_torus"])
 def test_too_little_room_is_told_and_enough_is_enough(name):
     topology, wave = solved(name, 0)
-    target = int(np.argmax(np.where(np.isfinite(wave.distance), wave.distance, -1)))
+    target = int(
+        np.argmax(np.where(np.isfinite(wave.vertices.distance), wave.vertices.distance, -1))
+    )
     outcome, nodes, faces = trace(topology, wave, target, 1000)
     assert outcome == TRACED
     assert len(nodes) > 4
@@ -54,10 +57,13 @@ def broken(name):
     topology, wave = solved(name, 0)
     h = int(np.flatnonzero(topology.links[:, OPPOSITE] < 0)[-1])
     v = int(topology.links[h, APEX])
-    others = np.setdiff1d(np.arange(len(wave.distance)), topology.links[h])
-    wave.winner_ints[v, ENTRY_EDGE], wave.winner_ints[v, PREDECESSOR] = h, others[0]
-    wave.winner[v] = (0.1, -5.0)
-    wave.distance[v] = 0.0  # nothing else lies on the way
+    others = np.setdiff1d(np.arange(len(wave.vertices.distance)), topology.links[h])
+    wave.vertices.winner_ints[v, ENTRY_EDGE], wave.vertices.winner_ints[v, PREDECESSOR] = (
+        h,
+        others[0],
+    )
+    wave.vertices.winner[v] = (0.1, -5.0)
+    wave.vertices.distance[v] = 0.0  # nothing else lies on the way
     return topology, wave, v
 
 
@@ -74,7 +80,7 @@ def test_a_lost_line_is_an_internal_error():
     field = gc.exact_distance(mesh, 0)
     _, wave, v = broken("jittered_grid")
     for name in ("winner", "winner_ints", "distance"):
-        getattr(field._winners.get(Control()), name)[:] = getattr(wave, name)
+        getattr(field._winners.get(Control()), name)[:] = getattr(wave.vertices, name)
     with pytest.raises(gc.errors.InternalError, match="left the surface"):
         field.path_to(int(mesh.topology.outer_vertex[v]))
 

@@ -9,7 +9,8 @@ import geodesic_core as gc
 from geodesic_core.fields.sweep import Control
 from geodesic_core.kernels.paths.edge_dijkstra import ASTAR_WEIGHT, search_edges, vertices_to
 from geodesic_core.kernels.sweep import state
-from geodesic_core.kernels.sweep.state import PREDECESSOR, TOUCHED, exact_bounds
+from geodesic_core.kernels.sweep.bounds import exact_bounds
+from geodesic_core.kernels.sweep.state import PREDECESSOR, TOUCHED
 from geodesic_core.search.landmarks import Landmarks
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
@@ -72,7 +73,7 @@ def test_landmarks_do_not_lengthen_it_beyond_the_haste(name):
         goal = goal_at_vertex(mesh, last, landmarks=landmarks)
         search_edges(topology, wave, exact_bounds(math.inf, goal), first, last)
         shortest = graph.edge_distances(case.vertices, case.faces, begin)[end]
-        length = wave.distance[last]
+        length = wave.vertices.distance[last]
         assert shortest * (1 - 1e-12) <= length <= ASTAR_WEIGHT * shortest * (1 + 1e-12)
 
 
@@ -83,8 +84,8 @@ def test_it_stops_at_its_end_and_goes_toward_it():
     first, last = (int(topology.inner_vertex[v]) for v in (30, 60))
     wave = state.new_wavefront(topology, pruned=True)
     search_edges(topology, wave, exact_bounds(math.inf, goal_at_vertex(mesh, last)), first, last)
-    assert wave.distance[last] == pytest.approx(30.0)
-    seen = mesh.vertices[topology.outer_vertex[wave.touched[: wave.counters[TOUCHED]]], 0]
+    assert wave.vertices.distance[last] == pytest.approx(30.0)
+    seen = mesh.vertices[topology.outer_vertex[wave.vertices.touched[: wave.counters[TOUCHED]]], 0]
     assert seen.min() >= 27
 
 
@@ -95,8 +96,8 @@ def test_an_unreachable_end_is_left_at_infinity():
     search_edges(
         mesh.topology, wave, exact_bounds(math.inf, goal_at_vertex(mesh, last)), first, last
     )
-    assert math.isinf(wave.distance[last])
-    assert vertices_to(wave.winner_ints[:, PREDECESSOR], last).tolist() == [last]
+    assert math.isinf(wave.vertices.distance[last])
+    assert vertices_to(wave.vertices.winner_ints[:, PREDECESSOR], last).tolist() == [last]
 
 
 def test_both_ends_of_an_open_fan_are_neighbours():

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
+from geodesic_core.kernels.sweep.bounds import merging_bounds
 from geodesic_core.kernels.sweep.merging import (
     accuracy,
     continuity,
@@ -17,7 +18,7 @@ from geodesic_core.kernels.sweep.merging import (
     shortfall,
     visibility,
 )
-from geodesic_core.kernels.sweep.state import merging_bounds, new_wavefront
+from geodesic_core.kernels.sweep.state import new_wavefront
 from geodesic_core.kernels.sweep.trimming import leaves_gap
 from geodesic_core.tolerances import LOCAL_SHARE
 from tests.support import zoo

@@ -9,6 +9,7 @@ import geodesic_core as gc
 from geodesic_core.fields.sweep import Control, run_sweep
 from geodesic_core.kernels.paths import edge_dijkstra
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
+from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds
 from geodesic_core.kernels.sweep.pruning import (
     forget,
     least_to_start,
@@ -17,14 +18,7 @@ from geodesic_core.kernels.sweep.pruning import (
     may_pass,
     steepest_to_start,
 )
-from geodesic_core.kernels.sweep.state import (
-    MARKS,
-    SIZE,
-    TOUCHED,
-    exact_bounds,
-    merging_bounds,
-    new_wavefront,
-)
+from geodesic_core.kernels.sweep.state import MARKS, SIZE, TOUCHED, new_wavefront
 from geodesic_core.search.landmarks import Landmarks
 from tests.conftest import WITHOUT_JIT
 from tests.support import expected, zoo
@@ -140,17 +134,17 @@ def test_what_an_earlier_sweep_knows_bounds_the_rest(case, count):
                 bounds,
             )
             wave = run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0)
-            view = view_toward(mesh, landmarks, start, known=wave.distance, ceiling=limit)
+            view = view_toward(mesh, landmarks, start, known=wave.vertices.distance, ceiling=limit)
             rest = np.array([lower_bound_to_target(view, v) for v in range(len(exact))])
             assert (rest <= exact * (1 + ROUNDING)).all()
-            pruned += int((wave.distance > exact * (1 + 1e-3)).sum())
+            pruned += int((wave.vertices.distance > exact * (1 + 1e-3)).sum())
     assert pruned > 0, "else the ceiling was never needed"
 
 
 def test_what_may_pass_lies_within_the_limit():
     mesh = gc.TriangleMesh(*zoo.grid(4, 4))
     wave = new_wavefront(mesh.topology, pruned=True)
-    wave.distance[3], wave.heuristic[3] = 2.0, 1.5
+    wave.vertices.distance[3], wave.vertices.heuristic[3] = 2.0, 1.5
     for limit, passes in ((3.5, True), (3.6, True), (3.4, False)):
         view = view_of_arrays(
             mesh.topology, wave, exact_bounds(math.inf, goal_at_vertex(mesh, 0, limit))
@@ -165,9 +159,12 @@ def test_what_may_pass_lies_within_the_limit():
 
 def snapshot(wave) -> dict[str, bytes]:
     """All that a search builds upon; the rest of the arrays is written before it is read."""
-    names = ("distance", "winner_ints", "status", "heap_place", "counters", "upper", "light")
-    held = {name: getattr(wave, name).tobytes() for name in (*names, "reference", "runs", "origin")}
-    return held | {"lists": wave.lists[:, [SIZE, MARKS]].tobytes()}
+    names = ("distance", "winner_ints", "status", "upper", "light", "reference", "source_index")
+    held = {name: getattr(wave.vertices, name).tobytes() for name in names}
+    held["heap_place"] = wave.queues.heap_place.tobytes()
+    held["runs"] = wave.pool.runs.tobytes()
+    held["counters"] = wave.counters.tobytes()
+    return held | {"lists": wave.pool.lists[:, [SIZE, MARKS]].tobytes()}
 
 
 def after(mesh, start, end, *, merges, budget):
@@ -218,9 +215,11 @@ def test_a_search_along_edges_is_forgotten_whole(name):
 def test_every_touched_vertex_is_noted_once():
     mesh = gc.TriangleMesh(*zoo.grid(9, 9))
     wave, _ = after(mesh, 0, 55, merges=False, budget=1 << 60)
-    touched = wave.touched[: wave.counters[TOUCHED]].tolist()
+    touched = wave.vertices.touched[: wave.counters[TOUCHED]].tolist()
     assert len(touched) == len(set(touched)) < len(mesh.vertices)
-    changed = np.flatnonzero(np.isfinite(wave.distance) | (wave.status != state.FAR))
+    changed = np.flatnonzero(
+        np.isfinite(wave.vertices.distance) | (wave.vertices.status != state.FAR)
+    )
     assert sorted(touched) == changed.tolist()
 
 
@@ -229,7 +228,12 @@ def test_visited_are_the_faces_that_were_reached_at_all_corners():
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     wave, _ = after(mesh, 0, 20, merges=False, budget=1 << 60)
     visited = np.zeros(len(mesh.faces), np.uint8)
-    mark_visited(mesh.topology, wave.distance, wave.touched[: wave.counters[TOUCHED]], visited)
-    reached = np.isfinite(wave.distance[mesh.topology.inner_vertex])
+    mark_visited(
+        mesh.topology,
+        wave.vertices.distance,
+        wave.vertices.touched[: wave.counters[TOUCHED]],
+        visited,
+    )
+    reached = np.isfinite(wave.vertices.distance[mesh.topology.inner_vertex])
     np.testing.assert_array_equal(visited, reached[mesh.faces].all(axis=1))
     assert 0 < visited.sum() < len(visited)

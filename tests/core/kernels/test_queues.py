@@ -35,14 +35,14 @@ def drained(view) -> list[int]:
 @given(st.lists(st.integers(0, 5), min_size=VERTICES, max_size=VERTICES), st.randoms())
 def test_vertices_leave_by_distance_and_then_by_number(distances, random):
     wave, view = empty()
-    wave.distance[:] = distances
+    wave.vertices.distance[:] = distances
     order = list(range(VERTICES))
     random.shuffle(order)
     for v in order:
-        push_or_raise(view, v, view.distance[v])
+        push_or_raise(view, v, view.vertices.distance[v])
     check_heap(wave)
     assert drained(view) == sorted(range(VERTICES), key=lambda v: (distances[v], v))
-    assert (wave.heap_place == -1).all()
+    assert (wave.queues.heap_place == -1).all()
 
 
 @given(st.lists(st.tuples(st.integers(0, VERTICES - 1), st.floats(0, 1)), max_size=150))
@@ -51,9 +51,9 @@ def test_distances_decrease_while_others_leave(offers):
     wave, view = empty()
     waiting = {}
     for i, (v, distance) in enumerate(offers):
-        if distance < wave.distance[v]:
-            wave.distance[v] = distance
-            push_or_raise(view, v, view.distance[v])
+        if distance < wave.vertices.distance[v]:
+            wave.vertices.distance[v] = distance
+            push_or_raise(view, v, view.vertices.distance[v])
             waiting[v] = distance
         check_heap_order(wave)
         if i % 3 == 2 and waiting:
@@ -64,10 +64,10 @@ def test_distances_decrease_while_others_leave(offers):
 
 
 def check_heap_order(wave):
-    heap = wave.heap[: wave.counters[HEAP_SIZE]].tolist()
-    keys = [(wave.distance[v], v) for v in heap]
+    heap = wave.queues.heap[: wave.counters[HEAP_SIZE]].tolist()
+    keys = [(wave.vertices.distance[v], v) for v in heap]
     assert all(keys[(i - 1) // 4] <= keys[i] for i in range(1, len(keys)))
-    assert [int(wave.heap_place[v]) for v in heap] == list(range(len(heap)))
+    assert [int(wave.queues.heap_place[v]) for v in heap] == list(range(len(heap)))
 
 
 def test_ring_is_first_in_first_out_all_the_way_around():

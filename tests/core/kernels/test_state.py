@@ -10,7 +10,7 @@ from geodesic_core.kernels.sweep.propagation import POOL_FULL, SCRATCH_FULL
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.invariants import Watch, exact_by_euclid, exact_by_unfolding
-from tests.support.stepping import finished, started, steps, topology_of
+from tests.support.stepping import finished, started, steps, topology_of, with_pool
 
 # Of every kind, and small enough for the oracle when twice subdivided
 CURVED = [
@@ -116,7 +116,10 @@ def test_bisectors_of_two_branches_within_one_edge():
 
 def state_of(wave):
     """What an answer is made of, to the bit."""
-    return [array.tobytes() for array in (wave.distance, wave.winner_ints, wave.origin)]
+    return [
+        array.tobytes()
+        for array in (wave.vertices.distance, wave.vertices.winner_ints, wave.vertices.source_index)
+    ]
 
 
 @pytest.mark.parametrize("name", ["sphere", "crags_with_holes", "double_frame"])
@@ -133,7 +136,8 @@ def test_growing_changes_nothing(name):
     """From a pool and a scratch of one row each."""
     topology = topology_of(CASES[name])
     whole = finished(topology, started(topology, 3))
-    wave = started(topology, 3)._replace(windows=np.empty((1, 8)), scratch=np.empty((1, 8)))
+    row = np.empty((1, 8))
+    wave = with_pool(started(topology, 3), windows=row, scratch=row.copy())
     outcomes = []
     for outcome, grown in steps(topology, wave):
         outcomes.append(outcome)
