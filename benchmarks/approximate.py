@@ -143,7 +143,7 @@ def run_merging(inputs: Inputs, runs: int) -> Section:
         calls: list[Callable[[], Any]] = [
             partial(gc.exact_distance, mesh, 0),
             solve,
-            partial(solve, keep_windows=True),
+            partial(solve, retain="paths"),
         ]
         (exact_s, exact), (seconds, field), (_, kept) = by_turns(calls, runs, PATIENCE_S)
         errors = 100 * _errors(field.distances, exact.distances)
@@ -168,7 +168,7 @@ def run_merging(inputs: Inputs, runs: int) -> Section:
         f"The same source, ε = {ERROR:.1%}, solves on a prepared mesh, medians of {runs} by turns. "
         f"Windows are per edge, both directions together: kept is after trimming and merging. "
         f"Memory is a solve's peak as a share of the mesh's own arrays, without and with what "
-        f"paths need (`keep_windows`).",
+        "paths need (`retain`).",
         [
             "mesh",
             "faces",

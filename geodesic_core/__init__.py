@@ -6,6 +6,7 @@ Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then
 """
 
 from geodesic_core import errors, samples
+from geodesic_core.control import Control
 from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.distance_field import DistanceField, Source, SweepStats
 from geodesic_core.fields.isolines import Isoline
@@ -18,6 +19,7 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.matrix import distance_matrix
 from geodesic_core.search.nearest import Nearest, nearest
 from geodesic_core.solvers import (
+    Retain,
     Solver,
     approximate_distance,
     exact_distance,
@@ -26,6 +28,7 @@ from geodesic_core.solvers import (
 )
 
 __all__ = [
+    "Control",
     "Curve",
     "DistanceField",
     "ErrorBound",
@@ -34,6 +37,7 @@ __all__ = [
     "Isoline",
     "MeshReport",
     "Nearest",
+    "Retain",
     "Sample",
     "SearchStep",
     "Solver",
@@ -51,3 +55,8 @@ __all__ = [
     "shortest_path",
     "warm_up",
 ]
+
+
+def __dir__() -> list[str]:
+    """Return the public names."""
+    return sorted(__all__)

@@ -1,48 +1,21 @@
-"""Running a sweep to its end: slice by slice, watched by its caller; codes become exceptions."""
+"""Control of a call by its caller: progress, cancelling, a deadline and a memory limit."""
 
-import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import (
     Cancelled,
     DeadlineExceeded,
     InvalidArgument,
     MemoryLimitExceeded,
-    NotConverged,
 )
-from geodesic_core.fields.sources import Nodes
-from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
-from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep import continuous_dijkstra, state, surface_points
-from geodesic_core.kernels.sweep.bounds import Bounds
-from geodesic_core.kernels.sweep.propagation import (
-    MERGES_FULL,
-    POOL_FULL,
-    RETAINED_FULL,
-    RUNAWAY,
-    SCRATCH_FULL,
-)
-from geodesic_core.kernels.sweep.state import Wavefront
-from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import RUNS
 from geodesic_core.validation import is_number
 
 SLICE_SECONDS = 0.05
-"""About how long a call computes before it looks up: what cancelling takes, at most."""
-
-_FIRST_BUDGET = 1_000_000
+"""About how long a call computes between two checkpoints: what cancelling takes, at most."""
 
 _FIRST_ITEMS = 256
-
-_FIRST_LIMITED_BUDGET = 10_000
-_LIMITED_GROWTH = 1.25
-"""Of the slices of a sweep whose limit shrinks: each is a quarter of all before it, so that a sweep
-does not go on for longer than that once it has found enough."""
 
 
 @dataclass(frozen=True)
@@ -95,89 +68,6 @@ class Control:
             raise MemoryLimitExceeded(needed, self.memory_limit)
 
 
-def sweep_nodes(
-    mesh: TriangleMesh,
-    wave: Wavefront,
-    nodes: Nodes,
-    start_distances: Floats,
-    bounds: Bounds,
-    control: Control,
-    share_done: Callable[[Wavefront], float],
-    limit_of: Callable[[Wavefront], float] | None = None,
-) -> Wavefront:
-    """Start a sweep at the sources of ``nodes``, run it to its end, and reach its targets.
-
-    Raises
-    ------
-    Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged
-        As in `run_sweep`.
-    """
-    topology = mesh.topology
-    continuous_dijkstra.start_sweep(
-        topology, wave, nodes.sources, nodes.origins, start_distances, bounds
-    )
-    if not nodes.has_sited_targets:
-        return run_sweep(mesh, wave, bounds, control, share_done, limit_of)
-    surface_points.watch_sites(topology, wave, bounds, nodes.first_target)
-    wave = run_sweep(mesh, wave, bounds, control, share_done, limit_of)
-    surface_points.reach_sites_inside(topology, wave, bounds, nodes.first_target)
-    return wave
-
-
-def run_sweep(
-    mesh: TriangleMesh,
-    wave: Wavefront,
-    bounds: Bounds,
-    control: Control,
-    share_done: Callable[[Wavefront], float],
-    limit_of: Callable[[Wavefront], float] | None = None,
-) -> Wavefront:
-    """Run a sweep that has started to its end; return its state, which may have grown.
-
-    ``share_done`` tells how much of the call is done. ``limit_of`` tells, from what is known so
-    far, how far the sweep still has to look: never farther than ``bounds``. It is asked after fixed
-    amounts of work, so that the sweep stays the same to the bit.
-
-    Raises
-    ------
-    Cancelled, DeadlineExceeded, MemoryLimitExceeded
-        As the control says.
-    NotConverged
-        The windows of an edge came up too often.
-    """
-    budget = _FIRST_BUDGET if limit_of is None else _FIRST_LIMITED_BUDGET
-    left, shown, outcome = budget, 0.0, continuous_dijkstra.RUNNING
-    while outcome != continuous_dijkstra.FINISHED:
-        shown = max(shown, share_done(wave))
-        control.checkpoint(shown)
-        began = time.perf_counter()
-        outcome = continuous_dijkstra.advance(mesh.topology, wave, bounds, left)
-        took = time.perf_counter() - began
-        if outcome == POOL_FULL:
-            grown = state.with_larger_pool
-        elif outcome == SCRATCH_FULL:
-            grown = state.with_larger_scratch
-        elif outcome == RETAINED_FULL:
-            grown = state.with_more_retained
-        elif outcome == MERGES_FULL:
-            grown = state.with_more_merges
-        elif outcome == RUNAWAY:
-            raise _not_converged(mesh, wave)
-        else:
-            if outcome == continuous_dijkstra.RUNNING and limit_of is not None:
-                limit = min(bounds.max_distance, limit_of(wave))
-                bounds = bounds._replace(max_distance=limit)
-                budget = min(int(_LIMITED_GROWTH * budget), _FIRST_BUDGET)
-            elif outcome == continuous_dijkstra.RUNNING:
-                budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
-            left = budget
-            continue
-        left -= int(wave.counters[state.WORK])  # slices do not depend on the room there was
-        wave = grown(wave)
-        control.check_memory(state.bytes_of(wave))
-    return wave
-
-
 def in_slices(count: int, work: Callable[[int, int], int], control: Control) -> None:
     """Do ``work`` on all of some items, from a first up to a last of them at a time.
 
@@ -197,45 +87,3 @@ def in_slices(count: int, work: Callable[[int, int], int], control: Control) -> 
         count = work(done, last)
         took = time.perf_counter() - began
         done, size = last, max(int(size * min(max(SLICE_SECONDS / took, 0.5), 2.0)), 1)
-
-
-def winners_of(wave: Wavefront, nearest: Ints) -> Winners:
-    """Return what backtracing needs of a sweep that has finished; ``nearest`` as in `Winners`."""
-    count = wave.counters[state.MERGES]
-    return Winners(
-        nearest=nearest,
-        distance=wave.vertices.distance,
-        winner=wave.vertices.winner,
-        winner_ints=wave.vertices.winner_ints,
-        reference=wave.vertices.reference,
-        merges=wave.pool.merges[:count],
-        merge_ints=wave.pool.merge_ints[:count],
-        site_ints=wave.sites.ints,
-        site_weights=wave.sites.weights,
-        piece_ints=wave.sites.segment_ints,
-        piece_ends=wave.sites.segment_ends,
-    )
-
-
-def _not_converged(mesh: TriangleMesh, wave: Wavefront) -> NotConverged:
-    half_edge = int(np.argmax(wave.pool.runs))
-    ends = mesh.topology.links[half_edge, [TAIL, HEAD]]
-    u, v = mesh.topology.outer_vertex[ends]
-    return NotConverged(
-        f"the windows of the edge between vertices {u} and {v} came up more than {RUNS} times; "
-        f"ask for a smaller error, or for exact distances"
-    )
-
-
-def share_of_vertices(reachable: int, limit: float) -> Callable[[Wavefront], float]:
-    """Return what tells the share of a sweep: of its vertices, or of the distance to a limit."""
-
-    def share(wave: Wavefront) -> float:
-        done = float(wave.counters[state.SETTLED_VERTICES]) / reachable
-        if math.isfinite(limit) and wave.counters[0] > 0:
-            done = max(
-                done, float(wave.vertices.distance[wave.queues.heap[0]]) / limit if limit else 1.0
-            )
-        return min(done, 1.0)
-
-    return share

@@ -5,17 +5,17 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from geodesic_core.arrays import Floats
+from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.fields.distance_field import DistanceField, Source, Sources, SweepStats, field_of
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
 from geodesic_core.fields.sources import component_of, disconnected
-from geodesic_core.fields.sweep import Control
 from geodesic_core.fields.whole_sweep import RepeatableSweep, peak_bytes
 from geodesic_core.kernels.sweep import state
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
@@ -28,7 +28,10 @@ from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
-from geodesic_core.validation import as_barriers, as_limit, is_number
+from geodesic_core.validation import as_barriers, as_limit, check_choice, is_number
+
+Retain = Literal["distances", "paths", "windows"]
+"""How much a field holds in memory: each word includes the ones before it."""
 
 
 def exact_distance(
@@ -38,7 +41,7 @@ def exact_distance(
     targets: Sequence[Point] = (),
     barriers: Iterable[int] = (),
     *,
-    keep_windows: bool = False,
+    retain: Retain = "paths",
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
     deadline_s: float | None = None,
@@ -61,11 +64,14 @@ def exact_distance(
     barriers
         Ids of faces that act as holes, for this call: the field is that of
         `TriangleMesh.with_barriers`, which makes the same mesh once for many calls.
-    keep_windows
-        Keep the windows of all faces, 64 bytes each: then `DistanceField.distance_at` and
-        `DistanceField.path_to` find any point by those of its face, without a search, and
-        `DistanceField.isolines` does not run the sweep again. On large meshes to keep them takes
-        longer than the sweep.
+    retain
+        What the field holds in memory; the rest is found by a second sweep when it is first needed.
+        ``"distances"``: distances and nearest sources. ``"paths"``: also what
+        `DistanceField.path_to` and `DistanceField.gradient` need, 36 bytes a vertex.
+        ``"windows"``: also the windows of all faces, 64 bytes each. Then
+        `DistanceField.distance_at` and `DistanceField.path_to` find any point by the windows of
+        its face, and `DistanceField.isolines` does not sweep again. On large meshes retaining
+        windows takes longer than the sweep.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
@@ -84,7 +90,7 @@ def exact_distance(
     control = Control(progress, cancel, deadline_s, memory_limit)
     bounds = exact_bounds(as_limit(max_distance))
     mesh, control = _among(mesh, barriers, control)
-    return _solve(mesh, sources, targets, bounds, EXACT, control, paths=True, windows=keep_windows)
+    return _solve(mesh, sources, targets, bounds, EXACT, retain, control)
 
 
 def approximate_distance(
@@ -96,8 +102,7 @@ def approximate_distance(
     targets: Sequence[Point] = (),
     barriers: Iterable[int] = (),
     *,
-    keep_windows: bool = False,
-    keep_isolines: bool = False,
+    retain: Retain = "distances",
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
     deadline_s: float | None = None,
@@ -116,12 +121,12 @@ def approximate_distance(
         The same in mesh units. Where both are given, both hold.
     max_distance, targets, barriers
         As in `exact_distance`.
-    keep_windows
-        Keep what `DistanceField.path_to` and `DistanceField.gradient` need, at most about as much
-        as the mesh's own arrays. Else the first of them runs the sweep again.
-    keep_isolines
-        Keep the windows of all faces, 64 bytes each, and what paths need: then neither those nor
-        `DistanceField.isolines` run the sweep again.
+    retain
+        What the field holds in memory; the rest is found by a second sweep when it is first needed.
+        ``"distances"``: distances and nearest sources. ``"paths"``: also what
+        `DistanceField.path_to` and `DistanceField.gradient` need, at most about as much as the
+        mesh's own arrays. ``"windows"``: also the windows of all faces, 64 bytes each, which
+        `DistanceField.isolines` needs.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
@@ -145,16 +150,7 @@ def approximate_distance(
         promise = ErrorBound("relative", relative, "guaranteed")
     else:
         promise = ErrorBound("absolute", absolute, "guaranteed")
-    return _solve(
-        mesh,
-        sources,
-        targets,
-        bounds,
-        promise,
-        control,
-        paths=keep_windows or keep_isolines,
-        windows=keep_isolines,
-    )
+    return _solve(mesh, sources, targets, bounds, promise, retain, control)
 
 
 def shortest_path(
@@ -226,13 +222,63 @@ class Solver:
         """Memory kept, bytes, the mesh not counted."""
         return sum(kept.nbytes for kept in (self._search, self._sweeper) if kept is not None)
 
-    def exact_distance(self, *arguments: Any, **options: Any) -> DistanceField:
+    def exact_distance(
+        self,
+        sources: Sources,
+        max_distance: float | None = None,
+        targets: Sequence[Point] = (),
+        barriers: Iterable[int] = (),
+        *,
+        retain: Retain = "paths",
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> DistanceField:
         """Do as `exact_distance` does, on this mesh."""
-        return exact_distance(self.mesh, *arguments, **options)
+        return exact_distance(
+            self.mesh,
+            sources,
+            max_distance,
+            targets,
+            barriers,
+            retain=retain,
+            progress=progress,
+            cancel=cancel,
+            deadline_s=deadline_s,
+            memory_limit=memory_limit,
+        )
 
-    def approximate_distance(self, *arguments: Any, **options: Any) -> DistanceField:
+    def approximate_distance(
+        self,
+        sources: Sources,
+        relative_error: float | None = 1e-3,
+        absolute_error: float | None = None,
+        max_distance: float | None = None,
+        targets: Sequence[Point] = (),
+        barriers: Iterable[int] = (),
+        *,
+        retain: Retain = "distances",
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> DistanceField:
         """Do as `approximate_distance` does, on this mesh."""
-        return approximate_distance(self.mesh, *arguments, **options)
+        return approximate_distance(
+            self.mesh,
+            sources,
+            relative_error,
+            absolute_error,
+            max_distance,
+            targets,
+            barriers,
+            retain=retain,
+            progress=progress,
+            cancel=cancel,
+            deadline_s=deadline_s,
+            memory_limit=memory_limit,
+        )
 
     def shortest_path(
         self,
@@ -345,7 +391,7 @@ def warm_up() -> None:
     corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     mesh = TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     exact_distance(mesh, 0).path_to(3)
-    approximate_distance(mesh, 0, keep_windows=True).path_to(3)
+    approximate_distance(mesh, 0, retain="paths").path_to(3)
     shortest_path(mesh, 0, 3, explain=True)
     mesh.report  # noqa: B018 - computed on access
 
@@ -368,12 +414,12 @@ def _solve(
     targets: Sequence[Point],
     bounds: Bounds,
     promise: ErrorBound,
+    retain: Retain,
     control: Control,
-    *,
-    paths: bool,
-    windows: bool,
 ) -> DistanceField:
-    """Check the arguments, sweep, and make the result, with what paths and windows need kept."""
+    """Check the arguments, sweep, and make the result with what it is to retain."""
+    check_choice("retain", retain, get_args(Retain))
+    paths, windows = retain != "distances", retain == "windows"
     starts, places = _as_sources(mesh, sources)
     ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
     distances = np.array([start.start_distance for start in starts])

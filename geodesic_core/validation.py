@@ -1,7 +1,7 @@
 """What arguments must be."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,19 @@ def as_limit(max_distance: float | None) -> float:
     if not is_number(max_distance) or not max_distance >= 0.0:
         raise InvalidArgument(f"max_distance is {max_distance!r}; it must be a number, 0 or more")
     return float(max_distance)
+
+
+def check_choice(name: str, value: Any, choices: Sequence[str]) -> None:
+    """Refuse a value that is none of some words; ``name`` is the argument's.
+
+    Raises
+    ------
+    InvalidArgument
+        It is none of them.
+    """
+    if not isinstance(value, str) or value not in choices:
+        *others, last = map(repr, choices)
+        raise InvalidArgument(f"{name} is {value!r}; it must be {', '.join(others)} or {last}")
 
 
 def as_barriers(barriers: Any, face_count: int) -> Longs:

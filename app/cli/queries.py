@@ -30,7 +30,7 @@ from app.cli.arguments import (
 from app.cli.steps import origin_of, point_of, read, showing
 
 if TYPE_CHECKING:
-    from geodesic_core import ErrorBound, GeodesicPath, TriangleMesh
+    from geodesic_core import ErrorBound, GeodesicPath, Retain, TriangleMesh
 
 LINES = ".obj", ".csv", ".svg", ".geojson", ".json"
 """What lines can be written to."""
@@ -70,11 +70,12 @@ def distance(
 
     sources = [origin_of(mesh, "--source", written) for written in source]
     with showing("Computing distances") as step:
+        retain: Retain = "paths" if gradient else "distances"
         if granted is None:
-            field = exact_distance(mesh, sources, max_distance, **step._asdict())
+            field = exact_distance(mesh, sources, max_distance, retain=retain, **step._asdict())
         else:
             field = approximate_distance(
-                mesh, sources, *granted, max_distance, keep_windows=gradient, **step._asdict()
+                mesh, sources, *granted, max_distance, retain=retain, **step._asdict()
             )
     if gradient and out.suffix.lower() == ".npy":
         table = np.column_stack([field.distances, field.gradient])
@@ -143,7 +144,7 @@ def path(
             )
         else:
             field = approximate_distance(
-                mesh, first, *granted, max_distance, [last], keep_windows=True, **step._asdict()
+                mesh, first, *granted, max_distance, [last], retain="paths", **step._asdict()
             )
             found = field.path_to(last)
         solved = perf_counter() - start
@@ -194,7 +195,7 @@ def paths(
             field = exact_distance(mesh, start, max_distance, ends, **step._asdict())
         else:
             field = approximate_distance(
-                mesh, start, *granted, max_distance, ends, keep_windows=True, **step._asdict()
+                mesh, start, *granted, max_distance, ends, retain="paths", **step._asdict()
             )
         for end in ends:
             try:
@@ -258,7 +259,7 @@ def isolines(
             field = exact_distance(mesh, sources, max_distance, **options)
         else:
             field = approximate_distance(
-                mesh, sources, *granted, max_distance, keep_isolines=True, **options
+                mesh, sources, *granted, max_distance, retain="windows", **options
             )
     levels = level or field.levels(count or 0).tolist()
     with showing("Drawing isolines") as step:

@@ -65,8 +65,10 @@ def solve_field(
     def solve() -> gc.DistanceField:
         if request.method == "exact":
             return solver.exact_distance(sources, **options)
-        keep = {"keep_windows": True, "keep_isolines": isolines}
-        return solver.approximate_distance(sources, **errors, **keep, **options)
+        retain: gc.Retain = "windows" if isolines else "paths"
+        return solver.approximate_distance(
+            sources, request.relative_error, request.absolute_error, retain=retain, **options
+        )
 
     more = isolines and request.method != "exact"
     question = tuple(sources), max_distance, beside, request.method, *errors.values(), more

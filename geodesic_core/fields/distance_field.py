@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.control import Control
 from geodesic_core.errors import InternalError, NoPath
 from geodesic_core.fields.gradient import gradient_at_vertices
 from geodesic_core.fields.isolines import (
@@ -26,7 +27,6 @@ from geodesic_core.fields.packed import from_arrays, to_arrays
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, traced_path
 from geodesic_core.fields.point_query import Arrival, arrival_at, with_target
 from geodesic_core.fields.sources import Nodes, component_of, disconnected
-from geodesic_core.fields.sweep import Control
 from geodesic_core.fields.whole_sweep import RepeatableSweep, SweepResult
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners

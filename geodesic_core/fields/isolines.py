@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.control import Control, in_slices
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.path import length_of
 from geodesic_core.fields.sources import Nodes
-from geodesic_core.fields.sweep import Control, in_slices
 from geodesic_core.kernels.isolines import lines as kernels
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.isolines.lines import Chains, Cuts, Field

@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats
+from geodesic_core.control import Control
 from geodesic_core.fields.path import EXACT, GeodesicPath, reversed_path, traced_path
 from geodesic_core.fields.sources import corners_of, nodes_of
-from geodesic_core.fields.sweep import Control, sweep_nodes, winners_of
+from geodesic_core.fields.sweep import sweep_nodes, winners_of
 from geodesic_core.kernels.sweep import state
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, pruning_toward
 from geodesic_core.mesh.surface_point import SurfacePoint

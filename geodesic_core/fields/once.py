@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Generic, TypeVar
 
-from geodesic_core.fields.sweep import Control
+from geodesic_core.control import Control
 
 T = TypeVar("T")
 

@@ -3,18 +3,12 @@
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.errors import (
-    Cancelled,
-    DeadlineExceeded,
-    InvalidArgument,
-    MemoryLimitExceeded,
-    NotConverged,
-)
+from geodesic_core.control import SLICE_SECONDS, Control
+from geodesic_core.errors import NotConverged
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
 from geodesic_core.kernels.paths.backtracing import Winners
@@ -30,69 +24,13 @@ from geodesic_core.kernels.sweep.propagation import (
 from geodesic_core.kernels.sweep.state import Wavefront
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import RUNS
-from geodesic_core.validation import is_number
-
-SLICE_SECONDS = 0.05
-"""About how long a call computes before it looks up: what cancelling takes, at most."""
 
 _FIRST_BUDGET = 1_000_000
-
-_FIRST_ITEMS = 256
 
 _FIRST_LIMITED_BUDGET = 10_000
 _LIMITED_GROWTH = 1.25
 """Of the slices of a sweep whose limit shrinks: each is a quarter of all before it, so that a sweep
 does not go on for longer than that once it has found enough."""
-
-
-@dataclass(frozen=True)
-class Control:
-    """How a caller watches a call and stops it."""
-
-    progress: Callable[[float], None] | None = None
-    """Called about every 50 ms with the share that is done, from 0 to 1, never decreasing."""
-    cancel: Callable[[], bool] | None = None
-    """Asked about every 50 ms; the call stops once it answers true."""
-    deadline_s: float | None = None
-    """Seconds granted, from the call."""
-    memory_limit: int | None = None
-    """Bytes granted for the state of the call, the mesh itself not counted."""
-    bytes_beside: int = 0
-    """Bytes that the call holds besides the state of its present sweep."""
-    began: float = field(default_factory=time.perf_counter)
-    """When the call began."""
-
-    def __post_init__(self) -> None:
-        for name in ("deadline_s", "memory_limit"):
-            value = getattr(self, name)
-            if value is not None and (not is_number(value) or not value > 0):
-                raise InvalidArgument(f"{name} is {value!r}; it must be a number above 0")
-
-    def checkpoint(self, share: float) -> None:
-        """Report progress; raise if the call is to stop."""
-        if self.progress is not None:
-            self.progress(share)
-        if self.cancel is not None and self.cancel():
-            raise Cancelled(f"cancelled with {share:.0%} done")
-        if self.deadline_s is not None and time.perf_counter() - self.began > self.deadline_s:
-            raise DeadlineExceeded(f"not finished within {self.deadline_s:g} s: {share:.0%} done")
-
-    def for_part(self, part: int, parts: int, count: int = 1) -> "Control":
-        """Return the control of one of several equal parts of the call, or of some in a row."""
-        progress = self.progress
-        if progress is None:
-            return self
-        return replace(self, progress=lambda share: progress((part + count * share) / parts))
-
-    def holding(self, bytes_beside: int) -> "Control":
-        """Return the control of a sweep beside which the call holds so many more bytes."""
-        return replace(self, bytes_beside=self.bytes_beside + bytes_beside)
-
-    def check_memory(self, needed: int) -> None:
-        """Raise if the call needs more memory than it may take."""
-        needed += self.bytes_beside
-        if self.memory_limit is not None and needed > self.memory_limit:
-            raise MemoryLimitExceeded(needed, self.memory_limit)
 
 
 def sweep_nodes(
@@ -176,27 +114,6 @@ def run_sweep(
         wave = grown(wave)
         control.check_memory(state.bytes_of(wave))
     return wave
-
-
-def in_slices(count: int, work: Callable[[int, int], int], control: Control) -> None:
-    """Do ``work`` on all of some items, from a first up to a last of them at a time.
-
-    It returns how many there are by then: there may be more than at first.
-
-    Raises
-    ------
-    Cancelled, DeadlineExceeded
-        As the control says, which is asked before each slice.
-    """
-    done, size, shown = 0, _FIRST_ITEMS, 0.0
-    while done < count:
-        shown = max(shown, done / count)
-        control.checkpoint(shown)
-        last = min(done + size, count)
-        began = time.perf_counter()
-        count = work(done, last)
-        took = time.perf_counter() - began
-        done, size = last, max(int(size * min(max(SLICE_SECONDS / took, 0.5), 2.0)), 1)
 
 
 def winners_of(wave: Wavefront, nearest: Ints) -> Winners:

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Flags, Floats, Ints
+from geodesic_core.control import Control
 from geodesic_core.fields.sources import Nodes, nodes_of
-from geodesic_core.fields.sweep import Control, share_of_vertices, sweep_nodes, winners_of
+from geodesic_core.fields.sweep import share_of_vertices, sweep_nodes, winners_of
 from geodesic_core.kernels.isolines import face_windows
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners

@@ -8,7 +8,8 @@ import math
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Singles, aligned_rows
-from geodesic_core.fields.sweep import Control, run_sweep
+from geodesic_core.control import Control
+from geodesic_core.fields.sweep import run_sweep
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from geodesic_core.kernels.sweep.bounds import (
     LANDMARKS,

@@ -10,16 +10,16 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.fields.sources import as_points, component_of, ends_of
-from geodesic_core.fields.sweep import Control
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import available_cores, share_out
 from geodesic_core.tolerances import AT_LIMIT
-from geodesic_core.validation import as_limit, is_index
+from geodesic_core.validation import as_limit, check_choice, is_index
 
 Layout = Literal["dense", "sparse", "pairs"]
 
@@ -97,8 +97,7 @@ def find_matrix(
 ) -> Floats | csr_array:
     """Do as `distance_matrix` does, with a first sweeper and a search, each asked for if needed."""
     limit = as_limit(max_distance)
-    if layout not in get_args(Layout):
-        raise InvalidArgument(f"layout is {layout!r}; it must be 'dense', 'sparse' or 'pairs'")
+    check_choice("layout", layout, get_args(Layout))
     if threads is not None and not (is_index(threads) and threads >= 1):
         raise InvalidArgument(f"threads is {threads!r}; it must be an integer, 1 or more, or None")
     starts, stops = as_points(mesh, sources, "source"), as_points(mesh, targets, "target")

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.sources import as_points, ends_of
-from geodesic_core.fields.sweep import Control
 from geodesic_core.mesh.surface_point import Point
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.target_sweep import TargetSweep

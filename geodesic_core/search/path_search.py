@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.control import Control
 from geodesic_core.errors import (
     Cancelled,
     DeadlineExceeded,
@@ -30,7 +31,7 @@ from geodesic_core.errors import (
 )
 from geodesic_core.fields.path import EXACT, GeodesicPath, SearchStep, StepName, traced_path
 from geodesic_core.fields.sources import Nodes, corners_of, nodes_of
-from geodesic_core.fields.sweep import Control, sweep_nodes, winners_of
+from geodesic_core.fields.sweep import sweep_nodes, winners_of
 from geodesic_core.kernels.mesh.half_edges import LENGTH
 from geodesic_core.kernels.paths import edge_dijkstra, funnel
 from geodesic_core.kernels.sweep import pruning, state

@@ -7,7 +7,7 @@ from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
 from dataclasses import replace
 from functools import partial
 
-from geodesic_core.fields.sweep import SLICE_SECONDS, Control
+from geodesic_core.control import SLICE_SECONDS, Control
 
 Worker = Callable[[int, Control], None]
 """Does the part of a number."""

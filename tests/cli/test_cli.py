@@ -232,7 +232,7 @@ def test_an_approximate_path_reports_its_own_bound(
     ran = run("path", knot, *ends, "--method", "approximate", *options.split(), "--out", "p.json")
     assert (ran.code, ran.err) == (0, "")
     mesh = gc.load_mesh(knot)
-    expected = gc.approximate_distance(mesh, 3, **errors, keep_windows=True).path_to(700)
+    expected = gc.approximate_distance(mesh, 3, **errors, retain="paths").path_to(700)
     assert ran.figure("length") == repr(expected.length)
     value = expected.error_bound.value
     assert ran.figure("error bound") == f"{value!r} (relative, guaranteed)"
@@ -292,7 +292,7 @@ def test_paths_between_points_that_are_no_vertices(run: Run, knot: Path, method:
     if method == "exact":
         expected = gc.shortest_path(mesh, source, target)
     else:
-        field = gc.approximate_distance(mesh, source, targets=[target], keep_windows=True)
+        field = gc.approximate_distance(mesh, source, targets=[target], retain="paths")
         expected = field.path_to(target)
 
     ends = ["--source", "f40:0.2,0.3,0.5", "--target", f"e{start}-{end}:0.3"]
@@ -382,7 +382,7 @@ def test_approximate_paths_report_their_own_bounds(run: Run, knot: Path) -> None
     errors = ["--method", "approximate", "--relative-error", 0.05]
     targets = point_options("--target", 700, 20)
     ran = run("paths", knot, "--source", 3, *targets, *errors, "--out", "p.json")
-    field = gc.approximate_distance(gc.load_mesh(knot), 3, 0.05, keep_isolines=True)
+    field = gc.approximate_distance(gc.load_mesh(knot), 3, 0.05, retain="windows")
     assert ran.code == 0
     for found, target in zip(
         json.loads(Path("p.json").read_text())["paths"], (700, 20), strict=True

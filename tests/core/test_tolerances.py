@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 import geodesic_core as gc
 from geodesic_core import tolerances
+from geodesic_core.control import Control
 from geodesic_core.fields.sources import nodes_of
-from geodesic_core.fields.sweep import Control, run_sweep
+from geodesic_core.fields.sweep import run_sweep
 from geodesic_core.kernels.isolines.arcs import outer_arcs
 from geodesic_core.kernels.isolines.lines import united
 from geodesic_core.kernels.isolines.regions import CX, CY, RADIUS, REGION

@@ -172,7 +172,7 @@ def test_keys_tell_methods_and_errors_apart() -> None:
 
 def test_paths_are_the_library_s(client: TestClient, knot: str) -> None:
     mesh = mesh_of(client, knot)
-    field = gc.approximate_distance(mesh, 3, relative_error=0.05, keep_windows=True)
+    field = gc.approximate_distance(mesh, 3, relative_error=0.05, retain="paths")
     expected = field.path_to(700)
 
     answer = path(client, knot, method="approximate", relative_error=0.05).json()

@@ -43,9 +43,9 @@ def test_lines_are_the_library_s(client: TestClient, knot: str, method: dict) ->
     mesh = mesh_of(client, knot)
     sources = [gc.Source(gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), 0.25), gc.Source(700)]
     if method:
-        field = gc.approximate_distance(mesh, sources, 0.05, keep_isolines=True)
+        field = gc.approximate_distance(mesh, sources, 0.05, retain="windows")
     else:
-        field = gc.exact_distance(mesh, sources, keep_windows=True)
+        field = gc.exact_distance(mesh, sources, retain="windows")
     asked = [INSIDE | {"start_distance": 0.25}, {"vertex": 700}]
     levels = [2.0, 0.1, 2.0, 99.0]
 

@@ -29,7 +29,7 @@ def test_paths_are_the_library_s(client: TestClient, knot: str, method: dict) ->
     mesh = mesh_of(client, knot)
     places = [700, gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), 3, 700, 1200]
     if method:
-        field = gc.approximate_distance(mesh, 3, 0.05, targets=places, keep_windows=True)
+        field = gc.approximate_distance(mesh, 3, 0.05, targets=places, retain="paths")
     else:
         field = gc.exact_distance(mesh, 3, targets=places)
 

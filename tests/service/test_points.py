@@ -161,7 +161,7 @@ def test_paths_are_the_library_s(
     source = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5))
     target = mesh.point_on_edge(start, end, 0.3)
     if method:
-        field = gc.approximate_distance(mesh, source, 0.05, targets=[target], keep_windows=True)
+        field = gc.approximate_distance(mesh, source, 0.05, targets=[target], retain="paths")
         expected = field.path_to(target)
     else:
         expected = gc.shortest_path(mesh, source, target)

@@ -120,7 +120,8 @@ def check_found_again(mesh, sources, seed):
     levels = [*some_levels(field, seed, 4), *finite[:: len(finite) // 3 + 1].tolist()]
     for limit in (None, float(finite[len(finite) // 2])):
         kept, found = (
-            gc.exact_distance(mesh, sources, limit, keep_windows=keep) for keep in (True, False)
+            gc.exact_distance(mesh, sources, limit, retain=retain)
+            for retain in ("windows", "distances")
         )
         drawn = zip(levels, kept.isolines(levels), found.isolines(levels), strict=True)
         for level, expected, lines in drawn:

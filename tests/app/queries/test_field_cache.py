@@ -128,7 +128,7 @@ def test_fields_go_when_there_is_no_more_room(opened: OpenMesh, sweeps: list[int
 def test_the_size_of_a_field_is_that_of_its_arrays() -> None:
     mesh = gc.TriangleMesh(*gc.samples.knot(2000))
     plain = gc.exact_distance(mesh, 0)
-    kept = gc.exact_distance(mesh, 0, keep_windows=True)
+    kept = gc.exact_distance(mesh, 0, retain="windows")
 
     assert plain.nbytes >= plain.distances.nbytes + plain.nearest_source.nbytes
     assert kept.nbytes >= plain.nbytes + 64 * kept.stats.windows_kept

@@ -13,9 +13,9 @@ from tests.support.approximation import MERGING
 from tests.support.stepping import with_pool
 
 
-def answer(mesh, source, *, keep_windows=True):
+def answer(mesh, source, *, retain="paths"):
     """A field, and a few of its paths, as bytes."""
-    field = gc.approximate_distance(mesh, [source, 0], 1e-2, keep_windows=keep_windows)
+    field = gc.approximate_distance(mesh, [source, 0], 1e-2, retain=retain)
     paths = [field.path_to(target).points for target in range(1, len(mesh.vertices), 50)]
     return [array.tobytes() for array in (field.distances, field.nearest_source, *paths)]
 
@@ -26,7 +26,7 @@ def test_two_runs_agree(name):
     meshes = [gc.TriangleMesh(case.vertices, case.faces) for _ in range(2)]
     first = answer(meshes[0], 7)
     assert answer(meshes[0], 7) == answer(meshes[1], 7) == first
-    assert answer(meshes[0], 7, keep_windows=False) == first
+    assert answer(meshes[0], 7, retain="distances") == first
 
 
 @pytest.mark.jit
@@ -45,7 +45,7 @@ def test_paths_asked_from_several_threads():
     case = MERGING["dented_ball"]
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     targets = list(range(1, len(case.vertices), 7))
-    kept = gc.approximate_distance(mesh, 0, 1e-2, keep_windows=True)
+    kept = gc.approximate_distance(mesh, 0, 1e-2, retain="paths")
     field = gc.approximate_distance(mesh, 0, 1e-2)
     with ThreadPoolExecutor(4) as pool:
         paths = list(pool.map(lambda target: field.path_to(target).points.tobytes(), targets))
@@ -56,7 +56,7 @@ def test_the_mesh_is_not_written_to():
     case = MERGING["islands"]
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     before = {name: array.tobytes() for name, array in mesh.arrays().items()}
-    answer(mesh, 0, keep_windows=False)
+    answer(mesh, 0, retain="distances")
     assert before == {name: array.tobytes() for name, array in mesh.arrays().items()}
 
 

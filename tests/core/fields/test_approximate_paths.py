@@ -18,7 +18,7 @@ from tests.support.approximation import (
 
 def check_paths(mesh, source, exact, error, at_most):
     """Check the paths from a source to all vertices, or about ``at_most``, evenly spread."""
-    field = gc.approximate_distance(mesh, source, error, keep_windows=True)
+    field = gc.approximate_distance(mesh, source, error, retain="paths")
     reached = np.flatnonzero(np.isfinite(exact))
     for target in reached[:: len(reached) // at_most + 1].tolist():
         if target != source:
@@ -63,7 +63,7 @@ def test_paths_from_many_sources(case):
 @pytest.mark.parametrize("name", ["dented_ball", "islands", "dented_ring"])
 def test_kept_or_found_again_the_path_is_the_same(name):
     case = MERGING[name]
-    kept, found = (solved(case, 0, 1e-2, keep_windows=keep) for keep in (True, False))
+    kept, found = (solved(case, 0, 1e-2, retain=each) for each in ("paths", "distances"))
     np.testing.assert_array_equal(kept.distances, found.distances)
     for target in range(1, len(case.vertices), 9):
         one, other = kept.path_to(target), found.path_to(target)
@@ -77,7 +77,7 @@ def test_kept_or_found_again_the_path_is_the_same(name):
 @pytest.mark.parametrize("name", ["dented_ball", "islands"])
 def test_some_paths_are_longer_than_the_field_says(name):
     """Else nothing was merged, and the tests above are idle."""
-    field = solved(MERGING[name], 0, 1e-2, keep_windows=True)
+    field = solved(MERGING[name], 0, 1e-2, retain="paths")
     bounds = [field.path_to(t).error_bound.value for t in range(1, len(field.distances))]
     assert 1e-5 < max(bounds) < 1e-2
 
@@ -86,7 +86,7 @@ def test_paths_under_an_absolute_error():
     case = MERGING["dented_ring"]
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     exact = gc.exact_distance(mesh, 3).distances
-    field = gc.approximate_distance(mesh, 3, None, 1e-3, keep_windows=True)
+    field = gc.approximate_distance(mesh, 3, None, 1e-3, retain="paths")
     check_within(field.distances, exact, absolute=1e-3)
     for target in range(4, len(exact), 11):
         check_approximate_path(field, target, exact[target], 1e-3 / exact[target])
@@ -98,7 +98,7 @@ def test_a_path_ends_at_the_nearest_of_several_sources(name):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     sources = [gc.Source(0), gc.Source(70, 0.5), gc.Source(gc.SurfacePoint.vertex(120), 0.25)]
     exact = gc.exact_distance(mesh, sources).distances
-    field = gc.approximate_distance(mesh, sources, 1e-2, keep_windows=True)
+    field = gc.approximate_distance(mesh, sources, 1e-2, retain="paths")
     roots = [0, 70, 120]
     assert set(field.nearest_source.tolist()) == {0, 1, 2}
     for target in range(0, len(exact), 4 if WITHOUT_JIT else 1):
@@ -165,7 +165,7 @@ def test_a_walk_into_another_sheet_than_the_path_came_from_is_given_up():
         for corner in range(3):
             source = gc.SurfacePoint.edge(face, corner, 0.2)
             exact = gc.exact_distance(mesh, source).distances
-            field = gc.approximate_distance(mesh, source, keep_windows=True)
+            field = gc.approximate_distance(mesh, source, retain="paths")
             for target in range(len(vertices)):
                 length = field.path_to(target).length
                 assert exact[target] * (1 - 1e-9) <= length <= exact[target] * (1 + 1e-3)

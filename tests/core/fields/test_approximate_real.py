@@ -44,7 +44,7 @@ def test_within_the_error_at_every_vertex(name, count):
 )
 def test_paths_are_at_most_longer_by_the_error(name, count):
     longest = 0.0
-    for exact, error, field in fields(name, count, keep_windows=True):
+    for exact, error, field in fields(name, count, retain="paths"):
         far = np.flatnonzero(np.isfinite(exact.distances) & (exact.distances > 0))
         for target in np.random.default_rng(1).choice(far, 15 if count == 1 else 50).tolist():
             check_approximate_path(field, target, exact.distances[target], error)

@@ -133,8 +133,8 @@ def test_windows_of_nearly_equal_sigma_are_cut_at_their_bisector(solve, late):
 
 
 @pytest.mark.jit
-@pytest.mark.parametrize("keep_windows", [True, False])
-def test_memory_is_at_most_that_of_the_mesh_and_a_fifth(keep_windows):
+@pytest.mark.parametrize(("retain", "most"), [("distances", 0.6), ("paths", 1.2)])
+def test_memory_is_at_most_that_of_the_mesh_and_a_fifth(retain, most):
     for mesh in (gc.TriangleMesh(*zoo.icosphere(5)), gc.TriangleMesh(*zoo.torus(120, 60))):
-        stats = gc.approximate_distance(mesh, 0, keep_windows=keep_windows).stats
-        assert stats.peak_bytes <= (1.2 if keep_windows else 0.6) * mesh.nbytes
+        stats = gc.approximate_distance(mesh, 0, retain=retain).stats
+        assert stats.peak_bytes <= most * mesh.nbytes

@@ -193,7 +193,7 @@ def check_still_usable(mesh, approximate):
 
 
 @pytest.mark.parametrize(
-    "arguments", [{}, {"max_distance": 1.0}, {"keep_windows": True}, {"relative_error": 1e-6}]
+    "arguments", [{}, {"max_distance": 1.0}, {"retain": "paths"}, {"relative_error": 1e-6}]
 )
 def test_progress_of_approximate_sweeps_grows_to_one(mesh, arguments):
     seen = []
@@ -213,10 +213,10 @@ def test_progress_of_approximate_sweeps_grows_to_one(mesh, arguments):
         ({"memory_limit": 1_000_000}, gc.errors.MemoryLimitExceeded),
     ],
 )
-@pytest.mark.parametrize("keep_windows", [True, False])
-def test_approximate_sweeps_stop_too(mesh, approximate, arguments, error, keep_windows):
+@pytest.mark.parametrize("retain", ["distances", "paths"])
+def test_approximate_sweeps_stop_too(mesh, approximate, arguments, error, retain):
     with pytest.raises(error):
-        gc.approximate_distance(mesh, 0, keep_windows=keep_windows, **arguments)
+        gc.approximate_distance(mesh, 0, retain=retain, **arguments)
     check_still_usable(mesh, approximate)
 
 
@@ -238,10 +238,10 @@ def repeat_approximate_sweeps(mesh, cancel):
         gc.approximate_distance(mesh, 0, 1e-6, cancel=cancel)
 
 
-@pytest.mark.parametrize("keep_windows", [True, False])
-def test_memory_limit_is_what_an_approximate_sweep_needs(mesh, approximate, keep_windows):
-    stats = gc.approximate_distance(mesh, 0, keep_windows=keep_windows).stats
-    enough = {"keep_windows": keep_windows, "memory_limit": stats.peak_bytes}
+@pytest.mark.parametrize("retain", ["distances", "paths"])
+def test_memory_limit_is_what_an_approximate_sweep_needs(mesh, approximate, retain):
+    stats = gc.approximate_distance(mesh, 0, retain=retain).stats
+    enough = {"retain": retain, "memory_limit": stats.peak_bytes}
     field = gc.approximate_distance(mesh, 0, **enough)
     np.testing.assert_array_equal(field.distances, approximate)
     with pytest.raises(gc.errors.MemoryLimitExceeded):
@@ -252,7 +252,7 @@ def test_what_is_merged_counts_as_memory(mesh):
     """What is enough without paths is not with them."""
     lean = gc.approximate_distance(mesh, 0).stats.peak_bytes
     with pytest.raises(gc.errors.MemoryLimitExceeded):
-        gc.approximate_distance(mesh, 0, keep_windows=True, memory_limit=lean)
+        gc.approximate_distance(mesh, 0, retain="paths", memory_limit=lean)
 
 
 def test_an_exception_in_a_callback_of_an_approximate_sweep_comes_out(mesh, approximate):

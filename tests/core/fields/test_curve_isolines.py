@@ -44,7 +44,7 @@ def test_stadiums_around_a_segment(seed):
     mesh = gc.TriangleMesh(points, faces)
     ends = [mesh.locate([*place, 0.0]) for place in rng.uniform(3.0, 5.0, (2, 2))]
     path = gc.shortest_path(mesh, *ends)
-    field = gc.exact_distance(mesh, gc.Curve(path.locations), keep_windows=True)
+    field = gc.exact_distance(mesh, gc.Curve(path.locations), retain="windows")
     levels = [0.01, 0.3, 1.0, 2.3]
     for level, lines in zip(levels, field.isolines(levels, FINE), strict=True):
         (line,) = lines
@@ -69,7 +69,7 @@ def test_around_a_polyline_is_the_edge_of_its_stadiums(seed):
         for start, end in itertools.pairwise(mesh.locate(place) for place in corners)
         for point in gc.shortest_path(mesh, start, end).locations
     ]
-    field = gc.exact_distance(mesh, gc.Curve(curve), keep_windows=True)
+    field = gc.exact_distance(mesh, gc.Curve(curve), retain="windows")
     levels = [0.05, 0.4, 1.1, 2.0]
     raster = (np.indices((400, 400)).reshape(2, -1).T + 0.5) / 50
     away = to_segments(corners[:, :2], raster)
@@ -89,7 +89,7 @@ def test_open_lines_where_the_domain_ends(jitter):
     points, faces = zoo.grid(6, 4, seed=2, jitter=jitter)
     mesh = gc.TriangleMesh(points, faces)
     path = gc.shortest_path(mesh, mesh.locate([0.0, 1.5, 0.0]), mesh.locate([6.0, 1.5, 0.0]))
-    field = gc.exact_distance(mesh, gc.Curve(path.locations), keep_windows=True)
+    field = gc.exact_distance(mesh, gc.Curve(path.locations), retain="windows")
     for level, count in ((0.3, 2), (1.4, 2), (1.7, 1), (2.6, 0)):
         lines = field.isolines([level])[0]
         assert len(lines) == count
@@ -115,7 +115,7 @@ def test_lines_along_edges_do_not_depend_on_rounding(seed, scale, limited):
     corners = points[[at[place] for place in ((2, 2), (6, 2), (6, 6), (2, 6), (2, 2))]]
     for level in (1.0, 1.5):
         limit = scale * level if limited else math.inf
-        field = gc.exact_distance(mesh, curve, max_distance=limit, keep_windows=True)
+        field = gc.exact_distance(mesh, curve, max_distance=limit, retain="windows")
         lines = field.isolines([scale * level], FINE)[0]
         lengths = sorted(line.length / scale for line in lines)
         inner, outer = 16.0 - 8.0 * level, 16.0 + 2 * math.pi * level
@@ -133,7 +133,7 @@ def test_fronts_that_meet_leave_no_line():
     mesh = gc.TriangleMesh(points, faces)
     for upper in (5, 6):
         curves = [gc.Curve([at[x, y] for x in range(7)]) for y in (2, upper)]
-        field = gc.exact_distance(mesh, curves, keep_windows=True)
+        field = gc.exact_distance(mesh, curves, retain="windows")
         half = (upper - 2) / 2
         before, between = field.isolines([half - 0.25, half])
         assert len(before) == 4
@@ -152,7 +152,7 @@ def test_bands_around_a_box():
         for start, end in itertools.pairwise(mesh.locate(place) for place in ring)
         for point in gc.shortest_path(mesh, start, end).locations
     ]
-    field = gc.exact_distance(mesh, gc.Curve(points), keep_windows=True)
+    field = gc.exact_distance(mesh, gc.Curve(points), retain="windows")
     for level in (0.2, 0.9, 1.2):
         lines = field.isolines([level])[0]
         assert [line.closed for line in lines] == [True, True]
@@ -169,7 +169,7 @@ def test_points_on_a_box_are_at_the_level_by_unfolding():
     mesh = gc.TriangleMesh(*zoo.voxels(list(itertools.product(*map(range, size)))))
     start, end = np.array([0.3, 0.4, 0.0]), np.array([0.9, 0.8, 0.0])
     path = gc.shortest_path(mesh, mesh.locate(start), mesh.locate(end))
-    field = gc.exact_distance(mesh, gc.Curve(path.locations), keep_windows=True)
+    field = gc.exact_distance(mesh, gc.Curve(path.locations), retain="windows")
     shares = np.linspace(0.0, 1.0, 101)
     for level, lines in zip((0.6, 1.9), field.isolines([0.6, 1.9]), strict=True):
         for place in lines[0].points[:: max(len(lines[0].points) // 6, 1)]:
@@ -186,7 +186,7 @@ def test_all_of_each_level_is_found(case):
     if curve is None:
         pytest.skip("the random ends are not connected")
     for sources in (curve, [gc.Source(curve, 0.05 * mesh.diagonal), 0]):
-        field = gc.exact_distance(mesh, sources, keep_windows=True)
+        field = gc.exact_distance(mesh, sources, retain="windows")
         check_all(mesh, sources, field, some_levels(field, 51, 2))
 
 
@@ -197,7 +197,7 @@ def test_levels_of_vertices(case):
     mesh = mesh_of(case)
     u, v, w = mesh.faces[0].tolist()
     curve = gc.Curve([u, v, w, u])
-    field = gc.exact_distance(mesh, curve, keep_windows=True)
+    field = gc.exact_distance(mesh, curve, retain="windows")
     vertices = np.flatnonzero(np.isfinite(field.distances) & (field.distances > 0.0))[:6]
     check_all(mesh, curve, field, field.distances[vertices].tolist(), crossings=False)
 
@@ -210,7 +210,7 @@ def test_limits_and_what_is_kept_change_no_line_within(case):
     full = gc.exact_distance(mesh, curve)
     levels = some_levels(full, 52, 3)
     limit = sorted(levels)[1]
-    near = gc.exact_distance(mesh, curve, max_distance=limit, keep_windows=True)
+    near = gc.exact_distance(mesh, curve, max_distance=limit, retain="windows")
     for level, ours, theirs in zip(
         levels, near.isolines(levels), full.isolines(levels), strict=True
     ):
@@ -234,8 +234,8 @@ def test_windows_kept_or_found_again_draw_the_same_lines(case):
 def test_approximate_lines_keep_to_the_error(case):
     mesh, error = mesh_of(case), 0.02
     curve = random_curve(mesh, np.random.default_rng(53))
-    for keep in (True, False):
-        field = gc.approximate_distance(mesh, curve, error, keep_isolines=keep)
+    for retain in ("windows", "distances"):
+        field = gc.approximate_distance(mesh, curve, error, retain=retain)
         levels = some_levels(field, 53, 2)
         for level, lines in zip(levels, field.isolines(levels), strict=True):
             points = [point for line in lines for point in line_points(mesh, line)]

@@ -166,7 +166,7 @@ def test_distances_on_a_plane_are_those_of_segments(seed):
     # Points that the sweep was not told of, and the direction at vertices
     later = [
         gc.exact_distance(mesh, curve),
-        gc.exact_distance(mesh, curve, keep_windows=True),
+        gc.exact_distance(mesh, curve, retain="windows"),
         gc.approximate_distance(mesh, curve, 1e-2),
     ]
     for target, field in itertools.product(targets[:12], later):
@@ -222,7 +222,7 @@ def test_distances_are_least_over_the_points_of_the_curve(case, error):
     if error is None:
         field = gc.exact_distance(mesh, curve, targets=targets)
     else:
-        field = gc.approximate_distance(mesh, curve, error, targets=targets, keep_windows=True)
+        field = gc.approximate_distance(mesh, curve, error, targets=targets, retain="paths")
     for target in targets:
         distance = field.distance_at(target)
         if math.isinf(distance):

@@ -26,14 +26,14 @@ SOURCES: dict[str, Any] = {
 }
 KINDS: dict[str, Any] = {
     "exact": lambda **options: gc.exact_distance(MESH, **options),
-    "exact, windows kept": lambda **options: gc.exact_distance(MESH, keep_windows=True, **options),
+    "exact, windows kept": lambda **options: gc.exact_distance(MESH, retain="windows", **options),
     "approximate": lambda **options: gc.approximate_distance(MESH, **options),
     "by any error": lambda **options: gc.approximate_distance(
         MESH, relative_error=0.9, absolute_error=0.1, **options
     ),
-    "for paths": lambda **options: gc.approximate_distance(MESH, keep_windows=True, **options),
+    "for paths": lambda **options: gc.approximate_distance(MESH, retain="paths", **options),
     "for isolines": lambda **options: gc.approximate_distance(
-        MESH, relative_error=None, absolute_error=0.01, keep_isolines=True, **options
+        MESH, relative_error=None, absolute_error=0.01, retain="windows", **options
     ),
 }
 
@@ -79,8 +79,8 @@ def test_a_field_is_what_its_arrays_say(sources: str, kind: str, rest: dict[str,
 
 def test_it_needs_no_sweep_for_what_the_first_one_knew(monkeypatch: pytest.MonkeyPatch) -> None:
     fields = [
-        gc.exact_distance(MESH, 3, targets=[POINTS[1]], keep_windows=True),
-        gc.approximate_distance(MESH, 3, targets=[POINTS[1]], keep_isolines=True),
+        gc.exact_distance(MESH, 3, targets=[POINTS[1]], retain="windows"),
+        gc.approximate_distance(MESH, 3, targets=[POINTS[1]], retain="windows"),
     ]
     kept = [kept_on_disk(field.arrays()) for field in fields]
 

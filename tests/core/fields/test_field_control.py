@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core import control
 from geodesic_core.errors import (
     Cancelled,
     DeadlineExceeded,
@@ -22,9 +23,9 @@ CURVE = gc.Curve([gc.SurfacePoint.face(40, w) for w in ((0.2, 0.3, 0.5), (0.6, 0
 
 FIELDS = {
     "exact": lambda mesh: gc.exact_distance(mesh, 0),
-    "kept": lambda mesh: gc.exact_distance(mesh, 0, keep_windows=True),
+    "kept": lambda mesh: gc.exact_distance(mesh, 0, retain="windows"),
     "approximate": lambda mesh: gc.approximate_distance(mesh, 0),
-    "kept approximate": lambda mesh: gc.approximate_distance(mesh, 0, keep_isolines=True),
+    "kept approximate": lambda mesh: gc.approximate_distance(mesh, 0, retain="windows"),
     "curve": lambda mesh: gc.exact_distance(mesh, CURVE),
     "approximate curve": lambda mesh: gc.approximate_distance(mesh, CURVE),
 }
@@ -61,8 +62,9 @@ def mesh():
 def slices_by_number(monkeypatch):
     """Each slice twice as long as the one before, however fast the machine is."""
     monkeypatch.setattr(sweep, "SLICE_SECONDS", 1e9)
+    monkeypatch.setattr(control, "SLICE_SECONDS", 1e9)
     monkeypatch.setattr(sweep, "_FIRST_BUDGET", 2000)
-    monkeypatch.setattr(sweep, "_FIRST_ITEMS", 8)
+    monkeypatch.setattr(control, "_FIRST_ITEMS", 8)
 
 
 def flat(answer):
@@ -216,7 +218,7 @@ def test_windows_and_what_is_drawn_count_as_memory(mesh):
 
 def test_isolines_keep_the_windows_of_the_faces_that_they_pass():
     mesh = gc.TriangleMesh(*gc.samples.plane(20_000))
-    kept, field = gc.exact_distance(mesh, 0, keep_windows=True), gc.exact_distance(mesh, 0)
+    kept, field = gc.exact_distance(mesh, 0, retain="windows"), gc.exact_distance(mesh, 0)
     (level,) = field.levels(1)
     assert kept.stats.peak_bytes > 4 * field.stats.peak_bytes
     limit = 2 * field.stats.peak_bytes

@@ -23,7 +23,7 @@ def test_distance_falls_by_as_much_as_one_walks_against_it(case):
     mesh = mesh_of(case)
     step = 1e-3 * min(edge_lengths(mesh.vertices, mesh.faces).values())
     for source in random_points(mesh, 3, seed=31):
-        field = gc.exact_distance(mesh, source, keep_windows=True)
+        field = gc.exact_distance(mesh, source, retain="windows")
         gradient = field.gradient
         for v, distance in enumerate(field.distances[: 20 if WITHOUT_JIT else None].tolist()):
             if np.isinf(distance) or distance == 0.0:

@@ -45,7 +45,7 @@ def check_all(mesh, sources, field, levels, *, crossings=True):
 def test_all_of_each_level_is_found(case):
     mesh = mesh_of(case)
     for source in random_points(mesh, 3, seed=41)[1:]:
-        field = gc.exact_distance(mesh, source, keep_windows=True)
+        field = gc.exact_distance(mesh, source, retain="windows")
         check_all(mesh, source, field, some_levels(field, 41, 2))
 
 
@@ -54,7 +54,7 @@ def test_all_of_each_level_is_found(case):
 def test_points_lie_at_the_level_on_slivers_too(case):
     mesh = mesh_of(case)
     for source in random_points(mesh, 3, seed=42):
-        field = gc.exact_distance(mesh, source, keep_windows=True)
+        field = gc.exact_distance(mesh, source, retain="windows")
         check_all(mesh, source, field, some_levels(field, 42, 2), crossings=False)
 
 
@@ -62,7 +62,7 @@ def test_points_lie_at_the_level_on_slivers_too(case):
 def test_levels_of_vertices(case):
     """A level passes through its vertex, or has all around it within."""
     mesh = mesh_of(case)
-    field = gc.exact_distance(mesh, 0, keep_windows=True)
+    field = gc.exact_distance(mesh, 0, retain="windows")
     vertices = np.flatnonzero(np.isfinite(field.distances) & (field.distances > 0.0))[:6]
     levels = field.distances[vertices].tolist()
     check_all(mesh, 0, field, levels, crossings=False)
@@ -80,7 +80,7 @@ def test_lines_along_edges_are_one_and_whole(share, scale):
     turned = scale * points @ zoo.rotation(8).T
     mesh = gc.TriangleMesh(turned, faces)
     column = [int(v) for v in np.flatnonzero(points[:, 0] == 2.0)]
-    field = gc.exact_distance(mesh, gc.Curve(column), keep_windows=True)
+    field = gc.exact_distance(mesh, gc.Curve(column), retain="windows")
     for away, sides in ((1.0, 2), (2.0, 2), (3.0, 1)):
         level = scale * away * (1.0 + share * LEVEL)
         (lines,) = field.isolines([level])
@@ -125,7 +125,7 @@ def test_circles_in_the_plane(seed):
     face = int(np.argmin(np.linalg.norm(points[faces].mean(axis=1) - (4, 4, 0), axis=1)))
     for source in (gc.SurfacePoint.face(face, (0.2, 0.3, 0.5)), gc.SurfacePoint.edge(face, 1, 0.3)):
         centre = mesh.position(source)
-        field = gc.exact_distance(mesh, source, keep_windows=True)
+        field = gc.exact_distance(mesh, source, retain="windows")
         for level, lines in zip(
             (0.01, 1.0, 2.9), field.isolines([0.01, 1.0, 2.9], FINE), strict=True
         ):
@@ -143,7 +143,7 @@ def test_arcs_behind_a_corner():
     points, faces = zoo.drop_unused(points, zoo.without_cells(faces, 4, cells))
     mesh = gc.TriangleMesh(points, faces)
     source, corner = np.array([4.0, 1.0]), np.array([2.0, 2.0])
-    field = gc.exact_distance(mesh, mesh.locate([*source, 0.0]), keep_windows=True)
+    field = gc.exact_distance(mesh, mesh.locate([*source, 0.0]), retain="windows")
     for level, lines in zip((3.0, 3.6), field.isolines([3.0, 3.6], FINE), strict=True):
         (line,) = lines
         assert not line.closed
@@ -191,7 +191,7 @@ def test_several_sources_with_start_distances(case):
     mesh = mesh_of(case)
     points = random_points(mesh, 3, seed=43)
     sources = [gc.Source(point, 0.05 * i * mesh.diagonal) for i, point in enumerate(points)]
-    field = gc.exact_distance(mesh, sources, keep_windows=True)
+    field = gc.exact_distance(mesh, sources, retain="windows")
     check_all(mesh, sources, field, some_levels(field, 43, 3))
 
 
@@ -203,7 +203,7 @@ def test_max_distance_and_what_is_kept_change_no_line_within(case):
     full = gc.exact_distance(mesh, source)
     levels = some_levels(full, 44, 3)
     limit = sorted(levels)[1]
-    near = gc.exact_distance(mesh, source, max_distance=limit, keep_windows=True)
+    near = gc.exact_distance(mesh, source, max_distance=limit, retain="windows")
     for level, ours, theirs in zip(
         levels, near.isolines(levels), full.isolines(levels), strict=True
     ):
@@ -229,8 +229,8 @@ def test_approximate_lines_keep_to_the_error(case):
     mesh = mesh_of(case)
     (source,) = random_points(mesh, 1, seed=45)
     error = 0.02
-    for keep in (True, False):
-        field = gc.approximate_distance(mesh, source, error, keep_isolines=keep)
+    for retain in ("windows", "distances"):
+        field = gc.approximate_distance(mesh, source, error, retain=retain)
         for level, lines in zip(
             levels := some_levels(field, 45, 2), field.isolines(levels), strict=True
         ):
@@ -238,7 +238,7 @@ def test_approximate_lines_keep_to_the_error(case):
                 check_pieces(mesh, line)
                 check_ends(mesh, line)
                 positions = line.points[:: max(len(line.points) // 10, 1)]
-                exact = gc.exact_distance(mesh, source, keep_windows=True)
+                exact = gc.exact_distance(mesh, source, retain="windows")
                 found = np.array([exact.distance_at(mesh.locate(p)) for p in positions])
                 assert (found >= level * (1 - 1e-9)).all()
                 assert (found <= level / (1 - error)).all()
@@ -318,7 +318,7 @@ def test_chord_errors_that_are_none(chord_error):
 @pytest.mark.parametrize("name", ["cow.obj", "spot.obj", "alligator.obj", "fandisk10k.ply"])
 def test_real_meshes(name):
     mesh = gc.load_mesh(real_mesh(name))
-    field = gc.exact_distance(mesh, 0, keep_windows=True)
+    field = gc.exact_distance(mesh, 0, retain="windows")
     levels = field.levels(5)
     for level, lines in zip(levels, field.isolines(levels), strict=True):
         assert lines
@@ -329,7 +329,7 @@ def test_real_meshes(name):
 
 def test_nothing_is_shared_between_calls():
     mesh = mesh_of(zoo.SMALL["hills"])
-    field = gc.exact_distance(mesh, 0, keep_windows=not WITHOUT_JIT)
+    field = gc.exact_distance(mesh, 0, retain="paths" if WITHOUT_JIT else "windows")
     first = field.isolines(field.levels(2))
     for lines, others in zip(first, field.isolines(field.levels(2)), strict=True):
         for line, other in zip(lines, others, strict=True):

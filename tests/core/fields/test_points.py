@@ -97,7 +97,7 @@ def test_approximate_distances_of_points_keep_to_the_bound(case):
     for source in points:
         exact = gc.exact_distance(mesh, source, targets=points)
         for error in (1e-3, 0.05):
-            field = gc.approximate_distance(mesh, source, error, targets=points, keep_windows=True)
+            field = gc.approximate_distance(mesh, source, error, targets=points, retain="paths")
             assert (field.distances <= exact.distances * (1 + 1e-9)).all()
             assert (field.distances >= exact.distances * (1 - error)).all()
             for target in points:
@@ -350,7 +350,7 @@ def test_approximate_paths_take_the_right_face_beyond_an_irregular_edge(case, se
             for face in rng.integers(len(mesh.faces), size=4)
         ]
         exact = gc.exact_distance(mesh, points[:2], targets=points)
-        field = gc.approximate_distance(mesh, points[:2], 1e-3, targets=points, keep_windows=True)
+        field = gc.approximate_distance(mesh, points[:2], 1e-3, targets=points, retain="paths")
         for target in [*points, *range(len(mesh.vertices))]:
             distance = exact.distance_at(target)
             length = field.path_to(target).length

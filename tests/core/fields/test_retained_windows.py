@@ -15,7 +15,7 @@ from tests.support.certificates import check_path
 
 
 def kept_field(mesh, sources, **options):
-    return gc.exact_distance(mesh, sources, keep_windows=True, **options)
+    return gc.exact_distance(mesh, sources, retain="windows", **options)
 
 
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
@@ -99,16 +99,17 @@ def test_kept_windows_count_against_the_memory_limit(solve):
     lean = solve(mesh, 0).stats.peak_bytes
     solve(mesh, 0, memory_limit=lean)
     with pytest.raises(MemoryLimitExceeded):
-        solve(mesh, 0, memory_limit=lean, keep_windows=True)
-    needed = solve(mesh, 0, keep_windows=True).stats.peak_bytes
-    solve(mesh, 0, memory_limit=needed, keep_windows=True)
+        solve(mesh, 0, memory_limit=lean, retain="windows")
+    needed = solve(mesh, 0, retain="windows").stats.peak_bytes
+    solve(mesh, 0, memory_limit=needed, retain="windows")
 
 
 def test_points_of_an_approximate_field_mean_the_same_whether_it_kept_windows_or_not():
     mesh = gc.TriangleMesh(*gc.samples.knot(500))
     source, *targets = random_points(mesh, 8, seed=25)
     fields = [
-        gc.approximate_distance(mesh, source, 0.05, keep_isolines=keep) for keep in (True, False)
+        gc.approximate_distance(mesh, source, 0.05, retain=retain)
+        for retain in ("windows", "distances")
     ]
     exact = gc.exact_distance(mesh, source, targets=targets)
     for field, target in itertools.product(fields, targets):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.fields.sweep import Control, winners_of
+from geodesic_core.control import Control
+from geodesic_core.fields.sweep import winners_of
 from geodesic_core.kernels.mesh.half_edges import APEX, OPPOSITE
 from geodesic_core.kernels.paths.backtracing import LOST, NO_ROOM, TRACED, trace_path
 from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources

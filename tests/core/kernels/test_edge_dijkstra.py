@@ -6,7 +6,7 @@ import math
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.fields.sweep import Control
+from geodesic_core.control import Control
 from geodesic_core.kernels.paths.edge_dijkstra import ASTAR_WEIGHT, search_edges, vertices_to
 from geodesic_core.kernels.sweep import state
 from geodesic_core.kernels.sweep.bounds import exact_bounds

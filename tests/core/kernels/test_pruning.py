@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.fields.sweep import Control, run_sweep
+from geodesic_core.control import Control
+from geodesic_core.fields.sweep import run_sweep
 from geodesic_core.kernels.paths import edge_dijkstra
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds

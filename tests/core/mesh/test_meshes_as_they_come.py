@@ -338,8 +338,8 @@ def test_points_inside_a_face_of_no_area():
     near = gc.SurfacePoint.face(0, (0.5, 0.4, 0.1))  # at x = 2
     inside = gc.SurfacePoint.face(1, (0.25, 0.25, 0.5))  # at (4, 1.5)
     expected = np.linalg.norm(mesh.vertices - mesh.vertices[1], axis=1)
-    for keep in (False, True):
-        field = gc.exact_distance(mesh, source, keep_windows=keep)
+    for retain in ("paths", "windows"):
+        field = gc.exact_distance(mesh, source, retain=retain)
         np.testing.assert_allclose(field.distances, expected, rtol=1e-14, atol=1e-13)
         assert field.distance_at(near) == pytest.approx(1.0, rel=1e-14)
         assert field.distance_at(inside) == pytest.approx(np.hypot(1, 1.5), rel=1e-14)

@@ -57,7 +57,7 @@ def test_between_euclid_and_dijkstra(case, seed, error):
 def test_paths_and_their_certificates_hold(case, seed, error):
     mesh, source = mesh_of(case), vertex_of(case, seed)
     exact = gc.exact_distance(mesh, source).distances
-    field = gc.approximate_distance(mesh, source, error, keep_windows=True)
+    field = gc.approximate_distance(mesh, source, error, retain="paths")
     for target in np.random.default_rng(seed).integers(0, len(case.vertices), 8).tolist():
         if target != source and np.isfinite(exact[target]):
             check_approximate_path(field, target, exact[target], error)
@@ -74,8 +74,8 @@ def test_twice_the_size_is_twice_the_distance_to_the_bit(case, seed, error):
 def test_two_runs_are_equal_to_the_bit(case, seed, error):
     source = vertex_of(case, seed)
     fields = [
-        gc.approximate_distance(mesh_of(case), source, error, keep_windows=keep)
-        for keep in (False, True)
+        gc.approximate_distance(mesh_of(case), source, error, retain=retain)
+        for retain in ("distances", "paths")
     ]
     assert fields[0].distances.tobytes() == fields[1].distances.tobytes()
 

@@ -14,7 +14,7 @@ from tests.support.random_meshes import cases
 def test_lines_are_at_their_level_and_complete(case, seed, share):
     mesh = mesh_of(case)
     source = random_points(mesh, 3, seed)[seed % 3]
-    field = gc.exact_distance(mesh, source, keep_windows=True)
+    field = gc.exact_distance(mesh, source, retain="windows")
     level = share * float(field.distances[np.isfinite(field.distances)].max())
     (lines,) = field.isolines([level])
     for line in lines:

@@ -87,7 +87,7 @@ def test_approximate_distances_stay_within_the_error(case, seed, rewritings, err
         field = gc.exact_distance(pair.mesh, source, targets=pair.points)
         with suppress(gc.errors.NotConverged):
             found = gc.approximate_distance(
-                pair.other, moved, error, targets=pair.moved, keep_windows=True
+                pair.other, moved, error, targets=pair.moved, retain="paths"
             )
             near = [found.distance_at(point) for point in pair.moved]
             near = np.concatenate([found.distances[pair.vertices], near]) / pair.scale

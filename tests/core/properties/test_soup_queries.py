@@ -59,7 +59,7 @@ def test_kept_windows_agree_with_the_search(seed):
     points = points_on(mesh, rng) if mesh else []
     distances, solver = np.empty((len(points), len(points))), gc.Solver(mesh) if mesh else None
     for i, source in enumerate(points):
-        kept = gc.exact_distance(mesh, source, keep_windows=True, deadline_s=DEADLINE)
+        kept = gc.exact_distance(mesh, source, retain="windows", deadline_s=DEADLINE)
         told = gc.exact_distance(mesh, source, targets=points, deadline_s=DEADLINE)
         searched = gc.exact_distance(mesh, source, deadline_s=DEADLINE)
         distances[i] = [kept.distance_at(point, deadline_s=DEADLINE) for point in points]
@@ -186,7 +186,7 @@ def test_matrices_and_the_nearest_are_those_of_the_fields(seed):
 def test_isolines_are_at_their_level(seed):
     mesh, rng = soup(seed)
     for source in points_on(mesh, rng, 2) if mesh else []:
-        kept = gc.exact_distance(mesh, source, keep_windows=True, deadline_s=DEADLINE)
+        kept = gc.exact_distance(mesh, source, retain="windows", deadline_s=DEADLINE)
         reached = kept.distances[np.isfinite(kept.distances)]
         if reached.max() == 0.0:
             continue

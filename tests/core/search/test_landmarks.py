@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.fields.sweep import Control
+from geodesic_core.control import Control
 from geodesic_core.kernels.sweep.bounds import LANDMARKS
 from geodesic_core.search.landmarks import Landmarks
 from geodesic_core.tolerances import LANDMARK_ERROR

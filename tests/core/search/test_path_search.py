@@ -267,7 +267,7 @@ def test_a_solver_has_the_solvers_of_its_mesh():
     np.testing.assert_array_equal(
         exact.distances, gc.exact_distance(solver.mesh, [3, 5], max_distance=2.0).distances
     )
-    found = solver.approximate_distance(3, 1e-2, keep_windows=True)
+    found = solver.approximate_distance(3, 1e-2, retain="paths")
     np.testing.assert_array_equal(
         found.distances, gc.approximate_distance(solver.mesh, 3, 1e-2).distances
     )
