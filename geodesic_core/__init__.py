@@ -8,9 +8,11 @@ Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then
 from geodesic_core import errors, samples
 from geodesic_core.control import Control
 from geodesic_core.errors import GeodesicError
-from geodesic_core.fields.distance_field import DistanceField, Source, SweepStats
+from geodesic_core.fields.distance_field import DistanceField
 from geodesic_core.fields.isolines import Isoline
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, SearchStep
+from geodesic_core.fields.repeatable_sweep import SweepStats
+from geodesic_core.fields.sources import Source
 from geodesic_core.io.load import load_mesh
 from geodesic_core.mesh.curve import Curve
 from geodesic_core.mesh.report import MeshReport, Sample

@@ -8,7 +8,6 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.noise import hashed, noise
 
 Sample = tuple[Floats, Ints]
 """(V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside."""
@@ -108,12 +107,12 @@ def terrain(faces: int) -> Sample:
         np.linspace(0.0, 10.0, rows + 1), np.linspace(0.0, 10.0, columns + 1), indexing="ij"
     )
     # Mountains stand where the land is high, and are the rougher the higher; valleys are smooth.
-    land = 0.5 + 0.7 * noise(0.17 * x + 0.6, 0.17 * y + 0.3, 4)
+    land = 0.5 + 0.7 * _noise(0.17 * x + 0.6, 0.17 * y + 0.3, 4)
     height, rough = 1.5 * land, np.clip(land, 0.0, 1.0)
-    bend_x, bend_y = 0.5 * noise(0.6 * x, 0.6 * y, 2), 0.5 * noise(0.6 * x, 0.6 * y, 3)
+    bend_x, bend_y = 0.5 * _noise(0.6 * x, 0.6 * y, 2), 0.5 * _noise(0.6 * x, 0.6 * y, 3)
     amplitude, frequency, octave = 1.9, 0.25, 5
     while 4.0 * frequency <= rows / 10.0 and octave < 16:
-        bent = noise(frequency * (x + bend_x), frequency * (y + bend_y), octave)
+        bent = _noise(frequency * (x + bend_x), frequency * (y + bend_y), octave)
         ridge = (1.0 - 1.4 * np.sqrt(bent * bent + 0.003)) * rough
         height += amplitude * ridge * np.abs(ridge)
         rough = np.clip(1.2 * ridge, 0.05, 1.0)
@@ -151,9 +150,9 @@ def obstacles(faces: int) -> Sample:
     x, y = flat[first].T
     vertices = np.stack(
         [
-            x + 0.35 * noise(0.23 * x, 0.23 * y, 101),
-            y + 0.35 * noise(0.23 * x, 0.23 * y, 102),
-            1.2 * noise(0.17 * x, 0.17 * y, 103),
+            x + 0.35 * _noise(0.23 * x, 0.23 * y, 101),
+            y + 0.35 * _noise(0.23 * x, 0.23 * y, 102),
+            1.2 * _noise(0.17 * x, 0.17 * y, 103),
         ],
         axis=1,
     )
@@ -182,7 +181,7 @@ def _tile_counts(faces: int) -> tuple[int, int]:
 
 def _reach(tile: int, away: Floats) -> Floats:
     """Return the points of a hole's border in the directions of those of its tile's border."""
-    chance = hashed(np.array([tile]), np.array([7]), 100)[0]
+    chance = _hashed(np.array([tile]), np.array([7]), 100)[0]
     direction: Floats = away / np.sqrt((away * away).sum(axis=1, keepdims=True))
     if chance % 3 == 0:  # a pillar
         radius: float = 0.4 + (chance >> 8) % 256 / 768.0
@@ -232,3 +231,30 @@ def _icosahedron() -> tuple[Floats, Ints]:
     inward = np.linalg.det(corners[triples]) < 0.0
     triples[inward] = triples[inward][:, ::-1]
     return corners, triples.astype(np.int32)
+
+
+def _noise(x: Floats, y: Floats, seed: int) -> Floats:
+    """Return gradient noise: smooth, 0 at the points of the unit lattice, within ±1.
+
+    It takes arithmetic alone, so that it is the same to the bit on every machine.
+    """
+    left, below = np.floor(x), np.floor(y)
+    u, v = x - left, y - below
+    corners = []
+    for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        bits = _hashed(left.astype(np.int64) + dx, below.astype(np.int64) + dy, seed)
+        slope_x, slope_y = (bits & 0xFFFF) / 32768.0 - 1.0, (bits >> 16 & 0xFFFF) / 32768.0 - 1.0
+        corners.append(slope_x * (u - dx) + slope_y * (v - dy))
+    s, t = (w * w * w * (w * (6.0 * w - 15.0) + 10.0) for w in (u, v))
+    lower = corners[0] + s * (corners[1] - corners[0])
+    upper = corners[2] + s * (corners[3] - corners[2])
+    found: Floats = lower + t * (upper - lower)
+    return found
+
+
+def _hashed(i: Longs, j: Longs, seed: int) -> Longs:
+    """Return 32 pseudorandom bits for each point of a lattice."""
+    mixed = i * 0x9E3779B1 + j * 0x85EBCA77 + seed * 0xC2B2AE3D
+    for _ in range(2):
+        mixed = (mixed ^ (mixed >> 15 & 0x1FFFF)) * 0x2C1B3C6D & 0xFFFFFFFF
+    return mixed ^ mixed >> 16

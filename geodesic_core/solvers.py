@@ -5,22 +5,19 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
-from geodesic_core.fields.distance_field import DistanceField, Source, Sources, SweepStats, field_of
+from geodesic_core.errors import InvalidArgument, NoPath
+from geodesic_core.fields.distance_field import DistanceField, field_of
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
-from geodesic_core.fields.sources import component_of, disconnected
-from geodesic_core.fields.whole_sweep import RepeatableSweep, peak_bytes
-from geodesic_core.kernels.sweep import state
+from geodesic_core.fields.repeatable_sweep import RepeatableSweep, stats_of
+from geodesic_core.fields.sources import Sources, as_sources, component_of, disconnected
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
-from geodesic_core.kernels.sweep.state import Wavefront
-from geodesic_core.mesh.curve import Curve, Polyline, polyline_of
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.matrix import Layout, find_matrix
@@ -420,19 +417,14 @@ def _solve(
     """Check the arguments, sweep, and make the result with what it is to retain."""
     check_choice("retain", retain, get_args(Retain))
     paths, windows = retain != "distances", retain == "windows"
-    starts, places = _as_sources(mesh, sources)
+    starts, places = as_sources(mesh, sources)
     ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
     distances = np.array([start.start_distance for start in starts])
     sweep = RepeatableSweep.between(mesh, places, distances, ends, bounds)
     wave = sweep.run(control, paths=paths, windows=sweep.all_faces if windows else None)
     found = sweep.found(wave, paths=paths, windows=windows)
-    stats = _stats(mesh, wave, time.perf_counter() - control.began)
+    stats = stats_of(mesh, wave, time.perf_counter() - control.began)
     return field_of(starts, places, ends, sweep, promise, found, stats)
-
-
-def _stats(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
-    created, kept, peak = (int(wave.counters[i]) for i in (state.CREATED, state.KEPT, state.PEAK))
-    return SweepStats.of(mesh, created, kept, peak, peak_bytes(wave), seconds)
 
 
 def _as_stops(
@@ -464,29 +456,3 @@ def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, f
         math.inf if relative is None else float(relative),
         math.inf if absolute is None else float(absolute),
     )
-
-
-def _as_sources(
-    mesh: TriangleMesh, sources: Any
-) -> tuple[tuple[Source, ...], tuple[Polyline, ...]]:
-    """Return the sources, and their canonical points."""
-    if isinstance(sources, str | bytes):
-        raise InvalidPoint(f"the source is {sources!r}; it must be a vertex index or a Source")
-    if isinstance(sources, Source | SurfacePoint | Curve) or not isinstance(sources, Iterable):
-        sources = [sources]
-    found, places = [], []
-    for i, item in enumerate(sources):
-        source = item if isinstance(item, Source) else Source(item)
-        if isinstance(source.point, Curve):
-            places.append(polyline_of(mesh, source.point, f"source {i}"))
-        else:
-            places.append((mesh.point(source.point, f"source {i}"),))
-        start = source.start_distance
-        if not is_number(start) or not (math.isfinite(start) and start >= 0.0):
-            raise InvalidArgument(
-                f"source {i} starts at {start!r}; it must be a finite number, 0 or more"
-            )
-        found.append(source)
-    if not found:
-        raise InvalidPoint("there are no sources: give at least one")
-    return tuple(found), tuple(places)

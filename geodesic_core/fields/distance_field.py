@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,57 +21,28 @@ from geodesic_core.fields.isolines import (
     crossed_faces,
     spaced_levels,
 )
-from geodesic_core.fields.nearest_source import NearestSource, find_nearest_source
-from geodesic_core.fields.once import Lazy
-from geodesic_core.fields.packed import from_arrays, to_arrays
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, traced_path
-from geodesic_core.fields.point_query import Arrival, arrival_at, with_target
-from geodesic_core.fields.sources import Nodes, component_of, disconnected
-from geodesic_core.fields.whole_sweep import RepeatableSweep, SweepResult
+from geodesic_core.fields.point_query import (
+    Arrival,
+    NearestSource,
+    arrival_at,
+    find_nearest_source,
+    with_target,
+)
+from geodesic_core.fields.repeatable_sweep import Lazy, RepeatableSweep, SweepResult, SweepStats
+from geodesic_core.fields.sources import Nodes, Source, component_of, disconnected
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
-from geodesic_core.mesh.curve import Curve, Polyline
+from geodesic_core.mesh.curve import (
+    Curve,
+    Polyline,
+    polylines_from_arrays,
+    polylines_to_arrays,
+)
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import FOOT, LEVEL, PATH_LENGTH
-
-
-@dataclass(frozen=True, slots=True)
-class Source:
-    """A source, and the distance at which it starts (mesh units, 0 or more)."""
-
-    point: Point | Curve
-    start_distance: float = 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class SweepStats:
-    """What a sweep did."""
-
-    windows_created: int
-    windows_kept: int
-    """Windows left after trimming: those that were propagated."""
-    windows_peak: int
-    """Windows alive at once, at most."""
-    windows_per_edge_created: float
-    windows_per_edge_kept: float
-    peak_bytes: int
-    """Memory of the sweep's state at its largest, the mesh itself not counted."""
-    seconds: float
-    """Time of the solve, with the allocation of its state."""
-
-    @classmethod
-    def of(
-        cls, mesh: TriangleMesh, created: int, kept: int, peak: int, peak_bytes: int, seconds: float
-    ) -> Self:
-        """Return the statistics of a sweep with these counts of windows."""
-        edges = mesh.edge_count
-        return cls(created, kept, peak, created / edges, kept / edges, peak_bytes, seconds)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the statistics as what JSON can hold."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -103,8 +74,8 @@ class DistanceField:
 
         What it answers is the same to the bit; its sources are spelled canonically.
         """
-        places = from_arrays("source", arrays)
-        targets = tuple(point for (point,) in from_arrays("target", arrays))
+        places = polylines_from_arrays("source", arrays)
+        targets = tuple(point for (point,) in polylines_from_arrays("target", arrays))
         starts = arrays["start_distances"]
         sources = tuple(
             Source(line[0] if len(line) == 1 else Curve(line), start)
@@ -134,8 +105,8 @@ class DistanceField:
         errors = [bounds.relative_error, bounds.absolute_error] if bounds.merging else []
         counts = stats.windows_created, stats.windows_kept, stats.windows_peak, stats.peak_bytes
         return {
-            **to_arrays("source", self._places),
-            **to_arrays("target", [(target,) for target in self._targets]),
+            **polylines_to_arrays("source", self._places),
+            **polylines_to_arrays("target", [(target,) for target in self._targets]),
             "start_distances": self._sweep.start_distances,
             "limits": np.array([bounds.max_distance, *errors]),
             "promise": np.array([promise.type, promise.kind]),
@@ -477,6 +448,3 @@ def field_of(
         _sweep=sweep,
         _found=found,
     )
-
-
-Sources = Point | Curve | Source | Sequence[Point | Curve | Source]

@@ -1,18 +1,32 @@
-"""How any point is reached by the windows that an exact sweep kept, and the way back from there."""
+"""Distances and paths of any point of the surface, from a field.
+
+An exact field with windows reaches the point by those of its face. Else an exact sweep runs back
+from the point to the nearest source, pruned by the field: its values bound the rest of every path
+from below, as those of step 2 do in a search between two points (section 5). So only a thin strip
+around the answer is swept.
+"""
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from geodesic_core.fields.sources import Nodes
+from geodesic_core.arrays import Floats
+from geodesic_core.control import Control
+from geodesic_core.fields.path import EXACT, GeodesicPath, reversed_path, traced_path
+from geodesic_core.fields.sources import Nodes, corners_of, nodes_of
+from geodesic_core.fields.sweep import sweep_nodes, winners_of
 from geodesic_core.kernels.isolines.face_windows import FaceWindows, Reach, reach_point
 from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.kernels.sweep import state
+from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, pruning_toward
 from geodesic_core.kernels.sweep.state import SITE
 from geodesic_core.mesh.curve import weights_by_face
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.tolerances import SEARCH_SLACK, TIE
 
 
 class Arrival(NamedTuple):
@@ -69,4 +83,77 @@ def with_target(
             positions=np.vstack([nodes.positions, mesh.position(point)]),
         ),
         node,
+    )
+
+
+class NearestSource(NamedTuple):
+    """The source nearest to a point, its exact distance, and the path from there."""
+
+    source: int
+    """Index into the sources of the field; -1 where there is no path"""
+    distance: float
+    """Mesh units, the source's start distance counted; infinite where there is no path"""
+    path: GeodesicPath | None
+
+
+def find_nearest_source(
+    mesh: TriangleMesh,
+    sources: Sequence[SurfacePoint],
+    start_distances: Floats,
+    known: Floats,
+    bounds: Bounds,
+    point: SurfacePoint,
+    control: Control,
+) -> NearestSource:
+    """Return the nearest source of a field with values ``known``, found within ``bounds``.
+
+    ``known`` is by inner vertex, with more behind. O(faces in the strip), and O(V + F) for memory.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `run_sweep`.
+    """
+    nodes = nodes_of(mesh, [(point,)], sources)
+    corners, reaches = corners_of(mesh, point)
+    least = known[: len(mesh.vertices)]
+    upper = float((_most(least[corners], bounds) + reaches).min())
+    upper = min(upper, _within_face(mesh, sources, start_distances, point), bounds.max_distance)
+    if math.isinf(upper):
+        return NearestSource(-1, math.inf, None)
+    # Whatever is farther than the field was to look is as far as that, at least.
+    rest = np.minimum(least, bounds.max_distance)
+    goal = pruning_toward(np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
+    wave = state.new_wavefront(mesh.topology, nodes.sites, pruned=True)
+    control.check_memory(state.bytes_of(wave))
+    backward = exact_bounds(math.inf, goal)
+    wave = sweep_nodes(mesh, wave, nodes, np.zeros(1), backward, control, lambda _: 0.0)
+    totals = wave.vertices.distance[nodes.targets] + start_distances
+    distance = float(totals.min())
+    if distance > bounds.max_distance:
+        return NearestSource(-1, math.inf, None)
+    nearest = int(np.flatnonzero(totals <= distance * (1.0 + TIE))[0])
+    winners = winners_of(wave, np.zeros(len(wave.vertices.distance), np.int32))
+    path = traced_path(mesh, winners, nodes, int(nodes.targets[nearest]), EXACT)
+    return NearestSource(nearest, float(totals[nearest]), reversed_path(path))
+
+
+def _most(least: Floats, bounds: Bounds) -> Floats:
+    """Return the longest that distances may be of which the field has these values."""
+    if not bounds.merging:
+        return least
+    return np.minimum(least / (1.0 - bounds.relative_error), least + bounds.absolute_error)
+
+
+def _within_face(
+    mesh: TriangleMesh, sources: Sequence[SurfacePoint], starts: Floats, point: SurfacePoint
+) -> float:
+    position = mesh.position(point)
+    return min(
+        (
+            start + float(np.linalg.norm(mesh.position(source) - position))
+            for source, start in zip(sources, starts.tolist(), strict=True)
+            if source.face_index == point.face_index
+        ),
+        default=math.inf,
     )

@@ -1,17 +1,38 @@
 """From points and curves to the nodes of a sweep: vertices, sites, and the pieces of curves."""
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.errors import InvalidArgument, NoPath
+from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.kernels.sweep.state import NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.mesh.canonical import half_edges_around
-from geodesic_core.mesh.curve import PieceInFace, Polyline, pieces_of, weights_by_face
-from geodesic_core.mesh.surface_point import UNPLACED, SurfacePoint
+from geodesic_core.mesh.curve import (
+    Curve,
+    PieceInFace,
+    Polyline,
+    pieces_of,
+    polyline_of,
+    weights_by_face,
+)
+from geodesic_core.mesh.surface_point import UNPLACED, Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.validation import is_number
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A source, and the distance at which it starts (mesh units, 0 or more)."""
+
+    point: Point | Curve
+    start_distance: float = 0.0
+
+
+Sources = Point | Curve | Source | Sequence[Point | Curve | Source]
 
 
 @dataclass(frozen=True)
@@ -175,6 +196,30 @@ def _edge_faces(mesh: TriangleMesh, face: int) -> int:
     """Return how many faces the three edges of an inner face have, each edge's counted."""
     links = mesh.topology.links
     return sum(len(list(half_edges_around(links, h))) for h in range(3 * face, 3 * face + 3))
+
+
+def as_sources(mesh: TriangleMesh, sources: Any) -> tuple[tuple[Source, ...], tuple[Polyline, ...]]:
+    """Return the sources, and their canonical points."""
+    if isinstance(sources, str | bytes):
+        raise InvalidPoint(f"the source is {sources!r}; it must be a vertex index or a Source")
+    if isinstance(sources, Source | SurfacePoint | Curve) or not isinstance(sources, Iterable):
+        sources = [sources]
+    found, places = [], []
+    for i, item in enumerate(sources):
+        source = item if isinstance(item, Source) else Source(item)
+        if isinstance(source.point, Curve):
+            places.append(polyline_of(mesh, source.point, f"source {i}"))
+        else:
+            places.append((mesh.point(source.point, f"source {i}"),))
+        start = source.start_distance
+        if not is_number(start) or not (math.isfinite(start) and start >= 0.0):
+            raise InvalidArgument(
+                f"source {i} starts at {start!r}; it must be a finite number, 0 or more"
+            )
+        found.append(source)
+    if not found:
+        raise InvalidPoint("there are no sources: give at least one")
+    return tuple(found), tuple(places)
 
 
 def as_points(

@@ -1,11 +1,12 @@
 """Curves on the surface, as sources: polylines of which each piece lies in a face."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import NamedTuple
+from itertools import chain, pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidArgument, InvalidPoint
@@ -16,6 +17,8 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 Polyline = tuple[SurfacePoint, ...]
 """The canonical points of a curve; of a point, itself alone."""
+
+_NO_VERTEX = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,3 +127,29 @@ def foot_on(mesh: TriangleMesh, piece: PieceInFace, position: Floats) -> Surface
     face = int(mesh.topology.outer_face[piece.face])
     u, v, w = (share[v] for v in mesh.topology.inner_vertex[mesh.faces[face]].tolist())
     return mesh.point(SurfacePoint.face(face, (u, v, w)))
+
+
+def polylines_to_arrays(name: str, lines: Sequence[Polyline]) -> dict[str, NDArray[Any]]:
+    """Return canonical points, line by line, as arrays whose names begin with ``name``."""
+    points = list(chain.from_iterable(lines))
+    vertices = [_NO_VERTEX if p.vertex_index is None else p.vertex_index for p in points]
+    return {
+        f"{name}_sizes": np.array([len(line) for line in lines], np.int64),
+        f"{name}_faces": np.array([point.face_index for point in points], np.int64),
+        f"{name}_weights": np.array([point.barycentric for point in points]).reshape(-1, 3),
+        f"{name}_vertices": np.array(vertices, np.int64),
+    }
+
+
+def polylines_from_arrays(name: str, arrays: Mapping[str, NDArray[Any]]) -> tuple[Polyline, ...]:
+    """Return the lines that were `polylines_to_arrays` under this name."""
+    rows = zip(
+        *(arrays[f"{name}_{part}"].tolist() for part in ("faces", "weights", "vertices")),
+        strict=True,
+    )
+    points = iter(
+        SurfacePoint(face, tuple(weights), None if vertex == _NO_VERTEX else vertex)
+        for face, weights, vertex in rows
+    )
+    sizes = arrays[f"{name}_sizes"].tolist()
+    return tuple(tuple(next(points) for _ in range(size)) for size in sizes)

@@ -1,8 +1,11 @@
-"""Edges of no length: the vertices that they join are one place of the surface.
+"""Degeneracies: equal rows, faces that repeat a vertex, and edges of no length.
 
-Inside, one vertex stands for all of them, the lowest. A face with such an edge has no extent left:
-what remains of it is an edge of its neighbours, or a point.
+The vertices that an edge of no length joins are one place of the surface. Inside, the lowest stands
+for all of them. A face with such an edge has no extent: an edge of its neighbours, or a point, is
+left of it.
 """
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,3 +41,26 @@ def lowest_joined(vertex_count: int, edges: Longs) -> Longs:
     _, lowest = np.unique(label, return_index=True)
     joined: Longs = lowest[label]
     return joined
+
+
+def first_equal(rows: NDArray[Any]) -> Longs:
+    """Return for each of (N, K) rows the index of the first row that equals it; O(N log N)."""
+    order = np.lexsort(rows.T)
+    new = np.ones(len(rows), bool)
+    new[1:] = (rows[order[1:]] != rows[order[:-1]]).any(axis=1)
+    first = np.empty(len(rows), np.int64)
+    # lexsort is stable: the first of equal rows has the lowest index.
+    first[order] = order[new][np.cumsum(new) - 1]
+    return first
+
+
+def repeated_rows(rows: NDArray[Any]) -> Longs:
+    """Return the indices of the rows that equal an earlier one."""
+    return np.flatnonzero(first_equal(rows) != np.arange(len(rows)))
+
+
+def merge_equal(vertices: Floats) -> tuple[Floats, Longs]:
+    """Return distinct positions in order of first appearance, and the new index of each vertex."""
+    first = first_equal(vertices)
+    is_first = first == np.arange(len(vertices))
+    return vertices[is_first], (np.cumsum(is_first) - 1)[first]

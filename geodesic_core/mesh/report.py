@@ -17,8 +17,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     SIN_LEFT,
     Topology,
 )
-from geodesic_core.mesh.degeneracies import edges_of_no_length, of_three_vertices
-from geodesic_core.mesh.equal_rows import repeated
+from geodesic_core.mesh.degeneracies import edges_of_no_length, of_three_vertices, repeated_rows
 
 NAMED = 10
 """Ids named in a message or a report, at most."""
@@ -141,11 +140,11 @@ def report_of(
         boundary_vertices=int(np.count_nonzero(flags & BOUNDARY)),
         bow_tie_vertices=Sample.of(np.flatnonzero(flags & (FANS | SEAM) == FANS)),
         isolated_vertices=Sample.of(np.flatnonzero(~is_used)),
-        duplicate_vertices=Sample.of(used[repeated(vertices[used])]),
+        duplicate_vertices=Sample.of(used[repeated_rows(vertices[used])]),
         repeated_vertex_faces=Sample.of(outside[~of_three_vertices(faces[outside])]),
         zero_length_edges=Sample.of(edges_of_no_length(vertices, faces[collapsed])),
         collapsed_faces=Sample.of(collapsed),
-        duplicate_faces=Sample.of(surface[repeated(np.sort(corners, axis=1))]),
+        duplicate_faces=Sample.of(surface[repeated_rows(np.sort(corners, axis=1))]),
         degenerate_faces=Sample.of(np.sort(topology.outer_face[flat])),
         non_manifold_edges=Sample.of(edges[edge_faces > 2]),
         inconsistent_orientation=bool(same_way.any()),

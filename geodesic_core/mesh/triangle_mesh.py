@@ -13,11 +13,22 @@ from geodesic_core.kernels.mesh import build
 from geodesic_core.kernels.mesh.half_edges import Topology
 from geodesic_core.mesh import canonical
 from geodesic_core.mesh.closest_point import NearestFace
-from geodesic_core.mesh.degeneracies import edges_of_no_length, lowest_joined, of_three_vertices
-from geodesic_core.mesh.equal_rows import merged
+from geodesic_core.mesh.degeneracies import (
+    edges_of_no_length,
+    lowest_joined,
+    merge_equal,
+    of_three_vertices,
+)
 from geodesic_core.mesh.report import NAMED, MeshReport, report_of, warnings_of
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangulation import triangulated
+from geodesic_core.mesh.validation import (
+    as_faces,
+    as_polygons,
+    as_vertices,
+    check_corners,
+    check_vertices,
+)
 from geodesic_core.tolerances import LARGEST_COORDINATE, SHORTEST_EDGE, SNAP, WEIGHT_ERROR
 from geodesic_core.validation import as_barriers, as_limit, is_number
 
@@ -56,7 +67,7 @@ class TriangleMesh:
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, merge: Merge = "none") -> None:
-        self._build(_as_vertices(vertices), _as_faces(faces), None, merge, ())
+        self._build(as_vertices(vertices), as_faces(faces), None, merge, ())
 
     @classmethod
     def from_polygons(
@@ -90,10 +101,10 @@ class TriangleMesh:
         InvalidMesh
             As `TriangleMesh` does.
         """
-        points = _as_vertices(vertices)
-        _refuse_bad_vertices(points)
-        flat, counts = _as_polygons(corners, sizes)
-        _refuse_out_of_range(flat, counts, len(points))
+        points = as_vertices(vertices)
+        check_vertices(points)
+        flat, counts = as_polygons(corners, sizes)
+        check_corners(flat, counts, len(points))
         faces, face_map = triangulated(points, flat, counts)
         mesh = cls.__new__(cls)
         mesh._build(points, faces, face_map, merge, notes)
@@ -109,11 +120,11 @@ class TriangleMesh:
     ) -> None:
         outcome, _ = build.check_arrays(points, triangles)
         if outcome != build.SOUND:
-            _refuse_bad_vertices(points)
-            _refuse_out_of_range(triangles.reshape(-1), np.full(len(triangles), 3), len(points))
+            check_vertices(points)
+            check_corners(triangles.reshape(-1), np.full(len(triangles), 3), len(points))
         vertex_map: Longs | None = None
         if merge == "exact":
-            points, vertex_map = merged(points)
+            points, vertex_map = merge_equal(points)
             triangles = vertex_map[triangles]
         elif merge != "none":
             raise InvalidArgument(f"merge is {merge!r}; it must be 'none' or 'exact'")
@@ -391,91 +402,6 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
     return frozen
 
 
-def _as_vertices(vertices: ArrayLike) -> Floats:
-    try:
-        given = np.asarray(vertices)
-        array = np.array(given, dtype=np.float64, order="C") if given.dtype.kind in "fiuO" else None
-    except (TypeError, ValueError) as error:
-        raise InvalidMesh(f"vertices are not real numbers: {error}", kind="vertex") from error
-    if array is None:  # text and complex numbers: numpy would convert them
-        raise InvalidMesh(
-            f"vertices have type {given.dtype}; they must be real numbers", kind="vertex"
-        )
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidMesh(f"vertices have shape {array.shape}; it must be (V, 3)", kind="vertex")
-    return array
-
-
-def _as_faces(faces: ArrayLike) -> Longs:
-    try:
-        array = np.asarray(faces)
-    except ValueError as error:
-        raise InvalidMesh(f"faces are not triangles: {error}", kind="face") from error
-    if array.size == 0:
-        raise InvalidMesh("the mesh has no faces", kind="face")
-    if array.ndim != 2 or array.shape[1] != 3:
-        raise InvalidMesh(
-            f"faces have shape {array.shape}; it must be (F, 3): triangulate polygons first",
-            kind="face",
-        )
-    if array.dtype.kind not in "iu":
-        raise InvalidMesh(
-            f"faces have type {array.dtype}; vertex indices must be integers", kind="face"
-        )
-    return np.array(array, dtype=np.int64, order="C")
-
-
-def _as_polygons(corners: ArrayLike, sizes: ArrayLike) -> tuple[Longs, Longs]:
-    try:
-        flat, counts = np.asarray(corners), np.asarray(sizes)
-    except ValueError as error:
-        raise InvalidMesh(f"polygons are not rows of corners: {error}", kind="face") from error
-    if counts.size == 0:
-        raise InvalidMesh("the mesh has no faces", kind="face")
-    for name, array in (("corners", flat), ("sizes", counts)):
-        if array.ndim != 1 or array.dtype.kind not in "iu":
-            raise InvalidMesh(f"{name} must be one row of integers", kind="face")
-    empty = np.flatnonzero(counts < 1)
-    if len(empty):
-        raise InvalidMesh(
-            f"face {empty[0]} has no corners{_and_more(empty)}",
-            kind="face",
-            elements=empty[:NAMED].tolist(),
-        )
-    if counts.sum() != len(flat):
-        raise InvalidMesh(
-            f"the sizes sum to {counts.sum()}, but there are {len(flat)} corners", kind="face"
-        )
-    return flat.astype(np.int64), counts.astype(np.int64)
-
-
-def _refuse_bad_vertices(vertices: Floats) -> None:
-    with np.errstate(invalid="ignore"):
-        bad = np.flatnonzero(~(np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1))
-    if len(bad):
-        raise InvalidMesh(
-            f"vertex {bad[0]} is at {vertices[bad[0]].tolist()}: coordinates must be finite and at "
-            f"most {LARGEST_COORDINATE:g} in size{_and_more(bad)}",
-            kind="vertex",
-            elements=bad[:NAMED].tolist(),
-        )
-
-
-def _refuse_out_of_range(corners: Longs, sizes: Longs, vertex_count: int) -> None:
-    """Refuse faces, given as rows of corners one after the other, that name no vertex."""
-    is_bad = (corners < 0) | (corners >= vertex_count)
-    if not is_bad.any():
-        return
-    bad = np.unique(np.repeat(np.arange(len(sizes)), sizes)[is_bad])
-    start = int(sizes[: bad[0]].sum())
-    raise InvalidMesh(
-        f"face {bad[0]} is {corners[start : start + sizes[bad[0]]].tolist()}, but vertices are "
-        f"numbered 0 to {vertex_count - 1}{_and_more(bad)}",
-        kind="face",
-        elements=bad[:NAMED].tolist(),
-    )
-
-
 def _prepare(vertices: Floats, faces: Ints, kept: Longs) -> Topology:
     """Return the topology of some of the faces."""
     topology, outcome, bad = _built(vertices, faces, kept)
@@ -509,7 +435,3 @@ def _built(vertices: Floats, faces: Ints, kept: Longs) -> tuple[Topology, int, i
     outcome, bad = build.build_topology(vertices, faces[surface], topology)
     topology.outer_face[:] = surface[topology.outer_face]
     return topology, outcome, bad
-
-
-def _and_more(bad: Sequence[Any] | NDArray[Any]) -> str:
-    return f" (and {len(bad) - 1} more)" if len(bad) > 1 else ""

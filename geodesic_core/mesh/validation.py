@@ -1,397 +1,25 @@
-"""The triangle mesh: validated, frozen, with its topology."""
+"""Validation of the arrays that a mesh is made of; messages name the elements at fault."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from functools import cached_property
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
-from geodesic_core.kernels.mesh import build
-from geodesic_core.kernels.mesh.half_edges import Topology
-from geodesic_core.mesh import canonical
-from geodesic_core.mesh.closest_point import NearestFace
-from geodesic_core.mesh.degeneracies import edges_of_no_length, lowest_joined, of_three_vertices
-from geodesic_core.mesh.equal_rows import merged
-from geodesic_core.mesh.report import NAMED, MeshReport, report_of, warnings_of
-from geodesic_core.mesh.surface_point import SurfacePoint
-from geodesic_core.mesh.triangulation import triangulated
-from geodesic_core.tolerances import LARGEST_COORDINATE, SHORTEST_EDGE, SNAP, WEIGHT_ERROR
-from geodesic_core.validation import as_barriers, as_limit, is_number
-
-Merge = Literal["none", "exact"]
+from geodesic_core.arrays import Floats, Longs
+from geodesic_core.errors import InvalidMesh
+from geodesic_core.mesh.report import NAMED
+from geodesic_core.tolerances import LARGEST_COORDINATE
 
 
-class TriangleMesh:
-    """A triangle mesh, checked and prepared for geodesics.
-
-    Parameters
-    ----------
-    vertices
-        (V, 3) positions, mesh units; finite.
-    faces
-        (F, 3) vertex indices, integers. Neighbours may be wound differently, and an edge may have
-        any number of faces.
-    merge
-        ``"exact"`` merges vertices at equal positions, in order of first appearance;
-        `vertex_map` then leads from given to merged vertices. ``"none"`` keeps them apart.
+def as_vertices(vertices: ArrayLike) -> Floats:
+    """Return a (V, 3) float64 copy of positions, whose values `check_vertices` checks.
 
     Raises
     ------
     InvalidMesh
-        Naming the elements at fault: wrong shape or type, NaN or infinity, an index out of range,
-        no face with three vertices at different positions, an edge shorter than 1e-50.
-
-    Notes
-    -----
-    The arrays are copied once, and read-only. Vertices and faces keep the caller's order: the
-    topology's own, nearer in memory, shows nowhere. A face that repeats a vertex keeps its number,
-    but is no part of the surface: it joins nothing, and no point lies in it. To block other faces
-    as well, see `with_barriers`. An edge of no length, of a face of three different vertices, makes
-    its ends one place: their distance is 0. What is left of the face is an edge, whose points are
-    those of its other faces, or a point. Preparing costs O(V + F) time, and memory of about 365
-    bytes a face.
+        They are not rows of three real numbers.
     """
-
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, merge: Merge = "none") -> None:
-        self._build(_as_vertices(vertices), _as_faces(faces), None, merge, ())
-
-    @classmethod
-    def from_polygons(
-        cls,
-        vertices: ArrayLike,
-        corners: ArrayLike,
-        sizes: ArrayLike,
-        merge: Merge = "none",
-        notes: Sequence[str] = (),
-    ) -> "TriangleMesh":
-        """Return the mesh of polygons, each cut into triangles in its place.
-
-        `face_map` leads from faces to polygons. One of fewer than three different corners becomes
-        one face that repeats a vertex.
-
-        Parameters
-        ----------
-        vertices
-            (V, 3) positions, mesh units; finite.
-        corners
-            (C,) vertex indices of all polygons, one polygon after the other.
-        sizes
-            (P,) how many corners each polygon has, 1 or more.
-        merge
-            As `TriangleMesh` takes it.
-        notes
-            What `warnings` begin with.
-
-        Raises
-        ------
-        InvalidMesh
-            As `TriangleMesh` does.
-        """
-        points = _as_vertices(vertices)
-        _refuse_bad_vertices(points)
-        flat, counts = _as_polygons(corners, sizes)
-        _refuse_out_of_range(flat, counts, len(points))
-        faces, face_map = triangulated(points, flat, counts)
-        mesh = cls.__new__(cls)
-        mesh._build(points, faces, face_map, merge, notes)
-        return mesh
-
-    def _build(
-        self,
-        points: Floats,
-        triangles: Longs,
-        face_map: Longs | None,
-        merge: Merge,
-        notes: Sequence[str],
-    ) -> None:
-        outcome, _ = build.check_arrays(points, triangles)
-        if outcome != build.SOUND:
-            _refuse_bad_vertices(points)
-            _refuse_out_of_range(triangles.reshape(-1), np.full(len(triangles), 3), len(points))
-        vertex_map: Longs | None = None
-        if merge == "exact":
-            points, vertex_map = merged(points)
-            triangles = vertex_map[triangles]
-        elif merge != "none":
-            raise InvalidArgument(f"merge is {merge!r}; it must be 'none' or 'exact'")
-        faces = triangles.astype(np.int32)
-        topology = _prepare(points, faces, np.arange(len(faces)))
-        self._hold(points, faces, vertex_map, face_map, topology, notes)
-
-    def _hold(
-        self,
-        vertices: Floats,
-        faces: Ints,
-        vertex_map: Longs | None,
-        face_map: Longs | None,
-        topology: Topology,
-        notes: Sequence[str] = (),
-    ) -> None:
-        self.vertices = _frozen(vertices)
-        """(V, 3) float64, read-only; mesh units."""
-        self.faces = _frozen(faces)
-        """(F, 3) int32, read-only."""
-        self.vertex_map = None if vertex_map is None else _frozen(vertex_map)
-        """(given vertices,) int64: the vertex that each given one became; None where none moved."""
-        self.face_map = None if face_map is None else _frozen(face_map)
-        """(F,) int64: the polygon that each face came from; None where each polygon is one face."""
-        self.topology = Topology(*(_frozen(array) for array in topology))
-        """Half-edges and flat geometry, see `geodesic_core.kernels.mesh.half_edges`."""
-        self._notes = tuple(notes)
-
-    @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "TriangleMesh":
-        """Return the mesh whose `arrays` these are; trusted, not checked; may be memory-mapped."""
-        mesh = cls.__new__(cls)
-        mesh._hold(
-            arrays["vertices"],
-            arrays["faces"],
-            arrays.get("vertex_map"),
-            arrays.get("face_map"),
-            Topology(**{name: arrays[name] for name in Topology._fields}),
-        )
-        return mesh
-
-    def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return all arrays by name, the prepared topology included: what a store keeps."""
-        arrays: dict[str, NDArray[Any]] = {"vertices": self.vertices, "faces": self.faces}
-        if self.vertex_map is not None:
-            arrays["vertex_map"] = self.vertex_map
-        if self.face_map is not None:
-            arrays["face_map"] = self.face_map
-        return arrays | self.topology._asdict()
-
-    def with_barriers(self, barriers: Iterable[int]) -> "TriangleMesh":
-        """Return this mesh with some faces blocked: holes, at whose corners paths may bend.
-
-        Every question can be asked of it, and all vertices and faces keep their numbers. Paths run
-        along a blocked face where a free one is beside, and past it through a corner that free
-        faces share. No point lies in blocked faces alone; a vertex of these alone is as isolated
-        as one of no face: it reaches itself, and nothing else.
-
-        Parameters
-        ----------
-        barriers
-            Ids of triangles, in any order (those of polygons are found in `face_map`). What is
-            blocked already stays so.
-
-        Raises
-        ------
-        InvalidArgument
-            They are not ids of faces, or leave no face free.
-
-        Notes
-        -----
-        O(V + F): what `TriangleMesh` takes, but for checking. The two share vertices and faces.
-        Nothing is kept of it here: who asks again among the same barriers keeps the mesh.
-        """
-        blocked = as_barriers(barriers, len(self.faces))
-        added = np.setdiff1d(blocked[of_three_vertices(self.faces[blocked])], self.barriers)
-        if len(added) == 0:
-            return self
-        kept = np.setdiff1d(np.arange(len(self.faces)), np.union1d(self.barriers, added))
-        if (self.inner_face[kept] < 0).all():
-            raise InvalidArgument("the barriers block every face: there is no surface left")
-        mesh = TriangleMesh.__new__(TriangleMesh)
-        # A copy of the vertices: kernels that prepare are compiled for arrays that can be written.
-        topology = _prepare(np.array(self.vertices), self.faces, kept)
-        mesh._hold(self.vertices, self.faces, self.vertex_map, self.face_map, topology, self._notes)
-        return mesh
-
-    @cached_property
-    def barriers(self) -> Longs:
-        """(B,) int64: the faces that are blocked, ascending; see `with_barriers`."""
-        nodes = self.topology.inner_vertex[self.faces]
-        return np.flatnonzero((self.inner_face < 0) & of_three_vertices(nodes))
-
-    @cached_property
-    def nbytes(self) -> int:
-        """Memory of all arrays, bytes."""
-        return sum(array.nbytes for array in self.arrays().values())
-
-    @property
-    def components(self) -> Ints:
-        """(V,) int32: the connected component of each vertex."""
-        return self.topology.component
-
-    @cached_property
-    def inner_face(self) -> Ints:
-        """(F,) int32: the topology's number of each face; -1 of one that is not in the surface.
-
-        Such a face repeats a vertex, has an edge of no length, or is blocked.
-        """
-        inner = np.full(len(self.faces), -1, np.int32)
-        outer = self.topology.outer_face
-        inner[outer] = np.arange(len(outer), dtype=np.int32)
-        return inner
-
-    @cached_property
-    def diagonal(self) -> float:
-        """Length of the bounding box's diagonal, mesh units."""
-        return float(np.linalg.norm(self.vertices.max(axis=0) - self.vertices.min(axis=0)))
-
-    @cached_property
-    def _nearest_face(self) -> NearestFace:
-        return NearestFace(self.vertices, self.faces, np.flatnonzero(self.inner_face >= 0))
-
-    def locate(self, position: ArrayLike, max_distance: float | None = None) -> SurfacePoint:
-        """Return the point of the surface nearest to a position.
-
-        Parameters
-        ----------
-        position
-            (3,) mesh units.
-        max_distance
-            How far the surface may be, mesh units.
-
-        Raises
-        ------
-        InvalidPoint
-            The position is not three numbers of a size that vertices may have, or the surface is
-            farther away.
-        InvalidArgument
-            The distance is not a number, 0 or more.
-
-        Notes
-        -----
-        What lies within 1e-12 of the bounding box from a vertex or an edge counts as on it. The
-        first call builds a search tree, O(F log F).
-        """
-        try:
-            place = np.asarray(position, dtype=np.float64)
-        except (TypeError, ValueError):
-            place = np.empty(0)
-        if place.shape != (3,) or not (np.abs(place) <= LARGEST_COORDINATE).all():
-            raise InvalidPoint(
-                f"the position is {position!r}; it must be three finite numbers, at most "
-                f"{LARGEST_COORDINATE:g} in size"
-            )
-        limit = as_limit(max_distance)
-        face, point, distance = self._nearest_face(place)
-        if distance > limit:
-            raise InvalidPoint(
-                f"the nearest point of the surface is {distance:g} away from {place.tolist()}, "
-                f"which is more than max_distance = {limit:g}"
-            )
-        weights = canonical.weights_of(point, self.vertices[self.faces[face]], SNAP * self.diagonal)
-        return self._point_in_face(face, weights, "position")
-
-    def point(self, point: int | SurfacePoint, name: str = "point") -> SurfacePoint:
-        """Return a point in its one spelling: all that name the same come out equal, to the bit.
-
-        Raises
-        ------
-        InvalidPoint
-            It is not a point of this mesh; ``name`` is how the message calls it.
-        """
-        index: Any = point
-        if isinstance(point, SurfacePoint):
-            if point.vertex_index is None:
-                canonical.check_index(point.face_index, len(self.faces), "face", name)
-                canonical.check_weights(point.barycentric, point.face_index, name)
-                return self._point_in_face(point.face_index, point.barycentric, name)
-            index = point.vertex_index
-        canonical.check_index(index, len(self.vertices), "vertex", name)
-        return canonical.at_vertex(self.topology, self.faces, int(index))
-
-    def _point_in_face(self, face: int, weights: Sequence[float], name: str) -> SurfacePoint:
-        if not of_three_vertices(self.faces[[face]])[0]:
-            raise InvalidPoint(
-                f"the {name} is in face {face}, which repeats a vertex and is no part of the "
-                f"surface"
-            )
-        point = canonical.in_face(self.topology, self.faces, self.inner_face, face, weights)
-        if point is None and face in self.barriers:
-            raise InvalidPoint(
-                f"the {name} lies in face {face}, which is blocked, and in no face that is free"
-            )
-        if point is None:
-            raise InvalidPoint(
-                f"the {name} is in face {face}, which has an edge of no length and is no part of "
-                f"the surface: the edge that is left of it belongs to no other face"
-            )
-        return point
-
-    def point_on_edge(self, start: int, end: int, t: float) -> SurfacePoint:
-        """Return the canonical point at share ``t`` of the way between the ends of an edge.
-
-        Parameters
-        ----------
-        start, end
-            Vertex indices; an edge of the surface joins them.
-        t
-            Share of the way from the first to the second, 0 to 1.
-
-        Raises
-        ------
-        InvalidPoint
-            The two are no vertices, no edge of the surface joins them, or ``t`` is not from 0 to 1.
-        """
-        for vertex in (start, end):
-            canonical.check_index(vertex, len(self.vertices), "vertex", "end of the edge")
-        if not is_number(t) or not -WEIGHT_ERROR <= t <= 1.0 + WEIGHT_ERROR:
-            raise InvalidPoint(f"t is {t!r}; it must be a number from 0 to 1")
-        share = min(max(float(t), 0.0), 1.0)
-        point = canonical.on_edge(self.topology, self.faces, start, end, share)
-        if point is None:
-            kind = "edge of a free face" if len(self.barriers) else "edge"
-            raise InvalidPoint(f"no {kind} joins the vertices {start} and {end}")
-        return point
-
-    def position(self, point: int | SurfacePoint) -> Floats:
-        """Return the (3,) position of a point, mesh units; of a vertex exactly the mesh's own.
-
-        Raises
-        ------
-        InvalidPoint
-            It is not a point of this mesh.
-        """
-        if isinstance(point, SurfacePoint) and point.vertex_index is None:
-            point = self.point(point)
-            if point.vertex_index is None:
-                return self._position_in_face(point)
-        vertex: Any = point.vertex_index if isinstance(point, SurfacePoint) else point
-        canonical.check_index(vertex, len(self.vertices), "vertex", "point")
-        position: Floats = self.vertices[vertex]
-        return position
-
-    def _position_in_face(self, point: SurfacePoint) -> Floats:
-        # Not a matrix product, whose last bit depends on where its arrays lie in memory.
-        weights = np.array(point.barycentric)[:, None]
-        position: Floats = (weights * self.vertices[self.faces[point.face_index]]).sum(axis=0)
-        return position
-
-    @cached_property
-    def edge_count(self) -> int:
-        """Number of edges."""
-        return int(build.count_edges(self.topology.links))
-
-    @cached_property
-    def report(self) -> MeshReport:
-        """Counts and defects; O(V log V + F log F), computed once."""
-        return report_of(self.vertices, self.faces, self.face_map, self.topology)
-
-    @cached_property
-    def warnings(self) -> tuple[str, ...]:
-        """What a user should know of this mesh, a sentence each, with the remedy."""
-        return (*self._notes, *warnings_of(self.report))
-
-    def __repr__(self) -> str:
-        blocked = f", {len(self.barriers)} of them blocked" if len(self.barriers) else ""
-        return f"TriangleMesh({len(self.vertices)} vertices, {len(self.faces)} faces{blocked})"
-
-
-def _frozen(array: NDArray[Any]) -> NDArray[Any]:
-    """Return the array read-only: the kernels are compiled for that type alone."""
-    frozen = np.ascontiguousarray(array).view(np.ndarray)
-    frozen.flags.writeable = False
-    return frozen
-
-
-def _as_vertices(vertices: ArrayLike) -> Floats:
     try:
         given = np.asarray(vertices)
         array = np.array(given, dtype=np.float64, order="C") if given.dtype.kind in "fiuO" else None
@@ -406,7 +34,14 @@ def _as_vertices(vertices: ArrayLike) -> Floats:
     return array
 
 
-def _as_faces(faces: ArrayLike) -> Longs:
+def as_faces(faces: ArrayLike) -> Longs:
+    """Return a (F, 3) int64 copy of vertex indices, whose range `check_corners` checks.
+
+    Raises
+    ------
+    InvalidMesh
+        There are none, or they are not rows of three integers.
+    """
     try:
         array = np.asarray(faces)
     except ValueError as error:
@@ -425,7 +60,14 @@ def _as_faces(faces: ArrayLike) -> Longs:
     return np.array(array, dtype=np.int64, order="C")
 
 
-def _as_polygons(corners: ArrayLike, sizes: ArrayLike) -> tuple[Longs, Longs]:
+def as_polygons(corners: ArrayLike, sizes: ArrayLike) -> tuple[Longs, Longs]:
+    """Return int64 copies of the (C,) corners of all polygons and of their (P,) sizes.
+
+    Raises
+    ------
+    InvalidMesh
+        They are not integers, a polygon has no corners, or the sizes do not sum to C.
+    """
     try:
         flat, counts = np.asarray(corners), np.asarray(sizes)
     except ValueError as error:
@@ -449,7 +91,14 @@ def _as_polygons(corners: ArrayLike, sizes: ArrayLike) -> tuple[Longs, Longs]:
     return flat.astype(np.int64), counts.astype(np.int64)
 
 
-def _refuse_bad_vertices(vertices: Floats) -> None:
+def check_vertices(vertices: Floats) -> None:
+    """Refuse (V, 3) positions that are not finite, or larger than `LARGEST_COORDINATE`.
+
+    Raises
+    ------
+    InvalidMesh
+        Naming the vertices at fault.
+    """
     with np.errstate(invalid="ignore"):
         bad = np.flatnonzero(~(np.abs(vertices) <= LARGEST_COORDINATE).all(axis=1))
     if len(bad):
@@ -461,8 +110,14 @@ def _refuse_bad_vertices(vertices: Floats) -> None:
         )
 
 
-def _refuse_out_of_range(corners: Longs, sizes: Longs, vertex_count: int) -> None:
-    """Refuse faces, given as rows of corners one after the other, that name no vertex."""
+def check_corners(corners: Longs, sizes: Longs, vertex_count: int) -> None:
+    """Refuse faces with an index out of range; all corners are given in one row, face by face.
+
+    Raises
+    ------
+    InvalidMesh
+        Naming the faces at fault.
+    """
     is_bad = (corners < 0) | (corners >= vertex_count)
     if not is_bad.any():
         return
@@ -474,41 +129,6 @@ def _refuse_out_of_range(corners: Longs, sizes: Longs, vertex_count: int) -> Non
         kind="face",
         elements=bad[:NAMED].tolist(),
     )
-
-
-def _prepare(vertices: Floats, faces: Ints, kept: Longs) -> Topology:
-    """Return the topology of some of the faces."""
-    topology, outcome, bad = _built(vertices, faces, kept)
-    if outcome == build.TOO_SHORT:
-        joined = lowest_joined(len(vertices), edges_of_no_length(vertices, faces[kept]))
-        topology, outcome, bad = _built(vertices, joined[faces].astype(np.int32), kept)
-        topology.inner_vertex[:] = topology.inner_vertex[joined]
-        # The numbers of those that joined others are left out.
-        topology.component[:] = np.unique(topology.component[joined], return_inverse=True)[1]
-    if outcome == build.TOO_SHORT:
-        face = int(topology.outer_face[bad])
-        raise InvalidMesh(
-            f"face {face} is {faces[face].tolist()} and has an edge shorter than "
-            f"{SHORTEST_EDGE:g}: scale the mesh, or merge the edge's vertices",
-            kind="face",
-            elements=[face],
-        )
-    return topology
-
-
-def _built(vertices: Floats, faces: Ints, kept: Longs) -> tuple[Topology, int, int]:
-    """Return the topology of those faces of three different vertices, and how building it went."""
-    surface = kept[of_three_vertices(faces[kept])]
-    if len(surface) == 0:
-        raise InvalidMesh(
-            "each face repeats a vertex or has an edge of no length: there is no surface",
-            kind="face",
-            elements=kept[:NAMED].tolist(),
-        )
-    topology = build.empty_topology(len(vertices), len(surface))
-    outcome, bad = build.build_topology(vertices, faces[surface], topology)
-    topology.outer_face[:] = surface[topology.outer_face]
-    return topology, outcome, bad
 
 
 def _and_more(bad: Sequence[Any] | NDArray[Any]) -> str:

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 import geodesic_core as gc
 from app.queries import IsolinesQuery
 from app.store.meshes import OpenMesh
-from geodesic_core.fields.whole_sweep import RepeatableSweep
+from geodesic_core.fields.repeatable_sweep import RepeatableSweep
 from tests.support.service import check_problem, granted, mesh_of, serving, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}

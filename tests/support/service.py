@@ -21,7 +21,7 @@ from app.store.fields import FieldStore
 from app.store.layout import owned
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
-from geodesic_core.fields import whole_sweep
+from geodesic_core.fields import repeatable_sweep
 from tests.support.paths import real_mesh
 
 NPY = {"Accept": "application/x-npy"}
@@ -155,11 +155,11 @@ def check_problem(response: Any, status: int, code: str) -> dict[str, Any]:
 @pytest.fixture
 def sweeps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Grows by one with each sweep."""
-    run, ran = whole_sweep.RepeatableSweep.run, []
+    run, ran = repeatable_sweep.RepeatableSweep.run, []
 
     def counted(self: Any, *arguments: Any, **options: Any) -> Any:
         ran.append(1)
         return run(self, *arguments, **options)
 
-    monkeypatch.setattr(whole_sweep.RepeatableSweep, "run", counted)
+    monkeypatch.setattr(repeatable_sweep.RepeatableSweep, "run", counted)
     return ran

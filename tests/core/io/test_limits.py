@@ -168,6 +168,6 @@ def test_lack_of_memory_is_no_fault_of_the_file(monkeypatch: pytest.MonkeyPatch)
     def run_out(*_: Any) -> None:
         raise MemoryError
 
-    monkeypatch.setattr("geodesic_core.io.load.glb_faces", run_out)
+    monkeypatch.setattr("geodesic_core.io.glb.count_faces", run_out)
     with pytest.raises(MemoryError):
         load_mesh(glb(VERTICES, FACES), "glb", max_faces=1)

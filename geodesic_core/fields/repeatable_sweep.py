@@ -1,9 +1,9 @@
 """A sweep from some sources over all of a mesh: run once, or again for what was not kept."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,37 @@ from geodesic_core.kernels.sweep.state import Wavefront
 from geodesic_core.mesh.curve import Polyline
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class SweepStats:
+    """What a sweep did."""
+
+    windows_created: int
+    windows_kept: int
+    """Windows left after trimming: those that were propagated."""
+    windows_peak: int
+    """Windows alive at once, at most."""
+    windows_per_edge_created: float
+    windows_per_edge_kept: float
+    peak_bytes: int
+    """Memory of the sweep's state at its largest, the mesh itself not counted."""
+    seconds: float
+    """Time of the solve, with the allocation of its state."""
+
+    @classmethod
+    def of(
+        cls, mesh: TriangleMesh, created: int, kept: int, peak: int, peak_bytes: int, seconds: float
+    ) -> Self:
+        """Return the statistics of a sweep with these counts of windows."""
+        edges = mesh.edge_count
+        return cls(created, kept, peak, created / edges, kept / edges, peak_bytes, seconds)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the statistics as what JSON can hold."""
+        return asdict(self)
 
 
 class SweepResult(NamedTuple):
@@ -147,3 +178,34 @@ def all_winners(wave: Wavefront) -> Winners:
 def peak_bytes(wave: Wavefront) -> int:
     """Return the memory of a sweep that has finished, and of the windows that it kept."""
     return state.bytes_of(wave) + (face_windows.bytes_of(wave) if len(wave.pool.retained) else 0)
+
+
+def stats_of(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
+    """Return the statistics of a sweep that has finished."""
+    created, kept, peak = (int(wave.counters[i]) for i in (state.CREATED, state.KEPT, state.PEAK))
+    return SweepStats.of(mesh, created, kept, peak, peak_bytes(wave), seconds)
+
+
+class Lazy(Generic[T]):
+    """A value that is there already, or is found at the first call that is not stopped."""
+
+    def __init__(self, find: Callable[[Control], T], found: T | None = None) -> None:
+        self._find = find
+        self._found = found
+
+    @property
+    def found(self) -> T | None:
+        """The value, if it is there."""
+        return self._found
+
+    def get(self, control: Control) -> T:
+        """Return the value.
+
+        Raises
+        ------
+        GeodesicError
+            As finding it does; the next call looks for it anew.
+        """
+        if self._found is None:
+            self._found = self._find(control)
+        return self._found
