@@ -25,7 +25,8 @@ LEAST_WORKER_MEMORY = 512 * MIB
 """What compiling a kernel takes."""
 
 
-def _cores() -> int:
+def available_cores() -> int:
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
@@ -104,7 +105,7 @@ class Settings(BaseSettings):
 
     store: Annotated[Path, BeforeValidator(_store)] = Path("geodesic-store")
     """Folder of meshes, results and fields, or its `file://` URL; created where it is not there."""
-    workers: PositiveInt = Field(default_factory=_cores)
+    workers: PositiveInt = Field(default_factory=available_cores)
     """Worker processes; one for each core, unless set."""
     worker_memory_bytes: int = Field(ge=LEAST_WORKER_MEMORY, default_factory=_worker_memory)
     """Memory of a worker for its work, whatever that is; what it maps (meshes) does not count."""

@@ -9,12 +9,12 @@ from geodesic_core import errors, samples
 from geodesic_core.control import Control
 from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.distance_field import DistanceField
-from geodesic_core.fields.isolines import Isoline
+from geodesic_core.fields.isolines import Isoline, resolve_chord_error, spaced_levels
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, SearchStep
 from geodesic_core.fields.repeatable_sweep import SweepStats
 from geodesic_core.fields.sources import Source
 from geodesic_core.io.load import load_mesh
-from geodesic_core.mesh.curve import Curve
+from geodesic_core.mesh.curve import Curve, share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -25,11 +25,14 @@ from geodesic_core.solvers import (
     Solver,
     approximate_distance,
     exact_distance,
+    kernel_digest,
     shortest_path,
     warm_up,
 )
+from geodesic_core.tolerances import WEIGHT_ERROR
 
 __all__ = [
+    "WEIGHT_ERROR",
     "Control",
     "Curve",
     "DistanceField",
@@ -51,10 +54,14 @@ __all__ = [
     "distance_matrix",
     "errors",
     "exact_distance",
+    "kernel_digest",
     "load_mesh",
     "nearest",
+    "resolve_chord_error",
     "samples",
+    "share_a_face",
     "shortest_path",
+    "spaced_levels",
     "warm_up",
 ]
 

@@ -17,6 +17,7 @@ from geodesic_core.fields.distance_field import DistanceField, field_of
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep, stats_of
 from geodesic_core.fields.sources import Sources, as_sources, component_of, disconnected
+from geodesic_core.kernels.jit import sources_digest
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -391,6 +392,23 @@ def warm_up() -> None:
     approximate_distance(mesh, 0, retain="paths").path_to(3)
     shortest_path(mesh, 0, 3, explain=True)
     mesh.report  # noqa: B018 - computed on access
+
+
+def kernel_digest() -> str:
+    """Return a digest of the kernels' sources: equal digests give answers equal to the bit.
+
+    Returns
+    -------
+    str
+        Hexadecimal; the same for equal sources on every machine.
+
+    Examples
+    --------
+    >>> import geodesic_core as gc
+    >>> gc.kernel_digest() == gc.kernel_digest()
+    True
+    """
+    return sources_digest()
 
 
 def _among(

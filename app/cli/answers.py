@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 def of_distances(field: "DistanceField", *, gradient: bool = False) -> "Answer":
     """Return the distances of all vertices, with the directions in which they grow if wanted."""
     from app.encoding import Answer, Indices
-    from app.queries.points import described_source
+    from app.queries.points import describe_source
     from app.queries.views import columns_of, surface_of, table_of_distances
 
     members = {
-        "sources": [described_source(field.mesh, source) for source in field.sources],
+        "sources": [describe_source(field.mesh, source) for source in field.sources],
         "distances": field.distances,
         "nearest_source": Indices(field.nearest_source),
         **({"gradient": field.gradient} if gradient else {}),
@@ -74,10 +74,10 @@ def of_isolines(
 ) -> "Answer":
     """Return the lines of a field at some levels."""
     from app.encoding import Answer
-    from app.queries.isolines import told_of
+    from app.queries.isolines import describe_level
     from app.queries.views import lines_of
 
-    lines = [told_of(level, each) for level, each in zip(levels, found, strict=True)]
+    lines = [describe_level(level, each) for level, each in zip(levels, found, strict=True)]
     members = {"isolines": lines, "error_bound": field.error_bound}
     return Answer(members, shown=("isolines",), lines=lambda: lines_of(lines))
 

@@ -64,14 +64,14 @@ class Point(NamedTuple):
 _INDEX = re.compile(r"-?[0-9]+")
 
 
-class Origin(NamedTuple):
+class PointOrCurve(NamedTuple):
     """A point, or the points of a curve, where paths start, as they were written."""
 
     text: str
     points: Sequence[Point]
 
     @classmethod
-    def parse(cls, text: str) -> "Origin":
+    def parse(cls, text: str) -> "PointOrCurve":
         """Return the point or the curve that an option names."""
         return cls(text, [Point.parse(part) for part in text.split("/")])
 
@@ -133,19 +133,19 @@ Sources = Annotated[
     ),
 ]
 Origins = Annotated[
-    list[Origin],
+    list[PointOrCurve],
     typer.Option(
         "--source",
-        parser=Origin.parse,
+        parser=PointOrCurve.parse,
         metavar="POINT",
         help=f"A source, {SPELLINGS}, {CURVES}; may be given again.",
     ),
 ]
 OriginOption = Annotated[
-    Origin,
+    PointOrCurve,
     typer.Option(
         "--source",
-        parser=Origin.parse,
+        parser=PointOrCurve.parse,
         metavar="POINT",
         help=f"What to start from, {SPELLINGS}, {CURVES}.",
     ),

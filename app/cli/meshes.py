@@ -52,11 +52,11 @@ def sample(
     faces: Annotated[int, typer.Option(help="About how many faces.")] = 20_000,
 ) -> None:
     """Make a mesh to try things on."""
+    import geodesic_core as gc
     from app.encoding import Surface
     from app.encoding.ply_mesh import ply_of
-    from geodesic_core.samples import SAMPLES
 
-    vertices, triangles = SAMPLES[name](faces)
+    vertices, triangles = gc.samples.SAMPLES[name](faces)
     files.write_file(out, ply_of(Surface(vertices, triangles)))
     typer.echo(f"mesh        {len(vertices)} vertices, {len(triangles)} faces")
     typer.echo(f"written     {out}")

@@ -8,7 +8,7 @@ from time import perf_counter
 from types import FrameType
 from typing import TYPE_CHECKING, NamedTuple
 
-from app.cli.arguments import Merge, Origin, Point
+from app.cli.arguments import Merge, Point, PointOrCurve
 
 if TYPE_CHECKING:
     from geodesic_core import Curve, SurfacePoint, TriangleMesh
@@ -38,28 +38,31 @@ def read(
 
 def point_of(mesh: "TriangleMesh", option: str, written: Point) -> "SurfacePoint":
     """Return the point of the mesh that an option names."""
-    from app.queries.points import resolve
+    from app.queries.points import resolve_point
     from geodesic_core.errors import InvalidPoint
 
     try:
-        return resolve(mesh, written.point)
+        return resolve_point(mesh, written.point)
     except InvalidPoint as error:
         raise Failure(f"{option} {written.text}: {error}") from None
 
 
-def origin_of(mesh: "TriangleMesh", option: str, written: Origin) -> "SurfacePoint | Curve":
+def origin_of(mesh: "TriangleMesh", option: str, written: PointOrCurve) -> "SurfacePoint | Curve":
     """Return the point or the curve that an option names."""
     points = [point_of(mesh, option, point) for point in written.points]
     if len(points) == 1:
         return points[0]
-    from geodesic_core import Curve
-    from geodesic_core.errors import InvalidPoint
-    from geodesic_core.mesh.curve import polyline_of
+    from itertools import pairwise
 
-    try:
-        return Curve(polyline_of(mesh, Curve(points), "the curve"))
-    except InvalidPoint as error:
-        raise Failure(f"{option} {written.text}: {error}") from None
+    from geodesic_core import Curve, share_a_face
+
+    for i, (start, end) in enumerate(pairwise(points)):
+        if not share_a_face(mesh, start, end):
+            raise Failure(
+                f"{option} {written.text}: the points {i} and {i + 1} of the curve, {start} and "
+                f"{end}, have no face in common"
+            )
+    return Curve(points)
 
 
 class Step(NamedTuple):

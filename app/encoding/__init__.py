@@ -1,12 +1,14 @@
-"""From an answer to bytes: one module for each format, and a registry of them.
+"""Encoders from answers to bytes: one module for each format, and a registry.
 
-An `Answer` is a JSON object whose members may be arrays. Beside it stand its views, which other
-formats are written from: a `Table`, lines (`Line`), places (`Place`), a `Surface`. What encoders
-return is a sequence of parts, made while it is written: no answer is in memory as a whole twice.
+An `Answer` is a JSON object whose members may be arrays. It also has views for other formats: a
+`Table`, lines (`Line`), points (`PointFeature`), a `Surface`. Encoders return an iterator of parts,
+so that no answer is in memory as a whole twice.
 """
 
 from app.encoding.answer import Answer, Encoded
-from app.encoding.form import (
+from app.encoding.negotiation import negotiate, negotiate_coding
+from app.encoding.registry import encode
+from app.encoding.representation import (
     CSV,
     FORMATS,
     GEOJSON,
@@ -19,9 +21,7 @@ from app.encoding.form import (
     SVG,
     Representation,
 )
-from app.encoding.negotiation import negotiate, negotiate_coding
-from app.encoding.registry import encode
-from app.encoding.views import Indices, Line, Place, Surface, Table
+from app.encoding.views import Indices, Line, PointFeature, Surface, Table
 
 __all__ = [
     "CSV",
@@ -38,7 +38,7 @@ __all__ = [
     "Encoded",
     "Indices",
     "Line",
-    "Place",
+    "PointFeature",
     "Representation",
     "Surface",
     "Table",

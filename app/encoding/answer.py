@@ -1,32 +1,33 @@
-"""An answer on its way out, and what becomes of it."""
+"""Answers of queries, and encoded answers."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from app.encoding.views import Line, Place, Surface, Table
+from app.encoding.views import Line, PointFeature, Surface, Table
 
 Buffer = bytes | memoryview
 
 
 @dataclass(frozen=True)
 class Answer:
-    """An answer: members of all sizes, among them arrays, and how other formats show them.
+    """The members of an answer, arrays among them, and its views for other formats.
 
     Attributes
     ----------
     members
-        In the order of the JSON object; arrays where they are large.
+        By name, in the order of the JSON object; arrays where they are large.
     arrays
-        Names of the members that are the body in binary formats (empty where that is ``None``); the
-        small ones become headers. The distances of a sparse matrix come with their rows and
-        columns. No names for an answer that has no such format.
+        Names of the members that make the body in binary formats (an empty body where the member is
+        ``None``); the other members become headers where they are small. The distances of a sparse
+        matrix come with their rows and columns. Empty for an answer without a binary format.
     shown
-        Names of the members that the views show; the small ones of the others become headers.
+        Names of the members that the views show; the others become headers where they are small.
     values
-        How many values its JSON has, where the query did not tell before it was answered.
-    table, lines, places, surface
-        Its views, or what makes them: None where it has no such view. There is at least one line.
+        Number of values in JSON, where the query could not tell it before; else 0.
+    table, lines, points, surface
+        The views, or functions that make them; None for a view that it lacks. There is at least one
+        line.
     """
 
     members: Mapping[str, Any]
@@ -35,13 +36,13 @@ class Answer:
     values: int = 0
     table: Table | None = None
     lines: Callable[[], Sequence[Line]] | None = None
-    places: Callable[[], Sequence[Place]] | None = None
+    points: Callable[[], Sequence[PointFeature]] | None = None
     surface: Surface | None = None
 
 
 @dataclass(frozen=True)
 class Encoded:
-    """What is sent: the parts of the body, made one after the other, and headers of its own."""
+    """The parts of a body, made one after the other, and its headers."""
 
     parts: Iterable[Buffer]
     headers: Mapping[str, str] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Bare arrays: little-endian, in C order, unreachable as infinity; the rest as headers."""
+"""Bare arrays: little-endian, in C order, unreachable as infinity; other members as headers."""
 
 from io import BytesIO
 from typing import Any
@@ -21,7 +21,7 @@ def to_npy(answer: Answer, dtype: str) -> Encoded:
 
 
 def to_octets(answer: Answer, dtype: str) -> Encoded:
-    """Encode the array without anything."""
+    """Encode the bytes of the array, without a header."""
     array = _body(answer, dtype)
     return Encoded([_raw(array)], _headers(answer, array.dtype, array.shape))
 
@@ -38,7 +38,7 @@ def to_npz(answer: Answer, dtype: str) -> Encoded:
 
 def _body(answer: Answer, dtype: str) -> NDArray[Any]:
     array: NDArray[Any] | None = answer.members[answer.arrays[0]]
-    if array is None:  # no path: the headers say why
+    if array is None:  # no path: the headers state the reason
         array = np.empty(0)
     try:
         with np.errstate(over="raise"):

@@ -1,4 +1,4 @@
-"""Parts of a body, neither tiny nor the whole."""
+"""Blocks of a body: small parts joined."""
 
 from collections.abc import Iterable, Iterator
 
@@ -8,16 +8,16 @@ _LEAST = 2**16
 
 
 def joined(parts: Iterable[Buffer], least: int = _LEAST) -> Iterator[Buffer]:
-    """Yield the same bytes in fewer parts: small ones joined to such of ``least`` bytes."""
-    held: list[Buffer] = []
+    """Yield the same bytes in fewer parts: small ones are joined to parts of ``least`` bytes."""
+    pending: list[Buffer] = []
     size = 0
     for part in parts:
-        if size >= least or len(part) >= least:  # a large one goes by itself: it is not copied
-            yield b"".join(held)
-            held, size = [], 0
+        if size >= least or len(part) >= least:  # a large part is not copied
+            yield b"".join(pending)
+            pending, size = [], 0
         if len(part) >= least:
             yield part
         else:
-            held.append(part)
+            pending.append(part)
             size += len(part)
-    yield b"".join(held)
+    yield b"".join(pending)

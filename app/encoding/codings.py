@@ -1,8 +1,8 @@
-"""Content codings: gzip and zstd, each at its fastest.
+"""Content codings: gzip and zstd, each at its fastest level.
 
-Numbers in decimal have little to find for more effort: on random distances, level 6 of gzip made
-answers 6 % smaller than level 1 and took five times as long; that of zstd none smaller, and eight
-times.
+More effort gains little on decimal numbers: on random distances, level 6 of gzip made answers 6 %
+smaller than level 1 and took five times as long; level 6 of zstd made none smaller and took eight
+times as long.
 """
 
 import sys
@@ -19,7 +19,7 @@ else:
     from backports import zstd
 
 LEAST = 1024
-"""Bytes from which on a body is compressed."""
+"""Bytes of the smallest body that is compressed."""
 
 
 class _Compressor(Protocol):
@@ -31,11 +31,11 @@ CODINGS: Mapping[str, Callable[[], _Compressor]] = {
     "zstd": lambda: zstd.ZstdCompressor(level=1),
     "gzip": lambda: zlib.compressobj(level=1, wbits=31),
 }
-"""In the order of preference: zstd is five times as fast, and no larger."""
+"""The codings in the order of preference: zstd is five times as fast, and no larger."""
 
 
 def compressed(encoded: Encoded, coding: str) -> Encoded:
-    """Return the same in a coding of ``CODINGS``, or as it is where it is small."""
+    """Return a body in a coding of ``CODINGS``; a small one as it is."""
     parts = iter(encoded.parts)
     first: list[Buffer] = []
     while sum(map(len, first)) < LEAST:

@@ -1,4 +1,4 @@
-"""Colours in which equal steps look equal: viridis, which is legible without colour as well."""
+"""The colour map viridis: equal steps look equal, in shades of grey as well."""
 
 from functools import cache
 from typing import Any
@@ -17,7 +17,7 @@ def largest_of(values: NDArray[np.floating[Any]]) -> float:
 
 
 def colours_of(values: NDArray[np.floating[Any]], largest: float) -> NDArray[np.uint8]:
-    """Return the colours (N, 3) of values from 0 to the ``largest``; grey for what is infinite."""
+    """Return the colours (N, 3) of values from 0 to the ``largest``; grey for infinite ones."""
     is_finite = np.isfinite(values)
     shades = np.where(is_finite, values, 0.0) / (largest or 1.0)
     colours: NDArray[np.uint8] = _table()[np.rint(shades * (_STEPS - 1)).astype(np.intp)]

@@ -10,14 +10,14 @@ from app.encoding.headers import headers_of
 from app.encoding.views import Table, table_of_lines
 
 _ROWS = 2**12
-"""How many rows are written at a time."""
+"""Rows that are written at a time."""
 
 
 def to_csv(answer: Answer) -> Encoded:
     """Encode the table, or the points of the lines."""
     table = answer.table
     if table is None:
-        assert answer.lines is not None, "what comes as CSV has a table or lines"  # noqa: S101
+        assert answer.lines is not None, "an answer in CSV has a table or lines"  # noqa: S101
         table = table_of_lines(answer.lines())
     return Encoded(_written(table), headers_of(answer, answer.shown))
 

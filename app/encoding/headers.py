@@ -1,4 +1,4 @@
-"""What formats have no room for, as headers of the response."""
+"""Members of an answer that a format has no room for, as headers of the response."""
 
 import json
 from collections.abc import Collection, Sized
@@ -10,11 +10,11 @@ from app.encoding.answer import Answer
 from app.encoding.json_document import dumped
 
 _LONGEST = 4096
-"""Servers and proxies refuse longer header lines; what does not fit is in the JSON answer."""
+"""Longest value of a header: servers and proxies refuse longer lines. JSON has all members."""
 
 
 def headers_of(answer: Answer, left_out: Collection[str]) -> dict[str, str]:
-    """Return the small members of an answer, but for some, as headers ``Geodesic-…``."""
+    """Return the small members of an answer, except some, as headers ``Geodesic-…``."""
     headers = {}
     for name, value in answer.members.items():
         if name in left_out:
@@ -26,10 +26,10 @@ def headers_of(answer: Answer, left_out: Collection[str]) -> dict[str, str]:
 
 
 def _ascii(value: Any) -> str | None:
-    """Return JSON as headers have it, None where it is too long: json is slow, and adds escapes."""
+    """Return a value as JSON in ASCII; None where that is too long for a header."""
     if isinstance(value, Sized) and 2 * len(value) > _LONGEST:
         return None  # each element has a character and a comma
-    text = dumped(value)
+    text = dumped(value)  # shorter, and faster than json
     if len(text) > _LONGEST:
         return None
     return json.dumps(orjson.loads(text), separators=(",", ":"))  # headers are Latin-1

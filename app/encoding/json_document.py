@@ -1,4 +1,4 @@
-"""JSON: all members, and ``null`` for what is not finite."""
+"""JSON: all members, with ``null`` for numbers that are not finite."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -11,7 +11,7 @@ from app.encoding.answer import Answer, Buffer, Encoded
 from app.encoding.views import Indices
 
 _VALUES, _ELEMENTS = 2**11, 2**9
-"""How many values of arrays, and elements of lists, are encoded at a time.
+"""Values of arrays, and elements of lists, that are encoded at a time.
 
 orjson reserves 40 bytes for the former, 256 for the latter. Above 128 kB malloc takes memory from
 the kernel each time anew: with eight times as many, a million values took twice as long.
@@ -53,7 +53,7 @@ def _value(value: Any) -> Iterator[Buffer]:
 
 
 def _rows_at_a_time(value: Any) -> int | None:
-    """Return how many rows of a value are encoded at a time; None for all."""
+    """Return the number of rows of a value that are encoded at a time; None for all."""
     if not isinstance(value, np.ndarray | Indices | list | tuple):
         return None
     rows = _ELEMENTS

@@ -1,9 +1,9 @@
-"""What a client accepts, and what it gets of that."""
+"""Content negotiation: from what a client accepts to one media type and one coding."""
 
 from collections.abc import Sequence
 
 from app.encoding.codings import CODINGS
-from app.encoding.form import FORMATS
+from app.encoding.representation import FORMATS
 
 
 def negotiate(
@@ -11,7 +11,7 @@ def negotiate(
 ) -> str | None:
     """Return the media type for ``Accept``, or for ``name`` of ``FORMATS``, which overrides it.
 
-    None where it is not one of the ``offers``.
+    Returns None where none of the ``offers`` is acceptable.
     """
     if name is not None:
         return FORMATS[name] if FORMATS[name] in offers else None
@@ -25,13 +25,13 @@ def negotiate(
 
 
 def negotiate_coding(accept_encoding: str | None) -> str | None:
-    """Return the content coding for ``Accept-Encoding``: of equally welcome ones the fastest."""
+    """Return the content coding for ``Accept-Encoding``: the fastest of those liked best."""
     qualities = dict(_accepted(accept_encoding or ""))
     others = qualities.get("*", 0.0)
     wanted = {coding: qualities.get(coding, others) for coding in CODINGS}
     best = max(wanted, key=lambda coding: wanted[coding])
-    is_welcome = wanted[best] > 0 and wanted[best] >= qualities.get("identity", 0.0)
-    return best if is_welcome else None
+    is_accepted = wanted[best] > 0 and wanted[best] >= qualities.get("identity", 0.0)
+    return best if is_accepted else None
 
 
 def _accepted(header: str) -> list[tuple[str, float]]:

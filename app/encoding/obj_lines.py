@@ -1,4 +1,4 @@
-"""OBJ: polylines, as programs for modelling read them."""
+"""OBJ: polylines, for modelling programs."""
 
 from collections.abc import Iterator, Sequence
 
@@ -8,8 +8,8 @@ from app.encoding.views import Line
 
 
 def to_obj(answer: Answer) -> Encoded:
-    """Encode the lines: ``l`` elements, ``p`` for one that is a point."""
-    assert answer.lines is not None, "what comes as OBJ has lines"  # noqa: S101
+    """Encode the lines as ``l`` elements, single points as ``p``."""
+    assert answer.lines is not None, "an answer in OBJ has lines"  # noqa: S101
     return Encoded(_written(answer.lines()), headers_of(answer, answer.shown))
 
 
@@ -21,8 +21,8 @@ def _written(lines: Sequence[Line]) -> Iterator[Buffer]:
             yield b"g %b\n" % group.encode()
         count = len(line.points)
         if not count:
-            told = " ".join(f"{name}={value}" for name, value in line.told.items())
-            yield b"# no line: %b\n" % told.encode()
+            properties = " ".join(f"{name}={value}" for name, value in line.properties.items())
+            yield b"# no line: %b\n" % properties.encode()
             continue
         yield ("v %r %r %r\n" * count % tuple(line.points.ravel().tolist())).encode()
         indices = [*range(first, first + count), *([first] if line.is_closed else ())]

@@ -12,14 +12,14 @@ from app.encoding.headers import headers_of
 from app.encoding.views import Indices, Surface
 
 _ROWS = 2**11
-"""How many rows are written at a time: few enough for malloc to keep their memory."""
+"""Rows that are written at a time: few enough for malloc to reuse their memory."""
 _KINDS = {"f": ("double", "<f8"), "i": ("int", "<i4")}
 _RGB = "red", "green", "blue"
 
 
 def to_ply(answer: Answer) -> Encoded:
     """Encode the surface."""
-    assert answer.surface is not None, "what comes as PLY has a surface"  # noqa: S101
+    assert answer.surface is not None, "an answer in PLY has a surface"  # noqa: S101
     return Encoded(ply_of(answer.surface), headers_of(answer, answer.shown))
 
 

@@ -1,4 +1,4 @@
-"""Which encoder writes which media type."""
+"""The encoder of each media type."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -9,7 +9,11 @@ from app.encoding.arrays import to_npy, to_npz, to_octets
 from app.encoding.blocks import joined
 from app.encoding.codings import compressed
 from app.encoding.csv_table import to_csv
-from app.encoding.form import (
+from app.encoding.geojson import to_geojson
+from app.encoding.json_document import to_json
+from app.encoding.obj_lines import to_obj
+from app.encoding.ply_mesh import to_ply
+from app.encoding.representation import (
     ARRAYS,
     CSV,
     GEOJSON,
@@ -22,10 +26,6 @@ from app.encoding.form import (
     SVG,
     Representation,
 )
-from app.encoding.geojson import to_geojson
-from app.encoding.json_document import to_json
-from app.encoding.obj_lines import to_obj
-from app.encoding.ply_mesh import to_ply
 from app.encoding.svg_drawing import to_svg
 
 _ENCODERS: Mapping[str, Callable[..., Encoded]] = {
@@ -41,11 +41,11 @@ _ENCODERS: Mapping[str, Callable[..., Encoded]] = {
 }
 
 
-def encode(answer: Answer, form: Representation) -> Encoded:
-    """Encode ``answer`` in a form that it comes in; its parts are made when they are asked for."""
-    encoder = _ENCODERS[form.media_type]
-    if form.media_type in ARRAYS:
-        encoder = partial(encoder, dtype=form.dtype)
+def encode(answer: Answer, representation: Representation) -> Encoded:
+    """Encode ``answer`` in a representation that it has; the parts are made as they are read."""
+    encoder = _ENCODERS[representation.media_type]
+    if representation.media_type in ARRAYS:
+        encoder = partial(encoder, dtype=representation.dtype)
     encoded = encoder(answer)
     encoded = replace(encoded, parts=joined(encoded.parts))
-    return encoded if form.coding is None else compressed(encoded, form.coding)
+    return encoded if representation.coding is None else compressed(encoded, representation.coding)

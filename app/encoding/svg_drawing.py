@@ -1,4 +1,4 @@
-"""SVG: lines as they look from above, along z."""
+"""SVG: lines seen from above, along z."""
 
 from collections.abc import Iterator, Sequence
 from xml.sax.saxutils import quoteattr
@@ -12,9 +12,9 @@ from app.encoding.json_document import dumped
 from app.encoding.views import Line
 
 _MARGIN = 0.02
-"""Around the drawing, as a share of its longer side."""
+"""Margin around the drawing, as a share of its longer side."""
 _STROKE = 0.003
-"""The same for the width of lines; many a viewer knows no width in pixels."""
+"""Width of lines, likewise: some viewers know no width in pixels."""
 _HEAD = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="%r %r %r %r" fill="none" '
     'stroke-width="%r" stroke-linejoin="round" stroke-linecap="round">\n'
@@ -24,7 +24,7 @@ _HEAD = (
 
 def to_svg(answer: Answer) -> Encoded:
     """Encode the lines, x to the right and y up, in a picture that they fill."""
-    assert answer.lines is not None, "what comes as SVG has lines"  # noqa: S101
+    assert answer.lines is not None, "an answer in SVG has lines"  # noqa: S101
     return Encoded(_written(answer.lines()), headers_of(answer, answer.shown))
 
 
@@ -38,7 +38,7 @@ def _written(lines: Sequence[Line]) -> Iterator[Buffer]:
 
 
 def _view_box(lines: Sequence[Line]) -> tuple[float, ...]:
-    """Return the left, the upper end, width and height of the picture, y growing downwards."""
+    """Return left, top, width and height of the picture; y grows downwards."""
     ends = [end for p in lines if len(p.points) for end in (p.points.min(0), p.points.max(0))]
     if not ends:
         return 0.0, 0.0, 1.0, 1.0
@@ -54,12 +54,12 @@ def _element(line: Line) -> str:
     points = ("%r,%r " * len(flat) % tuple(flat.ravel().tolist()))[:-1]
     if len(flat) == 1:
         points = f"{points} {points}"  # a dot, by its round caps
-    told = "".join(
+    data = "".join(
         f" data-{name}={quoteattr(value if isinstance(value, str) else dumped(value).decode())}"
-        for name, value in line.told.items()
+        for name, value in line.properties.items()
         if value is not None
     )
     return (
-        f'<{"polygon" if line.is_closed else "polyline"} stroke="{hex_colour(line.shade)}"{told} '
+        f'<{"polygon" if line.is_closed else "polyline"} stroke="{hex_colour(line.shade)}"{data} '
         f'points="{points}"/>\n'
     )

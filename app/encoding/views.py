@@ -1,4 +1,4 @@
-"""How an answer looks to programs that know no meshes: as a table, lines, places, or a surface."""
+"""Views of an answer, for formats without its structure: table, lines, points, surface."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ import orjson
 from numpy.typing import NDArray
 
 _ROWS = 2**11
-"""Rows of arrays that become cells at a time."""
+"""Rows of arrays that are turned into cells at a time."""
 
 
 class Indices:
@@ -45,34 +45,34 @@ class Table:
 
     @classmethod
     def of(cls, columns: Mapping[str, Column]) -> "Table":
-        """Return the table of some columns of one length."""
+        """Return the table with columns of one length."""
         return cls([*columns], lambda: rows_of(*columns.values()))
 
 
 @dataclass(frozen=True)
 class Line:
-    """A polyline, or what is told of there being none."""
+    """A polyline with its properties; without points where there is no line."""
 
     points: NDArray[np.float64]
-    """(K, 3), mesh units; none where there is no line"""
-    told: Mapping[str, Any]
-    """What it has in GeoJSON and CSV, under the same names in all lines of an answer"""
+    """(K, 3), mesh units; empty where there is no line"""
+    properties: Mapping[str, Any]
+    """Values for GeoJSON and CSV, under the same names in all lines of an answer"""
     group: str = ""
-    """What it belongs to, in OBJ: lines of one group follow one another"""
+    """The group in OBJ; lines of one group follow one another"""
     is_closed: bool = False
     """Whether it leads back from its last point to the first, which is not repeated"""
     shade: float = 0.0
-    """Which colour it has: 0 to 1"""
+    """The colour, from 0 to 1"""
     at_points: Mapping[str, Sequence[Any]] = field(default_factory=dict)
-    """What CSV tells of each point: K values each, under the same names in all lines"""
+    """Columns of K values for the points in CSV, under the same names in all lines"""
 
 
 @dataclass(frozen=True)
-class Place:
-    """A point, and what GeoJSON tells of it."""
+class PointFeature:
+    """A point with its properties in GeoJSON; None for a point that was not found."""
 
     position: Sequence[float] | None
-    told: Mapping[str, Any]
+    properties: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -85,33 +85,33 @@ class Surface:
 
 
 def rows_of(*columns: Column) -> Iterator[Sequence[Any]]:
-    """Yield the rows of some columns of one length, which become cells a part at a time."""
+    """Yield the rows of columns of one length, turning a part of each into cells at a time."""
     for start in range(0, len(columns[0]), _ROWS):
         part = slice(start, start + _ROWS)
         yield from zip(*(_cells(column[part]) for column in columns), strict=True)
 
 
 def table_of_lines(lines: Sequence[Line]) -> Table:
-    """Return a row for each point; one without, where there is no line."""
+    """Return the table with a row for each point, and one row for a line without points."""
     first = lines[0]
 
     def rows() -> Iterator[Sequence[Any]]:
         for line in lines:
-            told = tuple(map(_cell, line.told.values()))
+            properties = tuple(map(_cell, line.properties.values()))
             if not len(line.points):
-                yield told + (None,) * (4 + len(first.at_points))
+                yield properties + (None,) * (4 + len(first.at_points))
                 continue
             columns = *line.points.T.tolist(), *line.at_points.values()
             points = zip(range(len(line.points)), *columns, strict=True)
-            yield from (told + point for point in points)
+            yield from (properties + point for point in points)
 
-    return Table([*first.told, "point", *"xyz", *first.at_points], rows)
+    return Table([*first.properties, "point", *"xyz", *first.at_points], rows)
 
 
 def _cells(column: Column) -> Sequence[Any]:
-    """Return what stands in the cells of a column: nothing where there is no number.
+    """Return the cells of a column: empty where there is no number.
 
-    That of arrays as text, which orjson makes in a third of the time that Python takes.
+    Cells of arrays are text, which orjson makes in a third of the time that Python takes.
     """
     match column:
         case range():

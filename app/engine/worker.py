@@ -39,7 +39,7 @@ from app.engine.work import (
 )
 from app.errors import problem_of
 from app.queries import SMALL_SECONDS, ExecutionContext, FieldCache, Query, code_version, estimate
-from app.queries.validation import refuse_large_json
+from app.queries.validation import check_json_size
 from app.settings import Settings, variable_of
 from app.store.fields import FieldStore
 from app.store.lru_cache import LRUCache
@@ -148,7 +148,7 @@ class Worker:
         with clock.phase("compute"):
             found = work.query.answer(opened, grant)
         if work.form.media_type == JSON:
-            refuse_large_json(found.values, settings.max_json_values, work.query.hint)
+            check_json_size(found.values, settings.max_json_values, work.query.hint)
         with clock.phase("encode"):
             encoded = encode(found, work.form)
             written = write_result(
@@ -179,7 +179,7 @@ class Worker:
         opened = self._keep((mesh_id, b""), lambda: self.store.open(mesh_id))
         if len(barriers):
             free = opened
-            opened = self._keep((mesh_id, barriers.tobytes()), lambda: query.among(free))
+            opened = self._keep((mesh_id, barriers.tobytes()), lambda: query.with_barriers(free))
         return opened
 
     def _keep(self, name: tuple[str, bytes], open_mesh: Callable[[], OpenMesh]) -> OpenMesh:

@@ -15,7 +15,7 @@ from starlette.requests import ClientDisconnect
 
 from app.access import Caller
 from app.encoding import Representation, negotiate, negotiate_coding
-from app.encoding.form import ARRAYS, TEXTS
+from app.encoding.representation import ARRAYS, TEXTS
 from app.errors import Fault, problem
 from app.schemas.requests import AnswerParameters
 from app.service.service import RequestContext, Service

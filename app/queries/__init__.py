@@ -1,8 +1,7 @@
-"""What can be asked of a mesh: one module per kind of question, and what all of them share.
+"""The kinds of queries to a mesh, one module each, and what they share.
 
-A `Query` is a request that has been validated. Its kind says all that is known of it: what is
-checked before a worker is asked, the formats it is answered in, how it is answered, and what that
-is likely to cost.
+A `Query` is a validated request. Its class knows all of its kind: the checks before a worker is
+asked, the formats of the answer, how it is computed, and its expected cost.
 """
 
 from app.queries.base import (

@@ -1,4 +1,4 @@
-"""Exact or approximate: what queries grant, and what their answers promise."""
+"""Exact or approximate: the errors that queries allow, and the bounds that answers state."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -9,8 +9,8 @@ import orjson
 import geodesic_core as gc
 from app.errors import pointer
 from app.queries.base import ExecutionContext, Query
-from app.queries.validation import refuse_places
-from app.schemas.points import Origin, Source, StrictModel
+from app.queries.validation import invalid_fields
+from app.schemas.points import PointOrCurve, Source, StrictModel
 from app.schemas.requests import Accuracy
 from app.store.meshes import OpenMesh
 
@@ -18,26 +18,26 @@ A = TypeVar("A", bound=Accuracy)
 
 _ERRORS = ("relative_error", "absolute_error")
 
-_USUAL_ERROR = 1e-3
-"""The relative error of approximate answers where none is named."""
+_DEFAULT_ERROR = 1e-3
+"""The relative error of approximate answers where the request names none."""
 
 CERTAIN: Mapping[str, Any] = {"type": "relative", "value": 0.0, "kind": "guaranteed"}
-"""The bound of what is known without error, by any method: exact answers, and that there is none"""
+"""The bound of what is known without error: exact answers, and that there is no path."""
 
 
-def with_its_error(request: A) -> A:
-    """Return a request with the error that it grants, or refuse an error that has no sense."""
+def with_default_error(request: A) -> A:
+    """Return a request that names its error, or refuse an error of an exact answer."""
     given = [name for name, error in errors_of(request).items() if error is not None]
     if request.method == "approximate":
-        return request if given else request.model_copy(update={"relative_error": _USUAL_ERROR})
+        return request if given else request.model_copy(update={"relative_error": _DEFAULT_ERROR})
     if given:
         message = "goes with method 'approximate' only; exact answers have no error"
-        raise refuse_places([pointer(name) for name in given], message)
+        raise invalid_fields([pointer(name) for name in given], message)
     return request
 
 
 def errors_of(request: Accuracy) -> dict[str, float | None]:
-    """Return the errors that are granted."""
+    """Return the errors that a request allows, by name."""
     return {name: getattr(request, name) for name in _ERRORS}
 
 
@@ -45,38 +45,43 @@ def solve_field(
     opened: OpenMesh,
     request: Accuracy,
     sources: Sequence[gc.Source],
-    grant: ExecutionContext,
+    context: ExecutionContext,
     *,
     max_distance: float | None = None,
     targets: Sequence[gc.SurfacePoint] = (),
     isolines: bool = False,
 ) -> gc.DistanceField:
-    """Return the field of distances from some sources, as exact as it has to be; maybe a kept one.
+    """Return the field of distances from some sources, as exact as requested; maybe a cached one.
 
-    It keeps what paths need. For ``isolines`` approximate ones keep all windows. Exact ones sweep
-    again for them: their windows are so many that it takes less time and memory to find those that
-    the levels need.
+    It retains what paths need. For ``isolines`` approximate fields retain all windows. Exact fields
+    sweep again: they have so many windows that it takes less time and memory to find only those
+    that the levels need.
     """
     solver, errors = opened.solver, errors_of(request)
     # Vertices are reached in any case.
-    beside = tuple(target for target in targets if target.vertex_index is None)
-    options = {"max_distance": max_distance, "targets": beside, **grant.options}
+    off_vertices = tuple(target for target in targets if target.vertex_index is None)
+    options = {"max_distance": max_distance, "targets": off_vertices, **context.options}
 
     def solve() -> gc.DistanceField:
         if request.method == "exact":
             return solver.exact_distance(sources, **options)
         retain: gc.Retain = "windows" if isolines else "paths"
         return solver.approximate_distance(
-            sources, request.relative_error, request.absolute_error, retain=retain, **options
+            sources, errors["relative_error"], errors["absolute_error"], retain=retain, **options
         )
 
-    more = isolines and request.method != "exact"
-    question = tuple(sources), max_distance, beside, request.method, *errors.values(), more
-    return grant.fields.find(opened, question, solve)
+    if context.fields is None:
+        return solve()
+    windows = isolines and request.method != "exact"
+    values = errors.values()
+    question = tuple(sources), max_distance, off_vertices, request.method, *values, windows
+    return context.fields.find(opened, question, solve)
 
 
-def topics_of(query: Query[Any], sources: Sequence[Source | Origin]) -> tuple[str, ...]:
-    """Return what is known of the field that a query needs before its mesh is open."""
+def affinity_keys_of(
+    query: Query[Any], sources: Sequence[Source | PointOrCurve]
+) -> tuple[str, ...]:
+    """Return the affinity keys of a query that needs the field of some sources."""
     request = query.request
     rest = request.model_dump(include={"method", "max_distance", "barriers", *_ERRORS})
     written = orjson.dumps([query.mesh_id, rest, *sources], _as_source, orjson.OPT_SORT_KEYS)
@@ -88,16 +93,32 @@ def _as_source(point: StrictModel) -> dict[str, Any]:
     return {"start_distance": 0.0, **vars(point)}
 
 
+# Members of answers
+
+
 def method_of(request: Accuracy) -> dict[str, Any]:
-    """Return what answers say of their method."""
+    """Return the members that state the method."""
     return {"method": request.method, "exact": request.method == "exact"}
 
 
-def likely_bound(request: Accuracy) -> Mapping[str, Any]:
-    """Return about the same as `bound_of` for a field that is not there yet."""
+def bound_of(bound: gc.ErrorBound) -> Mapping[str, Any]:
+    """Return the members of an error bound."""
+    return {"type": bound.type, "value": bound.value, "kind": bound.kind}
+
+
+def expected_bound(request: Accuracy) -> Mapping[str, Any]:
+    """Return about the same as `bound_of`, for a field that is not solved."""
     return {"type": "relative", "value": request.relative_error or 0.0, "kind": "guaranteed"}
 
 
-def bound_of(bound: gc.ErrorBound) -> Mapping[str, Any]:
-    """Return what answers say of their error."""
-    return {"type": bound.type, "value": bound.value, "kind": bound.kind}
+def stats_of(stats: gc.SweepStats) -> Mapping[str, Any]:
+    """Return the statistics that are the same in every run; seconds are in `Server-Timing`."""
+    return {name: value for name, value in stats.as_dict().items() if name != "seconds"}
+
+
+def expected_stats(mesh: gc.TriangleMesh, share: float) -> Mapping[str, Any]:
+    """Return statistics of about as many digits, for a sweep over a share of the mesh."""
+    faces = int(share * len(mesh.faces)) + 1
+    windows = round(faces**1.5)
+    per_edge = windows / mesh.edge_count
+    return stats_of(gc.SweepStats(windows, windows, faces, per_edge, per_edge, 100 * faces, 0.0))

@@ -1,8 +1,8 @@
-"""What all queries share: a validated request to a mesh, with a stable hash."""
+"""The base of all queries: a validated request to a mesh, with a stable hash."""
 
 import hashlib
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import Any, ClassVar, Generic, Self, TypeVar
@@ -17,49 +17,54 @@ from app import __version__
 from app.encoding import JSON, NPY, OCTETS, Answer, Representation
 from app.queries.cost_model import PER_FACE_BLOCKED, Cost
 from app.queries.field_cache import FieldCache
-from app.queries.places import Places, resolved
+from app.queries.points import SurfacePoints, resolve_points
 from app.queries.validation import (
     MeshSize,
-    Named,
-    refuse_barriers_outside,
-    refuse_large_json,
-    refuse_outside,
-    refuse_places,
+    WrittenPoints,
+    check_barriers,
+    check_json_size,
+    check_points,
+    invalid_fields,
 )
-from app.schemas.points import Point, StrictModel
+from app.schemas.points import StrictModel
 from app.schemas.requests import AmongBarriers
 from app.settings import Settings
 from app.store.meshes import OpenMesh
-from geodesic_core.kernels.jit import sources_digest
 
 VALUES_OF_POINT = 8
-"""What the JSON of a point has: position, distance, and a face with three weights."""
+"""Values of a point in JSON: position, distance, and a face with three weights."""
 
 SMALL_SECONDS = 0.05
+"""Seconds of work below which a query is small: it need not wait behind long work."""
+
+UNLIMITED = 2**63
+"""A limit that no answer reaches."""
 
 R = TypeVar("R", bound=StrictModel)
 
 
 @dataclass(frozen=True)
 class ExecutionContext:
-    """What the answer to a query may take, and how it learns that it is to stop."""
+    """The resources of one answer, and the callbacks by which it is watched and stopped."""
 
     cancel: Callable[[], bool]
     progress: Callable[[float], None]
-    fields: FieldCache
-    memory_limit: int
-    max_values: int
-    """Most values of the answer, where it is written as JSON."""
-    max_cells: int
-    """Most cells of a matrix that tells its number only once it is there."""
+    fields: FieldCache | None = None
+    """Fields of earlier answers; None solves anew"""
+    memory_limit: int | None = None
+    """Bytes; None for no limit"""
+    max_values: int = UNLIMITED
+    """Most values of the answer, where it is written as JSON"""
+    max_cells: int = UNLIMITED
+    """Most cells of a sparse matrix, whose number is known only once it is computed"""
 
     def part(self, part: int, parts: int) -> "ExecutionContext":
-        """Return the grant of one of several calls, of about the same length, for one answer."""
+        """Return the context of one of several calls, of about the same length, for one answer."""
         return replace(self, progress=lambda share: self.progress((part + share) / parts))
 
     @property
     def options(self) -> dict[str, Any]:
-        """The same as the solvers have it."""
+        """The keyword arguments of solvers."""
         return {
             "cancel": self.cancel,
             "progress": self.progress,
@@ -68,14 +73,14 @@ class ExecutionContext:
 
 
 @dataclass(frozen=True)
-class Likely:
-    """What an answer is likely to cost."""
+class Forecast:
+    """The expected cost of an answer, and its expected size."""
 
     cost: Cost
     answer: Answer
-    """One of about the same size: mostly of straight distances in place of geodesic ones"""
+    """An answer of about the same size, mostly of straight distances instead of geodesic ones"""
     times: float = 1.0
-    """How many times as large the real one will be"""
+    """The size of the real answer, as a multiple of that"""
 
 
 @dataclass(frozen=True)
@@ -88,22 +93,31 @@ class Query(ABC, Generic[R]):
 
     mesh_id: str
     request: R
-    """In the one spelling that stands for all that mean the same."""
+    """Normalized: requests that mean the same are equal"""
 
     kind: ClassVar[str]
-    """As clients call it"""
+    """The name of the kind for clients"""
     model: ClassVar[type[StrictModel]]
-    """Of the request"""
+    """The model of its requests"""
 
     @classmethod
-    def ask(cls, mesh_id: str, size: MeshSize, request: R, settings: Settings) -> Self:
-        """Return the query that ``request`` asks of a mesh of this ``size``, or refuse it."""
+    def ask(
+        cls, mesh_id: str, size: MeshSize, request: R, settings: Settings | None = None
+    ) -> Self:
+        """Return the query that ``request`` asks of a mesh of this ``size``.
+
+        Raises
+        ------
+        ProblemError
+            A member of the request is invalid, or exceeds a limit of the ``settings``, if any.
+        """
         if isinstance(request, AmongBarriers):
-            refuse_barriers_outside(request.barriers, size)
+            check_barriers(request.barriers, size)
             request = request.model_copy(update={"barriers": sorted(set(request.barriers))})
-        query = cls(mesh_id, cls.normal(request))
-        query.refuse(settings)
-        refuse_outside(query.points(), size)
+        query = cls(mesh_id, cls.normalized(request))
+        if settings is not None:
+            query.check_limits(settings)
+        check_points(query.written_points(), size)
         return query
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -121,7 +135,7 @@ class Query(ABC, Generic[R]):
 
     @property
     def affinity_keys(self) -> tuple[str, ...]:
-        """What a worker that was asked before may have kept: a field, and the mesh."""
+        """What a worker may have cached of an earlier query: a field, then the mesh."""
         return (self.mesh_id,)
 
     @property
@@ -131,7 +145,7 @@ class Query(ABC, Generic[R]):
         blocked = request.barriers if isinstance(request, AmongBarriers) else ()
         return np.array(blocked, np.int64)
 
-    # What a kind says of itself
+    # What each kind defines
 
     @property
     def is_repeatable(self) -> bool:
@@ -140,72 +154,78 @@ class Query(ABC, Generic[R]):
 
     @property
     def offers(self) -> Sequence[str]:
-        """The media types that the answer comes in."""
+        """The media types of the answer."""
         return JSON, NPY, OCTETS
 
     @property
     def hint(self) -> str:
-        """What to do where the answer is too large for JSON."""
+        """The remedy for an answer that is too large for JSON."""
         return "ask for application/x-npy, with `Accept` or with ?format=npy"
 
     @classmethod
-    def normal(cls, request: R) -> R:
-        """Return the request in its one spelling, or refuse what does not go together."""
+    def normalized(cls, request: R) -> R:
+        """Return the request in its one spelling, or refuse members that contradict each other."""
         return request
 
-    def refuse(self, settings: Settings) -> None:
-        """Refuse what exceeds the limits of the service."""
+    def check_limits(self, settings: Settings) -> None:
+        """Refuse a request that exceeds the limits of the service."""
 
-    def refuse_format(self, media_type: str) -> None:
-        """Refuse what one of the ``offers`` does not hold."""
+    def check_format(self, media_type: str) -> None:
+        """Refuse a request that one of the ``offers`` has no room for."""
 
     def value_count(self, size: MeshSize) -> int:
-        """Return how many values the answer will have in JSON; 0 where only it will tell."""
+        """Return the number of values of the answer in JSON; 0 where only solving tells it."""
         return 0
 
-    def points(self) -> Named:
-        """Yield the points, in an order that ``solve`` knows."""
+    def written_points(self) -> WrittenPoints:
+        """Yield the points of the request, in the order that `solve` takes them."""
         return iter(())
 
     @abstractmethod
     def rough_seconds(self, size: MeshSize) -> float:
-        """Return about how long ``solve`` takes, as far as the size of the mesh tells."""
+        """Return about how long `solve` takes, as far as the size of the mesh tells."""
 
     @abstractmethod
-    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
-        """Answer on an open mesh, for these ``points``."""
+    def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
+        """Compute the answer on an open mesh, for the resolved points."""
 
     @abstractmethod
-    def likely(self, opened: OpenMesh, places: Places) -> Likely:
-        """Return what ``solve`` is likely to cost, without solving."""
+    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
+        """Return the expected cost of `solve`, without solving."""
 
-    # What all have
+    # What all kinds share
 
     def is_small(self, size: MeshSize) -> bool:
-        """Tell whether the answer takes so little that nobody should have to wait for it."""
+        """Tell whether the answer takes less than `SMALL_SECONDS`, about."""
         blocked = PER_FACE_BLOCKED * size.faces if len(self.barriers) else 0.0
         return self.rough_seconds(size) + blocked < SMALL_SECONDS
 
-    def refuse_answer(self, media_type: str, size: MeshSize, settings: Settings) -> None:
-        """Refuse an answer that this media type is not good for, where that is known before."""
+    def check_answer(self, media_type: str, size: MeshSize, settings: Settings) -> None:
+        """Refuse a media type that has no room for the answer, as far as that is known before."""
         if media_type == JSON:
-            refuse_large_json(self.value_count(size), settings.max_json_values, self.hint)
+            check_json_size(self.value_count(size), settings.max_json_values, self.hint)
         else:
-            self.refuse_format(media_type)
+            self.check_format(media_type)
 
-    def among(self, opened: OpenMesh) -> OpenMesh:
+    def with_barriers(self, opened: OpenMesh) -> OpenMesh:
         """Return a mesh with the ``barriers``, or refuse those that leave nothing of it."""
         try:
             return opened.with_barriers(self.barriers)
         except gc.errors.InvalidArgument as error:
-            raise refuse_places(["/barriers"], str(error)) from None
+            raise invalid_fields(["/barriers"], str(error)) from None
 
-    def answer(self, opened: OpenMesh, grant: ExecutionContext) -> Answer:
-        """Answer on a mesh that is open `among` the barriers.
+    def answer(self, opened: OpenMesh, context: ExecutionContext) -> Answer:
+        """Compute the answer on an open mesh that has the ``barriers``.
 
-        Stops with ``Cancelled`` once the grant says so.
+        Raises
+        ------
+        ProblemError
+            A point is not on the mesh, or the answer exceeds a limit of the context.
+        GeodesicError
+            The solver failed, or was stopped: ``Cancelled`` once ``context.cancel`` returns True.
         """
-        return self.solve(opened, resolved(self.points(), opened.mesh, grant.cancel), grant)
+        points = resolve_points(self.written_points(), opened.mesh, context.cancel)
+        return self.solve(opened, points, context)
 
 
 def _revived(kind: type[Query[Any]], mesh_id: str, request: bytes) -> Query[Any]:
@@ -214,26 +234,22 @@ def _revived(kind: type[Query[Any]], mesh_id: str, request: bytes) -> Query[Any]
 
 @cache
 def code_version() -> str:
-    """Return what tells answers of different code apart: release and kernel sources."""
-    return f"{__version__}+{sources_digest()}"
+    """Return the version that tells answers of different code apart: release and kernels."""
+    return f"{__version__}+{gc.kernel_digest()}"
 
 
-def result_key(query: Query[Any], form: Representation) -> str:
-    """Return the hash that names the answer to ``query`` in a form.
+def result_key(query: Query[Any], representation: Representation) -> str:
+    """Return the name of the answer to ``query`` in a representation.
 
-    It is the same in any run, unless the answer is not: that of each run has a name of its own.
+    It is the hash that `fingerprint` returns, unless the answer differs from run to run: then each
+    run has a name of its own.
     """
-    return fingerprint(query, form) if query.is_repeatable else uuid4().hex
+    return fingerprint(query, representation) if query.is_repeatable else uuid4().hex
 
 
-def fingerprint(query: Query[Any], form: Representation) -> str:
-    """Return the hash that stands for ``query`` in a form, answered by this code."""
-    names = [type(query).__name__, query.mesh_id, form, code_version()]
+def fingerprint(query: Query[Any], representation: Representation) -> str:
+    """Return the hash of ``query`` in a representation, as answered by this code."""
+    names = [type(query).__name__, query.mesh_id, representation, code_version()]
     digest = hashlib.blake2b(orjson.dumps(names), digest_size=16)
     digest.update(query.written)
     return digest.hexdigest()
-
-
-def numbered(where: str, written: Sequence[Point]) -> Iterator[tuple[str, Point]]:
-    """Yield the points of a list, each with its place."""
-    return ((f"{where}/{i}", point) for i, point in enumerate(written))

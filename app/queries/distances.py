@@ -11,14 +11,16 @@ import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, problem
 from app.queries.accuracy import (
+    affinity_keys_of,
     bound_of,
-    likely_bound,
+    expected_bound,
+    expected_stats,
     method_of,
     solve_field,
-    topics_of,
-    with_its_error,
+    stats_of,
+    with_default_error,
 )
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Likely, Query, numbered
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
     PER_POINT,
     Cost,
@@ -27,18 +29,26 @@ from app.queries.cost_model import (
     straight_to_nearest,
     sweep_cost,
 )
-from app.queries.places import Places, components_of, positions_of, unreachable
-from app.queries.points import described, described_source
-from app.queries.sources import named_sources, point_count, starts_of
-from app.queries.stats import likely_stats, stats_of
-from app.queries.validation import MeshSize, Named, refuse_more, refuse_places
+from app.queries.points import (
+    SurfacePoints,
+    components_of,
+    count_unreachable,
+    describe_point,
+    describe_source,
+    numbered,
+    point_count,
+    points_in_sources,
+    positions_of,
+    to_sources,
+)
+from app.queries.validation import MeshSize, WrittenPoints, check_count, invalid_fields
 from app.queries.views import columns_of, surface_of, table_of_distances
 from app.schemas.requests import DistancesRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
 _VALUES_INCLUDED = {"nearest_source": 1, "gradient": 3}
-"""Values of JSON for each distance"""
+"""Values in JSON for each distance, by name."""
 
 
 class DistancesQuery(Query[DistancesRequest]):
@@ -48,27 +58,24 @@ class DistancesQuery(Query[DistancesRequest]):
     model = DistancesRequest
 
     @classmethod
-    def normal(cls, request: DistancesRequest) -> DistancesRequest:
-        """Name the error that is granted, and what is included once.
-
-        The gradient is known at vertices only.
-        """
+    def normalized(cls, request: DistancesRequest) -> DistancesRequest:
+        """Name the error, and each included array once; refuse the gradient at targets."""
         if "gradient" in request.include and request.targets is not None:
             message = "gradient is that of all vertices; ask for it without targets"
-            raise refuse_places(["/include"], message)
-        once = request.model_copy(update={"include": list(dict.fromkeys(request.include))})
-        return with_its_error(once)
+            raise invalid_fields(["/include"], message)
+        included = list(dict.fromkeys(request.include))
+        return with_default_error(request.model_copy(update={"include": included}))
 
-    def refuse(self, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources."""
-        refuse_more("sources", point_count(*self.request.sources), settings, "max_sources")
+        check_count("sources", point_count(*self.request.sources), settings, "max_sources")
 
     @property
     def offers(self) -> Sequence[str]:
-        """The media types: a mesh has distances at its vertices."""
+        """The media types of the answer; PLY has room for distances of all vertices only."""
         return (JSON, NPY, OCTETS, CSV, *([PLY] if self.request.targets is None else []))
 
-    def refuse_format(self, media_type: str) -> None:
+    def check_format(self, media_type: str) -> None:
         """Refuse a second array in binary."""
         message = "does not come with a bare array; ask for json, csv or ply"
         faults = [Fault("/include", f"{name} {message}") for name in self._included]
@@ -76,7 +83,7 @@ class DistancesQuery(Query[DistancesRequest]):
             raise problem("invalid_request", f"{media_type} holds one array", errors=tuple(faults))
 
     def value_count(self, size: MeshSize) -> int:
-        """Return the number of distances and of what is told of each."""
+        """Return the number of distances, and of the values that are included with each."""
         columns = 1 + sum(_VALUES_INCLUDED[name] for name in self._included)
         if self.request.targets is None:
             return columns * size.vertices
@@ -85,12 +92,14 @@ class DistancesQuery(Query[DistancesRequest]):
     @property
     def affinity_keys(self) -> tuple[str, ...]:
         """The field of these sources, and the mesh."""
-        return topics_of(self, self.request.sources)
+        return affinity_keys_of(self, self.request.sources)
 
-    def points(self) -> Named:
+    def written_points(self) -> WrittenPoints:
         """Yield the sources, then the targets."""
         request = self.request
-        return chain(named_sources(request.sources), numbered("/targets", request.targets or ()))
+        return chain(
+            points_in_sources(request.sources), numbered("/targets", request.targets or ())
+        )
 
     def rough_seconds(self, size: MeshSize) -> float:
         """Return the cost of a sweep to the limit."""
@@ -100,16 +109,16 @@ class DistancesQuery(Query[DistancesRequest]):
         points = point_count(*request.sources) + len(request.targets or ())
         return sweep_cost(size.faces, request, share, paths=paths).seconds + PER_POINT * points
 
-    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
+    def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep once."""
         request = self.request
-        sources, targets = self._parted(places)
-        starts = starts_of(opened.mesh, request.sources, sources)
+        sources, targets = self._parted(points)
+        starts = to_sources(opened.mesh, request.sources, sources)
         field = solve_field(
             opened,
             request,
             starts,
-            grant,
+            context,
             max_distance=request.max_distance,
             targets=targets or (),
         )
@@ -121,42 +130,44 @@ class DistancesQuery(Query[DistancesRequest]):
         if "gradient" in self._included:
             included["gradient"] = field.gradient
         bound, stats = bound_of(field.error_bound), stats_of(field.stats)
-        return self._answer(opened, places, starts, distances, included, bound, stats)
+        return self._answer(opened, points, starts, distances, included, bound, stats)
 
-    def likely(self, opened: OpenMesh, places: Places) -> Likely:
-        """Return what one sweep costs; the numbers of the answer are straight distances."""
+    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
+        """Return the cost of one sweep, and an answer of straight distances."""
         request, mesh = self.request, opened.mesh
-        sources, targets = self._parted(places)
-        starts = starts_of(mesh, request.sources, sources)
+        sources, targets = self._parted(points)
+        starts = to_sources(mesh, request.sources, sources)
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(sources) * float(share_within(mesh, request.max_distance)))
         sweep = sweep_cost(len(mesh.faces), request, share, paths="gradient" in self._included)
-        away, nearest = straight_to_nearest(mesh, sources, targets, request.max_distance)
-        cost = Cost(sweep.seconds + PER_POINT * len(places), sweep.memory_bytes)
-        bound = likely_bound(request)
+        straight, nearest = straight_to_nearest(mesh, sources, targets, request.max_distance)
+        cost = Cost(sweep.seconds + PER_POINT * len(points), sweep.memory_bytes)
+        bound = expected_bound(request)
         included: dict[str, NDArray[Any]] = {}
         if "nearest_source" in self._included:
             included["nearest_source"] = nearest
         if "gradient" in self._included:
             ahead = mesh.vertices - positions_of(mesh, sources)[nearest]
-            included["gradient"] = _straight_gradient(ahead, away)
-        stats = likely_stats(mesh, share)
-        return Likely(cost, self._answer(opened, places, starts, away, included, bound, stats))
+            included["gradient"] = _straight_gradient(ahead, straight)
+        stats = expected_stats(mesh, share)
+        return Forecast(
+            cost, self._answer(opened, points, starts, straight, included, bound, stats)
+        )
 
     @property
     def _included(self) -> Sequence[str]:
         return self.request.include
 
-    def _parted(self, places: Places) -> tuple[Places, Places | None]:
+    def _parted(self, points: SurfacePoints) -> tuple[SurfacePoints, SurfacePoints | None]:
         """Return sources and targets, None where those are all vertices."""
         count = point_count(*self.request.sources)
-        return places[:count], None if self.request.targets is None else places[count:]
+        return points[:count], None if self.request.targets is None else points[count:]
 
     def _answer(
         self,
         opened: OpenMesh,
-        places: Places,
+        points: SurfacePoints,
         starts: Sequence[gc.Source],
         distances: NDArray[np.float64],
         included: Mapping[str, NDArray[Any]],
@@ -164,15 +175,15 @@ class DistancesQuery(Query[DistancesRequest]):
         stats: Mapping[str, Any],
     ) -> Answer:
         mesh = opened.mesh
-        sources, targets = self._parted(places)
+        sources, targets = self._parted(points)
         members: dict[str, Any] = {
             "mesh_id": self.mesh_id,
             **method_of(self.request),
             "error_bound": error_bound,
-            "sources": [described_source(mesh, start) for start in starts],
+            "sources": [describe_source(mesh, start) for start in starts],
         }
         if targets is not None:
-            members["targets"] = [described(mesh, place) for place in targets]
+            members["targets"] = [describe_point(mesh, point) for point in targets]
         members |= {
             "distances": distances,
             "unreachable": _unreachable(mesh, sources, targets, distances),
@@ -192,22 +203,22 @@ class DistancesQuery(Query[DistancesRequest]):
 
 
 def _straight_gradient(
-    ahead: NDArray[np.float64], away: NDArray[np.float64]
+    ahead: NDArray[np.float64], straight: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return the directions (V, 3) of what is straight ahead; NaN as in the real one."""
+    """Return the directions of vectors (V, 3); NaN at sources and where unreachable."""
     length = np.linalg.norm(ahead, axis=1)
-    length[~np.isfinite(away) | (length == 0.0)] = np.nan
+    length[~np.isfinite(straight) | (length == 0.0)] = np.nan
     ahead /= length[:, None]
     return ahead
 
 
 def _at(
-    targets: Places | None, at_vertices: NDArray[Any], at: Callable[[gc.SurfacePoint], Any]
+    targets: SurfacePoints | None, at_vertices: NDArray[Any], at: Callable[[gc.SurfacePoint], Any]
 ) -> NDArray[Any]:
     """Return the values of a field at targets, or at all vertices."""
     if targets is None:
         return at_vertices
-    vertices = [-1 if place.vertex_index is None else place.vertex_index for place in targets]
+    vertices = [-1 if point.vertex_index is None else point.vertex_index for point in targets]
     values = at_vertices[vertices]
     for i, vertex in enumerate(vertices):
         if vertex < 0:
@@ -217,10 +228,10 @@ def _at(
 
 def _unreachable(
     mesh: gc.TriangleMesh,
-    sources: Places,
-    targets: Places | None,
+    sources: SurfacePoints,
+    targets: SurfacePoints | None,
     distances: NDArray[np.float64],
 ) -> Mapping[str, int]:
     ends = mesh.components if targets is None else components_of(mesh, targets)
     with_a_source = np.isin(ends, components_of(mesh, sources))
-    return unreachable(np.isinf(distances), with_a_source)
+    return count_unreachable(np.isinf(distances), with_a_source)

@@ -1,4 +1,4 @@
-"""What a query is likely to take, told without running it."""
+"""Estimates: the time, memory and size of an answer, without computing it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -7,13 +7,13 @@ from typing import Any
 from app.encoding import Representation, encode
 from app.queries.base import Query
 from app.queries.cost_model import PER_FACE_BLOCKED
-from app.queries.places import resolved
+from app.queries.points import resolve_points
 from app.store.meshes import OpenMesh
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """What an answer is likely to take, in no more digits than there is sense in."""
+    """The expected cost of an answer, rounded to the digits that make sense."""
 
     seconds: float
     memory_bytes: int
@@ -21,14 +21,22 @@ class Estimate:
 
 
 def estimate(
-    query: Query[Any], form: Representation, opened: OpenMesh, cancel: Callable[[], bool]
+    query: Query[Any], representation: Representation, opened: OpenMesh, cancel: Callable[[], bool]
 ) -> Estimate:
-    """Return what the answer to ``query`` would take, or refuse its points as the answer would."""
-    places = resolved(query.points(), opened.mesh, cancel)
-    likely = query.likely(opened, places)
-    parts = encode(likely.answer, replace(form, coding=None)).parts
-    size = likely.times * sum(map(len, parts))
-    cost = likely.cost
+    """Return the expected cost of the answer to ``query``.
+
+    Raises
+    ------
+    ProblemError
+        The query cannot be answered: a point is not on the mesh, for example.
+    Cancelled
+        ``cancel`` returned True.
+    """
+    points = resolve_points(query.written_points(), opened.mesh, cancel)
+    forecast = query.forecast(opened, points)
+    parts = encode(forecast.answer, replace(representation, coding=None)).parts
+    size = forecast.times * sum(map(len, parts))
+    cost = forecast.cost
     seconds = cost.seconds
     if len(query.barriers):
         seconds += PER_FACE_BLOCKED * len(opened.mesh.faces)

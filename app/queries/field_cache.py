@@ -1,4 +1,4 @@
-"""Fields that have been solved, kept by what was asked for: the next question finds its answer."""
+"""Solved fields, cached by question, so that the next query finds them."""
 
 import hashlib
 from collections.abc import Callable, Hashable
@@ -12,7 +12,7 @@ from app.store.lru_cache import LRUCache
 from app.store.meshes import OpenMesh
 
 _WORTH_WRITING_S = 0.05
-"""Seconds of a solve; to write what takes less would take about as long, and be done as often."""
+"""Seconds of a solve from which on its field is stored: writing takes about as long."""
 
 Question = tuple[Hashable, ...]
 
@@ -29,8 +29,8 @@ class Unwritten:
 class FieldCache:
     """Fields of open meshes, at most ``capacity`` bytes; the least recently used go first.
 
-    What is not here may be in the ``store``, by any worker, found by this ``code``. Solving again
-    would give the same field to the bit, so that no answer tells whether its field was kept.
+    Other fields may be in the ``store``, written by any worker of the same ``code``. Solving again
+    would give the same field to the bit, so that no answer tells whether its field was cached.
     """
 
     def __init__(self, capacity: int, store: FieldStore, code: str) -> None:
@@ -43,7 +43,7 @@ class FieldCache:
     def find(
         self, opened: OpenMesh, question: Question, solve: Callable[[], gc.DistanceField]
     ) -> gc.DistanceField:
-        """Return the field that answers a question on a mesh: kept, or solved now."""
+        """Return the field that answers a question on a mesh: cached, stored, or solved now."""
         read_or_solve = partial(self._read_or_solve, opened, question, solve)
         field = self._fields.find((opened.name, question), read_or_solve)
         list(self._fields.surplus())
@@ -55,19 +55,19 @@ class FieldCache:
         return bool(self._unwritten)
 
     def write(self) -> None:
-        """Write into the store what has been solved since the last time, and took long."""
+        """Write into the store the fields that took long to solve since the last time."""
         while self._unwritten:
             new = self._unwritten.pop()
             self._store.write(new.mesh_id, new.key, new.field.arrays(), self._code)
 
     def forget(self, mesh: Hashable) -> None:
-        """Drop the fields of a mesh, which hold on to it; they stay in the store."""
+        """Drop the fields of a mesh, which refer to it; they stay in the store."""
         for name in [name for name in self._fields if name[0] == mesh]:
             self._fields.drop(name)
 
     @property
     def nbytes(self) -> int:
-        """Memory of all of them, bytes, each as it was when it was measured last."""
+        """Memory of all cached fields, bytes, each as it was when it was measured last."""
         return self._fields.nbytes
 
     def _read_or_solve(

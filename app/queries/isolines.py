@@ -10,22 +10,24 @@ from numpy.typing import NDArray
 import geodesic_core as gc
 from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
 from app.queries.accuracy import (
+    affinity_keys_of,
     bound_of,
-    likely_bound,
+    expected_bound,
+    expected_stats,
     method_of,
     solve_field,
-    topics_of,
-    with_its_error,
+    stats_of,
+    with_default_error,
 )
-from app.queries.base import ExecutionContext, Likely, Query
+from app.queries.base import ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
     ARC_IN_FACE,
     FACES_ON_LEVEL,
     PER_FACE_CROSSED,
     PER_POINT,
     PER_WINDOW_CROSSED,
-    PIECES_BY_WINDOWS,
-    PIECES_IN_FACE,
+    SEGMENTS_BY_WINDOWS,
+    SEGMENTS_IN_FACE,
     Cost,
     rough_share,
     share_within,
@@ -33,19 +35,27 @@ from app.queries.cost_model import (
     sweep_cost,
     typical_edge,
 )
-from app.queries.places import Places
-from app.queries.points import described_source
-from app.queries.sources import named_sources, point_count, starts_of
-from app.queries.stats import likely_stats, stats_of
-from app.queries.validation import MeshSize, Named, refuse_large_json, refuse_more, refuse_places
+from app.queries.points import (
+    SurfacePoints,
+    describe_source,
+    point_count,
+    points_in_sources,
+    to_sources,
+)
+from app.queries.validation import (
+    MeshSize,
+    WrittenPoints,
+    check_count,
+    check_json_size,
+    invalid_fields,
+)
 from app.queries.views import lines_of
 from app.schemas.requests import Accuracy, IsolinesRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
-from geodesic_core.fields.isolines import as_chord_error, spaced_levels
 
 _VALUES_OF_POINT, _VALUES_OF_LEVEL = 4, 1
-"""What the JSON of a point has: position, and the face of its piece; and what each level adds."""
+"""Values in JSON of a point (position, and the face of its segment), and of a level itself."""
 
 
 class IsolinesQuery(Query[IsolinesRequest]):
@@ -54,30 +64,30 @@ class IsolinesQuery(Query[IsolinesRequest]):
     kind = "isolines"
     model = IsolinesRequest
     offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
-    hint = "ask for fewer levels at once, or grant a larger chord_error"
+    hint = "ask for fewer levels at once, or context a larger chord_error"
 
     @classmethod
-    def normal(cls, request: IsolinesRequest) -> IsolinesRequest:
-        """Name the error that is granted; refuse levels that are told twice or not at all."""
+    def normalized(cls, request: IsolinesRequest) -> IsolinesRequest:
+        """Name the error; refuse levels and count together, or neither."""
         if request.levels is None and request.count is None:
-            raise refuse_places(["/levels"], "give levels, or count for some evenly spaced")
+            raise invalid_fields(["/levels"], "give levels, or count for some evenly spaced")
         if request.levels is not None and request.count is not None:
-            raise refuse_places(["/count"], "does not go with levels")
-        return with_its_error(request)
+            raise invalid_fields(["/count"], "does not go with levels")
+        return with_default_error(request)
 
-    def refuse(self, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources or levels."""
-        refuse_more("sources", point_count(*self.request.sources), settings, "max_sources")
-        refuse_more("levels", self._level_count, settings, "max_levels")
+        check_count("sources", point_count(*self.request.sources), settings, "max_sources")
+        check_count("levels", self._level_count, settings, "max_levels")
 
     @property
     def affinity_keys(self) -> tuple[str, ...]:
         """The field of these sources, and the mesh."""
-        return topics_of(self, self.request.sources)
+        return affinity_keys_of(self, self.request.sources)
 
-    def points(self) -> Named:
+    def written_points(self) -> WrittenPoints:
         """Yield the sources."""
-        return named_sources(self.request.sources)
+        return points_in_sources(self.request.sources)
 
     def rough_seconds(self, size: MeshSize) -> float:
         """Return the cost of a sweep to the limit, and of the lines."""
@@ -87,41 +97,41 @@ class IsolinesQuery(Query[IsolinesRequest]):
         sweep = sweep_cost(size.faces, request, share, crossed=crossed)
         return sweep.seconds + PER_FACE_CROSSED * crossed * size.faces
 
-    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
-        """Sweep, and draw level after level, as long as they fit into the answer."""
+    def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
+        """Sweep, then draw level by level, as long as the lines fit into the answer."""
         chord_error = self._chord_error(opened.mesh)
-        starts = starts_of(opened.mesh, self.request.sources, places)
+        starts = to_sources(opened.mesh, self.request.sources, points)
         field = solve_field(
             opened,
             self.request,
             starts,
-            grant.part(0, 2),
+            context.part(0, 2),
             max_distance=self.request.max_distance,
             isolines=True,
         )
         found: list[dict[str, Any]] = []
         values = 0
         levels = self._levels(field.distances)
-        drawn = field.each_isoline(levels, chord_error, **grant.part(1, 2).options)
+        drawn = field.each_isoline(levels, chord_error, **context.part(1, 2).options)
         for level, lines in zip(levels, drawn, strict=True):
             values += _VALUES_OF_LEVEL
             values += _VALUES_OF_POINT * sum(len(line.points) for line in lines)
-            refuse_large_json(values, grant.max_values, self.hint)
-            found.append(told_of(level, lines))
+            check_json_size(values, context.max_values, self.hint)
+            found.append(describe_level(level, lines))
         bound, stats = bound_of(field.error_bound), stats_of(field.stats)
         return self._answer(opened, starts, chord_error, found, bound, stats)
 
-    def likely(self, opened: OpenMesh, places: Places) -> Likely:
-        """Return what a sweep and its lines cost, each as it would be were geodesics straight."""
+    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
+        """Return the cost of a sweep and its lines, if geodesics were straight."""
         request, mesh = self.request, opened.mesh
         chord_error = self._chord_error(mesh)
-        starts = starts_of(mesh, request.sources, places)
+        starts = to_sources(mesh, request.sources, points)
         share = 1.0
         if request.max_distance is not None:
-            share = min(1.0, len(places) * float(share_within(mesh, request.max_distance)))
-        away, _ = straight_to_nearest(mesh, places, None, request.max_distance)
-        levels = self._levels(away)
-        crossed = [_crossed_faces(mesh, away, level) for level in levels]
+            share = min(1.0, len(points) * float(share_within(mesh, request.max_distance)))
+        straight, _ = straight_to_nearest(mesh, points, None, request.max_distance)
+        levels = self._levels(straight)
+        crossed = [_crossed_faces(mesh, straight, level) for level in levels]
         found = [
             {"level": level, "lines": [_straight_line(mesh, level, faces)] if len(faces) else []}
             for level, faces in zip(levels, crossed, strict=True)
@@ -131,12 +141,12 @@ class IsolinesQuery(Query[IsolinesRequest]):
         per_face = PER_FACE_CROSSED
         if request.method == "exact":
             per_face += PER_WINDOW_CROSSED * math.sqrt(share * len(mesh.faces))
-        seconds = sweep.seconds + PER_POINT * len(places) + per_face * float(counts.sum())
-        pieces = _pieces(mesh, request, np.array(levels), chord_error)
-        times = float(counts @ pieces) / counts.sum() if counts.any() else 1.0
-        bound, stats = likely_bound(request), likely_stats(mesh, share)
+        seconds = sweep.seconds + PER_POINT * len(points) + per_face * float(counts.sum())
+        segments = _segments_in_face(mesh, request, np.array(levels), chord_error)
+        times = float(counts @ segments) / counts.sum() if counts.any() else 1.0
+        bound, stats = expected_bound(request), expected_stats(mesh, share)
         answer = self._answer(opened, starts, chord_error, found, bound, stats)
-        return Likely(Cost(seconds, sweep.memory_bytes), answer, times)
+        return Forecast(Cost(seconds, sweep.memory_bytes), answer, times)
 
     @property
     def _level_count(self) -> int:
@@ -144,21 +154,21 @@ class IsolinesQuery(Query[IsolinesRequest]):
         return len(request.levels) if request.levels is not None else request.count or 0
 
     def _levels(self, distances: NDArray[np.float64]) -> list[float]:
-        """Return the levels that are asked for, or refuse to space some where nothing is away."""
+        """Return the levels of the request; refuse to space some where only sources are reached."""
         request = self.request
         if request.levels is not None:
             return request.levels
         try:
-            levels = spaced_levels(distances, self._level_count)
+            levels = gc.spaced_levels(distances, self._level_count)
         except gc.errors.InvalidArgument as error:
-            raise refuse_places(["/count"], str(error)) from None
+            raise invalid_fields(["/count"], str(error)) from None
         return [float(level) for level in levels]
 
     def _chord_error(self, mesh: gc.TriangleMesh) -> float:
         try:
-            return as_chord_error(mesh, self.request.chord_error)
+            return gc.resolve_chord_error(mesh, self.request.chord_error)
         except gc.errors.InvalidArgument as error:
-            raise refuse_places(["/chord_error"], str(error)) from None
+            raise invalid_fields(["/chord_error"], str(error)) from None
 
     def _answer(
         self,
@@ -175,7 +185,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
                 **method_of(self.request),
                 "error_bound": error_bound,
                 "chord_error": chord_error,
-                "sources": [described_source(opened.mesh, start) for start in starts],
+                "sources": [describe_source(opened.mesh, start) for start in starts],
                 "isolines": found,
                 "stats": stats,
                 "warnings": opened.warnings,
@@ -185,43 +195,43 @@ class IsolinesQuery(Query[IsolinesRequest]):
         )
 
 
-def told_of(level: float, lines: Sequence[gc.Isoline]) -> dict[str, Any]:
-    """Return what answers say of a level."""
-    told = [
+def describe_level(level: float, lines: Sequence[gc.Isoline]) -> dict[str, Any]:
+    """Return the members of a level."""
+    members = [
         {"closed": each.closed, "length": each.length, "points": each.points, "faces": each.faces}
         for each in lines
     ]
-    return {"level": level, "lines": told}
+    return {"level": level, "lines": members}
 
 
 def _crossed_faces(
-    mesh: gc.TriangleMesh, away: NDArray[np.float64], level: float
+    mesh: gc.TriangleMesh, distances: NDArray[np.float64], level: float
 ) -> NDArray[np.int32]:
-    """Return the faces that have corners on both sides of a level."""
-    inside = away[mesh.faces] <= level
+    """Return the faces with corners on both sides of a level."""
+    inside = distances[mesh.faces] <= level
     return np.flatnonzero(inside.any(axis=1) & ~inside.all(axis=1)).astype(np.int32)
 
 
 def _straight_line(mesh: gc.TriangleMesh, level: float, faces: NDArray[np.int32]) -> dict[str, Any]:
-    """Return a line of a point for each face that is crossed."""
+    """Return a line with one point for each face that it crosses."""
     points = mesh.vertices[mesh.faces[faces]].mean(axis=1)
     return {"closed": True, "length": level, "points": points, "faces": faces}
 
 
-def _pieces(
+def _segments_in_face(
     mesh: gc.TriangleMesh,
     request: Accuracy,
     levels: NDArray[np.float64],
     chord_error: float,
 ) -> NDArray[np.float64]:
-    """Return in how many pieces a line of each level crosses a face.
+    """Return the number of segments in which a line of each level crosses a face.
 
     Windows cut it into arcs. An arc of radius r turns by its length over r, by a right angle at
     most, and each chord turns by √(8 c / r), for the error c.
     """
-    least = PIECES_IN_FACE
+    least = SEGMENTS_IN_FACE
     if request.method == "exact":
-        least += PIECES_BY_WINDOWS * math.sqrt(len(mesh.faces))
+        least += SEGMENTS_BY_WINDOWS * math.sqrt(len(mesh.faces))
     turns = np.minimum(ARC_IN_FACE * typical_edge(mesh) / levels, 0.5 * np.pi)
-    pieces: NDArray[np.float64] = np.maximum(turns / np.sqrt(8.0 * chord_error / levels), least)
-    return pieces
+    segments: NDArray[np.float64] = np.maximum(turns / np.sqrt(8.0 * chord_error / levels), least)
+    return segments

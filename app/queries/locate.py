@@ -1,4 +1,4 @@
-"""Where positions are on the surface."""
+"""The points of the surface that are nearest to positions."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,12 +8,11 @@ import numpy as np
 import geodesic_core as gc
 from app.encoding import CSV, GEOJSON, JSON, Answer
 from app.errors import Fault
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Likely, Query
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
 from app.queries.cost_model import PER_POSITION, Cost
-from app.queries.places import Places, checkpoint
-from app.queries.points import described
-from app.queries.validation import MeshSize, refuse_points
-from app.queries.views import places_of, table_of_places
+from app.queries.points import SurfacePoints, checkpoint, describe_point
+from app.queries.validation import MeshSize, invalid_points
+from app.queries.views import point_features, table_of_points
 from app.schemas.requests import LocateRequest
 from app.store.meshes import OpenMesh
 
@@ -31,41 +30,42 @@ class LocateQuery(Query[LocateRequest]):
         return VALUES_OF_POINT * len(self.request.points)
 
     def rough_seconds(self, size: MeshSize) -> float:
-        """Return the cost of looking for each point."""
+        """Return the cost of locating each position."""
         return PER_POSITION * len(self.request.points)
 
-    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
-        """Look for one position after the other."""
+    def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
+        """Locate one position after the other."""
         found = []
         for i in range(len(self.request.points)):
-            checkpoint(grant.cancel)
+            checkpoint(context.cancel)
             found.append(self._located(opened.mesh, i))
         return self._answer(opened, found)
 
-    def likely(self, opened: OpenMesh, places: Places) -> Likely:
-        """Return what it costs to look for all positions, each like the one farthest out."""
-        points = self.request.points
-        farthest = max(range(len(points)), key=lambda i: max(map(abs, points[i])))
-        found = [self._located(opened.mesh, farthest)] * len(points)
-        return Likely(Cost(PER_POSITION * len(points), 0), self._answer(opened, found))
+    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
+        """Return the cost of locating all positions, each like the one farthest out."""
+        positions = self.request.points
+        farthest = max(range(len(positions)), key=lambda i: max(map(abs, positions[i])))
+        found = [self._located(opened.mesh, farthest)] * len(positions)
+        cost = Cost(PER_POSITION * len(positions), 0)
+        return Forecast(cost, self._answer(opened, found))
 
     def _located(self, mesh: gc.TriangleMesh, i: int) -> Mapping[str, Any] | None:
-        """Return what is nearest to a position; None where that is too far away."""
+        """Return the point nearest to a position; None where it is beyond the limit."""
         position, limit = self.request.points[i], self.request.max_distance
         try:
-            place = mesh.locate(position, limit)
+            point = mesh.locate(position, limit)
         except gc.errors.InvalidPoint as error:
-            if limit is None:  # it did not miss: its numbers are too large
-                raise refuse_points([Fault(f"/points/{i}", str(error))]) from None
+            if limit is None:  # not beyond a limit: its numbers are too large
+                raise invalid_points([Fault(f"/points/{i}", str(error))]) from None
             return None
-        told = described(mesh, place)
-        away = float(np.linalg.norm(np.subtract(told["position"], position)))
-        return {**told, "distance": away}
+        members = describe_point(mesh, point)
+        distance = float(np.linalg.norm(np.subtract(members["position"], position)))
+        return {**members, "distance": distance}
 
     def _answer(self, opened: OpenMesh, found: Sequence[Mapping[str, Any] | None]) -> Answer:
         return Answer(
             {"mesh_id": self.mesh_id, "points": found, "warnings": opened.warnings},
             shown=("points",),
-            table=table_of_places("point", found),
-            places=lambda: places_of("point", found),
+            table=table_of_points("point", found),
+            points=lambda: point_features("point", found),
         )

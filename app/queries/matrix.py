@@ -14,9 +14,10 @@ import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer
 from app.errors import over_limit
 from app.queries.accuracy import CERTAIN
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Likely, Query, numbered
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
     PER_POINT,
+    SWEPT_FROM,
     Cost,
     rough_share,
     search_cost,
@@ -25,19 +26,16 @@ from app.queries.cost_model import (
     straight_between,
     sweeps_cost,
 )
-from app.queries.places import Places, components_of
-from app.queries.points import described
-from app.queries.validation import MeshSize, Named, refuse_more, refuse_places
+from app.queries.points import SurfacePoints, components_of, describe_point, numbered
+from app.queries.validation import MeshSize, WrittenPoints, check_count, invalid_fields
 from app.queries.views import table_of_matrix, table_of_sparse
 from app.schemas.requests import MatrixRequest
-from app.settings import Settings
+from app.settings import Settings, available_cores
 from app.store.meshes import OpenMesh
-from geodesic_core.search.matrix import SWEEP_FROM
-from geodesic_core.search.threads import available_cores
 
 _CELLS = "cells of the matrix"
 _AT_A_TIME = 2**20
-"""Straight distances that are worked on at a time."""
+"""Straight distances that are computed at a time."""
 
 
 class MatrixQuery(Query[MatrixRequest]):
@@ -47,12 +45,12 @@ class MatrixQuery(Query[MatrixRequest]):
     model = MatrixRequest
 
     @classmethod
-    def normal(cls, request: MatrixRequest) -> MatrixRequest:
-        """Refuse pairs of which one end is missing."""
+    def normalized(cls, request: MatrixRequest) -> MatrixRequest:
+        """Refuse pairs without as many sources as targets."""
         sources, targets = len(request.sources), len(request.targets)
         if request.layout == "pairs" and sources != targets:
             message = f"there are {sources} sources and {targets} targets; pairs need as many"
-            raise refuse_places(["/targets"], message)
+            raise invalid_fields(["/targets"], message)
         return request
 
     @property
@@ -62,23 +60,23 @@ class MatrixQuery(Query[MatrixRequest]):
 
     @property
     def hint(self) -> str:
-        """What to do where the answer is too large for JSON."""
+        """The remedy for an answer that is too large for JSON."""
         if self.request.layout == "sparse":
             return "ask for application/x-npz, with `Accept` or with ?format=npz"
         return super().hint
 
-    def refuse(self, settings: Settings) -> None:
-        """Refuse too many sources or cells, where these can be told before they are found."""
-        refuse_more("sources", len(self.request.sources), settings, "max_sources")
+    def check_limits(self, settings: Settings) -> None:
+        """Refuse too many sources, or cells where their number is known before solving."""
+        check_count("sources", len(self.request.sources), settings, "max_sources")
         if self.request.layout != "sparse" or self.request.max_distance is None:
-            refuse_more(_CELLS, self._cells, settings, "max_matrix_cells")
+            check_count(_CELLS, self._cells, settings, "max_matrix_cells")
 
     def value_count(self, size: MeshSize) -> int:
-        """Return the number of cells and of what is told of each point."""
+        """Return the number of cells, and of the values of each point."""
         points = VALUES_OF_POINT * (len(self.request.sources) + len(self.request.targets))
         return points if self.request.layout == "sparse" else points + self._cells
 
-    def points(self) -> Named:
+    def written_points(self) -> WrittenPoints:
         """Yield the sources, then the targets."""
         request = self.request
         return chain(numbered("/sources", request.sources), numbered("/targets", request.targets))
@@ -91,23 +89,23 @@ class MatrixQuery(Query[MatrixRequest]):
         share = rough_share(size, 1, request.max_distance)
         return sweeps_cost(size.faces, [share] * sweeps, 1).seconds + PER_POINT * points
 
-    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
+    def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep from the smaller side."""
-        sources, targets = self._parted(places)
+        sources, targets = self._parted(points)
         request = self.request
         found: Any = opened.solver.distance_matrix(
-            sources, targets, request.max_distance, request.layout, **grant.options
+            sources, targets, request.max_distance, request.layout, **context.options
         )
-        if request.layout == "sparse" and found.nnz > grant.max_cells:
+        if request.layout == "sparse" and found.nnz > context.max_cells:
             raise over_limit(
-                "limit_exceeded", _CELLS, found.nnz, grant.max_cells, "max_matrix_cells"
+                "limit_exceeded", _CELLS, found.nnz, context.max_cells, "max_matrix_cells"
             )
-        return self._answer(opened, places, found)
+        return self._answer(opened, points, found)
 
-    def likely(self, opened: OpenMesh, places: Places) -> Likely:
-        """Return what the sweeps cost, each as far as its farthest target along a straight line."""
+    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
+        """Return the cost of sweeps, each to its farthest target along a straight line."""
         mesh, limit = opened.mesh, self.request.max_distance
-        sources, targets = self._parted(places)
+        sources, targets = self._parted(points)
         found: Any
         if self.request.layout == "pairs":
             found = straight_along(mesh, sources, targets, limit)
@@ -122,22 +120,24 @@ class MatrixQuery(Query[MatrixRequest]):
             radii = np.zeros(min(found.shape))
             np.maximum.at(radii, found.row if from_sources else found.col, found.data)
             cost = _cost_of_sweeps(mesh, radii)
-        seconds = cost.seconds + PER_POINT * len(places)
+        seconds = cost.seconds + PER_POINT * len(points)
         table = found.nnz * 12 if self.request.layout == "sparse" else found.nbytes
-        return Likely(Cost(seconds, cost.memory_bytes + table), self._answer(opened, places, found))
+        return Forecast(
+            Cost(seconds, cost.memory_bytes + table), self._answer(opened, points, found)
+        )
 
     @property
     def _cells(self) -> int:
         sources, targets = len(self.request.sources), len(self.request.targets)
         return sources if self.request.layout == "pairs" else sources * targets
 
-    def _parted(self, places: Places) -> tuple[Places, Places]:
+    def _parted(self, points: SurfacePoints) -> tuple[SurfacePoints, SurfacePoints]:
         count = len(self.request.sources)
-        return places[:count], places[count:]
+        return points[:count], points[count:]
 
-    def _answer(self, opened: OpenMesh, places: Places, found: Any) -> Answer:
+    def _answer(self, opened: OpenMesh, points: SurfacePoints, found: Any) -> Answer:
         mesh, layout = opened.mesh, self.request.layout
-        sources, targets = self._parted(places)
+        sources, targets = self._parted(points)
         starts, ends = components_of(mesh, sources), components_of(mesh, targets)
         members: dict[str, Any] = {
             "mesh_id": self.mesh_id,
@@ -145,8 +145,8 @@ class MatrixQuery(Query[MatrixRequest]):
             "exact": True,
             "error_bound": CERTAIN,
             "layout": layout,
-            "sources": _told(mesh, sources, starts),
-            "targets": _told(mesh, targets, ends),
+            "sources": _describe_ends(mesh, sources, starts),
+            "targets": _describe_ends(mesh, targets, ends),
         }
         arrays: tuple[str, ...] = ("distances",)
         if layout == "sparse":
@@ -169,23 +169,23 @@ class MatrixQuery(Query[MatrixRequest]):
             },
             "warnings": opened.warnings,
         }
-        values = VALUES_OF_POINT * len(places) + sum(members[name].size for name in arrays)
+        values = VALUES_OF_POINT * len(points) + sum(members[name].size for name in arrays)
         return Answer(members, arrays, arrays, values, table)
 
 
-def _told(
-    mesh: gc.TriangleMesh, places: Places, components: NDArray[np.int64]
+def _describe_ends(
+    mesh: gc.TriangleMesh, points: SurfacePoints, components: NDArray[np.int64]
 ) -> Sequence[Mapping[str, Any]]:
     return [
-        {**described(mesh, place), "component": component}
-        for place, component in zip(places, components.tolist(), strict=True)
+        {**describe_point(mesh, point), "component": component}
+        for point, component in zip(points, components.tolist(), strict=True)
     ]
 
 
 def _straight_sparse(
-    mesh: gc.TriangleMesh, sources: Places, targets: Places, limit: float | None
+    mesh: gc.TriangleMesh, sources: SurfacePoints, targets: SurfacePoints, limit: float | None
 ) -> coo_array:
-    """Return the straight distances that there are: some sources at a time, of all they are few."""
+    """Return the finite straight distances, computed for some sources at a time."""
     size = max(1, _AT_A_TIME // len(targets))
     rows, columns, values = [], [], []
     for first in range(0, len(sources), size):
@@ -194,12 +194,12 @@ def _straight_sparse(
         rows.append(first + row)
         columns.append(column)
         values.append(table[row, column])
-    places = np.concatenate(rows), np.concatenate(columns)
-    return coo_array((np.concatenate(values), places), shape=(len(sources), len(targets)))
+    cells = np.concatenate(rows), np.concatenate(columns)
+    return coo_array((np.concatenate(values), cells), shape=(len(sources), len(targets)))
 
 
 def _farthest(distances: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return how far the farthest that can be reached is, for each row."""
+    """Return the largest finite distance of each row, or 0."""
     farthest: NDArray[np.float64] = np.where(np.isfinite(distances), distances, 0.0).max(axis=1)
     return farthest
 
@@ -210,16 +210,19 @@ def _cost_of_sweeps(mesh: gc.TriangleMesh, radii: NDArray[np.float64]) -> Cost:
 
 
 def _cost_of_pairs(
-    mesh: gc.TriangleMesh, sources: Places, targets: Places, distances: NDArray[np.float64]
+    mesh: gc.TriangleMesh,
+    sources: SurfacePoints,
+    targets: SurfacePoints,
+    distances: NDArray[np.float64],
 ) -> Cost:
-    """Return the cost of searches and of sweeps, these from the side that has fewer points."""
+    """Return the cost of searches and of sweeps, these from the side with fewer points."""
     ends = min(sources, targets, key=lambda side: len(set(side)))
     pairs = Counter(ends)
-    searches = sum(count for count in pairs.values() if count < SWEEP_FROM)
-    radii = {end: 0.0 for end, count in pairs.items() if count >= SWEEP_FROM}
-    for end, away in zip(ends, distances.tolist(), strict=True):
-        if end in radii and away < math.inf:
-            radii[end] = max(radii[end], away)
+    searches = sum(count for count in pairs.values() if count < SWEPT_FROM)
+    radii = {end: 0.0 for end, count in pairs.items() if count >= SWEPT_FROM}
+    for end, distance in zip(ends, distances.tolist(), strict=True):
+        if end in radii and distance < math.inf:
+            radii[end] = max(radii[end], distance)
     costs = [search_cost(len(mesh.faces), searches)] if searches else []
     if radii:
         costs.append(_cost_of_sweeps(mesh, np.array(list(radii.values()))))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.encoding import CSV, GEOJSON, JSON, Answer
 from app.queries.accuracy import CERTAIN
-from app.queries.base import VALUES_OF_POINT, ExecutionContext, Likely, Query, numbered
+from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
     PER_POINT,
     Cost,
@@ -18,10 +18,15 @@ from app.queries.cost_model import (
     straight_between,
     sweeps_cost,
 )
-from app.queries.places import Places, components_of, unreachable
-from app.queries.points import described
-from app.queries.validation import MeshSize, Named, refuse_places
-from app.queries.views import places_of, table_of_places
+from app.queries.points import (
+    SurfacePoints,
+    components_of,
+    count_unreachable,
+    describe_point,
+    numbered,
+)
+from app.queries.validation import MeshSize, WrittenPoints, invalid_fields
+from app.queries.views import point_features, table_of_points
 from app.schemas.requests import NearestRequest
 from app.store.meshes import OpenMesh
 
@@ -35,19 +40,19 @@ class NearestQuery(Query[NearestRequest]):
     hint = "ask for a smaller k"
 
     @classmethod
-    def normal(cls, request: NearestRequest) -> NearestRequest:
+    def normalized(cls, request: NearestRequest) -> NearestRequest:
         """Refuse to find more candidates than there are."""
         k, count = request.k, len(request.candidates)
         if k > count:
             message = f"k is {k}; it must be an integer from 1 to the number of candidates, {count}"
-            raise refuse_places(["/k"], message)
+            raise invalid_fields(["/k"], message)
         return request
 
     def value_count(self, size: MeshSize) -> int:
-        """Return the number of values of those found."""
+        """Return the number of values of ``k`` candidates."""
         return (VALUES_OF_POINT + 1) * self.request.k
 
-    def points(self) -> Named:
+    def written_points(self) -> WrittenPoints:
         """Yield the source, then the candidates."""
         request = self.request
         return chain([("/source", request.source)], numbered("/candidates", request.candidates))
@@ -58,51 +63,51 @@ class NearestQuery(Query[NearestRequest]):
         sweep = sweeps_cost(size.faces, [share], 1)
         return sweep.seconds + PER_POINT * len(self.request.candidates)
 
-    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
+    def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep to the k-th nearest."""
-        source, *candidates = places
+        source, *candidates = points
         request = self.request
         found = opened.solver.nearest(
-            source, candidates, request.k, request.max_distance, **grant.options
+            source, candidates, request.k, request.max_distance, **context.options
         )
-        return self._answer(opened, places, found.indices, found.distances)
+        return self._answer(opened, points, found.indices, found.distances)
 
-    def likely(self, opened: OpenMesh, places: Places) -> Likely:
-        """Return what a sweep costs to the candidate that is k-th nearest along a straight line."""
+    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
+        """Return the cost of a sweep to the candidate that is k-th nearest in space."""
         mesh, k = opened.mesh, self.request.k
-        source, *candidates = places
-        away = straight_between(mesh, [source], candidates, self.request.max_distance)[0]
-        order = np.argsort(away, kind="stable")[:k]
-        order = order[np.isfinite(away[order])]
+        source, *candidates = points
+        straight = straight_between(mesh, [source], candidates, self.request.max_distance)[0]
+        order = np.argsort(straight, kind="stable")[:k]
+        order = order[np.isfinite(straight[order])]
         if len(order) == k:
-            share = float(share_within(mesh, away[order[-1]]))
+            share = float(share_within(mesh, straight[order[-1]]))
         elif self.request.max_distance is not None:
             share = float(share_within(mesh, self.request.max_distance))
         else:
             share = 1.0
         sweep = sweeps_cost(len(mesh.faces), [share], 1)
-        cost = Cost(sweep.seconds + PER_POINT * len(places), sweep.memory_bytes)
-        return Likely(cost, self._answer(opened, places, order, away[order]))
+        cost = Cost(sweep.seconds + PER_POINT * len(points), sweep.memory_bytes)
+        return Forecast(cost, self._answer(opened, points, order, straight[order]))
 
     def _answer(
         self,
         opened: OpenMesh,
-        places: Places,
+        points: SurfacePoints,
         indices: NDArray[Any],
         distances: NDArray[np.float64],
     ) -> Answer:
         mesh = opened.mesh
-        source, *candidates = places
+        source, *candidates = points
         found = [
-            {"candidate": i, "distance": away, **described(mesh, candidates[i])}
-            for i, away in zip(indices.tolist(), distances.tolist(), strict=True)
+            {"candidate": i, "distance": distance, **describe_point(mesh, candidates[i])}
+            for i, distance in zip(indices.tolist(), distances.tolist(), strict=True)
         ]
         members = {
             "mesh_id": self.mesh_id,
             "method": "exact",
             "exact": True,
             "error_bound": CERTAIN,
-            "source": described(mesh, source),
+            "source": describe_point(mesh, source),
             "nearest": found,
             "warnings": opened.warnings,
         }
@@ -110,10 +115,10 @@ class NearestQuery(Query[NearestRequest]):
             missed = np.ones(len(candidates), bool)
             missed[indices] = False
             connected = components_of(mesh, candidates) == components_of(mesh, [source])[0]
-            members["unreachable"] = unreachable(missed, connected)
+            members["unreachable"] = count_unreachable(missed, connected)
         return Answer(
             members,
             shown=("nearest",),
-            table=table_of_places("candidate", found),
-            places=lambda: places_of("candidate", found),
+            table=table_of_points("candidate", found),
+            points=lambda: point_features("candidate", found),
         )

@@ -1,4 +1,4 @@
-"""What answers say of a path, or of there being none."""
+"""The members of a path in answers, or the reason why there is none."""
 
 import math
 from typing import Any
@@ -11,11 +11,11 @@ from app.queries.accuracy import CERTAIN, bound_of
 from app.queries.cost_model import CROSSINGS
 
 SHOWN = "points", "locations", "faces"
-"""What drawings and tables of a path are made of."""
+"""The members that drawings and tables of a path show."""
 
 
 def outline_of(path: gc.GeodesicPath) -> dict[str, Any]:
-    """Return what is said of a path."""
+    """Return the members of a path."""
     return {
         "status": "ok",
         "length": path.length,
@@ -30,20 +30,20 @@ def outline_of(path: gc.GeodesicPath) -> dict[str, Any]:
 
 
 def no_outline(reason: str) -> dict[str, Any]:
-    """Return what is said where there is no path."""
+    """Return the members that stand for a path that does not exist."""
     return {"status": "no_path", "reason": reason, "points": None, "error_bound": CERTAIN}
 
 
-def likely_outline(
+def expected_outline(
     mesh: gc.TriangleMesh,
     start: NDArray[np.float64],
     end: NDArray[np.float64],
     length: float,
     edge: float,
 ) -> dict[str, Any]:
-    """Return what might be said of a path of this length: it crosses as many edges as others do.
+    """Return the members of a straight path, with as many points as paths of its length have.
 
-    There is none where the length is infinite; ``edge`` is the typical length of an edge.
+    An infinite length stands for no path; ``edge`` is the typical length of an edge.
     """
     if math.isinf(length):
         return no_outline("disconnected")

@@ -13,8 +13,8 @@ import geodesic_core as gc
 from app.encoding import CSV, GEOJSON, JSON, NPY, OBJ, OCTETS, SVG, Answer
 from app.errors import Fault, ProblemError, pointer
 from app.queries import point_text
-from app.queries.accuracy import method_of, solve_field, with_its_error
-from app.queries.base import ExecutionContext, Likely, Query, numbered
+from app.queries.accuracy import method_of, solve_field, with_default_error
+from app.queries.base import ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
     PER_PATH,
     PER_POINT,
@@ -25,16 +25,15 @@ from app.queries.cost_model import (
     sweep_cost,
     typical_edge,
 )
-from app.queries.outline import SHOWN, likely_outline, no_outline, outline_of
-from app.queries.places import Places, components_of, positions_of
-from app.queries.points import described
+from app.queries.outline import SHOWN, expected_outline, no_outline, outline_of
+from app.queries.points import SurfacePoints, components_of, describe_point, numbered, positions_of
 from app.queries.validation import (
     MeshSize,
-    Named,
+    WrittenPoints,
+    check_count,
     detail_of,
-    refuse_more,
-    refuse_places,
-    refuse_points,
+    invalid_fields,
+    invalid_points,
 )
 from app.queries.views import line_of
 from app.schemas.points import Point
@@ -51,33 +50,33 @@ class PathQuery(Query[PathRequest]):
     offers: Sequence[str] = (JSON, NPY, OCTETS, OBJ, CSV, SVG, GEOJSON)
 
     @classmethod
-    def normal(cls, request: PathRequest) -> PathRequest:
-        """Name the error that is granted."""
-        request = with_its_error(request)
+    def normalized(cls, request: PathRequest) -> PathRequest:
+        """Name the error; refuse options of exact paths where the path is approximate."""
+        request = with_default_error(request)
         if request.method == "approximate":
-            asked = {"/waypoints": request.waypoints, "/explain": request.explain}
-            given = [place for place, wanted in asked.items() if wanted]
+            options = {"/waypoints": request.waypoints, "/explain": request.explain}
+            given = [pointer for pointer, value in options.items() if value]
             if given:
-                raise refuse_places(given, "goes with method 'exact' only")
+                raise invalid_fields(given, "goes with method 'exact' only")
         return request
 
     @property
     def is_repeatable(self) -> bool:
-        """Whether the answer is the same in every run: one that tells seconds is not."""
+        """Whether the answer is the same in every run: an explained path states seconds."""
         return not self.request.explain
 
     @property
     def hint(self) -> str:
-        """What to do where the answer is too large for JSON."""
+        """The remedy for an answer that is too large for JSON."""
         if self.request.explain:
             return "ask without explain, or past fewer waypoints at once"
         return super().hint
 
-    def refuse(self, settings: Settings) -> None:
+    def check_limits(self, settings: Settings) -> None:
         """Refuse too many waypoints."""
-        refuse_more("waypoints", len(self.request.waypoints), settings, "max_waypoints")
+        check_count("waypoints", len(self.request.waypoints), settings, "max_waypoints")
 
-    def points(self) -> Named:
+    def written_points(self) -> WrittenPoints:
         """Yield the source, the target, then the waypoints."""
         ends = ("/source", self.request.source), ("/target", self.request.target)
         return chain(ends, numbered("/waypoints", self.request.waypoints))
@@ -90,10 +89,10 @@ class PathQuery(Query[PathRequest]):
             return sweep_cost(size.faces, request, share, paths=True).seconds
         return search_cost(size.faces, 1 + len(request.waypoints)).seconds
 
-    def solve(self, opened: OpenMesh, places: Places, grant: ExecutionContext) -> Answer:
-        """Search, or sweep where the path is to be approximate."""
+    def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
+        """Search for an exact path, or sweep for an approximate one."""
         request = self.request
-        source, target, *waypoints = places
+        source, target, *waypoints = points
         try:
             if request.method == "exact":
                 path = opened.solver.shortest_path(
@@ -102,7 +101,7 @@ class PathQuery(Query[PathRequest]):
                     waypoints,
                     request.max_distance,
                     explain=request.explain,
-                    **grant.options,
+                    **context.options,
                 )
             else:
                 start = [gc.Source(source)]
@@ -110,40 +109,40 @@ class PathQuery(Query[PathRequest]):
                     opened,
                     request,
                     start,
-                    grant,
+                    context,
                     max_distance=request.max_distance,
                     targets=[target],
                 )
-                path = field.path_to(target, **grant.options)
+                path = field.path_to(target, **context.options)
         except gc.errors.NoPath as error:
-            return self._answer(opened, places, no_outline(error.reason))
+            return self._answer(opened, points, no_outline(error.reason))
         found = outline_of(path)
         values = 8 * len(path.points)
         if path.steps is not None:
             found["steps"] = path.steps
             values += sum(step.faces.size for step in path.steps)
-        return replace(self._answer(opened, places, found), values=values)
+        return replace(self._answer(opened, points, found), values=values)
 
-    def likely(self, opened: OpenMesh, places: Places) -> Likely:
-        """Return what its searches or its sweep cost; the path leads straight to each stop."""
+    def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
+        """Return the cost of searches or of a sweep, and a path straight from stop to stop."""
         mesh, limit = opened.mesh, self.request.max_distance
-        source, target, *waypoints = places
+        source, target, *waypoints = points
         if self.request.method == "exact":
-            cost = search_cost(len(mesh.faces), len(places) - 1)
+            cost = search_cost(len(mesh.faces), len(points) - 1)
         else:
             share = 1.0 if limit is None else float(share_within(mesh, limit))
             cost = sweep_cost(len(mesh.faces), self.request, share, paths=True)
         stops = positions_of(mesh, [source, *waypoints, target])
         length = sum(float(np.linalg.norm(there - here)) for here, there in pairwise(stops))
         is_beyond = limit is not None and length > limit
-        if is_beyond or len(set(components_of(mesh, places).tolist())) > 1:
+        if is_beyond or len(set(components_of(mesh, points).tolist())) > 1:
             length = math.inf
-        found = likely_outline(mesh, stops[0], stops[-1], length, typical_edge(mesh))
-        seconds = cost.seconds + PER_PATH + PER_POINT * len(places)
-        return Likely(Cost(seconds, cost.memory_bytes), self._answer(opened, places, found))
+        found = expected_outline(mesh, stops[0], stops[-1], length, typical_edge(mesh))
+        seconds = cost.seconds + PER_PATH + PER_POINT * len(points)
+        return Forecast(Cost(seconds, cost.memory_bytes), self._answer(opened, points, found))
 
-    def _answer(self, opened: OpenMesh, places: Places, found: dict[str, Any]) -> Answer:
-        source, target, *waypoints = (described(opened.mesh, place) for place in places)
+    def _answer(self, opened: OpenMesh, points: SurfacePoints, found: dict[str, Any]) -> Answer:
+        source, target, *waypoints = (describe_point(opened.mesh, point) for point in points)
         members = {
             "mesh_id": self.mesh_id,
             **method_of(self.request),
@@ -159,7 +158,7 @@ class PathQuery(Query[PathRequest]):
 
 
 def written_request(parameters: PathParameters) -> PathRequest:
-    """Return the body of the ``POST`` that asks the same as the parameters of a ``GET``."""
+    """Return the body of the ``POST`` that is equivalent to the parameters of a ``GET``."""
     return PathRequest(
         source=_parsed("/source", parameters.source),
         target=_parsed("/target", parameters.target),
@@ -172,7 +171,7 @@ def written_request(parameters: PathParameters) -> PathRequest:
 
 @contextmanager
 def naming_parameters() -> Iterator[None]:
-    """Have refusals name the parameters of a ``GET`` where they name members of its body."""
+    """Rename members of the body to parameters of a ``GET`` in the problems raised inside."""
     try:
         yield
     except ProblemError as error:
@@ -184,20 +183,20 @@ def naming_parameters() -> Iterator[None]:
         ) from None
 
 
-def _parsed(place: str, text: str) -> Point:
+def _parsed(where: str, text: str) -> Point:
     try:
         return point_text.parse(text)
     except ValueError as error:
-        raise refuse_points([Fault(place, str(error))]) from None
+        raise invalid_points([Fault(where, str(error))]) from None
 
 
-def _in_query(place: str) -> str:
-    """Return the parameter of a ``GET`` that stands for a place in the body of a ``POST``."""
-    _, name, *members = place.split("/")
+def _in_query(where: str) -> str:
+    """Return the parameter of a ``GET`` for a pointer into the body of a ``POST``."""
+    _, name, *members = where.split("/")
     if name == "query":
-        return place
-    kept = members[:1] if name == "waypoints" else []  # the number of the waypoint
-    return pointer("query", _PARAMETERS.get(name, name), *kept)
+        return where
+    number = members[:1] if name == "waypoints" else []
+    return pointer("query", _PARAMETERS.get(name, name), *number)
 
 
 _PARAMETERS = {"source": "from", "target": "to", "waypoints": "via"}

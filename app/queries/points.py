@@ -1,20 +1,187 @@
-"""From a point as a client wrote it to the point of a mesh, and what answers say of that."""
+"""Points of a query: from those that a client wrote to those of the mesh, and back into answers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import chain, islice, pairwise
 from typing import Any, cast
 
+import numpy as np
+from numpy.typing import NDArray
+
 import geodesic_core as gc
-from app.schemas.points import EdgePoint, FacePoint, Point, PositionPoint, VertexPoint
+from app.errors import Fault
+from app.queries.validation import FAULTS_SHOWN, WrittenPoints, invalid_points
+from app.schemas.points import (
+    EdgePoint,
+    FacePoint,
+    Point,
+    PointOrCurve,
+    Polyline,
+    PositionPoint,
+    Source,
+    VertexPoint,
+)
+
+SurfacePoints = Sequence[gc.SurfacePoint]
+
+_GAP = (
+    "shares no face with the point before it; add those at which the curve crosses edges: a "
+    "shortest path has them"
+)
+
+# Points as clients write them
 
 
-def resolve(mesh: gc.TriangleMesh, point: Point) -> gc.SurfacePoint:
-    """Return the point of the mesh that is meant, in its one spelling.
+def numbered(pointer: str, points: Sequence[Point]) -> WrittenPoints:
+    """Yield the points of a list, each with its pointer."""
+    return ((f"{pointer}/{i}", point) for i, point in enumerate(points))
+
+
+def points_in(pointer: str, written: PointOrCurve | Source) -> WrittenPoints:
+    """Yield a point, or those of a curve, each with its pointer."""
+    if isinstance(written, Polyline):
+        return numbered(f"{pointer}/polyline", written.polyline)
+    return iter([(pointer, written)])
+
+
+def points_in_sources(sources: Sequence[Source]) -> WrittenPoints:
+    """Yield the points of sources, each with its pointer."""
+    return chain.from_iterable(
+        points_in(f"/sources/{i}", source) for i, source in enumerate(sources)
+    )
+
+
+def point_count(*written: PointOrCurve | Source) -> int:
+    """Return the number of points, those of curves counted one by one."""
+    return sum(len(each.polyline) if isinstance(each, Polyline) else 1 for each in written)
+
+
+# Points of the mesh
+
+
+def resolve_points(
+    written: WrittenPoints, mesh: gc.TriangleMesh, cancel: Callable[[], bool]
+) -> list[gc.SurfacePoint]:
+    """Return the canonical point of the mesh for each written one.
 
     Raises
     ------
-    InvalidPoint
-        It is not on the mesh.
+    ProblemError
+        Some are not on the mesh.
+    Cancelled
+        ``cancel`` returned True.
     """
+    points: list[gc.SurfacePoint] = []
+    faults: list[Fault] = []
+    for pointer, point in written:
+        checkpoint(cancel)
+        try:
+            points.append(resolve_point(mesh, point))
+        except gc.errors.InvalidPoint as error:
+            faults.append(Fault(f"{pointer}/{_member_at_fault(point)}", str(error)))
+            if len(faults) == FAULTS_SHOWN:
+                break
+    if faults:
+        raise invalid_points(faults)
+    return points
+
+
+def checkpoint(cancel: Callable[[], bool]) -> None:
+    """Raise ``Cancelled`` if the query is to stop."""
+    if cancel():
+        raise gc.errors.Cancelled("cancelled while points were resolved")
+
+
+def to_point_or_curve(
+    mesh: gc.TriangleMesh, pointer: str, written: PointOrCurve | Source, points: SurfacePoints
+) -> gc.SurfacePoint | gc.Curve:
+    """Return a point or a curve for the library, from its resolved points.
+
+    Raises
+    ------
+    ProblemError
+        A piece of the curve lies in no face.
+    """
+    if not isinstance(written, Polyline):
+        return points[0]
+    faults = (
+        Fault(f"{pointer}/polyline/{i}", _GAP)
+        for i, (start, end) in enumerate(pairwise(points), 1)
+        if not gc.share_a_face(mesh, start, end)
+    )
+    shown = tuple(islice(faults, FAULTS_SHOWN))
+    if shown:
+        raise invalid_points(shown)
+    return gc.Curve(tuple(points))
+
+
+def to_sources(
+    mesh: gc.TriangleMesh, written: Sequence[Source], points: SurfacePoints
+) -> list[gc.Source]:
+    """Return sources for the library, from their resolved points; raises as `to_point_or_curve`."""
+    rest = iter(points)
+    return [
+        gc.Source(
+            to_point_or_curve(
+                mesh, f"/sources/{i}", source, tuple(islice(rest, point_count(source)))
+            ),
+            source.start_distance,
+        )
+        for i, source in enumerate(written)
+    ]
+
+
+def components_of(mesh: gc.TriangleMesh, points: SurfacePoints) -> NDArray[np.int64]:
+    """Return the connected component of each point."""
+    vertices = [
+        mesh.faces[point.face_index, 0] if point.vertex_index is None else point.vertex_index
+        for point in points
+    ]
+    return mesh.components[np.array(vertices, np.int64)].astype(np.int64)
+
+
+def positions_of(mesh: gc.TriangleMesh, points: SurfacePoints) -> NDArray[np.float64]:
+    """Return the position (3,) of each point, mesh units."""
+    return np.array([describe_point(mesh, point)["position"] for point in points]).reshape(-1, 3)
+
+
+# Points in answers
+
+
+def describe_point(mesh: gc.TriangleMesh, point: gc.SurfacePoint) -> Mapping[str, Any]:
+    """Return the members of a resolved point: vertex, or face and weights, and position."""
+    vertex = point.vertex_index
+    if vertex is not None:  # queries have thousands, and the mesh would check each again
+        return {"vertex": vertex, "position": mesh.vertices[vertex].tolist()}
+    position = mesh.position(point).tolist()
+    return {"face": point.face_index, "barycentric": point.barycentric, "position": position}
+
+
+def describe_point_or_curve(
+    mesh: gc.TriangleMesh, start: gc.SurfacePoint | gc.Curve
+) -> Mapping[str, Any]:
+    """Return the members of a resolved point, or of a curve of such points."""
+    if isinstance(start, gc.Curve):
+        points = cast(SurfacePoints, start.points)
+        return {"polyline": [describe_point(mesh, point) for point in points]}
+    return describe_point(mesh, start)
+
+
+def describe_source(mesh: gc.TriangleMesh, source: gc.Source) -> Mapping[str, Any]:
+    """Return the members of a resolved source: its point or curve, and its start distance."""
+    start = describe_point_or_curve(mesh, cast(gc.SurfacePoint | gc.Curve, source.point))
+    return {**start, "start_distance": source.start_distance}
+
+
+def count_unreachable(missed: NDArray[np.bool_], connected: NDArray[np.bool_]) -> dict[str, int]:
+    """Return the number of distances that are missing, by reason."""
+    return {
+        "disconnected": int(np.count_nonzero(missed & ~connected)),
+        "beyond_max_distance": int(np.count_nonzero(missed & connected)),
+    }
+
+
+def resolve_point(mesh: gc.TriangleMesh, point: Point) -> gc.SurfacePoint:
+    """Return the canonical point for a written one; raises ``InvalidPoint`` off the mesh."""
     match point:
         case VertexPoint(vertex=vertex):
             return mesh.point(vertex)
@@ -26,26 +193,11 @@ def resolve(mesh: gc.TriangleMesh, point: Point) -> gc.SurfacePoint:
             return mesh.locate(position, limit)
 
 
-def described(mesh: gc.TriangleMesh, place: gc.SurfacePoint) -> Mapping[str, Any]:
-    """Return what answers say of a resolved point: vertex, or face and weights, and position."""
-    vertex = place.vertex_index
-    if vertex is not None:  # many a query has thousands, and the mesh would check each again
-        return {"vertex": vertex, "position": mesh.vertices[vertex].tolist()}
-    position = mesh.position(place).tolist()
-    return {"face": place.face_index, "barycentric": place.barycentric, "position": position}
-
-
-def described_origin(
-    mesh: gc.TriangleMesh, origin: gc.SurfacePoint | gc.Curve
-) -> Mapping[str, Any]:
-    """Return what answers say of where paths start: at a resolved point, or on a curve of such."""
-    if isinstance(origin, gc.Curve):
-        places = cast(Sequence[gc.SurfacePoint], origin.points)
-        return {"polyline": [described(mesh, place) for place in places]}
-    return described(mesh, origin)
-
-
-def described_source(mesh: gc.TriangleMesh, source: gc.Source) -> Mapping[str, Any]:
-    """Return what answers say of a resolved source: where it is, and what distances start at."""
-    origin = described_origin(mesh, cast(gc.SurfacePoint | gc.Curve, source.point))
-    return {**origin, "start_distance": source.start_distance}
+def _member_at_fault(point: Point) -> str:
+    """Return the member that is wrong with a point whose indices are in range."""
+    match point:
+        case EdgePoint():
+            return "edge"
+        case FacePoint():
+            return "barycentric"
+    return "position"

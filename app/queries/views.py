@@ -1,4 +1,4 @@
-"""Answers as tables, lines, places and surfaces, for formats that know no more than these."""
+"""Answers as tables, lines, points and surfaces, for the formats that are written from these."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app.encoding import Line, Place, Surface, Table
+from app.encoding import Line, PointFeature, Surface, Table
 from app.encoding.views import Column, Values, rows_of
 
 
 def columns_of(members: Mapping[str, Any]) -> dict[str, Values]:
-    """Return the distances of an answer, and what is included, by name; a vector as three."""
+    """Return the columns of an answer by name: distances, then included ones (vectors as three)."""
     columns: dict[str, Values] = {"distance": members["distances"]}
     if "nearest_source" in members:
         columns["nearest_source"] = members["nearest_source"]
@@ -33,17 +33,17 @@ def surface_of(mesh: gc.TriangleMesh, columns: Mapping[str, Values]) -> Surface:
 
 def line_of(outline: Mapping[str, Any], number: int | None = None) -> Line:
     """Return a path, or the reason why there is none; its ``number`` where there are several."""
-    told: dict[str, Any] = {} if number is None else {"path": number}
-    told |= {"status": outline.get("reason", "ok"), "length": outline.get("length")}
+    properties: dict[str, Any] = {} if number is None else {"path": number}
+    properties |= {"status": outline.get("reason", "ok"), "length": outline.get("length")}
     locations = outline.get("locations", ())
     columns: dict[str, list[Any]] = {"face": [each["face"] for each in locations]}
     columns |= {x: [each["barycentric"][i] for each in locations] for i, x in enumerate("uvw")}
     points = np.empty((0, 3)) if outline["points"] is None else outline["points"]
-    return Line(points, told, "" if number is None else f"path_{number}", at_points=columns)
+    return Line(points, properties, "" if number is None else f"path_{number}", at_points=columns)
 
 
 def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
-    """Return isolines, and for each level that has none a line without points."""
+    """Return isolines, and a line without points for each level that has none."""
     highest = max(level["level"] for level in levels)
     none = {"closed": None, "length": None, "points": np.empty((0, 3))}
     return [
@@ -78,24 +78,24 @@ def table_of_matrix(distances: NDArray[np.float64]) -> Table:
 
 
 def table_of_sparse(rows: Column, columns: Column, distances: Column) -> Table:
-    """Return a row for each cell that there is."""
+    """Return a row for each cell of a sparse matrix."""
     return Table.of(dict(zip(_MATRIX, (rows, columns, distances), strict=True)))
 
 
 _MATRIX = "source", "target", "distance"
 
 
-def places_of(index: str, found: Sequence[Mapping[str, Any] | None]) -> list[Place]:
-    """Return points as answers describe them; numbered by ``index`` where they do not say it."""
+def point_features(index: str, found: Sequence[Mapping[str, Any] | None]) -> list[PointFeature]:
+    """Return described points as features; numbered by ``index`` unless they have that member."""
     return [
-        Place(each["position"], {index: i} | {k: v for k, v in each.items() if k != "position"})
-        if each is not None
-        else Place(None, {index: i})
+        PointFeature(None, {index: i})
+        if each is None
+        else PointFeature(each["position"], {index: i, **_without_position(each)})
         for i, each in enumerate(found)
     ]
 
 
-def table_of_places(index: str, found: Sequence[Mapping[str, Any] | None]) -> Table:
+def table_of_points(index: str, found: Sequence[Mapping[str, Any] | None]) -> Table:
     """Return a row for each of the same points."""
 
     def rows() -> Iterator[Sequence[Any]]:
@@ -111,6 +111,10 @@ def table_of_places(index: str, found: Sequence[Mapping[str, Any] | None]) -> Ta
             )
 
     return Table([index, "distance", *"xyz", "vertex", "face", *"uvw"], rows)
+
+
+def _without_position(members: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in members.items() if name != "position"}
 
 
 _NOTHING = None, None, None

@@ -123,7 +123,7 @@ class CurveSource(Polyline, Start):
     """A source that is a curve: distances start at all of its points."""
 
 
-Origin = Annotated[
+PointOrCurve = Annotated[
     Annotated[VertexPoint, Tag(POINT_TAGS["vertex"])]
     | Annotated[EdgePoint, Tag(POINT_TAGS["edge"])]
     | Annotated[FacePoint, Tag(POINT_TAGS["face"])]

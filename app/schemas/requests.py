@@ -4,7 +4,15 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Field, FiniteFloat, StrictBool, StrictInt
 
-from app.schemas.points import NonNegative, Origin, Point, Positive, Source, StrictModel, Triple
+from app.schemas.points import (
+    NonNegative,
+    Point,
+    PointOrCurve,
+    Positive,
+    Source,
+    StrictModel,
+    Triple,
+)
 
 Method = Literal["exact", "approximate"]
 Layout = Literal["dense", "sparse", "pairs"]
@@ -134,7 +142,7 @@ class PathsRequest(Accuracy, AmongBarriers):
         }
     )
 
-    source: Origin
+    source: PointOrCurve
     targets: list[Point] = Field(min_length=1)
     max_distance: NonNegative | None = Field(
         default=None, description="There is no path to what is farther than this"

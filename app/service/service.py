@@ -182,7 +182,7 @@ class Service:
         self, query: Query[Any], size: MeshSize, form: Representation, asker: RequestContext
     ) -> tuple[Estimate, Seconds]:
         """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
-        query.refuse_answer(form.media_type, size, self.settings)
+        query.check_answer(form.media_type, size, self.settings)
         order = Task(
             EstimateQuery(query, form), asker.caller.name, query.affinity_keys, is_small=True
         )
@@ -201,7 +201,7 @@ class Service:
         key: str | None,
     ) -> Job:
         """Accept a job that answers ``query``; one for all with the same idempotency ``key``."""
-        query.refuse_answer(form.media_type, size, self.settings)
+        query.check_answer(form.media_type, size, self.settings)
         self.engine.refuse_when_full(asker.caller.name)
 
         async def solve(told: ProgressCallback) -> Result:
@@ -228,7 +228,7 @@ class Service:
         told: ProgressCallback,
     ) -> Answered:
         with self.mesh_books.held(query.mesh_id):
-            query.refuse_answer(form.media_type, size, self.settings)
+            query.check_answer(form.media_type, size, self.settings)
             name = result_name(query.mesh_id, result_key(query, form))
             kept = await self.results.find(name)
             self.lookups["miss" if kept is None else "hit"] += 1

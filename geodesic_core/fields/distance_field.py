@@ -16,9 +16,9 @@ from geodesic_core.fields.gradient import gradient_at_vertices
 from geodesic_core.fields.isolines import (
     Drawing,
     Isoline,
-    as_chord_error,
     as_levels,
     crossed_faces,
+    resolve_chord_error,
     spaced_levels,
 )
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, traced_path
@@ -323,7 +323,7 @@ class DistanceField:
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
         return list(
-            self._isolines(as_levels(levels), as_chord_error(self.mesh, chord_error), control)
+            self._isolines(as_levels(levels), resolve_chord_error(self.mesh, chord_error), control)
         )
 
     def each_isoline(
@@ -338,7 +338,9 @@ class DistanceField:
     ) -> Iterator[list[Isoline]]:
         """Yield what `isolines` returns, level by level: each is drawn when it is asked for."""
         control = Control(progress, cancel, deadline_s, memory_limit)
-        return self._isolines(as_levels(levels), as_chord_error(self.mesh, chord_error), control)
+        return self._isolines(
+            as_levels(levels), resolve_chord_error(self.mesh, chord_error), control
+        )
 
     def _isolines(
         self, levels: Sequence[float], chord_error: float, control: Control

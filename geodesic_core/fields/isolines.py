@@ -50,10 +50,29 @@ class Isoline:
 def spaced_levels(distances: Floats, count: int) -> Floats:
     """Return levels evenly spaced between 0 and the largest finite distance, both left out.
 
+    Parameters
+    ----------
+    distances
+        (N,) float64, mesh units; infinite where unreachable.
+    count
+        The number of levels, 1 or more.
+
+    Returns
+    -------
+    levels
+        (count,) float64, mesh units, ascending.
+
     Raises
     ------
     InvalidArgument
         The count is not an integer, 1 or more; or no finite distance is above 0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import geodesic_core as gc
+    >>> gc.spaced_levels(np.array([0.0, 1.0, 4.0, np.inf]), 3).tolist()
+    [1.0, 2.0, 3.0]
     """
     if not is_index(count) or count < 1:
         raise InvalidArgument(f"the count of levels is {count!r}; it must be an integer, 1 or more")
@@ -80,13 +99,35 @@ def as_levels(levels: Sequence[float]) -> list[float]:
     return [float(level) for level in levels]
 
 
-def as_chord_error(mesh: TriangleMesh, chord_error: float | None) -> float:
-    """Return how far chords may stray from their arcs, mesh units.
+def resolve_chord_error(mesh: TriangleMesh, chord_error: float | None = None) -> float:
+    """Return the chord error that isolines on a mesh are drawn with.
+
+    Parameters
+    ----------
+    mesh
+        The surface.
+    chord_error
+        The largest distance of chords from their arcs, mesh units; None for the default, a
+        thousandth of the mean edge length.
+
+    Returns
+    -------
+    chord_error
+        The same, or the default; mesh units.
 
     Raises
     ------
     InvalidArgument
-        It is not a finite number, or finer than `FINEST_CHORD`.
+        It is not a finite number, or less than a billionth of the bounding box's diagonal.
+
+    Examples
+    --------
+    >>> import geodesic_core as gc
+    >>> mesh = gc.TriangleMesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])
+    >>> gc.resolve_chord_error(mesh)
+    0.004
+    >>> gc.resolve_chord_error(mesh, 0.1)
+    0.1
     """
     if chord_error is None:
         return CHORD_SHARE * float(mesh.topology.geometry[:, LENGTH].mean())

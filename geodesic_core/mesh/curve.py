@@ -70,7 +70,30 @@ def polyline_of(mesh: TriangleMesh, curve: Curve, name: str) -> Polyline:
 
 
 def share_a_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> bool:
-    """Whether a piece of a curve may join two canonical points."""
+    """Tell whether two points have a face in common, as neighbours on a `Curve` must.
+
+    Parameters
+    ----------
+    mesh
+        The surface.
+    start, end
+        Canonical points, as `TriangleMesh.point` and `TriangleMesh.locate` return them.
+
+    Returns
+    -------
+    bool
+        True where a straight segment in a face joins them, and where they are the same.
+
+    Examples
+    --------
+    >>> import geodesic_core as gc
+    >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> mesh = gc.TriangleMesh(corners, [[0, 1, 2], [0, 2, 3]])
+    >>> gc.share_a_face(mesh, mesh.point(0), mesh.point(2))
+    True
+    >>> gc.share_a_face(mesh, mesh.point(1), mesh.point(3))
+    False
+    """
     if start == end:
         return True
     return bool(weights_by_face(mesh, start).keys() & weights_by_face(mesh, end))

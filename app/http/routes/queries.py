@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Query, Response
 
 from app.encoding import CSV, GEOJSON, JSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
-from app.encoding.form import ARRAYS, TEXTS
+from app.encoding.representation import ARRAYS, TEXTS
 from app.http.responses import ENDS, OF_FILES, documented, problems
 from app.http.routes.query_request import AskedDep
 from app.http.routes.query_route import QueryRoute

@@ -180,7 +180,7 @@ def size_and_peak(answer: Answer, form: Representation) -> tuple[int, int]:
 
 def test_members_are_headers_where_they_are_short() -> None:
     answer = Answer({"points": [1] * 10**6, "status": "ok", "warnings": []}, shown=("points",))
-    answer = replace(answer, places=list)
+    answer = replace(answer, points=list)
 
     assert encode(answer, Representation(GEOJSON)).headers == {
         "Geodesic-Status": "ok",

@@ -1,4 +1,4 @@
-"""In which form an answer is written: its media type, the width of its numbers, its coding."""
+"""Representations of an answer: media type, width of numbers, content coding."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,14 +25,14 @@ FORMATS: Mapping[str, str] = {
     "geojson": GEOJSON,
 }
 ARRAYS = frozenset({NPY, NPZ, OCTETS})
-"""Which have numbers of a chosen width."""
+"""The media types whose numbers have a chosen width."""
 TEXTS = frozenset({JSON, OBJ, CSV, SVG, GEOJSON})
-"""Which are worth compressing: the bytes of float64 are nearly random."""
+"""The media types that are worth compressing: the bytes of float64 are nearly random."""
 
 
 @dataclass(frozen=True)
 class Representation:
-    """What is to be made of an answer; two forms of one answer are two results."""
+    """One way to write an answer; each representation of an answer is a result of its own."""
 
     media_type: str
     dtype: str = "float64"
