@@ -10,31 +10,31 @@ import { listenToKeys } from "./panel/keys";
 import { Meshes } from "./panel/meshes";
 import { Pointer } from "./panel/pointer";
 import { showReport } from "./panel/report";
-import { Take } from "./panel/take";
+import { ExportPanel } from "./panel/exportPanel";
 import { readState, writeState } from "./state/permalink";
 import { Store, type State } from "./state/state";
 import { Status } from "./status";
 import { drawRamp } from "./view/legend";
 import { Stage } from "./view/scene";
-import { Shown } from "./view/shown";
+import { SceneView } from "./view/sceneView";
 
 const ADDRESS_DELAY_MS = 250; // browsers refuse addresses that change a hundred times in half a minute
 
 const stage = new Stage(byId("canvas", HTMLCanvasElement));
-const shown = new Shown(stage);
+const sceneView = new SceneView(stage);
 const status = new Status(() => stage.drawn());
 const store = new Store();
-const fields = new Fields(status, shown);
-const routes = new Routes(status, shown);
+const fields = new Fields(status, sceneView);
+const routes = new Routes(status, sceneView);
 const meshes = new Meshes(store, status);
-const controls = new Controls(store, status, shown);
-const take = new Take(store, status, stage);
-const pointer = new Pointer(shown, store, () => controls.tool);
-listenToKeys(store, status, shown, pointer);
+const controls = new Controls(store, status, sceneView);
+const exportPanel = new ExportPanel(store, status, stage);
+const pointer = new Pointer(sceneView, store, () => controls.tool);
+listenToKeys(store, status, sceneView, pointer);
 drawRamp();
-take.largest = () => fields.of(store.state)?.largest ?? 0;
-take.nearest = () => routes.source;
-controls.usualSpacing = () => Number(((take.largest() || 1) / 20).toPrecision(1));
+exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
+exportPanel.nearest = () => routes.source;
+controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
 stage.onMove = (view) => store.update({ view });
 setUpAppearance(() => void showWires(store.state));
 
@@ -45,14 +45,14 @@ let opening = new AbortController();
 store.listen((state, before) => {
   if (state.mesh !== before.mesh) open(state);
   controls.show(state);
-  take.show(state);
+  exportPanel.show(state);
   fields.follow(state);
   routes.follow(state);
-  if (state.lines !== before.lines) fields.stripe(state);
+  if (state.lines !== before.lines) fields.setIsolines(state);
   if (state.wireframe !== before.wireframe) void showWires(state);
   if (state.sources.length > 0) dismissHint();
-  if (shown.mesh) shown.showPoints(state);
-  if (state.barriers !== before.barriers) shown.barriers.show(shown.mesh, state.barriers);
+  if (sceneView.mesh) sceneView.showPoints(state);
+  if (state.barriers !== before.barriers) sceneView.barriers.show(sceneView.mesh, state.barriers);
   writeAddress();
 });
 
@@ -61,19 +61,19 @@ function open(state: State): void {
   opening.abort();
   meshes.showChosen();
   byId("welcome").hidden = true;
-  shown.close();
-  showReport(null, shown);
+  sceneView.close();
+  showReport(null, sceneView);
   const stop = (opening = new AbortController());
   status.run("loading", "Loading the mesh…", stop, async () => {
     const document = await getMesh(state.mesh!);
-    await shown.open(document, stop.signal);
+    await sceneView.open(document, stop.signal);
     stop.signal.throwIfAborted();
     const now = store.state;
-    stage.look(now.view ?? shown.viewOf(now));
-    showReport(document, shown);
+    stage.look(now.view ?? sceneView.viewOf(now));
+    showReport(document, sceneView);
     if (now.sources.length === 0) showHint();
-    shown.showPoints(now);
-    shown.barriers.show(shown.mesh, now.barriers);
+    sceneView.showPoints(now);
+    sceneView.barriers.show(sceneView.mesh, now.barriers);
     fields.paint(now);
     routes.draw();
     await showWires(now);
@@ -81,7 +81,7 @@ function open(state: State): void {
 }
 
 async function showWires({ wireframe }: State): Promise<void> {
-  await shown.surface?.setWireframe(wireframe, isDark() ? [1, 1, 1] : [0.05, 0.07, 0.12]);
+  await sceneView.surface?.setWireframe(wireframe, isDark() ? [1, 1, 1] : [0.05, 0.07, 0.12]);
   stage.invalidate();
 }
 
@@ -102,7 +102,7 @@ function begin(): void {
   status.run("loading", "Loading…", new AbortController(), async () => {
     const about = await getAbout();
     meshes.offer(about.samples);
-    take.offer(about);
+    exportPanel.offer(about);
     void meshes.list().catch((error: unknown) => status.fail(error));
     const asked = readState(location.search);
     byId("welcome").hidden = asked.mesh !== null;

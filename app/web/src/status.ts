@@ -1,6 +1,6 @@
 // What the page is doing: loading, ready, busy or error, for the eye, for the reader, for tests.
 import { isAbort, setKey } from "./api/http";
-import { Refusal } from "./api/refusal";
+import { ProblemError } from "./api/problemError";
 import { byId } from "./dom";
 
 type Kind = "loading" | "busy";
@@ -76,7 +76,7 @@ export class Status {
   }
 
   private tell(error: unknown): void {
-    const problem = error instanceof Refusal ? error.problem : null;
+    const problem = error instanceof ProblemError ? error.problem : null;
     const isOffline = error instanceof TypeError && /fetch/i.test(error.message);
     byId("error-title").textContent =
       problem?.title ?? (isOffline ? "The service does not answer" : "This did not work");

@@ -1,5 +1,5 @@
-// Every request goes through here: the key is added, and a refusal becomes an exception.
-import { refusalOf } from "./refusal";
+// Every request goes through here: the key is added, and a refusal becomes a ProblemError.
+import { problemOfResponse } from "./problemError";
 
 const PLACE = "geodesic-key";
 let key = sessionStorage.getItem(PLACE) ?? "";
@@ -17,7 +17,7 @@ export function authorization(): Record<string, string> {
 export async function call(path: string, init: RequestInit = {}): Promise<Response> {
   const headers = { ...authorization(), ...(init.headers as Record<string, string> | undefined) };
   const response = await fetch(path, { ...init, headers });
-  if (!response.ok) throw await refusalOf(response);
+  if (!response.ok) throw await problemOfResponse(response);
   return response;
 }
 

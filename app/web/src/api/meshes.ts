@@ -1,6 +1,6 @@
 // Meshes of the store: listed, made, uploaded.
 import { authorization, call, getJson } from "./http";
-import { refusal, Refusal } from "./refusal";
+import { parseProblem, ProblemError } from "./problemError";
 import type { MeshDocument, MeshList } from "./types";
 
 /** List a hundred meshes, those behind a cursor where there is one. */
@@ -36,10 +36,10 @@ export function uploadMesh(
     request.upload.onprogress = ({ loaded, total }) => onProgress(loaded < total ? loaded / total : null);
     request.onload = () => {
       if (request.status < 300) resolve(JSON.parse(request.responseText) as MeshDocument);
-      else reject(refusal(request.status, request.responseText, request.getResponseHeader("X-Request-ID") ?? ""));
+      else reject(parseProblem(request.status, request.responseText, request.getResponseHeader("X-Request-ID") ?? ""));
     };
     request.onerror = () =>
-      reject(new Refusal({ detail: "The upload broke off.", code: "unknown", status: 0, request_id: "" }));
+      reject(new ProblemError({ detail: "The upload broke off.", code: "unknown", status: 0, request_id: "" }));
     request.onabort = () => reject(new DOMException("The upload was cancelled.", "AbortError"));
     signal.addEventListener("abort", () => request.abort());
     request.send(file);

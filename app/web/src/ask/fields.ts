@@ -7,7 +7,7 @@ import { writePoint } from "../state/point";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import { hideLegend, showScale, showTerritories } from "../view/legend";
-import type { Shown } from "../view/shown";
+import type { SceneView } from "../view/sceneView";
 
 /** What is known for the same sources, barriers and limit. */
 interface Known {
@@ -25,7 +25,7 @@ export class Fields {
 
   constructor(
     private readonly status: Status,
-    private readonly shown: Shown,
+    private readonly sceneView: SceneView,
   ) {}
 
   /** The field that is drawn, or null. */
@@ -51,7 +51,7 @@ export class Fields {
     this.status.run("busy", "Computing distances…", stop, async (onProgress) => {
       // When this fails or is cancelled it may be asked for again.
       try {
-        await this.learn(state, onProgress, stop.signal);
+        await this.fetchMissing(state, onProgress, stop.signal);
       } catch (failure) {
         if (this.stop === stop) this.asked = "";
         throw failure;
@@ -62,7 +62,7 @@ export class Fields {
 
   /** Paint what is known; a mesh that was just loaded has no colours yet. */
   paint(state: State): void {
-    const { surface } = this.shown;
+    const { surface } = this.sceneView;
     const { exact, approximate, nearest } = this.known;
     const field = this.of(state);
     this.compare();
@@ -83,18 +83,18 @@ export class Fields {
         showTerritories(state.sources.map(writePoint));
       } else showScale("Distance in mesh units", field.largest);
     }
-    this.stripe(state);
+    this.setIsolines(state);
   }
 
   /** Draw isolines as ``state`` has them. */
-  stripe(state: State): void {
+  setIsolines(state: State): void {
     const field = this.of(state);
-    const { surface, stage } = this.shown;
-    surface?.stripe(field && state.shade !== "difference" ? spacingOf(state, field.largest) : 0);
+    const { surface, stage } = this.sceneView;
+    surface?.setIsolines(field && state.shade !== "difference" ? spacingOf(state, field.largest) : 0);
     stage.invalidate();
   }
 
-  private async learn(state: State, onProgress: (share: number) => void, signal: AbortSignal): Promise<void> {
+  private async fetchMissing(state: State, onProgress: (share: number) => void, signal: AbortSignal): Promise<void> {
     const { known } = this;
     const methods: Method[] = state.shade === "difference" ? ["exact", "approximate"] : [state.method];
     for (const method of methods) {

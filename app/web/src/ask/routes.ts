@@ -1,12 +1,12 @@
 // The shortest path to the target, which follows the pointer; and how it was searched for.
-import { Latest } from "../api/latest";
+import { LatestOnly } from "../api/latestOnly";
 import { askRoute, type RouteQuestion } from "../api/queries";
 import type { Outline, Point, Step } from "../api/types";
 import { byId, count, duration, written } from "../dom";
 import { writePoint } from "../state/point";
 import type { State } from "../state/state";
 import type { Status } from "../status";
-import type { Shown } from "../view/shown";
+import type { SceneView } from "../view/sceneView";
 
 type Asked = RouteQuestion & { mesh: string };
 
@@ -24,13 +24,13 @@ export class Routes {
   private asked = "";
   private steps: Step[] = [];
   private question: Asked | null = null;
-  private readonly latest: Latest<Asked>;
+  private readonly latestOnly: LatestOnly<Asked>;
 
   constructor(
     private readonly status: Status,
-    private readonly shown: Shown,
+    private readonly sceneView: SceneView,
   ) {
-    this.latest = new Latest<Asked>(
+    this.latestOnly = new LatestOnly<Asked>(
       ({ mesh, ...question }, stop) =>
         status.during("busy", "Searching the path…", stop, async () =>
           this.show(await askRoute(mesh, question, stop.signal), question),
@@ -54,9 +54,9 @@ export class Routes {
     const isAsked = mesh !== null && target !== null && sources.length > 0;
     this.question = isAsked ? { mesh, sources, target, waypoints, barriers, explain: false } : null;
     byId("explain-start", HTMLButtonElement).disabled = !isAsked;
-    if (this.question) this.latest.ask(this.question);
+    if (this.question) this.latestOnly.ask(this.question);
     else {
-      this.latest.cancel();
+      this.latestOnly.cancel();
       this.outline = null;
       byId("readout").hidden = true;
       this.draw();
@@ -72,7 +72,7 @@ export class Routes {
 
   /** Draw the path that is known; a mesh that was just loaded shows none yet. */
   draw(): void {
-    this.shown.showRoute(this.outline);
+    this.sceneView.showRoute(this.outline);
   }
 
   private show(outline: Outline, question: RouteQuestion): void {
@@ -115,7 +115,7 @@ export class Routes {
     if (!step) return;
     // A step that visits no face works in the region of the one before.
     const region = this.steps.slice(0, number + 1).findLast(({ faces }) => faces.length > 0);
-    this.shown.region.show(this.shown.mesh, region?.faces ?? []);
+    this.sceneView.region.show(this.sceneView.mesh, region?.faces ?? []);
     const legs = this.steps.at(-1)!.leg + 1;
     const leg = legs > 1 ? ` of leg ${step.leg + 1}` : "";
     byId("step-words").textContent =
@@ -128,7 +128,7 @@ export class Routes {
     if (byId("steps").hidden) return;
     byId("steps").hidden = true;
     byId("explain-start").hidden = false;
-    this.shown.region.show(null, []);
+    this.sceneView.region.show(null, []);
   }
 }
 

@@ -2,7 +2,7 @@
 import { BufferAttribute, BufferGeometry } from "three";
 import { MeshBVH } from "three-mesh-bvh";
 import { authorization } from "../api/http";
-import { Refusal } from "../api/refusal";
+import { ProblemError } from "../api/problemError";
 import type { MeshDocument } from "../api/types";
 
 type Triple = [number, number, number];
@@ -28,7 +28,7 @@ export type LoaderAnswer =
     }
   | { tell: "tree"; roots: ArrayBuffer[]; order: Uint32Array | Uint16Array }
   | { tell: "edges"; edges: Uint32Array<ArrayBuffer> }
-  | { tell: "refusal"; problem: Refusal["problem"] }
+  | { tell: "problem"; problem: ProblemError["problem"] }
   | { tell: "failure"; message: string };
 
 type Told<K> = Extract<LoaderAnswer, { tell: K }>;
@@ -113,9 +113,9 @@ class Answering {
   next<K extends LoaderAnswer["tell"]>(tell: K): Promise<Told<K>> {
     return new Promise((resolve, reject) => {
       const listen = ({ data }: MessageEvent<LoaderAnswer>): void => {
-        if (![tell, "refusal", "failure"].includes(data.tell)) return;
+        if (![tell, "problem", "failure"].includes(data.tell)) return;
         this.worker.removeEventListener("message", listen as EventListener);
-        if (data.tell === "refusal") reject(new Refusal(data.problem));
+        if (data.tell === "problem") reject(new ProblemError(data.problem));
         else if (data.tell === "failure") reject(new Error(data.message));
         else resolve(data as Told<K>);
       };

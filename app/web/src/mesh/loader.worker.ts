@@ -2,7 +2,7 @@
 import { BufferAttribute, BufferGeometry } from "three";
 import { MeshBVH } from "three-mesh-bvh";
 import { parseNpy, toIndices } from "../api/npy";
-import { Refusal, refusalOf } from "../api/refusal";
+import { ProblemError, problemOfResponse } from "../api/problemError";
 import type { LoaderAnswer, LoaderQuestion } from "./loader";
 
 let faces = new Uint32Array(0);
@@ -12,7 +12,7 @@ self.onmessage = async ({ data }: MessageEvent<LoaderQuestion>) => {
     if (data.ask === "mesh") await load(data);
     else sendEdges();
   } catch (error) {
-    if (error instanceof Refusal) send({ tell: "refusal", problem: error.problem });
+    if (error instanceof ProblemError) send({ tell: "problem", problem: error.problem });
     else send({ tell: "failure", message: error instanceof Error ? error.message : String(error) });
   }
 };
@@ -38,7 +38,7 @@ async function load({ vertices, faces: facesUrl, headers }: LoaderQuestion & { a
 
 async function array(url: string, headers: Record<string, string>): Promise<ReturnType<typeof parseNpy>> {
   const response = await fetch(url, { headers });
-  if (!response.ok) throw await refusalOf(response);
+  if (!response.ok) throw await problemOfResponse(response);
   return parseNpy(await response.arrayBuffer());
 }
 

@@ -5,7 +5,7 @@ import { parsePoints, writePoint, type WrittenPoint } from "../state/point";
 import { readState, writeRanges } from "../state/permalink";
 import { INITIAL, type Lines, type Shade, type State, type Store } from "../state/state";
 import type { Status } from "../status";
-import type { Shown } from "../view/shown";
+import type { SceneView } from "../view/sceneView";
 import { byId } from "../dom";
 import type { Tool } from "./pointer";
 
@@ -13,7 +13,7 @@ export class Controls {
   constructor(
     private readonly store: Store,
     private readonly status: Status,
-    shown: Shown,
+    sceneView: SceneView,
   ) {
     byId("points").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -36,7 +36,7 @@ export class Controls {
       store.update({ wireframe: byId("wireframe", HTMLInputElement).checked }),
     );
     byId("fit").addEventListener("click", () => {
-      shown.stage.look(null);
+      sceneView.stage.look(null);
       store.update({ view: null });
     });
   }

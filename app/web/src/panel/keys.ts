@@ -1,16 +1,16 @@
 // Everything by keyboard.
 import { INITIAL, type Store } from "../state/state";
 import type { Status } from "../status";
-import type { Shown } from "../view/shown";
+import type { SceneView } from "../view/sceneView";
 import { byId } from "../dom";
 import type { Pointer, Tool } from "./pointer";
 
 const STEP = 0.12;
 
-export function listenToKeys(store: Store, status: Status, shown: Shown, pointer: Pointer): void {
-  const { stage } = shown;
+export function listenToKeys(store: Store, status: Status, sceneView: SceneView, pointer: Pointer): void {
+  const { stage } = sceneView;
   const inTheMiddle = (tool: Tool, adds = false): void => {
-    const point = shown.pick(0, 0);
+    const point = sceneView.pick(0, 0);
     if (point) pointer.set(point, tool, adds);
   };
   const onMesh: Record<string, (event: KeyboardEvent) => void> = {

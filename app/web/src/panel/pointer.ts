@@ -4,7 +4,7 @@ import type { Point } from "../api/types";
 import { positionOf, type FacePoint } from "../mesh/picking";
 import { rounded } from "../state/point";
 import type { State, Store } from "../state/state";
-import type { Shown } from "../view/shown";
+import type { SceneView } from "../view/sceneView";
 
 export type Tool = "source" | "target" | "waypoint" | "barrier";
 
@@ -31,11 +31,11 @@ export class Pointer {
   private last: Place | null = null;
 
   constructor(
-    private readonly shown: Shown,
+    private readonly sceneView: SceneView,
     private readonly store: Store,
     private readonly tool: () => Tool,
   ) {
-    const { canvas } = shown.stage;
+    const { canvas } = sceneView.stage;
     // Before the controls of the camera, which then leave the drag alone.
     canvas.addEventListener("pointerdown", (event) => this.down(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.move(event), { capture: true });
@@ -55,7 +55,7 @@ export class Pointer {
     this.before = { target, waypoints };
     this.drag = this.dragFrom(event);
     if (this.drag) {
-      this.shown.stage.turnsByDrag = false;
+      this.sceneView.stage.turnsByDrag = false;
       if (this.painted) this.drag(event);
     }
   }
@@ -63,7 +63,7 @@ export class Pointer {
   /** Return what a drag does that begins here; null: it turns the mesh. */
   private dragFrom(event: PointerEvent): ((event: Place) => void) | null {
     const { sources, target, waypoints } = this.store.state;
-    if (!this.shown.mesh) return null;
+    if (!this.sceneView.mesh) return null;
     if (this.tool() === "barrier") {
       this.painted = new Set(this.store.state.barriers);
       return (place) => this.paint(place, event.shiftKey);
@@ -125,7 +125,7 @@ export class Pointer {
   private abandon(): void {
     const { drag, painted, before } = this;
     this.letGo();
-    if (painted) this.shown.barriers.show(this.shown.mesh, this.store.state.barriers);
+    if (painted) this.sceneView.barriers.show(this.sceneView.mesh, this.store.state.barriers);
     else if (drag && before) this.store.update(before);
   }
 
@@ -136,7 +136,7 @@ export class Pointer {
 
   private letGo(): void {
     this.start = this.before = this.drag = this.painted = this.last = null;
-    this.shown.stage.turnsByDrag = true;
+    this.sceneView.stage.turnsByDrag = true;
   }
 
   private paint(place: Place, erases: boolean): void {
@@ -153,16 +153,16 @@ export class Pointer {
       }
     }
     this.last = place;
-    this.shown.barriers.show(this.shown.mesh, this.painted!);
+    this.sceneView.barriers.show(this.sceneView.mesh, this.painted!);
   }
 
   private at(place: Place): FacePoint | null {
-    const point = this.shown.pick(...this.shown.stage.toDevice(place));
+    const point = this.sceneView.pick(...this.sceneView.stage.toDevice(place));
     return point && (rounded(point) as FacePoint);
   }
 
   private isNear(point: Point, event: PointerEvent): boolean {
-    const { mesh, stage } = this.shown;
+    const { mesh, stage } = this.sceneView;
     const [x, y] = stage.toPage(new Vector3(...mesh!.drawn(positionOf(mesh!, point))));
     return Math.hypot(x - event.clientX, y - event.clientY) < reachOf(event).near;
   }

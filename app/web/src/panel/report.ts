@@ -1,13 +1,13 @@
 // What was found in a mesh, in words; what is at fault is marked on it.
 import type { MeshDocument } from "../api/types";
 import { positionOf } from "../mesh/picking";
-import type { Shown } from "../view/shown";
+import type { SceneView } from "../view/sceneView";
 import { button, byId, count, written } from "../dom";
 
 type Found = MeshDocument["degenerate_faces"];
 type Kind = "face" | "vertex" | "edge";
 
-export function showReport(document_: MeshDocument | null, shown: Shown): void {
+export function showReport(document_: MeshDocument | null, sceneView: SceneView): void {
   const report = byId("report");
   report.replaceChildren();
   if (!document_) return;
@@ -15,7 +15,7 @@ export function showReport(document_: MeshDocument | null, shown: Shown): void {
   words.textContent = describe(document_);
   const list = document.createElement("ul");
   for (const [found, noun, plural, kind] of faultsOf(document_)) {
-    if (found.count > 0) list.append(row(count(found.count, noun, plural), found, kind, shown));
+    if (found.count > 0) list.append(row(count(found.count, noun, plural), found, kind, sceneView));
   }
   for (const warning of document_.warnings) {
     const line = document.createElement("li");
@@ -53,7 +53,7 @@ function faultsOf(mesh: MeshDocument): [Found, string, string, Kind][] {
   ];
 }
 
-function row(words: string, found: Found, kind: Kind, shown: Shown): HTMLLIElement {
+function row(words: string, found: Found, kind: Kind, sceneView: SceneView): HTMLLIElement {
   const line = document.createElement("li");
   const text = document.createElement("span");
   text.textContent = words;
@@ -61,8 +61,8 @@ function row(words: string, found: Found, kind: Kind, shown: Shown): HTMLLIEleme
     const isShown = shows.getAttribute("aria-pressed") === "true";
     for (const other of byId("report").querySelectorAll("button")) other.setAttribute("aria-pressed", "false");
     shows.setAttribute("aria-pressed", String(!isShown));
-    if (isShown) shown.showFaults([], []);
-    else mark(found.ids, kind, shown);
+    if (isShown) sceneView.showFaults([], []);
+    else mark(found.ids, kind, sceneView);
   });
   shows.setAttribute("aria-pressed", "false");
   shows.setAttribute("aria-label", `Show ${words}`);
@@ -71,13 +71,13 @@ function row(words: string, found: Found, kind: Kind, shown: Shown): HTMLLIEleme
 }
 
 /** Mark the first of what was found: the report has no more than ten ids of each. */
-function mark(ids: Found["ids"], kind: Kind, shown: Shown): void {
-  const mesh = shown.mesh;
+function mark(ids: Found["ids"], kind: Kind, sceneView: SceneView): void {
+  const mesh = sceneView.mesh;
   if (!mesh) return;
   const points = ids.map((id) => {
     if (Array.isArray(id)) return positionOf(mesh, { edge: id as [number, number], t: 0.5 });
     if (kind === "vertex") return mesh.vertex(id as number);
     return positionOf(mesh, { face: id as number, barycentric: [1 / 3, 1 / 3, 1 / 3] });
   });
-  shown.showFaults(kind === "face" ? (ids as number[]) : [], points);
+  sceneView.showFaults(kind === "face" ? (ids as number[]) : [], points);
 }

@@ -108,7 +108,7 @@ export class Surface {
     this.object = new Mesh(mesh.geometry, paint);
     this.colour(null, 1);
     this.divide(null);
-    this.stripe(0);
+    this.setIsolines(0);
   }
 
   /** Colour by values at vertices, of which those that are not finite are grey; null: by none. */
@@ -134,12 +134,12 @@ export class Surface {
   }
 
   /** Draw isolines so far apart; 0: none. */
-  stripe(spacing: number): void {
+  setIsolines(spacing: number): void {
     this.uniform("spacing").value = spacing;
   }
 
-  async setWireframe(shown: boolean, colour: Rgb): Promise<void> {
-    if (shown && !this.wires) {
+  async setWireframe(isVisible: boolean, colour: Rgb): Promise<void> {
+    if (isVisible && !this.wires) {
       const edges = await this.mesh.allEdges();
       if (this.wires) return;
       const geometry = new BufferGeometry();
@@ -150,7 +150,7 @@ export class Surface {
       this.object.add(this.wires);
     }
     if (this.wires) {
-      this.wires.visible = shown;
+      this.wires.visible = isVisible;
       this.wires.material.color.setRGB(...colour);
     }
   }

@@ -17,7 +17,7 @@ const FORMATS: Record<What, string[]> = {
   isolines: ["obj", "svg"],
 };
 
-export class Take {
+export class ExportPanel {
   private formats: string[] = [];
 
   constructor(
@@ -125,7 +125,7 @@ function onCopy(id: string, what: string, text: () => string): void {
 }
 
 function note(words: string): void {
-  byId("take-note").textContent = words;
+  byId("export-note").textContent = words;
 }
 
 function download(blob: Blob, name: string): void {

@@ -8,7 +8,7 @@ const PATIENCE_MS = 100;
  * answered; what it supersedes is aborted when it takes too long. Each abort doubles that time, so
  * that on a slow service answers come late, but come.
  */
-export class Latest<Q> {
+export class LatestOnly<Q> {
   private running: AbortController | undefined;
   private waiting: Q | undefined;
   private patience = PATIENCE_MS;

@@ -18,7 +18,7 @@ const TARGET: Rgb = [0.9, 0, 0.36];
 const WAYPOINT: Rgb = [0.96, 0.62, 0.04];
 const FAULT: Rgb = [0.85, 0.1, 0.1];
 
-export class Shown {
+export class SceneView {
   readonly barriers: Patch;
   readonly region: Patch;
   readonly faults: Patch;
