@@ -3,16 +3,16 @@ import { getMesh } from "./api/meshes";
 import { getAbout } from "./api/queries";
 import { Fields } from "./ask/fields";
 import { Routes } from "./ask/routes";
+import { byId } from "./dom";
 import { dismissHint, isDark, setUpAppearance, showHint } from "./panel/appearance";
 import { Controls, resolved } from "./panel/controls";
-import { byId } from "./dom";
+import { ExportPanel } from "./panel/exportPanel";
 import { listenToKeys } from "./panel/keys";
 import { Meshes } from "./panel/meshes";
 import { Pointer } from "./panel/pointer";
 import { showReport } from "./panel/report";
-import { ExportPanel } from "./panel/exportPanel";
 import { readState, writeState } from "./state/permalink";
-import { Store, type State } from "./state/state";
+import { type State, Store } from "./state/state";
 import { Status } from "./status";
 import { drawRamp } from "./view/legend";
 import { Stage } from "./view/scene";
@@ -112,7 +112,12 @@ function begin(): void {
       points.map((each) => resolved(asked.mesh!, each)),
     );
     const isKnown = asked.mesh === store.state.mesh;
-    store.update({ ...asked, sources: sources!, target: targets![0] ?? null, waypoints: waypoints! });
+    store.update({
+      ...asked,
+      sources: sources!,
+      target: targets![0] ?? null,
+      waypoints: waypoints!,
+    });
     if (isKnown) open(store.state); // a refused key may have kept it from being loaded
   });
 }

@@ -1,6 +1,6 @@
 // Meshes of the store: listed, made, uploaded.
 import { authorization, call, getJson } from "./http";
-import { parseProblem, ProblemError } from "./problemError";
+import { ProblemError, parseProblem } from "./problemError";
 import type { MeshDocument, MeshList } from "./types";
 
 /** List a hundred meshes, those behind a cursor where there is one. */
@@ -15,7 +15,9 @@ export function getMesh(id: string): Promise<MeshDocument> {
 
 export async function makeSample(name: string, faces: number): Promise<MeshDocument> {
   const parameters = new URLSearchParams({ sample: name, faces: String(faces) });
-  return (await call(`/v1/meshes?${parameters}`, { method: "POST" })).json() as Promise<MeshDocument>;
+  return (
+    await call(`/v1/meshes?${parameters}`, { method: "POST" })
+  ).json() as Promise<MeshDocument>;
 }
 
 /** Upload a file. By XMLHttpRequest, since fetch does not tell how much of a body it has sent. */
@@ -33,13 +35,28 @@ export function uploadMesh(
     for (const [name, value] of Object.entries(authorization())) {
       request.setRequestHeader(name, value);
     }
-    request.upload.onprogress = ({ loaded, total }) => onProgress(loaded < total ? loaded / total : null);
+    request.upload.onprogress = ({ loaded, total }) =>
+      onProgress(loaded < total ? loaded / total : null);
     request.onload = () => {
       if (request.status < 300) resolve(JSON.parse(request.responseText) as MeshDocument);
-      else reject(parseProblem(request.status, request.responseText, request.getResponseHeader("X-Request-ID") ?? ""));
+      else
+        reject(
+          parseProblem(
+            request.status,
+            request.responseText,
+            request.getResponseHeader("X-Request-ID") ?? "",
+          ),
+        );
     };
     request.onerror = () =>
-      reject(new ProblemError({ detail: "The upload broke off.", code: "unknown", status: 0, request_id: "" }));
+      reject(
+        new ProblemError({
+          detail: "The upload broke off.",
+          code: "unknown",
+          status: 0,
+          request_id: "",
+        }),
+      );
     request.onabort = () => reject(new DOMException("The upload was cancelled.", "AbortError"));
     signal.addEventListener("abort", () => request.abort());
     request.send(file);

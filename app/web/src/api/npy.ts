@@ -25,7 +25,13 @@ export function parseNpy(buffer: ArrayBuffer): NpyArray {
     throw new Error(`an array that this page cannot read: ${header.trim()}`);
   }
   const data = new KINDS[kind as keyof typeof KINDS](buffer, start + length);
-  return { data, shape: shape.split(",").filter((part) => part.trim()).map(Number) };
+  return {
+    data,
+    shape: shape
+      .split(",")
+      .filter((part) => part.trim())
+      .map(Number),
+  };
 }
 
 /** Return the numbers as indices; the service numbers in 64 bits, and has no mesh that needs them. */

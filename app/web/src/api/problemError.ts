@@ -2,7 +2,9 @@
 import type { Problem } from "./types";
 
 export class ProblemError extends Error {
-  constructor(readonly problem: Pick<Problem, "detail" | "code" | "status" | "request_id"> & Partial<Problem>) {
+  constructor(
+    readonly problem: Pick<Problem, "detail" | "code" | "status" | "request_id"> & Partial<Problem>,
+  ) {
     super(problem.detail);
   }
 }

@@ -1,6 +1,7 @@
 // The questions that the page asks of a mesh.
-import { answerOfJob } from "./jobs";
+
 import { getJson, post } from "./http";
+import { answerOfJob } from "./jobs";
 import { parseNpy } from "./npy";
 import type {
   About,

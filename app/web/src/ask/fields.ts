@@ -90,16 +90,28 @@ export class Fields {
   setIsolines(state: State): void {
     const field = this.of(state);
     const { surface, stage } = this.sceneView;
-    surface?.setIsolines(field && state.shade !== "difference" ? spacingOf(state, field.largest) : 0);
+    surface?.setIsolines(
+      field && state.shade !== "difference" ? spacingOf(state, field.largest) : 0,
+    );
     stage.invalidate();
   }
 
-  private async fetchMissing(state: State, onProgress: (share: number) => void, signal: AbortSignal): Promise<void> {
+  private async fetchMissing(
+    state: State,
+    onProgress: (share: number) => void,
+    signal: AbortSignal,
+  ): Promise<void> {
     const { known } = this;
-    const methods: Method[] = state.shade === "difference" ? ["exact", "approximate"] : [state.method];
+    const methods: Method[] =
+      state.shade === "difference" ? ["exact", "approximate"] : [state.method];
     for (const method of methods) {
       if (known[method]) continue;
-      known[method] = await askDistances(state.mesh!, questionOf(state, method), onProgress, signal);
+      known[method] = await askDistances(
+        state.mesh!,
+        questionOf(state, method),
+        onProgress,
+        signal,
+      );
       if (method === "approximate") known.error = state.error;
     }
     if (state.shade === "territories") {
@@ -144,7 +156,9 @@ function spacingOf({ lines }: State, largest: number): number {
 function shortfall(exact: Field, approximate: Field): Float64Array {
   return exact.distances.map((distance, i) => {
     if (distance === Infinity) return -1;
-    return distance > 0 ? Math.max(0, (100 * (distance - approximate.distances[i]!)) / distance) : 0;
+    return distance > 0
+      ? Math.max(0, (100 * (distance - approximate.distances[i]!)) / distance)
+      : 0;
   });
 }
 

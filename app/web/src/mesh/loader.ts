@@ -48,13 +48,15 @@ export class LoadedMesh {
     this.geometry.setAttribute("position", new BufferAttribute(shape.positions, 3));
     this.geometry.setAttribute("normal", new BufferAttribute(shape.normals, 3));
     this.geometry.setIndex(new BufferAttribute(shape.faces, 1));
-    this.tree = worker.next("tree").then(({ roots, order }) =>
-      MeshBVH.deserialize(
-        { version: 1, roots, index: null, indirectBuffer: order } as never,
-        this.geometry,
-        { setIndex: false },
-      ),
-    );
+    this.tree = worker
+      .next("tree")
+      .then(({ roots, order }) =>
+        MeshBVH.deserialize(
+          { version: 1, roots, index: null, indirectBuffer: order } as never,
+          this.geometry,
+          { setIndex: false },
+        ),
+      );
   }
 
   get frame(): Frame {
@@ -94,7 +96,12 @@ export async function loadMesh(document: MeshDocument, signal: AbortSignal): Pro
   const worker = new Answering();
   signal.addEventListener("abort", () => worker.end());
   const { vertices, faces } = document.arrays as Record<string, string>;
-  const question = { ask: "mesh" as const, vertices: vertices!, faces: faces!, headers: authorization() };
+  const question = {
+    ask: "mesh" as const,
+    vertices: vertices!,
+    faces: faces!,
+    headers: authorization(),
+  };
   const shape = await worker.ask(question, "shape");
   signal.throwIfAborted();
   return new LoadedMesh(document, shape, worker);
@@ -102,7 +109,9 @@ export async function loadMesh(document: MeshDocument, signal: AbortSignal): Pro
 
 /** The worker, whose answers are awaited by name. */
 class Answering {
-  private readonly worker = new Worker(new URL("./loader.worker.ts", import.meta.url), { type: "module" });
+  private readonly worker = new Worker(new URL("./loader.worker.ts", import.meta.url), {
+    type: "module",
+  });
 
   ask<K extends LoaderAnswer["tell"]>(question: LoaderQuestion, tell: K): Promise<Told<K>> {
     const answer = this.next(tell);

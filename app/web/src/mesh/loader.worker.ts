@@ -17,7 +17,11 @@ self.onmessage = async ({ data }: MessageEvent<LoaderQuestion>) => {
   }
 };
 
-async function load({ vertices, faces: facesUrl, headers }: LoaderQuestion & { ask: "mesh" }): Promise<void> {
+async function load({
+  vertices,
+  faces: facesUrl,
+  headers,
+}: LoaderQuestion & { ask: "mesh" }): Promise<void> {
   const [points, corners] = await Promise.all([array(vertices, headers), array(facesUrl, headers)]);
   const doubles = Float64Array.from(points.data as Float64Array);
   faces = toIndices(corners);
@@ -32,11 +36,16 @@ async function load({ vertices, faces: facesUrl, headers }: LoaderQuestion & { a
   geometry.setAttribute("position", new BufferAttribute(positions, 3));
   geometry.setIndex(new BufferAttribute(faces, 1));
   // Indirect: the faces keep their order, and so their numbers.
-  const tree = MeshBVH.serialize(new MeshBVH(geometry, { indirect: true }), { cloneBuffers: false });
+  const tree = MeshBVH.serialize(new MeshBVH(geometry, { indirect: true }), {
+    cloneBuffers: false,
+  });
   send({ tell: "tree", roots: tree.roots as ArrayBuffer[], order: tree.indirectBuffer! });
 }
 
-async function array(url: string, headers: Record<string, string>): Promise<ReturnType<typeof parseNpy>> {
+async function array(
+  url: string,
+  headers: Record<string, string>,
+): Promise<ReturnType<typeof parseNpy>> {
   const response = await fetch(url, { headers });
   if (!response.ok) throw await problemOfResponse(response);
   return parseNpy(await response.arrayBuffer());

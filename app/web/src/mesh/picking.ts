@@ -1,5 +1,5 @@
 // From a place on the screen to a point of the surface.
-import { DoubleSide, Ray, Vector3, type Camera } from "three";
+import { type Camera, DoubleSide, Ray, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
 import type { Point } from "../api/types";
 import type { LoadedMesh } from "./loader";
@@ -7,12 +7,20 @@ import type { LoadedMesh } from "./loader";
 export type FacePoint = Extract<Point, { face: number }>;
 
 /** Return the point of the surface under ``x``, ``y`` (-1 to 1, y upwards), or null beside it. */
-export function pick(mesh: LoadedMesh, tree: MeshBVH, camera: Camera, x: number, y: number): FacePoint | null {
+export function pick(
+  mesh: LoadedMesh,
+  tree: MeshBVH,
+  camera: Camera,
+  x: number,
+  y: number,
+): FacePoint | null {
   const origin = new Vector3().setFromMatrixPosition(camera.matrixWorld);
   const direction = new Vector3(x, y, 0.5).unproject(camera).sub(origin).normalize();
   const hit = tree.raycastFirst(new Ray(origin, direction), DoubleSide);
   if (hit?.faceIndex == null) return null;
-  const [a, b, c] = mesh.corners(hit.faceIndex).map((v) => new Vector3(...mesh.drawn(mesh.vertex(v))));
+  const [a, b, c] = mesh
+    .corners(hit.faceIndex)
+    .map((v) => new Vector3(...mesh.drawn(mesh.vertex(v))));
   return { face: hit.faceIndex, barycentric: weights(a!, b!, c!, hit.point) };
 }
 

@@ -1,12 +1,12 @@
 // Fields and switches: they show the state, and change it.
 import { locate } from "../api/queries";
 import type { Method, Point } from "../api/types";
-import { parsePoints, writePoint, type WrittenPoint } from "../state/point";
+import { byId } from "../dom";
 import { readState, writeRanges } from "../state/permalink";
+import { parsePoints, type WrittenPoint, writePoint } from "../state/point";
 import { INITIAL, type Lines, type Shade, type State, type Store } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
-import { byId } from "../dom";
 import type { Tool } from "./pointer";
 
 export class Controls {
@@ -57,9 +57,13 @@ export class Controls {
     setValue("error-slider", String(Math.log10(state.error)));
     showError(state.error);
     const { lines } = state;
-    byId("lines", HTMLSelectElement).value = lines === null ? "none" : "count" in lines ? "count" : "spacing";
+    byId("lines", HTMLSelectElement).value =
+      lines === null ? "none" : "count" in lines ? "count" : "spacing";
     byId("lines-value").hidden = lines === null;
-    setValue("lines-value", lines === null ? "" : String("count" in lines ? lines.count : lines.spacing));
+    setValue(
+      "lines-value",
+      lines === null ? "" : String("count" in lines ? lines.count : lines.spacing),
+    );
     byId("wireframe", HTMLInputElement).checked = state.wireframe;
   }
 
@@ -71,7 +75,10 @@ export class Controls {
       const [sources, targets, waypoints] = await Promise.all(
         ["sources", "target", "waypoints"].map((id) => resolved(mesh, parsePoints(text(id)))),
       );
-      const written = new URLSearchParams({ barriers: text("barriers"), max_distance: text("max-distance") });
+      const written = new URLSearchParams({
+        barriers: text("barriers"),
+        max_distance: text("max-distance"),
+      });
       const { barriers, maxDistance } = readState(written.toString());
       this.store.update({
         sources: sources!,
@@ -87,8 +94,10 @@ export class Controls {
     const kind = byId("lines", HTMLSelectElement).value;
     const value = byId("lines-value", HTMLInputElement).valueAsNumber;
     let lines: Lines = null;
-    if (kind === "count") lines = isOtherKind ? INITIAL.lines : { count: Math.max(1, Math.round(value) || 1) };
-    if (kind === "spacing") lines = { spacing: isOtherKind || !(value > 0) ? this.usualSpacing() : value };
+    if (kind === "count")
+      lines = isOtherKind ? INITIAL.lines : { count: Math.max(1, Math.round(value) || 1) };
+    if (kind === "spacing")
+      lines = { spacing: isOtherKind || !(value > 0) ? this.usualSpacing() : value };
     this.store.update({ lines });
   }
 

@@ -2,11 +2,11 @@
 import { authorization, post } from "../api/http";
 import type { About, Point } from "../api/types";
 import { questionOf } from "../ask/fields";
+import { button, byId } from "../dom";
 import { writeState } from "../state/permalink";
 import type { State, Store } from "../state/state";
 import type { Status } from "../status";
 import type { Stage } from "../view/scene";
-import { button, byId } from "../dom";
 import { curlOf, pythonOf } from "./snippets";
 
 type What = "distances" | "path" | "isolines";
@@ -27,9 +27,15 @@ export class ExportPanel {
   ) {
     const hasKey = (): boolean => "Authorization" in authorization();
     const { origin } = location;
-    onCopy("copy-link", "The link", () => origin + writeState({ ...store.state, view: stage.view }));
+    onCopy(
+      "copy-link",
+      "The link",
+      () => origin + writeState({ ...store.state, view: stage.view }),
+    );
     onCopy("copy-curl", "The command", () => curlOf(store.state, this.source(), origin, hasKey()));
-    onCopy("copy-python", "The program", () => pythonOf(store.state, this.source(), origin, hasKey()));
+    onCopy("copy-python", "The program", () =>
+      pythonOf(store.state, this.source(), origin, hasKey()),
+    );
     byId("picture").addEventListener("click", () => this.savePicture());
   }
 
@@ -39,7 +45,9 @@ export class ExportPanel {
     const lacking = new Set<string>();
     for (const what of ["distances", "path", "isolines"] as const) {
       const offered = FORMATS[what].filter((format) => this.formats.includes(format));
-      FORMATS[what].filter((format) => !offered.includes(format)).forEach((format) => lacking.add(format));
+      FORMATS[what]
+        .filter((format) => !offered.includes(format))
+        .forEach((format) => lacking.add(format));
       byId(`download-${what}`).replaceChildren(
         ...offered.map((format) => {
           const choice = button(format.toUpperCase(), () => this.save(what, format));
@@ -48,7 +56,8 @@ export class ExportPanel {
         }),
       );
     }
-    if (lacking.size > 0) note(`This service does not write ${[...lacking].join(", ").toUpperCase()}.`);
+    if (lacking.size > 0)
+      note(`This service does not write ${[...lacking].join(", ").toUpperCase()}.`);
     this.show(this.store.state);
   }
 
@@ -61,7 +70,8 @@ export class ExportPanel {
       isolines: hasField && state.lines !== null,
     };
     for (const [what, isThere] of Object.entries(has)) {
-      for (const choice of byId(`download-${what}`).querySelectorAll("button")) choice.disabled = !isThere;
+      for (const choice of byId(`download-${what}`).querySelectorAll("button"))
+        choice.disabled = !isThere;
     }
     for (const id of ["copy-curl", "copy-python"]) byId(id, HTMLButtonElement).disabled = !hasField;
     byId("picture", HTMLButtonElement).disabled = state.mesh === null;
@@ -84,7 +94,10 @@ export class ExportPanel {
     if (what === "path") return { source: this.source(), target, waypoints, barriers };
     const question = questionOf(state, state.method);
     if (what === "distances" || lines === null) return question;
-    return { ...question, ...("count" in lines ? { count: lines.count } : { levels: this.levels(lines.spacing) }) };
+    return {
+      ...question,
+      ...("count" in lines ? { count: lines.count } : { levels: this.levels(lines.spacing) }),
+    };
   }
 
   /** The largest distance that is drawn. */
@@ -98,7 +111,10 @@ export class ExportPanel {
   }
 
   private levels(spacing: number): number[] {
-    return Array.from({ length: Math.floor(this.largest() / spacing) }, (_, i) => (i + 1) * spacing);
+    return Array.from(
+      { length: Math.floor(this.largest() / spacing) },
+      (_, i) => (i + 1) * spacing,
+    );
   }
 
   private savePicture(): void {

@@ -1,13 +1,19 @@
 // Everything by keyboard.
+
+import { byId } from "../dom";
 import { INITIAL, type Store } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
-import { byId } from "../dom";
 import type { Pointer, Tool } from "./pointer";
 
 const STEP = 0.12;
 
-export function listenToKeys(store: Store, status: Status, sceneView: SceneView, pointer: Pointer): void {
+export function listenToKeys(
+  store: Store,
+  status: Status,
+  sceneView: SceneView,
+  pointer: Pointer,
+): void {
   const { stage } = sceneView;
   const inTheMiddle = (tool: Tool, adds = false): void => {
     const point = sceneView.pick(0, 0);
@@ -33,8 +39,10 @@ export function listenToKeys(store: Store, status: Status, sceneView: SceneView,
     f: () => byId("fit").click(),
   };
   document.addEventListener("keydown", (event) => {
-    const isTyping = event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement;
-    if (event.ctrlKey || event.metaKey || event.altKey || (isTyping && event.key !== "Escape")) return;
+    const isTyping =
+      event.target instanceof HTMLInputElement || event.target instanceof HTMLSelectElement;
+    if (event.ctrlKey || event.metaKey || event.altKey || (isTyping && event.key !== "Escape"))
+      return;
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
     const act = (event.target === stage.canvas ? onMesh[key] : undefined) ?? anywhere[key];
     if (!act) return;

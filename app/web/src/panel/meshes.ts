@@ -1,9 +1,9 @@
 // Where a mesh comes from: a file, a sample, the store.
 import { listMeshes, makeSample, uploadMesh } from "../api/meshes";
 import type { MeshDocument } from "../api/types";
-import { WITHOUT_POINTS, type Store } from "../state/state";
-import type { OnProgress, Status } from "../status";
 import { button, byId, count } from "../dom";
+import { type Store, WITHOUT_POINTS } from "../state/state";
+import type { OnProgress, Status } from "../status";
 
 const SAMPLES = [
   ["knot", "Knot", 30_000],
@@ -25,14 +25,17 @@ export class Meshes {
   ) {
     for (const place of ["samples", "welcome-samples"]) {
       const buttons = SAMPLES.map(([name, title, faces]) => {
-        const choice = button(title, () => this.take(`Making ${title}…`, title, () => makeSample(name, faces)));
+        const choice = button(title, () =>
+          this.take(`Making ${title}…`, title, () => makeSample(name, faces)),
+        );
         choice.dataset.sample = name;
         return choice;
       });
       byId(place).append(...buttons);
     }
     const file = byId("file", HTMLInputElement);
-    for (const id of ["pick", "welcome-pick"]) byId(id).addEventListener("click", () => file.click());
+    for (const id of ["pick", "welcome-pick"])
+      byId(id).addEventListener("click", () => file.click());
     file.addEventListener("change", () => {
       if (file.files?.[0]) this.upload(file.files[0]);
       file.value = "";

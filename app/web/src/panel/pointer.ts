@@ -1,7 +1,7 @@
 // What mouse and fingers do on the mesh: a click sets a point, a drag from a point pulls the path.
 import { Vector3 } from "three";
 import type { Point } from "../api/types";
-import { positionOf, type FacePoint } from "../mesh/picking";
+import { type FacePoint, positionOf } from "../mesh/picking";
 import { rounded } from "../state/point";
 import type { State, Store } from "../state/state";
 import type { SceneView } from "../view/sceneView";
@@ -69,7 +69,8 @@ export class Pointer {
       return (place) => this.paint(place, event.shiftKey);
     }
     const near = (point: Point | null): boolean => point !== null && this.isNear(point, event);
-    if (sources.length > 0 && event.altKey) return this.moving((point) => this.store.update({ target: point }));
+    if (sources.length > 0 && event.altKey)
+      return this.moving((point) => this.store.update({ target: point }));
     if (near(target)) return this.moving((point) => this.store.update({ target: point }));
     const waypoint = waypoints.findIndex(near);
     if (waypoint >= 0) {
@@ -141,7 +142,9 @@ export class Pointer {
 
   private paint(place: Place, erases: boolean): void {
     const from = this.last ?? place;
-    const steps = Math.ceil(Math.hypot(place.clientX - from.clientX, place.clientY - from.clientY) / 6);
+    const steps = Math.ceil(
+      Math.hypot(place.clientX - from.clientX, place.clientY - from.clientY) / 6,
+    );
     for (let i = 0; i <= steps; i++) {
       const share = steps === 0 ? 1 : i / steps;
       for (const [x, y] of BRUSH) {

@@ -1,8 +1,8 @@
 // What was found in a mesh, in words; what is at fault is marked on it.
 import type { MeshDocument } from "../api/types";
+import { button, byId, count, written } from "../dom";
 import { positionOf } from "../mesh/picking";
 import type { SceneView } from "../view/sceneView";
-import { button, byId, count, written } from "../dom";
 
 type Found = MeshDocument["degenerate_faces"];
 type Kind = "face" | "vertex" | "edge";
@@ -31,7 +31,9 @@ function describe(mesh: MeshDocument): string {
   const size = high.map((x, i) => written(x - low[i]!, 3)).join(" × ");
   const parts = mesh.components === 1 ? "one piece" : count(mesh.components, "piece");
   const rim =
-    mesh.boundary_loops === 0 ? "closed" : `with ${count(mesh.boundary_loops, "boundary", "boundaries")}`;
+    mesh.boundary_loops === 0
+      ? "closed"
+      : `with ${count(mesh.boundary_loops, "boundary", "boundaries")}`;
   return (
     `${count(mesh.vertices, "vertex", "vertices")}, ${count(mesh.faces, "face")}; ${parts}, ${rim}. ` +
     `${size} mesh units, edges of ${written(mesh.mean_edge_length, 3)} on average.`
@@ -40,10 +42,20 @@ function describe(mesh: MeshDocument): string {
 
 function faultsOf(mesh: MeshDocument): [Found, string, string, Kind][] {
   return [
-    [mesh.non_manifold_edges, "edge of three or more faces", "edges of three or more faces", "edge"],
+    [
+      mesh.non_manifold_edges,
+      "edge of three or more faces",
+      "edges of three or more faces",
+      "edge",
+    ],
     [mesh.misoriented_edges, "edge where winding flips", "edges where winding flips", "edge"],
     [mesh.degenerate_faces, "face without area", "faces without area", "face"],
-    [mesh.repeated_vertex_faces, "face that repeats a vertex", "faces that repeat a vertex", "face"],
+    [
+      mesh.repeated_vertex_faces,
+      "face that repeats a vertex",
+      "faces that repeat a vertex",
+      "face",
+    ],
     [mesh.duplicate_faces, "face twice", "faces twice", "face"],
     [mesh.collapsed_faces, "collapsed face", "collapsed faces", "face"],
     [mesh.zero_length_edges, "edge of no length", "edges of no length", "edge"],
@@ -59,7 +71,8 @@ function row(words: string, found: Found, kind: Kind, sceneView: SceneView): HTM
   text.textContent = words;
   const shows = button("Show", () => {
     const isShown = shows.getAttribute("aria-pressed") === "true";
-    for (const other of byId("report").querySelectorAll("button")) other.setAttribute("aria-pressed", "false");
+    for (const other of byId("report").querySelectorAll("button"))
+      other.setAttribute("aria-pressed", "false");
     shows.setAttribute("aria-pressed", String(!isShown));
     if (isShown) sceneView.showFaults([], []);
     else mark(found.ids, kind, sceneView);

@@ -13,7 +13,10 @@ function askedOf(state: State, source: Point): Asked {
   const { target, waypoints, barriers } = state;
   const mesh = `/v1/meshes/${state.mesh}`;
   if (!target) return { path: `${mesh}/distances`, body: questionOf(state, state.method) };
-  const more = { ...(waypoints.length > 0 && { waypoints }), ...(barriers.length > 0 && { barriers }) };
+  const more = {
+    ...(waypoints.length > 0 && { waypoints }),
+    ...(barriers.length > 0 && { barriers }),
+  };
   return { path: `${mesh}/path`, body: { source, target, ...more } };
 }
 

@@ -1,6 +1,6 @@
 // The address of the page says all that is asked for: /?mesh=ID&source=v0&target=v99
 import type { Method } from "../api/types";
-import { parsePoint, writePoint, type WrittenPoint } from "./point";
+import { parsePoint, type WrittenPoint, writePoint } from "./point";
 import { INITIAL, type Lines, type Shade, type State } from "./state";
 
 export type WrittenState = Omit<State, "sources" | "target" | "waypoints"> & {
@@ -20,7 +20,8 @@ export function writeState(state: State): string {
   if (state.error !== INITIAL.error) query.set("error", String(state.error));
   if (state.maxDistance !== null) query.set("max_distance", String(state.maxDistance));
   if (state.shade !== INITIAL.shade) query.set("shade", state.shade);
-  if (writeLines(state.lines) !== writeLines(INITIAL.lines)) query.set("lines", writeLines(state.lines));
+  if (writeLines(state.lines) !== writeLines(INITIAL.lines))
+    query.set("lines", writeLines(state.lines));
   if (state.wireframe) query.set("wireframe", "1");
   if (state.view) query.set("view", state.view.map((x) => Number(x.toFixed(4))).join(","));
   // Points are easier to read without escapes, which none of these needs in a query.
@@ -70,7 +71,9 @@ export function writeRanges(numbers: number[]): string {
     if (last && number <= last[1] + 1) last[1] = number;
     else ranges.push([number, number]);
   }
-  return ranges.map(([first, last]) => (first === last ? `${first}` : `${first}-${last}`)).join(",");
+  return ranges
+    .map(([first, last]) => (first === last ? `${first}` : `${first}-${last}`))
+    .join(",");
 }
 
 function readRanges(text: string): number[] {

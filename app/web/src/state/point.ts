@@ -35,7 +35,11 @@ export function writePoint(point: Point): string {
 /** Round to what an address needs: a millionth of a face is not seen. */
 export function rounded(point: Point): Point {
   if (!("face" in point)) return point;
-  const [u, v] = point.barycentric.map((weight) => Number(weight.toFixed(6))) as [number, number, number];
+  const [u, v] = point.barycentric.map((weight) => Number(weight.toFixed(6))) as [
+    number,
+    number,
+    number,
+  ];
   return { face: point.face, barycentric: [u, v, short(Math.max(0, 1 - u - v))] };
 }
 

@@ -9,8 +9,8 @@ import {
   Scene,
   ShaderMaterial,
   Vector2,
-  WebGLRenderTarget,
   type WebGLRenderer,
+  WebGLRenderTarget,
 } from "three";
 
 const VERTEX = /* glsl */ `
@@ -31,13 +31,19 @@ const FRAGMENT = /* glsl */ `
 
 export class Backdrop {
   private isFresh = false;
-  private readonly target = new WebGLRenderTarget(1, 1, { samples: 4, depthTexture: new DepthTexture(1, 1) });
+  private readonly target = new WebGLRenderTarget(1, 1, {
+    samples: 4,
+    depthTexture: new DepthTexture(1, 1),
+  });
   private readonly screen = new Scene();
   private readonly camera = new Camera();
 
   constructor(private readonly renderer: WebGLRenderer) {
     const material = new ShaderMaterial({
-      uniforms: { colours: { value: this.target.texture }, depths: { value: this.target.depthTexture } },
+      uniforms: {
+        colours: { value: this.target.texture },
+        depths: { value: this.target.depthTexture },
+      },
       vertexShader: VERTEX,
       fragmentShader: FRAGMENT,
       blending: NoBlending,

@@ -1,6 +1,7 @@
 // What the colours mean.
-import { css, RAMP, territory } from "./colours";
+
 import { byId, written } from "../dom";
+import { css, RAMP, territory } from "./colours";
 
 export function drawRamp(): void {
   const strip = byId("ramp", HTMLCanvasElement);

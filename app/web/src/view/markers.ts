@@ -55,9 +55,27 @@ export class Markers {
     const geometry = new BufferGeometry();
     const attribute = (numbers: number[], size: number): BufferAttribute =>
       new BufferAttribute(new Float32Array(numbers), size);
-    geometry.setAttribute("position", attribute(marks.flatMap(({ position }) => position), 3));
-    geometry.setAttribute("fill", attribute(marks.flatMap(({ fill }) => fill), 3));
-    geometry.setAttribute("size", attribute(marks.map(({ size }) => size), 1));
+    geometry.setAttribute(
+      "position",
+      attribute(
+        marks.flatMap(({ position }) => position),
+        3,
+      ),
+    );
+    geometry.setAttribute(
+      "fill",
+      attribute(
+        marks.flatMap(({ fill }) => fill),
+        3,
+      ),
+    );
+    geometry.setAttribute(
+      "size",
+      attribute(
+        marks.map(({ size }) => size),
+        1,
+      ),
+    );
     this.seen.geometry.dispose();
     const ratio = this.stage.renderer.getPixelRatio();
     for (const points of [this.seen, this.hidden]) {
@@ -68,7 +86,11 @@ export class Markers {
     this.stage.invalidateOverlay(PATIENCE_MS);
   }
 
-  private points(opacity: number, depthTest: boolean, order: number): Points<BufferGeometry, ShaderMaterial> {
+  private points(
+    opacity: number,
+    depthTest: boolean,
+    order: number,
+  ): Points<BufferGeometry, ShaderMaterial> {
     const material = new ShaderMaterial({
       uniforms: { ratio: { value: 1 }, opacity: { value: opacity } },
       vertexShader: VERTEX,

@@ -29,7 +29,9 @@ export class Patch {
   show(mesh: LoadedMesh | null, faces: Iterable<number>): void {
     this.object.geometry.dispose();
     const count = mesh ? mesh.document.faces : 0;
-    const corners = [...faces].filter((face) => face < count).flatMap((face) => mesh!.corners(face));
+    const corners = [...faces]
+      .filter((face) => face < count)
+      .flatMap((face) => mesh!.corners(face));
     const geometry = new BufferGeometry();
     if (mesh && corners.length > 0) {
       geometry.setAttribute("position", mesh.geometry.getAttribute("position"));

@@ -137,7 +137,10 @@ function ribbon(points: [number, number, number][]): BufferGeometry {
       ends.set(points[i + 1]!, 12 * i + 3 * corner);
     }
     corners.set([-1, -1, -1, 1, 1, -1, 1, 1], 8 * i);
-    index.set([0, 1, 2, 2, 1, 3].map((corner) => 4 * i + corner), 6 * i);
+    index.set(
+      [0, 1, 2, 2, 1, 3].map((corner) => 4 * i + corner),
+      6 * i,
+    );
   }
   const geometry = new BufferGeometry();
   geometry.setAttribute("start", new BufferAttribute(starts, 3));

@@ -3,13 +3,13 @@ import {
   ColorManagement,
   LinearSRGBColorSpace,
   MOUSE,
+  type Object3D,
   PerspectiveCamera,
   Scene,
   Spherical,
   TOUCH,
   Vector3,
   WebGLRenderer,
-  type Object3D,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Backdrop } from "./backdrop";
@@ -46,7 +46,8 @@ export class Stage {
     let before: number[] | null = null;
     this.controls.addEventListener("start", () => (before ??= this.view)); // each finger starts
     this.controls.addEventListener("end", () => {
-      if (before && this.view.some((x, i) => Math.abs(x - before![i]!) > 1e-4)) this.onMove(this.view);
+      if (before && this.view.some((x, i) => Math.abs(x - before![i]!) > 1e-4))
+        this.onMove(this.view);
       before = null;
     });
     this.look(null);
@@ -120,7 +121,9 @@ export class Stage {
   look(view: number[] | null): void {
     const [theta, phi, radius, x, y, z] = view ?? this.viewFrom(new Vector3(0.5, 0.35, 0.8));
     this.controls.target.set(x!, y!, z!);
-    this.camera.position.setFromSpherical(new Spherical(radius, phi, theta)).add(this.controls.target);
+    this.camera.position
+      .setFromSpherical(new Spherical(radius, phi, theta))
+      .add(this.controls.target);
     this.controls.update();
     this.camera.updateMatrixWorld(); // what is picked before the next frame is picked from here
     this.invalidate();

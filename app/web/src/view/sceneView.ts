@@ -2,11 +2,11 @@
 import { Mesh, PlaneGeometry, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
 import type { MeshDocument, Outline, Point } from "../api/types";
-import { loadMesh, type LoadedMesh } from "../mesh/loader";
-import { pick, positionOf, type FacePoint } from "../mesh/picking";
+import { type LoadedMesh, loadMesh } from "../mesh/loader";
+import { type FacePoint, pick, positionOf } from "../mesh/picking";
 import type { State } from "../state/state";
-import { territory, type Rgb } from "./colours";
-import { Markers, type Mark } from "./markers";
+import { type Rgb, territory } from "./colours";
+import { type Mark, Markers } from "./markers";
 import { Patch } from "./patch";
 import { RouteLine } from "./route";
 import { showScaleBar } from "./scalebar";
@@ -54,7 +54,10 @@ export class SceneView {
   /** Draw one of each once, of no extent, so that later none waits for its shader. */
   private warmUp(): void {
     this.points.show([{ position: [0, 0, 0], fill: SOURCE, size: 0 }]);
-    this.route.show([[0, 0, 0], [0, 0, 0]]);
+    this.route.show([
+      [0, 0, 0],
+      [0, 0, 0],
+    ]);
     this.stage.warmUp(new Mesh(new PlaneGeometry(0, 0), this.paint));
     this.points.show([]);
     this.route.show([]);
@@ -85,7 +88,12 @@ export class SceneView {
     const normals = mesh.geometry.getAttribute("normal");
     const direction = new Vector3();
     for (const point of points) {
-      const corner = "vertex" in point ? point.vertex : "edge" in point ? point.edge[0] : mesh.corners(point.face)[0];
+      const corner =
+        "vertex" in point
+          ? point.vertex
+          : "edge" in point
+            ? point.edge[0]
+            : mesh.corners(point.face)[0];
       direction.add(new Vector3().fromBufferAttribute(normals, corner));
     }
     return this.stage.viewFrom(direction);
@@ -107,7 +115,11 @@ export class SceneView {
 
   showFaults(faces: number[], points: [number, number, number][]): void {
     this.faults.show(this.mesh, faces);
-    const marks = points.map((point) => ({ position: this.mesh!.drawn(point), fill: FAULT, size: 13 }));
+    const marks = points.map((point) => ({
+      position: this.mesh!.drawn(point),
+      fill: FAULT,
+      size: 13,
+    }));
     this.faultPoints.show(marks);
   }
 

@@ -1,19 +1,19 @@
 // The mesh as it is drawn: distance as colour, with isolines as stripes.
 import {
   BufferAttribute,
+  BufferGeometry,
   Color,
   DataTexture,
   DoubleSide,
+  LinearFilter,
   LineBasicMaterial,
   LineSegments,
-  BufferGeometry,
-  LinearFilter,
   Mesh,
   RGBAFormat,
   ShaderMaterial,
 } from "three";
 import type { LoadedMesh } from "../mesh/loader";
-import { RAMP, territory, type Rgb } from "./colours";
+import { RAMP, type Rgb, territory } from "./colours";
 
 const VERTEX = /* glsl */ `
   attribute float value;
