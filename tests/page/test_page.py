@@ -348,7 +348,7 @@ def test_points_can_be_written(view: View, sphere: str) -> None:
 
     view.page.fill("#target", "nonsense")
     view.page.press("#target", "Enter")
-    view.page.wait_for_selector("#error-detail:has-text('“nonsense” is no point')")
+    view.page.wait_for_selector("#error-detail:has-text('“nonsense” is not a point')")
 
 
 def test_a_largest_distance(view: View, sphere: str) -> None:
@@ -449,7 +449,7 @@ def test_a_long_query_tells_its_progress_and_can_be_cancelled(view: View, large:
     assert not view.page.is_visible("#legend")
 
 
-# Take away
+# Export
 
 
 def test_a_permalink_restores_points_and_view(view: View, sphere: str) -> None:

@@ -1,13 +1,18 @@
-// Elements by id, and numbers as people read them.
-
+// Elements by id, and numbers as text for people.
 export function byId(id: string): HTMLElement;
 export function byId<T extends HTMLElement>(id: string, kind: new () => T): T;
 export function byId(id: string, kind: new () => HTMLElement = HTMLElement): HTMLElement {
-  const element = document.getElementById(id);
-  if (!(element instanceof kind)) throw new Error(`there is no ${kind.name} ${id}`);
+  return query(`#${id}`, kind);
+}
+
+/** Return the first element that a selector finds; it must be there, and of the right kind. */
+export function query<T extends HTMLElement>(selector: string, kind: new () => T): T {
+  const element = document.querySelector(selector);
+  if (!(element instanceof kind)) throw new Error(`there is no ${kind.name} ${selector}`);
   return element;
 }
 
+/** Return a number as text, rounded to significant digits. */
 export function written(x: number, digits = 5): string {
   if (x === 0) return "0";
   const size = Math.abs(x);
@@ -15,6 +20,7 @@ export function written(x: number, digits = 5): string {
   return Number(x.toPrecision(digits)).toLocaleString("en", { maximumSignificantDigits: digits });
 }
 
+/** Return a number and its noun: 1 face, 2 faces. */
 export function count(x: number, noun: string, plural = `${noun}s`): string {
   return `${x.toLocaleString("en")} ${x === 1 ? noun : plural}`;
 }

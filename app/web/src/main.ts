@@ -1,4 +1,4 @@
-// The page: what is asked for is in the state, and everything that is shown follows from it.
+// The page's parts and their wiring: users change the state, and every part follows it.
 import { getMesh } from "./api/meshes";
 import { getAbout } from "./api/queries";
 import { Fields } from "./ask/fields";
@@ -18,7 +18,7 @@ import { drawRamp } from "./view/legend";
 import { Stage } from "./view/scene";
 import { SceneView } from "./view/sceneView";
 
-const ADDRESS_DELAY_MS = 250; // browsers refuse addresses that change a hundred times in half a minute
+const ADDRESS_DELAY_MS = 250; // browsers limit changes of the address to a hundred in half a minute
 
 const stage = new Stage(byId("canvas", HTMLCanvasElement));
 const sceneView = new SceneView(stage);
@@ -43,7 +43,7 @@ controls.show(store.state);
 let opening = new AbortController();
 
 store.listen((state, before) => {
-  if (state.mesh !== before.mesh) open(state);
+  if (state.mesh !== null && state.mesh !== before.mesh) open(state.mesh);
   controls.show(state);
   exportPanel.show(state);
   fields.follow(state);
@@ -56,16 +56,17 @@ store.listen((state, before) => {
   writeAddress();
 });
 
-/** Load the mesh that is asked for, and draw on it what is known by then. */
-function open(state: State): void {
+/** Load a mesh, and draw on it the answers that have arrived by then. */
+function open(mesh: string): void {
   opening.abort();
   meshes.showChosen();
   byId("welcome").hidden = true;
   sceneView.close();
   showReport(null, sceneView);
-  const stop = (opening = new AbortController());
+  const stop = new AbortController();
+  opening = stop;
   status.run("loading", "Loading the mesh…", stop, async () => {
-    const document = await getMesh(state.mesh!);
+    const document = await getMesh(mesh);
     await sceneView.open(document, stop.signal);
     stop.signal.throwIfAborted();
     const now = store.state;
@@ -97,28 +98,25 @@ function setAddress(): void {
   history.replaceState(null, "", writeState(store.state));
 }
 
-/** Do what the address asks for. */
+/** Read the address, and show what it asks for. */
 function begin(): void {
   status.run("loading", "Loading…", new AbortController(), async () => {
     const about = await getAbout();
     meshes.offer(about.samples);
     exportPanel.offer(about);
     void meshes.list().catch((error: unknown) => status.fail(error));
-    const asked = readState(location.search);
-    byId("welcome").hidden = asked.mesh !== null;
-    if (asked.mesh === null) return;
-    const points = [asked.sources, asked.target ? [asked.target] : [], asked.waypoints];
-    const [sources, targets, waypoints] = await Promise.all(
-      points.map((each) => resolved(asked.mesh!, each)),
-    );
-    const isKnown = asked.mesh === store.state.mesh;
-    store.update({
-      ...asked,
-      sources: sources!,
-      target: targets![0] ?? null,
-      waypoints: waypoints!,
-    });
-    if (isKnown) open(store.state); // a refused key may have kept it from being loaded
+    const written = readState(location.search);
+    const { mesh } = written;
+    byId("welcome").hidden = mesh !== null;
+    if (mesh === null) return;
+    const [sources, target, waypoints] = await Promise.all([
+      resolved(mesh, written.sources),
+      resolved(mesh, written.target ? [written.target] : []),
+      resolved(mesh, written.waypoints),
+    ]);
+    const isOpen = mesh === store.state.mesh;
+    store.update({ ...written, sources, target: target[0] ?? null, waypoints });
+    if (isOpen) open(mesh); // without a valid key it was not loaded the first time
   });
 }
 

@@ -1,4 +1,4 @@
-// What the page is doing: loading, ready, busy or error, for the eye, for the reader, for tests.
+// The page's state of work, as users, screen readers and tests see it: loading, busy, ready, error.
 import { isAbort, setKey } from "./api/http";
 import { ProblemError } from "./api/problemError";
 import { byId } from "./dom";
@@ -6,7 +6,7 @@ import { byId } from "./dom";
 type Kind = "loading" | "busy";
 type Work<T> = (onProgress: OnProgress) => Promise<T>;
 
-/** Tells how much is done; null: something is, and nobody knows how much. */
+/** Report the share of the work that is done; null where it is unknown. */
 export type OnProgress = (share: number | null) => void;
 
 interface Task {
@@ -19,21 +19,21 @@ interface Task {
 export class Status {
   private readonly tasks = new Set<Task>();
   private hasFailed = false;
-  /** Called with a key that was typed in. */
+  /** Called when a key has been entered. */
   onKey: () => void = () => undefined;
 
   constructor(private readonly drawn: () => Promise<void>) {
     byId("cancel").addEventListener("click", () => this.cancel());
-    byId("error-close").addEventListener("click", () => this.forget());
+    byId("error-close").addEventListener("click", () => this.clearError());
     byId("key-form").addEventListener("submit", (event) => {
       event.preventDefault();
       setKey(byId("key", HTMLInputElement).value);
-      this.forget();
+      this.clearError();
       this.onKey();
     });
   }
 
-  /** Do ``work`` where everyone sees it; what it fails with is thrown on. */
+  /** Do ``work``, and show that it runs; its errors are thrown on. */
   async during<T>(kind: Kind, words: string, stop: AbortController, work: Work<T>): Promise<T> {
     const task: Task = { kind, words, share: null, stop };
     this.tasks.add(task);
@@ -50,7 +50,7 @@ export class Status {
     }
   }
 
-  /** The same, for work of which nobody awaits the end. */
+  /** Do ``work`` in the background; its errors are shown. */
   run(kind: Kind, words: string, stop: AbortController, work: Work<void>): void {
     this.during(kind, words, stop, work).catch((error: unknown) => this.fail(error));
   }
@@ -62,7 +62,7 @@ export class Status {
   fail(error: unknown): void {
     if (isAbort(error)) return;
     this.hasFailed = true;
-    this.tell(error);
+    this.describe(error);
     this.show();
     if (byId("key-form").hidden) return;
     const field = byId("key", HTMLInputElement);
@@ -70,12 +70,12 @@ export class Status {
     field.select();
   }
 
-  private forget(): void {
+  private clearError(): void {
     this.hasFailed = false;
     this.show();
   }
 
-  private tell(error: unknown): void {
+  private describe(error: unknown): void {
     const problem = error instanceof ProblemError ? error.problem : null;
     const isOffline = error instanceof TypeError && /fetch/i.test(error.message);
     byId("error-title").textContent =

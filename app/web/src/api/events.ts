@@ -1,4 +1,4 @@
-// Server-sent events by fetch, since EventSource cannot send a key.
+// Server-sent events, read by fetch because EventSource cannot send a key.
 import { call } from "./http";
 
 interface Event {
@@ -6,21 +6,22 @@ interface Event {
   data: string;
 }
 
-/** Yield the events of a stream until it ends. */
+/** Yield the events of a stream until it ends; ``lastId`` resumes after that event. */
 export async function* events(
   path: string,
   lastId: string,
   signal: AbortSignal,
 ): AsyncGenerator<Event> {
   const headers = { Accept: "text/event-stream", ...(lastId ? { "Last-Event-ID": lastId } : {}) };
-  const response = await call(path, { headers, signal });
-  const reader = response.body!.pipeThrough(new TextDecoderStream()).getReader();
+  const { body } = await call(path, { headers, signal });
+  if (!body) return;
+  const reader = body.pipeThrough(new TextDecoderStream()).getReader();
   let rest = "";
   for (;;) {
     const { done, value } = await reader.read();
     if (done) return;
     const blocks = (rest + value).replaceAll("\r\n", "\n").split("\n\n");
-    rest = blocks.pop()!;
+    rest = blocks.pop() ?? "";
     for (const block of blocks) {
       const event = parse(block);
       if (event.data) yield event;
@@ -31,9 +32,9 @@ export async function* events(
 function parse(block: string): Event {
   const event = { id: "", data: "" };
   for (const line of block.split("\n")) {
-    const [, name, value] = /^(id|data): ?(.*)$/.exec(line) ?? [];
-    if (name === "id") event.id = value!;
-    if (name === "data") event.data += value!;
+    const [, name, value = ""] = /^(id|data): ?(.*)$/.exec(line) ?? [];
+    if (name === "id") event.id = value;
+    if (name === "data") event.data += value;
   }
   return event;
 }

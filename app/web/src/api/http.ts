@@ -1,15 +1,17 @@
-// Every request goes through here: the key is added, and a refusal becomes a ProblemError.
+// Requests to the service: each carries the key, and an error status becomes a ProblemError.
 import { problemOfResponse } from "./problemError";
 
-const PLACE = "geodesic-key";
-let key = sessionStorage.getItem(PLACE) ?? "";
+const STORAGE_NAME = "geodesic-key";
+let key = sessionStorage.getItem(STORAGE_NAME) ?? "";
 
+/** Set the API key, and remember it while the tab is open; an empty text forgets it. */
 export function setKey(text: string): void {
   key = text.trim();
-  if (key) sessionStorage.setItem(PLACE, key);
-  else sessionStorage.removeItem(PLACE);
+  if (key) sessionStorage.setItem(STORAGE_NAME, key);
+  else sessionStorage.removeItem(STORAGE_NAME);
 }
 
+/** Return the headers that carry the key. */
 export function authorization(): Record<string, string> {
   return key ? { Authorization: `Bearer ${key}` } : {};
 }

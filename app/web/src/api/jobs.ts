@@ -1,10 +1,11 @@
-// A long query as a job: asked for, watched, and its answer fetched; stopped when it is aborted.
+// Long queries run as jobs: started, watched to their end, and dismissed when the caller aborts.
 import { events } from "./events";
 import { call, isAbort, post } from "./http";
 import type { Job } from "./types";
 
 const RETRY_MS = 1000;
 
+/** Run a query as a job, and return its answer. */
 export async function answerOfJob(
   path: string,
   body: unknown,
@@ -14,19 +15,19 @@ export async function answerOfJob(
 ): Promise<Response> {
   const headers = { Accept: accept, Prefer: "respond-async" };
   const job = (await (await post(path, body, headers)).json()) as Job;
-  const { self, results, events: stream } = job.links as Record<string, string>;
-  const stop = (): void => void call(self!, { method: "DELETE" }).catch(() => undefined);
-  if (signal.aborted) stop();
-  signal.addEventListener("abort", stop, { once: true });
+  const links = job.links as { self: string; results: string; events: string };
+  const dismiss = (): void => void call(links.self, { method: "DELETE" }).catch(() => undefined);
+  if (signal.aborted) dismiss();
+  signal.addEventListener("abort", dismiss, { once: true });
   try {
-    await finished(stream!, onProgress, signal);
-    return await call(results!, { signal });
+    await finished(links.events, onProgress, signal);
+    return await call(links.results, { signal });
   } finally {
-    signal.removeEventListener("abort", stop);
+    signal.removeEventListener("abort", dismiss);
   }
 }
 
-/** Watch a job to its end, across connections that break. */
+/** Watch a job to its end; a connection that breaks is opened again. */
 async function finished(
   path: string,
   onProgress: (share: number) => void,

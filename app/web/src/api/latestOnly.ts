@@ -1,12 +1,12 @@
-// One question at a time, of which the newest wins.
+// A queue of one: only the latest request is worth an answer.
 import { isAbort } from "./http";
 
 const PATIENCE_MS = 100;
 
 /**
- * Answers questions that come faster than they can be answered. The newest waits while another is
- * answered; what it supersedes is aborted when it takes too long. Each abort doubles that time, so
- * that on a slow service answers come late, but come.
+ * Runs one request at a time. The latest one waits for the one that runs, and replaces any other
+ * that waits. A request that has been superseded is aborted when it takes longer than the patience.
+ * Each abort doubles the patience, so that a slow service still answers some requests.
  */
 export class LatestOnly<Q> {
   private running: AbortController | undefined;
@@ -14,38 +14,39 @@ export class LatestOnly<Q> {
   private patience = PATIENCE_MS;
 
   constructor(
-    private readonly answer: (question: Q, stop: AbortController) => Promise<void>,
+    private readonly answer: (request: Q, stop: AbortController) => Promise<void>,
     private readonly fail: (error: unknown) => void,
   ) {}
 
-  ask(question: Q): void {
+  ask(request: Q): void {
     if (!this.running) {
-      void this.run(question);
+      void this.run(request);
       return;
     }
-    if (this.waiting === undefined) {
-      const superseded = this.running;
-      setTimeout(() => {
-        if (this.running === superseded && this.waiting !== undefined) {
-          this.patience *= 2;
-          superseded.abort();
-        }
-      }, this.patience);
-    }
-    this.waiting = question;
+    if (this.waiting === undefined) this.abortWhenOverdue(this.running);
+    this.waiting = request;
   }
 
-  /** Forget what was asked. */
+  /** Abort the request that runs, and drop the one that waits. */
   cancel(): void {
     this.waiting = undefined;
     this.running?.abort();
   }
 
-  private async run(question: Q): Promise<void> {
+  private abortWhenOverdue(superseded: AbortController): void {
+    setTimeout(() => {
+      if (this.running === superseded && this.waiting !== undefined) {
+        this.patience *= 2;
+        superseded.abort();
+      }
+    }, this.patience);
+  }
+
+  private async run(request: Q): Promise<void> {
     const running = new AbortController();
     this.running = running;
     try {
-      await this.answer(question, running);
+      await this.answer(request, running);
       this.patience = PATIENCE_MS;
     } catch (error) {
       if (!isAbort(error)) this.fail(error);

@@ -1,12 +1,12 @@
-// Meshes of the store: listed, made, uploaded.
+// Meshes of the store: list, get, make samples, upload.
 import { authorization, call, getJson } from "./http";
 import { ProblemError, parseProblem } from "./problemError";
 import type { MeshDocument, MeshList } from "./types";
 
-/** List a hundred meshes, those behind a cursor where there is one. */
+/** List up to a hundred meshes, from the start or after a cursor. */
 export function listMeshes(cursor: string | null): Promise<MeshList> {
-  const behind = cursor === null ? {} : { cursor };
-  return getJson(`/v1/meshes?${new URLSearchParams({ limit: "100", ...behind })}`);
+  const after = cursor === null ? {} : { cursor };
+  return getJson(`/v1/meshes?${new URLSearchParams({ limit: "100", ...after })}`);
 }
 
 export function getMesh(id: string): Promise<MeshDocument> {
@@ -20,7 +20,7 @@ export async function makeSample(name: string, faces: number): Promise<MeshDocum
   ).json() as Promise<MeshDocument>;
 }
 
-/** Upload a file. By XMLHttpRequest, since fetch does not tell how much of a body it has sent. */
+/** Upload a file by XMLHttpRequest, because fetch does not report upload progress. */
 export function uploadMesh(
   file: File,
   onProgress: (share: number | null) => void,

@@ -1,4 +1,4 @@
-// numpy's own file format: a header of text, then the numbers as they lie in memory.
+// Arrays in NumPy's .npy format: a header of text, then the raw numbers.
 
 export interface NpyArray {
   data: Float64Array | Float32Array | Int32Array | Uint32Array | BigInt64Array;
@@ -13,6 +13,7 @@ const KINDS = {
   "<i8": BigInt64Array,
 } as const;
 
+/** Parse an array in C order; its numbers share memory with ``buffer``. */
 export function parseNpy(buffer: ArrayBuffer): NpyArray {
   const view = new DataView(buffer);
   const isLong = view.getUint8(6) > 1; // version 2 has a header of more than 64 kB
@@ -34,7 +35,7 @@ export function parseNpy(buffer: ArrayBuffer): NpyArray {
   };
 }
 
-/** Return the numbers as indices; the service numbers in 64 bits, and has no mesh that needs them. */
+/** Return the numbers as 32-bit indices: the service writes 64 bits, but no mesh needs as many. */
 export function toIndices(array: NpyArray): Uint32Array<ArrayBuffer> {
   return Uint32Array.from(array.data as ArrayLike<number | bigint>, Number);
 }

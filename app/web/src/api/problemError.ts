@@ -1,10 +1,12 @@
-// What the service says when it does not do what it was asked to.
+// Problem documents of the service (RFC 9457) as exceptions.
 import type { Problem } from "./types";
 
+/** The members of a problem that are always there; a problem of our own making has no others. */
+type ProblemLike = Pick<Problem, "detail" | "code" | "status" | "request_id"> & Partial<Problem>;
+
+/** An error that the service has explained. */
 export class ProblemError extends Error {
-  constructor(
-    readonly problem: Pick<Problem, "detail" | "code" | "status" | "request_id"> & Partial<Problem>,
-  ) {
+  constructor(readonly problem: ProblemLike) {
     super(problem.detail);
   }
 }
@@ -14,7 +16,7 @@ export async function problemOfResponse(response: Response): Promise<ProblemErro
   return parseProblem(response.status, text, response.headers.get("X-Request-ID") ?? "");
 }
 
-/** Make an exception of a refusal; what is no problem document, a proxy's page, is told by its status. */
+/** Parse a problem document. Anything else, such as a proxy's page, is described by its status. */
 export function parseProblem(status: number, text: string, requestId: string): ProblemError {
   try {
     return new ProblemError(JSON.parse(text) as Problem);

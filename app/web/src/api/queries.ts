@@ -1,5 +1,4 @@
-// The questions that the page asks of a mesh.
-
+// Queries of the page: distances, territories, paths, points.
 import { getJson, post } from "./http";
 import { answerOfJob } from "./jobs";
 import { parseNpy } from "./npy";
@@ -12,21 +11,23 @@ import type {
   LocateAnswer,
   Outline,
   Point,
+  ResolvedPoint,
   Unreachable,
 } from "./types";
 
 const NPY = "application/x-npy";
-/** Queries that are likely to take longer become jobs, which tell their progress. */
+/** Queries expected to take longer run as jobs, which report progress. */
 const JOB_FROM_S = 0.5;
 
 export type Question = Partial<DistancesRequest> & Pick<DistancesRequest, "sources">;
 
+/** Distances to all vertices, infinite where unreachable. */
 export interface Field {
   distances: Float64Array;
   largest: number;
   bound: ErrorBound;
   unreachable: Unreachable;
-  /** Seconds of computing, by the service's own clock; null where the answer was kept. */
+  /** Computing time by the service's own clock; null for a cached answer. */
   seconds: number | null;
 }
 
@@ -47,8 +48,8 @@ export async function askDistances(
   return {
     distances,
     largest: largestOf(distances),
-    bound: told(response, "Geodesic-Error-Bound"),
-    unreachable: told(response, "Geodesic-Unreachable"),
+    bound: jsonHeader(response, "Geodesic-Error-Bound"),
+    unreachable: jsonHeader(response, "Geodesic-Unreachable"),
     seconds: secondsOf(response),
   };
 }
@@ -62,7 +63,7 @@ export async function askTerritories(
   const body = { ...question, include: ["nearest_source"] };
   const response = await post(`/v1/meshes/${mesh}/distances`, body, {}, signal);
   const { nearest_source } = (await response.json()) as DistancesAnswer;
-  return Int32Array.from(nearest_source!, (source) => source ?? -1);
+  return Int32Array.from(nearest_source ?? [], (source) => source ?? -1);
 }
 
 export interface RouteQuestion {
@@ -73,14 +74,14 @@ export interface RouteQuestion {
   explain: boolean;
 }
 
-/** Return the shortest path; from several sources that from the nearest one. */
+/** Return the shortest path; of several sources, it starts at the nearest. */
 export async function askRoute(
   mesh: string,
   question: RouteQuestion,
   signal: AbortSignal,
 ): Promise<Outline> {
   const { sources, ...rest } = question;
-  const source = sources[await nearestSource(mesh, question, signal)]!;
+  const source = sources[await nearestSource(mesh, question, signal)];
   const response = await post(`/v1/meshes/${mesh}/path`, { source, ...rest }, {}, signal);
   return response.json() as Promise<Outline>;
 }
@@ -100,16 +101,24 @@ async function nearestSource(
 /** Return the point of the surface that is nearest to a position. */
 export async function locate(mesh: string, position: [number, number, number]): Promise<Point> {
   const response = await post(`/v1/meshes/${mesh}/locate`, { points: [position] });
-  const { vertex, face, barycentric } = ((await response.json()) as LocateAnswer).points[0]!;
-  return vertex != null ? { vertex } : { face: face!, barycentric: barycentric! };
+  const [point] = ((await response.json()) as LocateAnswer).points;
+  if (!point) throw new Error("The service found no point of the surface there.");
+  return pointOf(point);
+}
+
+/** Return a point as the page has it: at a vertex by its number, otherwise within a face. */
+export function pointOf({ vertex, face, barycentric }: Partial<ResolvedPoint>): Point {
+  if (vertex != null) return { vertex };
+  if (face != null && barycentric) return { face, barycentric };
+  throw new Error("The service named a point that is neither at a vertex nor in a face.");
 }
 
 export function getAbout(): Promise<About> {
   return getJson("/v1");
 }
 
-function told<T>(response: Response, header: string): T {
-  return JSON.parse(response.headers.get(header)!) as T;
+function jsonHeader<T>(response: Response, name: string): T {
+  return JSON.parse(response.headers.get(name) ?? "null") as T;
 }
 
 function secondsOf(response: Response): number | null {

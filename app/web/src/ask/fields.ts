@@ -1,4 +1,4 @@
-// Distances to all vertices: asked for when sources, method or limits change, and painted.
+// Distances to all vertices: requested when sources, method or limits change, then painted.
 import type { Field, Question } from "../api/queries";
 import { askDistances, askTerritories } from "../api/queries";
 import type { Method } from "../api/types";
@@ -8,19 +8,21 @@ import type { State } from "../state/state";
 import type { Status } from "../status";
 import { hideLegend, showScale, showTerritories } from "../view/legend";
 import type { SceneView } from "../view/sceneView";
+import type { Surface } from "../view/surface";
 
-/** What is known for the same sources, barriers and limit. */
-interface Known {
+/** Answers for one set of sources, barriers and limit. */
+interface Answers {
   key: string;
   exact?: Field;
   approximate?: Field;
+  /** The error allowed in ``approximate``. */
   error?: number;
   nearest?: Int32Array;
 }
 
 export class Fields {
-  private known: Known = { key: "" };
-  private asked = "";
+  private answers: Answers = { key: "" };
+  private requested = "";
   private stop = new AbortController();
 
   constructor(
@@ -28,114 +30,115 @@ export class Fields {
     private readonly sceneView: SceneView,
   ) {}
 
-  /** The field that is drawn, or null. */
+  /** Return the field that is drawn, or null. */
   of(state: State): Field | null {
-    return this.known[state.method] ?? null;
+    return this.answers[state.method] ?? null;
   }
 
-  /** Ask for what ``state`` needs and nobody has told yet, and paint it. */
+  /** Request what ``state`` needs and has not been answered yet, and paint it. */
   follow(state: State): void {
     const { mesh, sources, barriers, maxDistance, method, error, shade } = state;
-    const asked = JSON.stringify([mesh, sources, barriers, maxDistance, method, error, shade]);
-    if (asked === this.asked) return;
-    this.asked = asked;
+    const requested = JSON.stringify([mesh, sources, barriers, maxDistance, method, error, shade]);
+    if (requested === this.requested) return;
+    this.requested = requested;
     this.stop.abort();
     const key = JSON.stringify([mesh, sources, barriers, maxDistance]);
-    if (key !== this.known.key) this.known = { key };
-    if (error !== this.known.error) delete this.known.approximate;
-    if (!mesh || sources.length === 0) {
-      this.paint(state);
-      return;
-    }
-    const stop = (this.stop = new AbortController());
+    if (key !== this.answers.key) this.answers = { key };
+    if (error !== this.answers.error) delete this.answers.approximate;
+    if (!mesh || sources.length === 0) this.paint(state);
+    else this.request(mesh, state);
+  }
+
+  private request(mesh: string, state: State): void {
+    const stop = new AbortController();
+    this.stop = stop;
     this.status.run("busy", "Computing distances…", stop, async (onProgress) => {
-      // When this fails or is cancelled it may be asked for again.
       try {
-        await this.fetchMissing(state, onProgress, stop.signal);
+        await this.fetchMissing(mesh, state, onProgress, stop.signal);
       } catch (failure) {
-        if (this.stop === stop) this.asked = "";
+        // After a failure or an abort, the same request may be made again.
+        if (this.stop === stop) this.requested = "";
         throw failure;
       }
       if (!stop.signal.aborted) this.paint(state);
     });
   }
 
-  /** Paint what is known; a mesh that was just loaded has no colours yet. */
-  paint(state: State): void {
-    const { surface } = this.sceneView;
-    const { exact, approximate, nearest } = this.known;
-    const field = this.of(state);
-    this.compare();
-    if (!surface) return;
-    surface.divide(null);
-    if (!field) {
-      surface.colour(null, 1);
-      hideLegend();
-    } else if (state.shade === "difference" && exact && approximate) {
-      const share = shortfall(exact, approximate);
-      const largest = share.reduce((most, x) => Math.max(most, x), 0);
-      surface.colour(share, largest);
-      showScale(`Short by, % (promised: ${written(100 * approximate.bound.value, 3)})`, largest);
-    } else {
-      surface.colour(field.distances, field.largest);
-      if (state.shade === "territories" && nearest) {
-        surface.divide(nearest);
-        showTerritories(state.sources.map(writePoint));
-      } else showScale("Distance in mesh units", field.largest);
-    }
-    this.setIsolines(state);
-  }
-
-  /** Draw isolines as ``state`` has them. */
-  setIsolines(state: State): void {
-    const field = this.of(state);
-    const { surface, stage } = this.sceneView;
-    surface?.setIsolines(
-      field && state.shade !== "difference" ? spacingOf(state, field.largest) : 0,
-    );
-    stage.invalidate();
-  }
-
   private async fetchMissing(
+    mesh: string,
     state: State,
     onProgress: (share: number) => void,
     signal: AbortSignal,
   ): Promise<void> {
-    const { known } = this;
-    const methods: Method[] =
-      state.shade === "difference" ? ["exact", "approximate"] : [state.method];
+    const { answers } = this;
+    const isCompared = state.shade === "difference";
+    const methods: Method[] = isCompared ? ["exact", "approximate"] : [state.method];
     for (const method of methods) {
-      if (known[method]) continue;
-      known[method] = await askDistances(
-        state.mesh!,
-        questionOf(state, method),
-        onProgress,
-        signal,
-      );
-      if (method === "approximate") known.error = state.error;
+      if (answers[method]) continue;
+      answers[method] = await askDistances(mesh, questionOf(state, method), onProgress, signal);
+      if (method === "approximate") answers.error = state.error;
     }
     if (state.shade === "territories") {
-      known.nearest ??= await askTerritories(state.mesh!, questionOf(state, state.method), signal);
+      answers.nearest ??= await askTerritories(mesh, questionOf(state, state.method), signal);
     }
+  }
+
+  /** Paint the answers that are there; a mesh without any stays grey. */
+  paint(state: State): void {
+    const { surface } = this.sceneView;
+    const field = this.of(state);
+    this.compare();
+    if (!surface) return;
+    surface.setTerritories(null);
+    if (field) this.paintField(surface, field, state);
+    else {
+      surface.setValues(null, 1);
+      hideLegend();
+    }
+    this.setIsolines(state);
+  }
+
+  private paintField(surface: Surface, field: Field, { shade, sources }: State): void {
+    const { exact, approximate, nearest } = this.answers;
+    if (shade === "difference" && exact && approximate) {
+      const errors = shortfall(exact, approximate);
+      const largest = largestOf(errors);
+      surface.setValues(errors, largest);
+      showScale(`Error, % (promised: ${written(100 * approximate.bound.value, 3)})`, largest);
+      return;
+    }
+    surface.setValues(field.distances, field.largest);
+    if (shade === "territories" && nearest) {
+      surface.setTerritories(nearest);
+      showTerritories(sources.map(writePoint));
+    } else showScale("Distance in mesh units", field.largest);
+  }
+
+  /** Draw the isolines that ``state`` asks for. */
+  setIsolines(state: State): void {
+    const field = this.of(state);
+    const { surface, stage } = this.sceneView;
+    const isDrawn = field !== null && state.shade !== "difference";
+    surface?.setIsolines(isDrawn ? spacingOf(state, field.largest) : 0);
+    stage.invalidate();
   }
 
   /** Show time and error of both methods side by side. */
   private compare(): void {
-    const { exact, approximate } = this.known;
-    const time = (field?: Field): string =>
-      !field ? "–" : field.seconds === null ? "kept" : duration(field.seconds);
-    byId("time-exact").textContent = time(exact);
-    byId("time-approximate").textContent = time(approximate);
+    const { exact, approximate } = this.answers;
+    const both = exact && approximate;
+    byId("time-exact").textContent = timeOf(exact);
+    byId("time-approximate").textContent = timeOf(approximate);
     byId("bound-exact").textContent = exact ? "0" : "–";
     byId("bound-approximate").textContent = approximate ? percent(approximate.bound.value) : "–";
-    const both = exact && approximate;
     byId("measured-exact").textContent = both ? "0" : "–";
     byId("measured-approximate").textContent = both
-      ? percent(shortfall(exact, approximate).reduce((most, x) => Math.max(most, x), 0) / 100)
+      ? percent(largestOf(shortfall(exact, approximate)) / 100)
       : "–";
   }
 }
 
+/** Return the body of a query for distances. */
 export function questionOf(state: State, method: Method): Question {
   return {
     sources: state.sources as Question["sources"],
@@ -146,22 +149,30 @@ export function questionOf(state: State, method: Method): Question {
   };
 }
 
-/** Return how far apart isolines are: as the service spaces its levels. */
+/** Return the distance between isolines, by the rule that the service has for its levels. */
 function spacingOf({ lines }: State, largest: number): number {
   if (lines === null) return 0;
   return "count" in lines ? largest / (lines.count + 1) : lines.spacing;
 }
 
-/** Return by how many per cent each approximate distance is too short; -1 where there is none. */
+/** Return by how many per cent each approximate distance is too short; -1 where unreachable. */
 function shortfall(exact: Field, approximate: Field): Float64Array {
   return exact.distances.map((distance, i) => {
     if (distance === Infinity) return -1;
-    return distance > 0
-      ? Math.max(0, (100 * (distance - approximate.distances[i]!)) / distance)
-      : 0;
+    const missing = distance - (approximate.distances[i] ?? Number.NaN);
+    return distance > 0 ? Math.max(0, (100 * missing) / distance) : 0;
   });
 }
 
-export function percent(share: number): string {
+function largestOf(values: Float64Array): number {
+  return values.reduce((most, x) => Math.max(most, x), 0);
+}
+
+function timeOf(field: Field | undefined): string {
+  if (!field) return "–";
+  return field.seconds === null ? "cached" : duration(field.seconds);
+}
+
+function percent(share: number): string {
   return `${written(100 * share, 3)} %`;
 }

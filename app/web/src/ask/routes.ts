@@ -1,6 +1,6 @@
-// The shortest path to the target, which follows the pointer; and how it was searched for.
+// The shortest path to the target, which follows the pointer, and the steps of its search.
 import { LatestOnly } from "../api/latestOnly";
-import { askRoute, type RouteQuestion } from "../api/queries";
+import { askRoute, pointOf, type RouteQuestion } from "../api/queries";
 import type { Outline, Point, Step } from "../api/types";
 import { byId, count, duration, written } from "../dom";
 import { writePoint } from "../state/point";
@@ -8,7 +8,7 @@ import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
 
-type Asked = RouteQuestion & { mesh: string };
+type RouteRequest = RouteQuestion & { mesh: string };
 
 const WORDS: Record<Step["name"], string> = {
   dijkstra: "Along edges: a first bound",
@@ -21,22 +21,22 @@ const WORDS: Record<Step["name"], string> = {
 
 export class Routes {
   outline: Outline | null = null;
-  private asked = "";
+  private requested = "";
   private steps: Step[] = [];
-  private question: Asked | null = null;
-  private readonly latestOnly: LatestOnly<Asked>;
+  private request: RouteRequest | null = null;
+  private readonly latestOnly: LatestOnly<RouteRequest>;
 
   constructor(
     private readonly status: Status,
     private readonly sceneView: SceneView,
   ) {
-    this.latestOnly = new LatestOnly<Asked>(
+    this.latestOnly = new LatestOnly<RouteRequest>(
       ({ mesh, ...question }, stop) =>
         status.during("busy", "Searching the path…", stop, async () =>
           this.show(await askRoute(mesh, question, stop.signal), question),
         ),
       (error) => {
-        this.asked = "";
+        this.requested = "";
         status.fail(error);
       },
     );
@@ -45,16 +45,16 @@ export class Routes {
     byId("step").addEventListener("input", () => this.showStep());
   }
 
-  /** Ask for the path that ``state`` has. */
+  /** Request the path that ``state`` asks for. */
   follow({ mesh, sources, target, waypoints, barriers }: State): void {
-    const asked = JSON.stringify([mesh, sources, target, waypoints, barriers]);
-    if (asked === this.asked) return;
-    this.asked = asked;
+    const requested = JSON.stringify([mesh, sources, target, waypoints, barriers]);
+    if (requested === this.requested) return;
+    this.requested = requested;
     this.endSteps();
-    const isAsked = mesh !== null && target !== null && sources.length > 0;
-    this.question = isAsked ? { mesh, sources, target, waypoints, barriers, explain: false } : null;
-    byId("explain-start", HTMLButtonElement).disabled = !isAsked;
-    if (this.question) this.latestOnly.ask(this.question);
+    const hasPath = mesh !== null && target !== null && sources.length > 0;
+    this.request = hasPath ? { mesh, sources, target, waypoints, barriers, explain: false } : null;
+    byId("explain-start", HTMLButtonElement).disabled = !hasPath;
+    if (this.request) this.latestOnly.ask(this.request);
     else {
       this.latestOnly.cancel();
       this.outline = null;
@@ -63,20 +63,18 @@ export class Routes {
     }
   }
 
-  /** Where the path that is known begins. */
+  /** The start of the path that was found. */
   get source(): Point | null {
-    if (!this.outline) return null;
-    const { vertex, face, barycentric } = this.outline.source;
-    return vertex != null ? { vertex } : { face: face!, barycentric: barycentric! };
+    return this.outline && pointOf(this.outline.source);
   }
 
-  /** Draw the path that is known; a mesh that was just loaded shows none yet. */
+  /** Draw the path that was found; a mesh that was just loaded shows none yet. */
   draw(): void {
     this.sceneView.showRoute(this.outline);
   }
 
   private show(outline: Outline, question: RouteQuestion): void {
-    if (!this.question) return;
+    if (!this.request) return;
     this.outline = outline;
     this.draw();
     const readout = byId("readout");
@@ -91,13 +89,13 @@ export class Routes {
   }
 
   private explain(): void {
-    const asked = this.question;
-    if (!asked) return;
-    const { mesh, ...question } = asked;
+    const { request } = this;
+    if (!request) return;
+    const { mesh, ...question } = request;
     const stop = new AbortController();
     this.status.run("busy", "Searching step by step…", stop, async () => {
       const outline = await askRoute(mesh, { ...question, explain: true }, stop.signal);
-      if (asked !== this.question) return;
+      if (request !== this.request) return;
       this.steps = outline.steps ?? [];
       byId("explain-start").hidden = true;
       byId("steps").hidden = false;
@@ -113,10 +111,10 @@ export class Routes {
     const number = byId("step", HTMLInputElement).valueAsNumber;
     const step = this.steps[number];
     if (!step) return;
-    // A step that visits no face works in the region of the one before.
+    // A step without faces of its own works in the region of the step before.
     const region = this.steps.slice(0, number + 1).findLast(({ faces }) => faces.length > 0);
     this.sceneView.region.show(this.sceneView.mesh, region?.faces ?? []);
-    const legs = this.steps.at(-1)!.leg + 1;
+    const legs = (this.steps.at(-1)?.leg ?? 0) + 1;
     const leg = legs > 1 ? ` of leg ${step.leg + 1}` : "";
     byId("step-words").textContent =
       `${number + 1} of ${this.steps.length}${leg}. ${WORDS[step.name]}. ` +

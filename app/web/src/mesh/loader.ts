@@ -1,4 +1,4 @@
-// A mesh of the store in the page: its arrays, and in a worker what takes long to make of them.
+// A mesh of the store in the page. A worker fetches its arrays and derives what takes long.
 import { BufferAttribute, BufferGeometry } from "three";
 import { MeshBVH } from "three-mesh-bvh";
 import { authorization } from "../api/http";
@@ -7,43 +7,43 @@ import type { MeshDocument } from "../api/types";
 
 type Triple = [number, number, number];
 
-/** How the mesh is drawn: moved to the origin, and scaled into the unit ball. */
+/** The transform of drawn positions: moved to the origin and scaled into the unit ball. */
 export interface Frame {
   centre: Triple;
   radius: number;
 }
 
-export type LoaderQuestion =
-  | { ask: "mesh"; vertices: string; faces: string; headers: Record<string, string> }
-  | { ask: "edges" };
+export type LoaderRequest =
+  | { kind: "mesh"; vertices: string; faces: string; headers: Record<string, string> }
+  | { kind: "edges" };
 
-export type LoaderAnswer =
+export type LoaderResponse =
   | {
-      tell: "shape";
+      kind: "shape";
       frame: Frame;
       vertices: Float64Array;
       positions: Float32Array<ArrayBuffer>;
       normals: Float32Array<ArrayBuffer>;
       faces: Uint32Array<ArrayBuffer>;
     }
-  | { tell: "tree"; roots: ArrayBuffer[]; order: Uint32Array | Uint16Array }
-  | { tell: "edges"; edges: Uint32Array<ArrayBuffer> }
-  | { tell: "problem"; problem: ProblemError["problem"] }
-  | { tell: "failure"; message: string };
+  | { kind: "tree"; roots: ArrayBuffer[]; order: Uint32Array | Uint16Array }
+  | { kind: "edges"; edges: Uint32Array<ArrayBuffer> }
+  | { kind: "problem"; problem: ProblemError["problem"] }
+  | { kind: "failure"; message: string };
 
-type Told<K> = Extract<LoaderAnswer, { tell: K }>;
+type ResponseOf<K> = Extract<LoaderResponse, { kind: K }>;
 
-/** A mesh as it is drawn and picked. */
+/** A mesh to draw and to pick points of. */
 export class LoadedMesh {
   readonly geometry = new BufferGeometry();
-  /** Settled when points can be picked. */
+  /** The tree for picking, which the worker builds last. */
   readonly tree: Promise<MeshBVH>;
   private edges: Promise<Uint32Array<ArrayBuffer>> | undefined;
 
   constructor(
     readonly document: MeshDocument,
-    private readonly shape: Told<"shape">,
-    private readonly worker: Answering,
+    private readonly shape: ResponseOf<"shape">,
+    private readonly worker: LoaderWorker,
   ) {
     this.geometry.setAttribute("position", new BufferAttribute(shape.positions, 3));
     this.geometry.setAttribute("normal", new BufferAttribute(shape.normals, 3));
@@ -68,13 +68,13 @@ export class LoadedMesh {
     return [faces[3 * face]!, faces[3 * face + 1]!, faces[3 * face + 2]!];
   }
 
-  /** Where a vertex is, in mesh units. */
+  /** Return the position of a vertex, in mesh units. */
   vertex(index: number): Triple {
     const { vertices } = this.shape;
     return [vertices[3 * index]!, vertices[3 * index + 1]!, vertices[3 * index + 2]!];
   }
 
-  /** Return a position as it is drawn. */
+  /** Return the drawn position of one in mesh units. */
   drawn(position: readonly number[]): Triple {
     const { centre, radius } = this.frame;
     return position.map((x, i) => (x - centre[i]!) / radius) as Triple;
@@ -82,7 +82,7 @@ export class LoadedMesh {
 
   /** Return the vertices of all edges, in pairs. */
   allEdges(): Promise<Uint32Array<ArrayBuffer>> {
-    this.edges ??= this.worker.ask({ ask: "edges" }, "edges").then(({ edges }) => edges);
+    this.edges ??= this.worker.ask({ kind: "edges" }, "edges").then(({ edges }) => edges);
     return this.edges;
   }
 
@@ -93,11 +93,11 @@ export class LoadedMesh {
 }
 
 export async function loadMesh(document: MeshDocument, signal: AbortSignal): Promise<LoadedMesh> {
-  const worker = new Answering();
+  const worker = new LoaderWorker();
   signal.addEventListener("abort", () => worker.end());
   const { vertices, faces } = document.arrays as Record<string, string>;
   const question = {
-    ask: "mesh" as const,
+    kind: "mesh" as const,
     vertices: vertices!,
     faces: faces!,
     headers: authorization(),
@@ -107,26 +107,26 @@ export async function loadMesh(document: MeshDocument, signal: AbortSignal): Pro
   return new LoadedMesh(document, shape, worker);
 }
 
-/** The worker, whose answers are awaited by name. */
-class Answering {
+/** The worker, with a promise for each kind of response. */
+class LoaderWorker {
   private readonly worker = new Worker(new URL("./loader.worker.ts", import.meta.url), {
     type: "module",
   });
 
-  ask<K extends LoaderAnswer["tell"]>(question: LoaderQuestion, tell: K): Promise<Told<K>> {
-    const answer = this.next(tell);
+  ask<K extends LoaderResponse["kind"]>(question: LoaderRequest, kind: K): Promise<ResponseOf<K>> {
+    const answer = this.next(kind);
     this.worker.postMessage(question);
     return answer;
   }
 
-  next<K extends LoaderAnswer["tell"]>(tell: K): Promise<Told<K>> {
+  next<K extends LoaderResponse["kind"]>(kind: K): Promise<ResponseOf<K>> {
     return new Promise((resolve, reject) => {
-      const listen = ({ data }: MessageEvent<LoaderAnswer>): void => {
-        if (![tell, "problem", "failure"].includes(data.tell)) return;
+      const listen = ({ data }: MessageEvent<LoaderResponse>): void => {
+        if (![kind, "problem", "failure"].includes(data.kind)) return;
         this.worker.removeEventListener("message", listen as EventListener);
-        if (data.tell === "problem") reject(new ProblemError(data.problem));
-        else if (data.tell === "failure") reject(new Error(data.message));
-        else resolve(data as Told<K>);
+        if (data.kind === "problem") reject(new ProblemError(data.problem));
+        else if (data.kind === "failure") reject(new Error(data.message));
+        else resolve(data as ResponseOf<K>);
       };
       this.worker.addEventListener("message", listen as EventListener);
     });

@@ -1,19 +1,19 @@
-// Off the main thread: arrays are fetched, normals computed, the tree for picking built.
+// Off the main thread: fetch the arrays, compute normals, build the tree for picking.
 import { BufferAttribute, BufferGeometry } from "three";
 import { MeshBVH } from "three-mesh-bvh";
 import { parseNpy, toIndices } from "../api/npy";
 import { ProblemError, problemOfResponse } from "../api/problemError";
-import type { LoaderAnswer, LoaderQuestion } from "./loader";
+import type { LoaderRequest, LoaderResponse } from "./loader";
 
 let faces = new Uint32Array(0);
 
-self.onmessage = async ({ data }: MessageEvent<LoaderQuestion>) => {
+self.onmessage = async ({ data }: MessageEvent<LoaderRequest>) => {
   try {
-    if (data.ask === "mesh") await load(data);
+    if (data.kind === "mesh") await load(data);
     else sendEdges();
   } catch (error) {
-    if (error instanceof ProblemError) send({ tell: "problem", problem: error.problem });
-    else send({ tell: "failure", message: error instanceof Error ? error.message : String(error) });
+    if (error instanceof ProblemError) send({ kind: "problem", problem: error.problem });
+    else send({ kind: "failure", message: error instanceof Error ? error.message : String(error) });
   }
 };
 
@@ -21,7 +21,7 @@ async function load({
   vertices,
   faces: facesUrl,
   headers,
-}: LoaderQuestion & { ask: "mesh" }): Promise<void> {
+}: LoaderRequest & { kind: "mesh" }): Promise<void> {
   const [points, corners] = await Promise.all([array(vertices, headers), array(facesUrl, headers)]);
   const doubles = Float64Array.from(points.data as Float64Array);
   faces = toIndices(corners);
@@ -31,15 +31,19 @@ async function load({
     positions[i] = (doubles[i]! - frame.centre[i % 3]!) / frame.radius;
   }
   const normals = normalsOf(positions, faces);
-  send({ tell: "shape", frame, vertices: doubles, positions, normals, faces }, []);
+  send({ kind: "shape", frame, vertices: doubles, positions, normals, faces }, []);
+  sendTree(positions);
+}
+
+function sendTree(positions: Float32Array): void {
   const geometry = new BufferGeometry();
   geometry.setAttribute("position", new BufferAttribute(positions, 3));
   geometry.setIndex(new BufferAttribute(faces, 1));
-  // Indirect: the faces keep their order, and so their numbers.
+  // An indirect tree leaves the faces, and so their numbers, in order.
   const tree = MeshBVH.serialize(new MeshBVH(geometry, { indirect: true }), {
     cloneBuffers: false,
   });
-  send({ tell: "tree", roots: tree.roots as ArrayBuffer[], order: tree.indirectBuffer! });
+  send({ kind: "tree", roots: tree.roots as ArrayBuffer[], order: tree.indirectBuffer! });
 }
 
 async function array(
@@ -63,7 +67,7 @@ function frameOf(points: Float64Array): { centre: [number, number, number]; radi
   return { centre, radius };
 }
 
-/** Normals at vertices, each face counting by its area; outwards on the whole, however faces are wound. */
+/** Return area-weighted normals at vertices, pointing outwards on the whole whatever the winding. */
 function normalsOf(p: Float32Array, corners: Uint32Array): Float32Array<ArrayBuffer> {
   const normals = new Float32Array(p.length);
   for (let f = 0; f < corners.length; f += 3) {
@@ -102,9 +106,9 @@ function sendEdges(): void {
     edges[count++] = Math.floor(keys[i]! / 2 ** 26);
     edges[count++] = keys[i]! % 2 ** 26;
   }
-  send({ tell: "edges", edges: edges.slice(0, count) });
+  send({ kind: "edges", edges: edges.slice(0, count) });
 }
 
-function send(answer: LoaderAnswer, transfer: Transferable[] = []): void {
+function send(answer: LoaderResponse, transfer: Transferable[] = []): void {
   self.postMessage(answer, { transfer });
 }

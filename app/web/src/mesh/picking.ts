@@ -1,4 +1,4 @@
-// From a place on the screen to a point of the surface.
+// Picking: from a place on the screen to a point of the surface, and the positions of points.
 import { type Camera, DoubleSide, Ray, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
 import type { Point } from "../api/types";
@@ -6,7 +6,7 @@ import type { LoadedMesh } from "./loader";
 
 export type FacePoint = Extract<Point, { face: number }>;
 
-/** Return the point of the surface under ``x``, ``y`` (-1 to 1, y upwards), or null beside it. */
+/** Return the point of the surface under ``x``, ``y`` (-1 to 1, y upwards), or null where there is none. */
 export function pick(
   mesh: LoadedMesh,
   tree: MeshBVH,
@@ -24,7 +24,7 @@ export function pick(
   return { face: hit.faceIndex, barycentric: weights(a!, b!, c!, hit.point) };
 }
 
-/** Weights of the corners, each 0 or more, 1 in all. */
+/** Return the barycentric weights of a point, none below 0, with sum 1. */
 function weights(a: Vector3, b: Vector3, c: Vector3, point: Vector3): [number, number, number] {
   const area = (p: Vector3, q: Vector3): number => {
     const normal = b.clone().sub(a).cross(c.clone().sub(a));
@@ -35,7 +35,7 @@ function weights(a: Vector3, b: Vector3, c: Vector3, point: Vector3): [number, n
   return sum > 0 ? (parts.map((part) => part / sum) as [number, number, number]) : [1, 0, 0];
 }
 
-/** Where a point is, in mesh units. */
+/** Return the position of a point, in mesh units. */
 export function positionOf(mesh: LoadedMesh, point: Point): [number, number, number] {
   if ("vertex" in point) return mesh.vertex(point.vertex);
   const [vertices, shares] =

@@ -1,4 +1,4 @@
-// Dark or light, the folded panel, the hint that goes away.
+// Appearance: dark or light, the folded panel, the hint.
 import { byId } from "../dom";
 
 const THEME = "geodesic-theme";

@@ -1,7 +1,7 @@
-// Fields and switches: they show the state, and change it.
+// Fields and switches: they show the state and change it.
 import { locate } from "../api/queries";
 import type { Method, Point } from "../api/types";
-import { byId } from "../dom";
+import { byId, query } from "../dom";
 import { readState, writeRanges } from "../state/permalink";
 import { parsePoints, type WrittenPoint, writePoint } from "../state/point";
 import { INITIAL, type Lines, type Shade, type State, type Store } from "../state/state";
@@ -42,10 +42,10 @@ export class Controls {
   }
 
   get tool(): Tool {
-    return document.querySelector<HTMLInputElement>("#tools input:checked")!.value as Tool;
+    return query("#tools input:checked", HTMLInputElement).value as Tool;
   }
 
-  /** Show what ``state`` is. */
+  /** Show ``state`` in all fields. */
   show(state: State): void {
     setValue("sources", state.sources.map(writePoint).join(" "));
     setValue("target", state.target ? writePoint(state.target) : "");
@@ -71,19 +71,21 @@ export class Controls {
     const { mesh } = this.store.state;
     if (mesh === null) return;
     const text = (id: string): string => byId(id, HTMLInputElement).value.trim();
-    this.status.run("busy", "Looking points up…", new AbortController(), async () => {
-      const [sources, targets, waypoints] = await Promise.all(
-        ["sources", "target", "waypoints"].map((id) => resolved(mesh, parsePoints(text(id)))),
-      );
+    this.status.run("busy", "Locating points…", new AbortController(), async () => {
+      const [sources, targets, waypoints] = await Promise.all([
+        resolved(mesh, parsePoints(text("sources"))),
+        resolved(mesh, parsePoints(text("target"))),
+        resolved(mesh, parsePoints(text("waypoints"))),
+      ]);
       const written = new URLSearchParams({
         barriers: text("barriers"),
         max_distance: text("max-distance"),
       });
       const { barriers, maxDistance } = readState(written.toString());
       this.store.update({
-        sources: sources!,
-        target: targets![0] ?? null,
-        waypoints: waypoints!,
+        sources,
+        target: targets[0] ?? null,
+        waypoints,
         barriers,
         maxDistance,
       });
@@ -101,11 +103,11 @@ export class Controls {
     this.store.update({ lines });
   }
 
-  /** Return the spacing that is drawn, or a round one, to begin with. */
+  /** Return the spacing of isolines to begin with: a round number. */
   usualSpacing: () => number = () => 1;
 }
 
-/** Return points as the page keeps them: positions become points of the surface. */
+/** Return points of the surface: the service locates those written as positions. */
 export function resolved(mesh: string, points: WrittenPoint[]): Promise<Point[]> {
   return Promise.all(
     points.map((point) => ("position" in point ? locate(mesh, point.position) : point)),
@@ -127,7 +129,7 @@ function onChoice(id: string, choose: (value: string) => void): void {
 }
 
 function choose(id: string, value: string): void {
-  document.querySelector<HTMLInputElement>(`#${id} input[value="${value}"]`)!.checked = true;
+  query(`#${id} input[value="${value}"]`, HTMLInputElement).checked = true;
 }
 
 function setValue(id: string, value: string): void {

@@ -1,4 +1,4 @@
-// What can be taken away: addresses, commands, files, a picture.
+// Exports: links, commands, files and a picture.
 import { authorization, post } from "../api/http";
 import type { About, Point } from "../api/types";
 import { questionOf } from "../ask/fields";
@@ -9,9 +9,9 @@ import type { Status } from "../status";
 import type { Stage } from "../view/scene";
 import { curlOf, pythonOf } from "./snippets";
 
-type What = "distances" | "path" | "isolines";
+type Product = "distances" | "path" | "isolines";
 
-const FORMATS: Record<What, string[]> = {
+const FORMATS: Record<Product, string[]> = {
   distances: ["npy", "csv", "ply"],
   path: ["obj", "svg", "csv"],
   isolines: ["obj", "svg"],
@@ -39,15 +39,15 @@ export class ExportPanel {
     byId("picture").addEventListener("click", () => this.savePicture());
   }
 
-  /** Offer what the service writes, and say what it does not. */
+  /** Offer the formats that the service writes, and name the others. */
   offer({ answer_formats }: Pick<About, "answer_formats">): void {
     this.formats = Object.keys(answer_formats);
     const lacking = new Set<string>();
     for (const what of ["distances", "path", "isolines"] as const) {
       const offered = FORMATS[what].filter((format) => this.formats.includes(format));
-      FORMATS[what]
-        .filter((format) => !offered.includes(format))
-        .forEach((format) => lacking.add(format));
+      for (const format of FORMATS[what]) {
+        if (!offered.includes(format)) lacking.add(format);
+      }
       byId(`download-${what}`).replaceChildren(
         ...offered.map((format) => {
           const choice = button(format.toUpperCase(), () => this.save(what, format));
@@ -56,12 +56,13 @@ export class ExportPanel {
         }),
       );
     }
-    if (lacking.size > 0)
+    if (lacking.size > 0) {
       note(`This service does not write ${[...lacking].join(", ").toUpperCase()}.`);
+    }
     this.show(this.store.state);
   }
 
-  /** Let be taken what there is. */
+  /** Enable the exports that ``state`` has answers for. */
   show(state: State): void {
     const hasField = state.mesh !== null && state.sources.length > 0;
     const has = {
@@ -77,7 +78,7 @@ export class ExportPanel {
     byId("picture", HTMLButtonElement).disabled = state.mesh === null;
   }
 
-  private save(what: What, format: string): void {
+  private save(what: Product, format: string): void {
     const stop = new AbortController();
     this.status.run("busy", `Fetching ${what}…`, stop, async () => {
       const { mesh } = this.store.state;
@@ -88,7 +89,7 @@ export class ExportPanel {
     });
   }
 
-  private bodyOf(what: What): unknown {
+  private bodyOf(what: Product): unknown {
     const { state } = this.store;
     const { target, waypoints, barriers, lines } = state;
     if (what === "path") return { source: this.source(), target, waypoints, barriers };
@@ -100,14 +101,16 @@ export class ExportPanel {
     };
   }
 
-  /** The largest distance that is drawn. */
+  /** Return the largest distance that is drawn. */
   largest: () => number = () => 0;
 
-  /** Where the path begins that is drawn: of several sources at the nearest. */
+  /** Return the start of the path that is drawn, or null. */
   nearest: () => Point | null = () => null;
 
   private source(): Point {
-    return this.nearest() ?? this.store.state.sources[0]!;
+    const source = this.nearest() ?? this.store.state.sources[0];
+    if (!source) throw new Error("There is no source yet.");
+    return source;
   }
 
   private levels(spacing: number): number[] {
@@ -123,11 +126,12 @@ export class ExportPanel {
     const picture = document.createElement("canvas");
     picture.width = canvas.width;
     picture.height = canvas.height;
-    const context = picture.getContext("2d")!;
+    const context = picture.getContext("2d");
+    if (!context) throw new Error("This browser cannot draw the picture.");
     context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--ground");
     context.fillRect(0, 0, picture.width, picture.height);
     context.drawImage(canvas, 0, 0);
-    picture.toBlob((blob) => download(blob!, "geodesic.png"), "image/png");
+    picture.toBlob((blob) => blob && download(blob, "geodesic.png"), "image/png");
   }
 }
 

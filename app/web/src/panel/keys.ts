@@ -1,5 +1,4 @@
-// Everything by keyboard.
-
+// The keyboard: keys for everything that a pointer does.
 import { byId } from "../dom";
 import { INITIAL, type Store } from "../state/state";
 import type { Status } from "../status";

@@ -1,4 +1,4 @@
-// Where a mesh comes from: a file, a sample, the store.
+// Choosing a mesh: from a file, from a sample or from the store.
 import { listMeshes, makeSample, uploadMesh } from "../api/meshes";
 import type { MeshDocument } from "../api/types";
 import { button, byId, count } from "../dom";
@@ -12,7 +12,7 @@ const SAMPLES = [
   ["obstacles", "Obstacles", 20_000],
 ] as const;
 
-/** What to choose to see more of the store; no mesh has this id. */
+/** The value of the option that lists more of the store; no mesh has this id. */
 const MORE = "more";
 
 export class Meshes {
@@ -26,7 +26,7 @@ export class Meshes {
     for (const place of ["samples", "welcome-samples"]) {
       const buttons = SAMPLES.map(([name, title, faces]) => {
         const choice = button(title, () =>
-          this.take(`Making ${title}…`, title, () => makeSample(name, faces)),
+          this.create(`Making ${title}…`, title, () => makeSample(name, faces)),
         );
         choice.dataset.sample = name;
         return choice;
@@ -48,14 +48,14 @@ export class Meshes {
     this.acceptDrops();
   }
 
-  /** Leave out the samples that this service does not make. */
+  /** Hide the samples that this service does not make. */
   offer(samples: readonly string[]): void {
     for (const choice of document.querySelectorAll<HTMLButtonElement>("[data-sample]")) {
-      choice.hidden = !samples.includes(choice.dataset.sample!);
+      choice.hidden = !samples.includes(choice.dataset.sample ?? "");
     }
   }
 
-  /** List what is in the store, and which of it is shown. */
+  /** List the meshes of the store, and select the one that is open. */
   async list(): Promise<void> {
     const options = await this.listed(null);
     const title = options.length > 0 ? "In the store…" : "The store is empty";
@@ -65,15 +65,15 @@ export class Meshes {
 
   showChosen(): void {
     this.select.value = this.store.state.mesh ?? "";
-    if (this.select.selectedIndex < 0) this.select.value = ""; // not all are listed
+    if (this.select.selectedIndex < 0) this.select.value = ""; // the mesh is not listed yet
   }
 
-  /** Go on with the list, in place of its last line, which asks for that. */
+  /** Replace the option that lists more by the meshes that come next. */
   private listMore(): void {
-    const last = this.select.selectedOptions[0]!;
+    const [last] = this.select.selectedOptions;
     this.showChosen();
-    this.listed(last.dataset.cursor!).then(
-      (options) => last.replaceWith(...options),
+    this.listed(last?.dataset.cursor ?? null).then(
+      (options) => last?.replaceWith(...options),
       (error: unknown) => this.status.fail(error),
     );
   }
@@ -94,12 +94,12 @@ export class Meshes {
   }
 
   private upload(file: File): void {
-    this.take(`Uploading ${file.name}…`, file.name, (onProgress, signal) =>
+    this.create(`Uploading ${file.name}…`, file.name, (onProgress, signal) =>
       uploadMesh(file, onProgress, signal),
     );
   }
 
-  private take(
+  private create(
     words: string,
     name: string,
     make: (onProgress: OnProgress, signal: AbortSignal) => Promise<MeshDocument>,

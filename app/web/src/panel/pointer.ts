@@ -1,4 +1,4 @@
-// What mouse and fingers do on the mesh: a click sets a point, a drag from a point pulls the path.
+// Mouse and fingers on the mesh: a click sets a point, a drag from a point pulls the path along.
 import { Vector3 } from "three";
 import type { Point } from "../api/types";
 import { type FacePoint, positionOf } from "../mesh/picking";
@@ -8,12 +8,12 @@ import type { SceneView } from "../view/sceneView";
 
 export type Tool = "source" | "target" | "waypoint" | "barrier";
 
-/** How far a click may stray, and from how far a point is taken hold of, in pixels; fingers are broad. */
+/** Tolerances in pixels: how far a click may move, and how close to a point a drag must start. */
 const REACH = { still: 5, near: 16 };
 const REACH_OF_FINGERS = { still: 10, near: 28 };
-/** How long a finger stays that adds another source, in milliseconds. */
-const HOLD = 500;
-/** Where a brush touches the mesh, in pixels from the pointer. */
+/** A finger that stays this long adds another source. */
+const HOLD_MS = 500;
+/** The points where the brush touches the mesh, in pixels from the pointer. */
 const BRUSH = [-9, -6, -3, 0, 3, 6, 9].flatMap((x) =>
   [-9, -6, -3, 0, 3, 6, 9].filter((y) => Math.hypot(x, y) < 10).map((y) => [x, y] as const),
 );
@@ -22,12 +22,12 @@ type Place = { clientX: number; clientY: number };
 
 export class Pointer {
   private start: PointerEvent | null = null;
-  /** What a drag has changed, as it was. */
+  /** The points that a drag may change, as they were before it. */
   private before: Pick<State, "target" | "waypoints"> | null = null;
   private drag: ((event: Place) => void) | null = null;
   private painted: Set<number> | null = null;
   private fingers = 0;
-  /** Where the brush was last. */
+  /** The last place of the brush. */
   private last: Place | null = null;
 
   constructor(
@@ -36,7 +36,7 @@ export class Pointer {
     private readonly tool: () => Tool,
   ) {
     const { canvas } = sceneView.stage;
-    // Before the controls of the camera, which then leave the drag alone.
+    // Listen before the camera's controls, which then leave the drag alone.
     canvas.addEventListener("pointerdown", (event) => this.down(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.move(event), { capture: true });
     canvas.addEventListener("pointerup", (event) => this.up(event), { capture: true });
@@ -47,7 +47,7 @@ export class Pointer {
   private down(event: PointerEvent): void {
     this.fingers += 1;
     if (event.button !== 0 || this.fingers > 1) {
-      this.abandon(); // two fingers move the mesh, whatever the first began
+      this.abandon(); // two fingers move the mesh, even after one has begun a drag
       return;
     }
     const { target, waypoints } = this.store.state;
@@ -60,13 +60,14 @@ export class Pointer {
     }
   }
 
-  /** Return what a drag does that begins here; null: it turns the mesh. */
+  /** Return the effect of a drag that begins here; null: it turns the mesh. */
   private dragFrom(event: PointerEvent): ((event: Place) => void) | null {
     const { sources, target, waypoints } = this.store.state;
     if (!this.sceneView.mesh) return null;
     if (this.tool() === "barrier") {
-      this.painted = new Set(this.store.state.barriers);
-      return (place) => this.paint(place, event.shiftKey);
+      const painted = new Set(this.store.state.barriers);
+      this.painted = painted;
+      return (place) => this.paint(painted, place, event.shiftKey);
     }
     const near = (point: Point | null): boolean => point !== null && this.isNear(point, event);
     if (sources.length > 0 && event.altKey)
@@ -78,7 +79,7 @@ export class Pointer {
         this.store.update({ waypoints: this.store.state.waypoints.with(waypoint, point) }),
       );
     }
-    // From a source, the path is pulled out.
+    // From a source, the drag pulls out a path.
     if (sources.some(near)) return this.moving((point) => this.store.update({ target: point }));
     return null;
   }
@@ -109,7 +110,7 @@ export class Pointer {
     if (point) this.set(point, event.altKey ? "target" : this.tool(), adds);
   }
 
-  /** Set what ``tool`` sets; ``adds``: another source. */
+  /** Set the point that ``tool`` stands for; ``adds`` keeps the sources there are. */
   set(point: Point, tool: Tool, adds: boolean): void {
     const { sources, waypoints } = this.store.state;
     if (tool === "source") this.store.update({ sources: adds ? [...sources, point] : [point] });
@@ -122,7 +123,7 @@ export class Pointer {
     this.end();
   }
 
-  /** Leave all as it was before the drag. */
+  /** Undo the drag. */
   private abandon(): void {
     const { drag, painted, before } = this;
     this.letGo();
@@ -140,7 +141,7 @@ export class Pointer {
     this.sceneView.stage.turnsByDrag = true;
   }
 
-  private paint(place: Place, erases: boolean): void {
+  private paint(painted: Set<number>, place: Place, erases: boolean): void {
     const from = this.last ?? place;
     const steps = Math.ceil(
       Math.hypot(place.clientX - from.clientX, place.clientY - from.clientY) / 6,
@@ -152,11 +153,11 @@ export class Pointer {
           clientX: from.clientX + share * (place.clientX - from.clientX) + x,
           clientY: from.clientY + share * (place.clientY - from.clientY) + y,
         });
-        if (point) this.painted![erases ? "delete" : "add"](point.face);
+        if (point) painted[erases ? "delete" : "add"](point.face);
       }
     }
     this.last = place;
-    this.sceneView.barriers.show(this.sceneView.mesh, this.painted!);
+    this.sceneView.barriers.show(this.sceneView.mesh, painted);
   }
 
   private at(place: Place): FacePoint | null {
@@ -166,7 +167,8 @@ export class Pointer {
 
   private isNear(point: Point, event: PointerEvent): boolean {
     const { mesh, stage } = this.sceneView;
-    const [x, y] = stage.toPage(new Vector3(...mesh!.drawn(positionOf(mesh!, point))));
+    if (!mesh) return false;
+    const [x, y] = stage.toPage(new Vector3(...mesh.drawn(positionOf(mesh, point))));
     return Math.hypot(x - event.clientX, y - event.clientY) < reachOf(event).near;
   }
 
@@ -177,7 +179,7 @@ export class Pointer {
 }
 
 function isHeld(start: PointerEvent, end: PointerEvent): boolean {
-  return end.pointerType === "touch" && end.timeStamp - start.timeStamp >= HOLD;
+  return end.pointerType === "touch" && end.timeStamp - start.timeStamp >= HOLD_MS;
 }
 
 function reachOf({ pointerType }: PointerEvent): typeof REACH {

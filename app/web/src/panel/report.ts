@@ -1,10 +1,10 @@
-// What was found in a mesh, in words; what is at fault is marked on it.
+// The report on a mesh in words, and its faults marked on the mesh.
 import type { MeshDocument } from "../api/types";
 import { button, byId, count, written } from "../dom";
 import { positionOf } from "../mesh/picking";
 import type { SceneView } from "../view/sceneView";
 
-type Found = MeshDocument["degenerate_faces"];
+type Faults = MeshDocument["degenerate_faces"];
 type Kind = "face" | "vertex" | "edge";
 
 export function showReport(document_: MeshDocument | null, sceneView: SceneView): void {
@@ -14,8 +14,9 @@ export function showReport(document_: MeshDocument | null, sceneView: SceneView)
   const words = document.createElement("p");
   words.textContent = describe(document_);
   const list = document.createElement("ul");
-  for (const [found, noun, plural, kind] of faultsOf(document_)) {
-    if (found.count > 0) list.append(row(count(found.count, noun, plural), found, kind, sceneView));
+  for (const [faults, noun, plural, kind] of faultsOf(document_)) {
+    if (faults.count > 0)
+      list.append(row(count(faults.count, noun, plural), faults, kind, sceneView));
   }
   for (const warning of document_.warnings) {
     const line = document.createElement("li");
@@ -28,7 +29,7 @@ export function showReport(document_: MeshDocument | null, sceneView: SceneView)
 
 function describe(mesh: MeshDocument): string {
   const [low, high] = mesh.bounds;
-  const size = high.map((x, i) => written(x - low[i]!, 3)).join(" × ");
+  const size = high.map((x, i) => written(x - (low[i] ?? 0), 3)).join(" × ");
   const parts = mesh.components === 1 ? "one piece" : count(mesh.components, "piece");
   const rim =
     mesh.boundary_loops === 0
@@ -40,7 +41,7 @@ function describe(mesh: MeshDocument): string {
   );
 }
 
-function faultsOf(mesh: MeshDocument): [Found, string, string, Kind][] {
+function faultsOf(mesh: MeshDocument): [Faults, string, string, Kind][] {
   return [
     [
       mesh.non_manifold_edges,
@@ -56,16 +57,21 @@ function faultsOf(mesh: MeshDocument): [Found, string, string, Kind][] {
       "faces that repeat a vertex",
       "face",
     ],
-    [mesh.duplicate_faces, "face twice", "faces twice", "face"],
+    [mesh.duplicate_faces, "duplicate face", "duplicate faces", "face"],
     [mesh.collapsed_faces, "collapsed face", "collapsed faces", "face"],
-    [mesh.zero_length_edges, "edge of no length", "edges of no length", "edge"],
-    [mesh.bow_tie_vertices, "vertex of several fans", "vertices of several fans", "vertex"],
-    [mesh.isolated_vertices, "vertex of no face", "vertices of no face", "vertex"],
-    [mesh.duplicate_vertices, "vertex twice", "vertices twice", "vertex"],
+    [mesh.zero_length_edges, "edge of zero length", "edges of zero length", "edge"],
+    [
+      mesh.bow_tie_vertices,
+      "vertex joining several fans",
+      "vertices joining several fans",
+      "vertex",
+    ],
+    [mesh.isolated_vertices, "vertex without a face", "vertices without a face", "vertex"],
+    [mesh.duplicate_vertices, "duplicate vertex", "duplicate vertices", "vertex"],
   ];
 }
 
-function row(words: string, found: Found, kind: Kind, sceneView: SceneView): HTMLLIElement {
+function row(words: string, faults: Faults, kind: Kind, sceneView: SceneView): HTMLLIElement {
   const line = document.createElement("li");
   const text = document.createElement("span");
   text.textContent = words;
@@ -75,7 +81,7 @@ function row(words: string, found: Found, kind: Kind, sceneView: SceneView): HTM
       other.setAttribute("aria-pressed", "false");
     shows.setAttribute("aria-pressed", String(!isShown));
     if (isShown) sceneView.showFaults([], []);
-    else mark(found.ids, kind, sceneView);
+    else mark(faults.ids, kind, sceneView);
   });
   shows.setAttribute("aria-pressed", "false");
   shows.setAttribute("aria-label", `Show ${words}`);
@@ -83,8 +89,8 @@ function row(words: string, found: Found, kind: Kind, sceneView: SceneView): HTM
   return line;
 }
 
-/** Mark the first of what was found: the report has no more than ten ids of each. */
-function mark(ids: Found["ids"], kind: Kind, sceneView: SceneView): void {
+/** Mark faults by their ids; the report lists the first ten of each kind. */
+function mark(ids: Faults["ids"], kind: Kind, sceneView: SceneView): void {
   const mesh = sceneView.mesh;
   if (!mesh) return;
   const points = ids.map((id) => {

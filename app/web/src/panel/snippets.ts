@@ -1,15 +1,15 @@
-// The same question for curl and for Python.
+// The current query as a curl command and as a Python program.
 import type { Point } from "../api/types";
 import { questionOf } from "../ask/fields";
 import type { State } from "../state/state";
 
-interface Asked {
+interface Query {
   path: string;
   body: unknown;
 }
 
-/** Return what is asked last: the path where there is a target, else the distances. */
-function askedOf(state: State, source: Point): Asked {
+/** Return the query for the path where there is a target, otherwise for the distances. */
+function queryOf(state: State, source: Point): Query {
   const { target, waypoints, barriers } = state;
   const mesh = `/v1/meshes/${state.mesh}`;
   if (!target) return { path: `${mesh}/distances`, body: questionOf(state, state.method) };
@@ -21,15 +21,15 @@ function askedOf(state: State, source: Point): Asked {
 }
 
 export function curlOf(state: State, source: Point, origin: string, hasKey: boolean): string {
-  const { path, body } = askedOf(state, source);
+  const { path, body } = queryOf(state, source);
   const key = hasKey ? ` -H "Authorization: Bearer $GEODESIC_KEY"` : "";
   return `curl '${origin}${path}'${key} -H 'Content-Type: application/json' \\\n  -d '${JSON.stringify(body)}'`;
 }
 
 export function pythonOf(state: State, source: Point, origin: string, hasKey: boolean): string {
-  const { path, body } = askedOf(state, source);
+  const { path, body } = queryOf(state, source);
   const key = hasKey ? `, "Authorization": "Bearer " + os.environ["GEODESIC_KEY"]` : "";
-  const told = state.target ? `answer["length"], answer["points"]` : `answer["distances"]`;
+  const results = state.target ? `answer["length"], answer["points"]` : `answer["distances"]`;
   return [
     "import json",
     ...(hasKey ? ["import os"] : []),
@@ -39,7 +39,7 @@ export function pythonOf(state: State, source: Point, origin: string, hasKey: bo
     `headers = {"Content-Type": "application/json"${key}}`,
     `request = Request("${origin}${path}", json.dumps(body).encode(), headers)`,
     "answer = json.load(urlopen(request))",
-    `print(${told})`,
+    `print(${results})`,
     "",
   ].join("\n");
 }

@@ -1,8 +1,9 @@
-// The address of the page says all that is asked for: /?mesh=ID&source=v0&target=v99
+// The state as the page's address, and back: /?mesh=ID&source=v0&target=v99
 import type { Method } from "../api/types";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
 import { INITIAL, type Lines, type Shade, type State } from "./state";
 
+/** A state whose points may still be positions, which the service has to locate. */
 export type WrittenState = Omit<State, "sources" | "target" | "waypoints"> & {
   sources: WrittenPoint[];
   target: WrittenPoint | null;
@@ -63,7 +64,7 @@ function readLines(text: string | null): Lines {
   return INITIAL.lines;
 }
 
-/** Numbers as ranges, in order: 3,7,40-59. */
+/** Write numbers as ranges, in order: 3,7,40-59. */
 export function writeRanges(numbers: number[]): string {
   const ranges: [number, number][] = [];
   for (const number of numbers.toSorted((a, b) => a - b)) {

@@ -1,4 +1,4 @@
-// A point as text: v12, e12-13:0.3, f7:0.2,0.3,0.5, p1,2,3.
+// Points as text: v12, e12-13:0.3, f7:0.2,0.3,0.5, p1,2,3.
 import type { Point } from "../api/types";
 
 export type WrittenPoint = Point | { position: [number, number, number] };
@@ -19,7 +19,9 @@ export function parsePoint(text: string): WrittenPoint {
   if (face) return { face: Number(face[1]), barycentric: triple(face, 2) };
   const position = POSITION.exec(text);
   if (position) return { position: triple(position, 1) };
-  throw new Error(`“${text}” is no point. A point is v12, e12-13:0.3, f7:0.2,0.3,0.5 or p1,2,3.`);
+  throw new Error(
+    `“${text}” is not a point. A point is v12, e12-13:0.3, f7:0.2,0.3,0.5 or p1,2,3.`,
+  );
 }
 
 export function parsePoints(text: string): WrittenPoint[] {
@@ -32,7 +34,7 @@ export function writePoint(point: Point): string {
   return `f${point.face}:${point.barycentric.map((weight) => short(weight)).join(",")}`;
 }
 
-/** Round to what an address needs: a millionth of a face is not seen. */
+/** Round the weights to six digits: less than a millionth of a face cannot be seen. */
 export function rounded(point: Point): Point {
   if (!("face" in point)) return point;
   const [u, v] = point.barycentric.map((weight) => Number(weight.toFixed(6))) as [

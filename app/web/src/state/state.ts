@@ -1,4 +1,4 @@
-// What the page is asked for. Everything that is drawn follows from it.
+// The state of the page: all that the user has chosen. Everything that is drawn follows from it.
 import type { Method, Point } from "../api/types";
 
 export type Shade = "distance" | "territories" | "difference";
@@ -16,7 +16,7 @@ export interface State {
   shade: Shade;
   lines: Lines;
   wireframe: boolean;
-  /** Azimuth, polar angle, distance and the point looked at, as drawn; null: the whole mesh. */
+  /** Azimuth, polar angle, distance and target of the camera, as drawn; null: the whole mesh. */
   view: number[] | null;
 }
 
@@ -56,7 +56,7 @@ export class Store {
   }
 }
 
-/** What does not outlive a mesh. */
+/** The part of the state that belongs to a mesh, empty for a new one. */
 export const WITHOUT_POINTS = {
   sources: [],
   target: null,

@@ -1,4 +1,4 @@
-// The mesh as an image with its depths, so that what moves over it is drawn without drawing it again.
+// The mesh as an image with depths, so that overlays move over it without drawing it again.
 import {
   AlwaysDepth,
   Camera,
@@ -54,7 +54,7 @@ export class Backdrop {
     this.screen.add(quad);
   }
 
-  /** Draw what ``scene`` looked like when it was last asked for after it had changed. */
+  /** Draw ``scene``: from its image, which is rendered again only after a change. */
   draw(scene: Scene, camera: Camera): void {
     if (!this.isFresh) {
       const size = this.renderer.getDrawingBufferSize(new Vector2());
@@ -68,7 +68,7 @@ export class Backdrop {
     this.renderer.render(this.screen, this.camera);
   }
 
-  /** Tell that the scene, or the camera, has changed. */
+  /** Drop the image, after the scene or the camera has changed. */
   forget(): void {
     this.isFresh = false;
   }

@@ -1,21 +1,20 @@
 // Colours of distances and of territories.
-
 export type Rgb = [number, number, number];
 
 const SIZE = 256;
 
 /**
- * From dark indigo over teal to light yellow: lightness grows evenly, as eyes have it (OKLab), so
- * that equal steps of distance look equal, and no kind of colour blindness hides the order.
+ * A ramp from dark indigo over teal to light yellow. Perceived lightness (OKLab) grows evenly: equal
+ * steps of distance look equal, and every kind of colour vision sees their order.
  */
 export const RAMP: readonly Rgb[] = Array.from({ length: SIZE }, (_, i) => rampAt(i / (SIZE - 1)));
 
 function rampAt(t: number): Rgb {
-  const chroma = 0.115 + 0.03 * Math.cos(2 * Math.PI * t); // as much as screens have on the way
+  const chroma = 0.115 + 0.03 * Math.cos(2 * Math.PI * t); // as much as sRGB allows along the way
   return fromOklch(0.28 + 0.65 * t, chroma, ((300 - 200 * t) * Math.PI) / 180);
 }
 
-/** OKLCh to sRGB, by the matrices of its definition. */
+/** Convert OKLCh to sRGB by the matrices of its definition. */
 function fromOklch(lightness: number, chroma: number, hue: number): Rgb {
   const [a, b] = [chroma * Math.cos(hue), chroma * Math.sin(hue)];
   const l = (lightness + 0.3963377774 * a + 0.2158037573 * b) ** 3;
@@ -29,7 +28,7 @@ function fromOklch(lightness: number, chroma: number, hue: number): Rgb {
   return linear.map((x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055)) as Rgb;
 }
 
-/** Colours that remain apart for the colour-blind (Okabe and Ito), but for black. */
+/** The colours of Okabe and Ito, which colour-blind people can tell apart; without black. */
 const TERRITORIES: readonly Rgb[] = [
   [0.902, 0.624, 0.0],
   [0.337, 0.706, 0.914],

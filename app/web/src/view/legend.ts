@@ -1,5 +1,4 @@
-// What the colours mean.
-
+// The legend: the meaning of the colours.
 import { byId, written } from "../dom";
 import { css, RAMP, territory } from "./colours";
 
@@ -24,10 +23,12 @@ export function showScale(title: string, largest: number): void {
   byId("legend-title").textContent = title;
   byId("territories").replaceChildren();
   byId("scale").hidden = false;
-  [0, 0.5, 1].forEach((share, i) => (byId(`tick-${i}`).textContent = written(share * largest, 3)));
+  for (const [i, share] of [0, 0.5, 1].entries()) {
+    byId(`tick-${i}`).textContent = written(share * largest, 3);
+  }
 }
 
-/** Show whose territory has which colour. */
+/** Show the colour of each source's territory. */
 export function showTerritories(sources: string[]): void {
   byId("legend").hidden = false;
   byId("legend-title").textContent = "Nearest source";

@@ -1,9 +1,9 @@
-// Points of the surface, as discs of the same size from wherever they are seen.
+// Points of the surface, drawn as discs of constant size on the screen.
 import { BufferAttribute, BufferGeometry, Points, ShaderMaterial } from "three";
 import type { Rgb } from "./colours";
 import type { Stage } from "./scene";
 
-// Discs face the camera, a little before their point, so that the surface does not cut them.
+// Discs face the camera, slightly in front of their point, so that the surface does not cut them.
 const VERTEX = /* glsl */ `
   attribute vec3 fill;
   attribute float size;
@@ -32,7 +32,7 @@ const FRAGMENT = /* glsl */ `
     gl_FragColor = vec4(colour, opacity * smoothstep(0.0, ratio, rim));
   }`;
 
-/** A target that is dragged is drawn together with the path to it, where that comes soon. */
+/** The time that a dragged target waits, to be drawn together with its path. */
 const PATIENCE_MS = 40;
 
 export interface Mark {

@@ -1,4 +1,4 @@
-// Some faces of the mesh, painted over.
+// A set of faces, painted over.
 import { BufferAttribute, BufferGeometry, DoubleSide, Mesh, MeshBasicMaterial } from "three";
 import type { LoadedMesh } from "../mesh/loader";
 import type { Stage } from "./scene";

@@ -1,4 +1,4 @@
-// The path, as a line of so many pixels: cased, and faint where the surface hides it.
+// The path as a line of constant width in pixels, with a casing; faint where the surface hides it.
 import {
   BufferAttribute,
   BufferGeometry,
@@ -15,8 +15,8 @@ import type { Stage } from "./scene";
 const COLOUR = 0xe6005c;
 const CASING = 0xffffff;
 
-// A rectangle of pixels for each piece, a little before it, so that the surface does not cut it. All
-// in one mesh: three's own lines have an instance a piece, which WebGL in software draws one by one.
+// A rectangle of pixels for each segment, slightly in front of it, so that the surface does not cut
+// it. All are one mesh: three's own lines draw an instance per segment, which is slow in software.
 const VERTEX = /* glsl */ `
   attribute vec3 start;
   attribute vec3 end;
@@ -30,7 +30,7 @@ const VERTEX = /* glsl */ `
 
   const float NEAR = 0.01;
 
-  // Where one end is seen, or where the piece comes from behind the camera.
+  // The projection of an end, or of the point where the segment enters from behind the camera.
   vec3 projected(vec4 eye, vec4 other) {
     if (eye.z > -NEAR && other.z < -NEAR) eye = mix(eye, other, (eye.z + NEAR) / (eye.z - other.z));
     vec4 clip = projectionMatrix * eye;
@@ -68,7 +68,7 @@ interface Look {
   /** Pixels. */
   width: number;
   opacity: number;
-  /** How far before the surface, in depth; null: wherever the surface is. */
+  /** The offset in depth in front of the surface; null ignores the surface. */
   before: number | null;
   order: number;
 }
@@ -87,7 +87,7 @@ export class RouteLine {
     stage.addOverlay(this.object);
   }
 
-  /** Show a line through positions as they are drawn; none where there are fewer than two. */
+  /** Show a line through drawn positions; fewer than two hide it. */
   show(points: [number, number, number][]): void {
     this.object.visible = points.length > 1;
     this.geometry.dispose();
@@ -104,7 +104,7 @@ export class RouteLine {
         opacity: { value: opacity },
         width: { value: width },
         before: { value: before ?? 0 },
-        caps: { value: before === null ? 0 : 1 }, // which would add up where they lie on each other
+        caps: { value: before === null ? 0 : 1 }, // without depth, overlapping caps would add up
         resolution: { value: resolution },
       },
       vertexShader: VERTEX,
@@ -125,13 +125,13 @@ export class RouteLine {
   }
 }
 
-/** Return four corners for each piece of a polyline, which know both of its ends. */
+/** Return four corners for each segment of a polyline, with both ends as attributes. */
 function ribbon(points: [number, number, number][]): BufferGeometry {
-  const pieces = Math.max(points.length - 1, 0);
-  const [starts, ends] = [new Float32Array(12 * pieces), new Float32Array(12 * pieces)];
-  const corners = new Float32Array(8 * pieces);
-  const index = new Uint32Array(6 * pieces);
-  for (let i = 0; i < pieces; i++) {
+  const segments = Math.max(points.length - 1, 0);
+  const [starts, ends] = [new Float32Array(12 * segments), new Float32Array(12 * segments)];
+  const corners = new Float32Array(8 * segments);
+  const index = new Uint32Array(6 * segments);
+  for (let i = 0; i < segments; i++) {
     for (let corner = 0; corner < 4; corner++) {
       starts.set(points[i]!, 12 * i + 3 * corner);
       ends.set(points[i + 1]!, 12 * i + 3 * corner);

@@ -1,4 +1,4 @@
-// How long a round number of mesh units is on the screen.
+// The scale bar: the length on the screen of a round number of mesh units.
 import { byId, written } from "../dom";
 import type { Stage } from "./scene";
 

@@ -1,4 +1,4 @@
-// The canvas: a camera around what is drawn, and a frame when something has changed.
+// The canvas: a camera around the mesh, and a new frame after each change.
 import {
   ColorManagement,
   LinearSRGBColorSpace,
@@ -14,13 +14,13 @@ import {
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { Backdrop } from "./backdrop";
 
-ColorManagement.enabled = false; // colours are written as they are shown
+ColorManagement.enabled = false; // colours are given in sRGB, as displayed
 
-const AWAY = 2.9; // of the camera from the unit ball, in its radii
+const CAMERA_DISTANCE = 2.9; // in radii of the unit ball
 
 export class Stage {
   private readonly scene = new Scene();
-  /** What moves while the mesh stands still: drawn over it. */
+  /** Objects that move while the mesh stands still; drawn over it. */
   private readonly overlay = new Scene();
   private readonly backdrop: Backdrop;
   readonly camera = new PerspectiveCamera(38, 1, 0.01, 50);
@@ -55,7 +55,7 @@ export class Stage {
     this.resize();
   }
 
-  /** Whether one pointer that is dragged turns the mesh; two fingers move it in any case. */
+  /** Set whether dragging one pointer turns the mesh; two fingers always move it. */
   set turnsByDrag(turns: boolean) {
     this.controls.mouseButtons.LEFT = turns ? MOUSE.ROTATE : null;
     this.controls.touches.ONE = turns ? TOUCH.ROTATE : null;
@@ -68,7 +68,7 @@ export class Stage {
     this.schedule();
   }
 
-  /** Draw a frame soon, in which only the overlay is another; it may wait some ms for more to draw. */
+  /** Draw a frame in which only the overlay has changed, within ``patience`` milliseconds. */
   invalidateOverlay(patience = 0): void {
     if (patience === 0) this.schedule();
     else this.patient ||= setTimeout(() => this.schedule(), patience);
@@ -80,17 +80,17 @@ export class Stage {
     requestAnimationFrame(() => this.render());
   }
 
-  /** Wait until what is there now has been drawn. */
+  /** Wait until the present state has been drawn. */
   drawn(): Promise<void> {
     this.schedule();
     return new Promise((resolve) => this.waiting.push(resolve));
   }
 
-  /** Have all that draws an object compiled before it is waited for. */
+  /** Compile the shaders of an object before it is first shown. */
   warmUp(object: Object3D): void {
     this.scene.add(object);
     this.renderNow();
-    this.renderNow(); // by way of the backdrop
+    this.renderNow(); // the second time through the backdrop
     this.scene.remove(object);
     this.invalidate();
   }
@@ -110,14 +110,14 @@ export class Stage {
     this.invalidate();
   }
 
-  /** Azimuth, polar angle and distance of the camera, and the point that it looks at. */
+  /** Azimuth, polar angle, distance and target of the camera. */
   get view(): number[] {
     const { target } = this.controls;
     const away = new Spherical().setFromVector3(this.camera.position.clone().sub(target));
     return [away.theta, away.phi, away.radius, target.x, target.y, target.z];
   }
 
-  /** Look as ``view`` says; null: at all of it. */
+  /** Move the camera to a view; null shows the whole mesh. */
   look(view: number[] | null): void {
     const [theta, phi, radius, x, y, z] = view ?? this.viewFrom(new Vector3(0.5, 0.35, 0.8));
     this.controls.target.set(x!, y!, z!);
@@ -125,18 +125,18 @@ export class Stage {
       .setFromSpherical(new Spherical(radius, phi, theta))
       .add(this.controls.target);
     this.controls.update();
-    this.camera.updateMatrixWorld(); // what is picked before the next frame is picked from here
+    this.camera.updateMatrixWorld(); // points may be picked before the next frame
     this.invalidate();
   }
 
-  /** Return the view of all of it, from a direction; not quite from above, where up is nowhere. */
+  /** Return the view of the whole mesh from a direction, kept off the poles, where up is undefined. */
   viewFrom(direction: Vector3): number[] {
     const { theta, phi } = new Spherical().setFromVector3(direction);
-    const away = AWAY / Math.min(1, this.canvas.clientWidth / this.canvas.clientHeight);
+    const away = CAMERA_DISTANCE / Math.min(1, this.canvas.clientWidth / this.canvas.clientHeight);
     return [theta, Math.min(Math.max(phi, 0.4), Math.PI - 0.4), away, 0, 0, 0];
   }
 
-  /** Turn by angles, and come nearer by a factor, as keys ask for. */
+  /** Turn by angles, and move nearer by a factor. */
   turn(azimuth: number, polar: number, nearer = 1): void {
     const [theta, phi, radius, ...target] = this.view as [number, number, number, ...number[]];
     const tilt = Math.min(Math.max(phi + polar, 0.02), Math.PI - 0.02);
@@ -144,20 +144,20 @@ export class Stage {
     this.onMove(this.view);
   }
 
-  /** Return a place on the canvas (-1 to 1, y upwards) of a pointer. */
+  /** Return the place of a pointer on the canvas (-1 to 1, y upwards). */
   toDevice(event: { clientX: number; clientY: number }): [number, number] {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     return [(2 * (event.clientX - left)) / width - 1, 1 - (2 * (event.clientY - top)) / height];
   }
 
-  /** Return where a drawn position is on the page, in pixels. */
+  /** Return the place of a drawn position on the page, in pixels. */
   toPage(position: Vector3): [number, number] {
     const { left, top, width, height } = this.canvas.getBoundingClientRect();
     const { x, y } = position.clone().project(this.camera);
     return [left + ((x + 1) / 2) * width, top + ((1 - y) / 2) * height];
   }
 
-  /** Pixels that a drawn length takes at the point looked at. */
+  /** Pixels per drawn unit of length, at the target of the camera. */
   get pixelsPerUnit(): number {
     const distance = this.camera.position.distanceTo(this.controls.target);
     const height = 2 * distance * Math.tan((this.camera.fov * Math.PI) / 360);
@@ -187,7 +187,7 @@ export class Stage {
     this.isDue = false;
     clearTimeout(this.patient);
     this.patient = 0;
-    // The unit ball has all of the range of depths.
+    // The unit ball gets the full range of depths.
     const away = this.camera.position.length();
     this.camera.near = Math.max(0.01, away - 1.2);
     this.camera.far = away + 1.2;

@@ -1,4 +1,4 @@
-// The mesh on the stage, with all that is drawn on it.
+// The mesh on the stage, with points, path, barriers and faults on it.
 import { Mesh, PlaneGeometry, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
 import type { MeshDocument, Outline, Point } from "../api/types";
@@ -51,7 +51,7 @@ export class SceneView {
     this.tree = await mesh.tree;
   }
 
-  /** Draw one of each once, of no extent, so that later none waits for its shader. */
+  /** Draw everything once without extent, so that later nothing waits for its shader. */
   private warmUp(): void {
     this.points.show([{ position: [0, 0, 0], fill: SOURCE, size: 0 }]);
     this.route.show([
@@ -80,7 +80,7 @@ export class SceneView {
     return this.mesh && this.tree ? pick(this.mesh, this.tree, this.stage.camera, x, y) : null;
   }
 
-  /** Return the view in which points are seen; null where there are none. */
+  /** Return a view in which the points can be seen; null where there are none. */
   viewOf({ sources, target }: State): number[] | null {
     const mesh = this.mesh;
     const points = target ? [...sources, target] : sources;

@@ -1,4 +1,4 @@
-// The mesh as it is drawn: distance as colour, with isolines as stripes.
+// The surface as it is drawn: distances as colours, isolines as stripes.
 import {
   BufferAttribute,
   BufferGeometry,
@@ -31,7 +31,7 @@ const VERTEX = /* glsl */ `
     gl_Position = projectionMatrix * eye;
   }`;
 
-// Values below 0 are none: such a vertex draws a face that is not reached as a whole into grey.
+// A value below 0 means unreached: one such vertex turns its whole face grey.
 const FRAGMENT = /* glsl */ `
   uniform sampler2D ramp;
   uniform float largest;
@@ -69,7 +69,7 @@ const FRAGMENT = /* glsl */ `
     gl_FragColor = vec4(colour, 1.0);
   }`;
 
-/** What all surfaces are painted with: made once, since a shader takes long to compile. */
+/** Return the material of all surfaces, made once because its shader takes long to compile. */
 export function surfacePaint(): ShaderMaterial {
   return new ShaderMaterial({
     uniforms: {
@@ -82,7 +82,7 @@ export function surfacePaint(): ShaderMaterial {
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
     side: DoubleSide,
-    // What lies on the surface is drawn before it.
+    // Objects on the surface are drawn in front of it.
     polygonOffset: true,
     polygonOffsetFactor: 1,
     polygonOffsetUnits: 1,
@@ -106,13 +106,13 @@ export class Surface {
     mesh.geometry.setAttribute("tint", this.tints);
     mesh.geometry.computeBoundingSphere();
     this.object = new Mesh(mesh.geometry, paint);
-    this.colour(null, 1);
-    this.divide(null);
+    this.setValues(null, 1);
+    this.setTerritories(null);
     this.setIsolines(0);
   }
 
-  /** Colour by values at vertices, of which those that are not finite are grey; null: by none. */
-  colour(values: ArrayLike<number> | null, largest: number): void {
+  /** Colour by values at vertices; vertices without a finite value are grey, with null all are. */
+  setValues(values: ArrayLike<number> | null, largest: number): void {
     const array = this.values.array;
     for (let i = 0; i < array.length; i++) {
       const value = values ? values[i]! : -1;
@@ -122,8 +122,8 @@ export class Surface {
     this.uniform("largest").value = largest || 1;
   }
 
-  /** Colour by the nearest source of each vertex; null: by value alone. */
-  divide(nearest: Int32Array | null): void {
+  /** Tint by the nearest source of each vertex; null: colour by value alone. */
+  setTerritories(nearest: Int32Array | null): void {
     this.uniform("tinted").value = nearest ? 1 : 0;
     if (!nearest) return;
     const array = this.tints.array;
@@ -133,7 +133,7 @@ export class Surface {
     this.tints.needsUpdate = true;
   }
 
-  /** Draw isolines so far apart; 0: none. */
+  /** Draw isolines ``spacing`` apart; 0 draws none. */
   setIsolines(spacing: number): void {
     this.uniform("spacing").value = spacing;
   }
