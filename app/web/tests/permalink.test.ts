@@ -1,0 +1,154 @@
+import { describe, expect, test } from "vitest";
+import { readState, type WrittenState, writeRanges, writeState } from "../src/state/permalink";
+import { INITIAL, type State } from "../src/state/state";
+import { randomPoint } from "./support/points";
+import { Random } from "./support/random";
+
+function searchOf(state: State): string {
+  return new URL(writeState(state), "http://host").search;
+}
+
+function randomState(random: Random): State {
+  const point = () => randomPoint(random);
+  const round = (x: number) => Number(x.toFixed(4));
+  const barriers = new Set(random.list(40, () => random.below(60)));
+  return {
+    mesh: random.pick([null, "0123456789abcdef", "f46a3f2a"]),
+    sources: random.list(3, point),
+    target: random.pick([null, point()]),
+    waypoints: random.list(3, point),
+    barriers: [...barriers].sort((a, b) => a - b),
+    method: random.pick(["exact", "approximate"] as const),
+    error: random.pick([INITIAL.error, random.size()]),
+    maxDistance: random.pick([null, random.size()]),
+    shade: random.pick(["distance", "territories", "difference"] as const),
+    lines: random.pick([null, { count: 1 + random.below(99) }, { spacing: random.size() }]),
+    wireframe: random.pick([true, false]),
+    view: random.pick([null, Array.from({ length: 6 }, () => round(6 * random.next() - 3))]),
+  };
+}
+
+describe("a round trip", () => {
+  test("reads back what was written", () => {
+    const random = new Random(3);
+    for (let i = 0; i < 1000; i++) {
+      const state = randomState(random);
+      expect(readState(searchOf(state)), writeState(state)).toEqual(state);
+    }
+  });
+
+  test("of an address leads to the same address", () => {
+    const random = new Random(4);
+    for (let i = 0; i < 500; i++) {
+      const search = searchOf(randomState(random));
+      expect(searchOf(readState(search) as State)).toBe(search);
+    }
+  });
+});
+
+describe("writing", () => {
+  test("the initial state has the shortest address", () => {
+    expect(writeState(INITIAL)).toBe("/");
+  });
+
+  test("points can be read in the address", () => {
+    const state: State = {
+      ...INITIAL,
+      mesh: "m",
+      sources: [{ vertex: 0 }, { face: 7, barycentric: [0.2, 0.3, 0.5] }],
+      target: { edge: [1, 2], t: 0.5 },
+      barriers: [40, 3, 42, 41],
+    };
+    expect(writeState(state)).toBe(
+      "/?mesh=m&source=v0&source=f7:0.2,0.3,0.5&target=e1-2:0.5&barriers=3,40-42",
+    );
+  });
+
+  test("a mesh with odd characters does not become other parameters", () => {
+    const state = { ...INITIAL, mesh: "a&b=c#d e+f%2C" };
+    expect(readState(searchOf(state))).toEqual(state);
+  });
+});
+
+describe("reading", () => {
+  const initial: WrittenState = INITIAL;
+
+  test.each(["", "?", "?nonsense", "?mesh", "?MESH=m"])("“%s” asks for nothing", (search) => {
+    expect({ ...readState(search), mesh: null }).toEqual(initial);
+  });
+
+  test("positions are read as they are written by hand", () => {
+    const { sources, target } = readState("?source=p1,2,3&target=12");
+    expect(sources).toEqual([{ position: [1, 2, 3] }]);
+    expect(target).toEqual({ vertex: 12 });
+  });
+
+  test("a point that is none is refused by name", () => {
+    expect(() => readState("?source=v0&source=oops")).toThrow("“oops” is not a point");
+    expect(() => readState("?target=")).toThrow("“” is not a point");
+    expect(() => readState("?via=v0,v1")).toThrow("“v0,v1” is not a point");
+  });
+
+  test.each([
+    ["method=fastest", {}],
+    ["method=", {}],
+    ["method=approximate", { method: "approximate" }],
+    ["shade=rainbow", {}],
+    ["error=0", {}],
+    ["error=-0.1", {}],
+    ["error=NaN", {}],
+    ["error=Infinity", {}],
+    ["error=1e-3", { error: 0.001 }],
+    ["max_distance=0", {}],
+    ["max_distance=-1", {}],
+    ["max_distance=much", {}],
+    ["max_distance=2.5", { maxDistance: 2.5 }],
+    ["lines=", {}],
+    ["lines=count", {}],
+    ["lines=count:0", {}],
+    ["lines=count:-3", {}],
+    ["lines=count:2.6", { lines: { count: 3 } }],
+    ["lines=spacing:x", {}],
+    ["lines=spacing:0.5", { lines: { spacing: 0.5 } }],
+    ["lines=stripes:3", {}],
+    ["lines=none", { lines: null }],
+    ["wireframe=yes", {}],
+    ["wireframe=1", { wireframe: true }],
+    ["view=1,2,3", {}],
+    ["view=1,2,3,4,5,x", {}],
+    ["view=1,2,3,4,5,Infinity", {}],
+    ["view=1,2,3,4,5,6,7", {}],
+    ["view=1,2,3,4,5,6", { view: [1, 2, 3, 4, 5, 6] }],
+    ["barriers=", {}],
+    ["barriers=x,3,-4,5-,7-6,1.5", { barriers: [3] }],
+    ["barriers=8-10,2", { barriers: [8, 9, 10, 2] }],
+  ])("%s", (search, change) => {
+    expect(readState(`?${search}`)).toEqual({ ...initial, ...change });
+  });
+});
+
+describe("ranges", () => {
+  test.each([
+    [[], ""],
+    [[5], "5"],
+    [[1, 2], "1-2"],
+    [[3, 7, 40, 41, 42], "3,7,40-42"],
+    [[42, 3, 41, 7, 40], "3,7,40-42"],
+    [[2, 2, 3, 3], "2-3"],
+    [[10, 9], "9-10"],
+  ])("%j", (numbers, text) => {
+    expect(writeRanges(numbers)).toBe(text);
+  });
+
+  test("hold the same numbers, and never two where one would do", () => {
+    const random = new Random(5);
+    for (let i = 0; i < 500; i++) {
+      const numbers = random.list(60, () => random.below(80));
+      const text = writeRanges(numbers);
+      const expected = [...new Set(numbers)].sort((a, b) => a - b);
+      expect(readState(`?barriers=${text}`).barriers).toEqual(expected);
+      const gaps = expected.filter((x, k) => k > 0 && x - (expected[k - 1] ?? x) > 1).length;
+      expect(text.split(",").length).toBe(gaps + 1);
+    }
+  });
+});

@@ -1,0 +1,184 @@
+import { describe, expect, test, vi } from "vitest";
+import type { Question, RouteQuestion } from "../src/api/queries";
+import { askDistances, askRoute, askTerritories, locate, pointOf } from "../src/api/queries";
+import { questionOf } from "../src/ask/fields";
+import { INITIAL, type State } from "../src/state/state";
+import { npyOf } from "./support/npy";
+import { fakeService, inParts, json } from "./support/service";
+
+const { signal } = new AbortController();
+const QUESTION: Question = { sources: [{ vertex: 0, start_distance: 0 }] };
+const BOUND = { type: "relative", value: 0.01, kind: "guaranteed" };
+const UNREACHABLE = { disconnected: 1, beyond_max_distance: 0 };
+
+function distances(values: number[], timing = "queue;dur=0.1, compute;dur=12.5"): Response {
+  const body = npyOf(Float64Array.from(values), "<f8", [values.length]);
+  const headers = {
+    "Server-Timing": timing,
+    "Geodesic-Error-Bound": JSON.stringify(BOUND),
+    "Geodesic-Unreachable": JSON.stringify(UNREACHABLE),
+  };
+  return new Response(body, { headers });
+}
+
+describe("distances", () => {
+  test("of a short query are asked for at once", async () => {
+    const requests = fakeService({
+      "POST /v1/meshes/m/distances?estimate=true": () => json({ seconds: 0.5 }),
+      "POST /v1/meshes/m/distances": () => distances([0, 2, Infinity, 1]),
+    });
+    const onProgress = vi.fn();
+    const field = await askDistances("m", QUESTION, onProgress, signal);
+
+    expect(field).toEqual({
+      distances: new Float64Array([0, 2, Infinity, 1]),
+      largest: 2,
+      bound: BOUND,
+      unreachable: UNREACHABLE,
+      seconds: 0.0125,
+    });
+    expect(requests).toHaveLength(2);
+    for (const { body, headers } of requests) {
+      expect(body).toEqual(QUESTION);
+      expect(headers.get("Accept")).toBe("application/x-npy");
+      expect(headers.has("Prefer")).toBe(false);
+    }
+    expect(onProgress).not.toHaveBeenCalled();
+  });
+
+  test("of a long query come from a job", async () => {
+    const links = {
+      self: "/v1/jobs/j",
+      results: "/v1/jobs/j/results",
+      events: "/v1/jobs/j/events",
+    };
+    const event = (id: number, status: string, progress: number) =>
+      `id: ${id}\ndata: ${JSON.stringify({ status, progress, links })}\n\n`;
+    const requests = fakeService({
+      "POST /v1/meshes/m/distances?estimate=true": () => json({ seconds: 0.51 }),
+      "POST /v1/meshes/m/distances": () => json({ status: "accepted", links }, 202),
+      "GET /v1/jobs/j/events": () =>
+        inParts([event(1, "running", 0.25) + event(2, "running", 0.5), event(3, "successful", 1)]),
+      "GET /v1/jobs/j/results": () => distances([0, 3]),
+    });
+    const onProgress = vi.fn();
+    const field = await askDistances("m", QUESTION, onProgress, signal);
+
+    expect(field.largest).toBe(3);
+    expect(onProgress.mock.calls).toEqual([[0.25], [0.5], [1]]);
+    expect(requests[1]?.headers.get("Prefer")).toBe("respond-async");
+    expect(requests.map(({ method }) => method)).toEqual(["POST", "POST", "GET", "GET"]);
+  });
+
+  test("from the cache took no time of computing", async () => {
+    fakeService({
+      "POST /v1/meshes/m/distances?estimate=true": () => json({ seconds: 0 }),
+      "POST /v1/meshes/m/distances": () => distances([0, Infinity], "kept"),
+    });
+    const field = await askDistances("m", QUESTION, () => undefined, signal);
+
+    expect(field.seconds).toBeNull();
+    expect(field.largest).toBe(0);
+  });
+
+  test("an estimate that is refused is not followed by the query", async () => {
+    const problem = { detail: "No mesh.", code: "mesh_not_found", status: 404, request_id: "r" };
+    const requests = fakeService({ "POST /v1": () => json(problem, 404) });
+
+    await expect(askDistances("m", QUESTION, () => undefined, signal)).rejects.toThrow("No mesh.");
+    expect(requests).toHaveLength(1);
+  });
+
+  test("territories have -1 where no source is near", async () => {
+    const requests = fakeService({
+      "POST /v1/meshes/m/distances": () => json({ nearest_source: [1, null, 0] }),
+    });
+    expect(await askTerritories("m", QUESTION, signal)).toEqual(new Int32Array([1, -1, 0]));
+    expect(requests[0]?.body).toEqual({ ...QUESTION, include: ["nearest_source"] });
+  });
+});
+
+describe("paths", () => {
+  const route: RouteQuestion = {
+    sources: [{ vertex: 4 }, { vertex: 5 }],
+    target: { vertex: 9 },
+    waypoints: [],
+    barriers: [7],
+    explain: false,
+  };
+
+  test("of one source are asked for directly", async () => {
+    const requests = fakeService({ "POST /v1/meshes/m/path": () => json({ length: 1 }) });
+    const { sources, ...rest } = route;
+    await askRoute("m", { ...route, sources: sources.slice(0, 1) }, signal);
+
+    expect(requests.map(({ body }) => body)).toEqual([{ source: { vertex: 4 }, ...rest }]);
+  });
+
+  test.each([
+    ["target", [], { vertex: 9 }],
+    ["first waypoint", [{ vertex: 6 }, { vertex: 8 }], { vertex: 6 }],
+  ])("of several sources start at the one nearest to the %s", async (_, waypoints, first) => {
+    const requests = fakeService({
+      "POST /v1/meshes/m/distances": () => json({ nearest_source: [1] }),
+      "POST /v1/meshes/m/path": () => json({ length: 2 }),
+    });
+    const { sources, ...rest } = { ...route, waypoints };
+    expect(await askRoute("m", { sources, ...rest }, signal)).toEqual({ length: 2 });
+
+    expect(requests.map(({ body }) => body)).toEqual([
+      { sources, targets: [first], barriers: [7], include: ["nearest_source"] },
+      { source: { vertex: 5 }, ...rest },
+    ]);
+  });
+
+  test("without a way to any source start at the first one", async () => {
+    const requests = fakeService({
+      "POST /v1/meshes/m/distances": () => json({ nearest_source: [null] }),
+      "POST /v1/meshes/m/path": () => json({ length: null, reason: "disconnected" }),
+    });
+    await askRoute("m", route, signal);
+
+    expect(requests[1]?.body).toMatchObject({ source: { vertex: 4 } });
+  });
+});
+
+describe("points", () => {
+  test("positions are located", async () => {
+    const located = { face: 3, barycentric: [0.5, 0.25, 0.25], position: [1, 2, 3], distance: 0 };
+    const requests = fakeService({ "POST /v1/meshes/m/locate": () => json({ points: [located] }) });
+
+    expect(await locate("m", [1, 2, 3])).toEqual({ face: 3, barycentric: [0.5, 0.25, 0.25] });
+    expect(requests[0]?.body).toEqual({ points: [[1, 2, 3]] });
+  });
+
+  test("a vertex is a vertex, the first one too", () => {
+    expect(pointOf({ vertex: 0, face: null, barycentric: null })).toEqual({ vertex: 0 });
+    expect(pointOf({ vertex: null, face: 0, barycentric: [1, 0, 0] })).toEqual({
+      face: 0,
+      barycentric: [1, 0, 0],
+    });
+  });
+
+  test("a point that is nowhere is an error", async () => {
+    fakeService({ "POST /v1/meshes/m/locate": () => json({ points: [null] }) });
+
+    await expect(locate("m", [1, 2, 3])).rejects.toThrow("no point of the surface");
+    expect(() => pointOf({})).toThrow("neither at a vertex nor in a face");
+  });
+});
+
+describe("the question of a state", () => {
+  const state: State = { ...INITIAL, mesh: "m", sources: [{ vertex: 1 }], error: 0.05 };
+
+  test("has what differs from the service's defaults", () => {
+    expect(questionOf(state, "exact")).toEqual({ sources: [{ vertex: 1 }], method: "exact" });
+    expect(questionOf(state, "approximate")).toMatchObject({ relative_error: 0.05 });
+    expect(questionOf({ ...state, maxDistance: 2, barriers: [3] }, "exact")).toEqual({
+      sources: [{ vertex: 1 }],
+      method: "exact",
+      max_distance: 2,
+      barriers: [3],
+    });
+  });
+});

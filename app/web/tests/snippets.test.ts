@@ -1,0 +1,54 @@
+import { expect, test } from "vitest";
+import { curlOf, pythonOf } from "../src/panel/snippets";
+import { INITIAL, type State } from "../src/state/state";
+
+const HOST = "https://host:8000";
+const SOURCE = { vertex: 1 };
+const STATE: State = { ...INITIAL, mesh: "m", sources: [SOURCE, { vertex: 2 }] };
+
+/** Return the body within a command or a program. */
+function bodyOf(text: string): unknown {
+  return JSON.parse(/'(\{.*\})'/.exec(text)?.[1] ?? "null");
+}
+
+test("without a target the distances from all sources are asked for", () => {
+  const state: State = { ...STATE, method: "approximate", error: 0.05, maxDistance: 2 };
+  const body = {
+    sources: STATE.sources,
+    method: "approximate",
+    relative_error: 0.05,
+    max_distance: 2,
+  };
+  const curl = curlOf(state, SOURCE, HOST, false);
+  const python = pythonOf(state, SOURCE, HOST, false);
+
+  expect(curl).toContain(`curl '${HOST}/v1/meshes/m/distances'`);
+  expect(python).toContain(`Request("${HOST}/v1/meshes/m/distances"`);
+  expect(python).toContain('print(answer["distances"])');
+  expect([bodyOf(curl), bodyOf(python)]).toEqual([body, body]);
+});
+
+test("with a target the path from the source in question is asked for", () => {
+  const state: State = {
+    ...STATE,
+    target: { vertex: 9 },
+    waypoints: [{ vertex: 5 }],
+    barriers: [7],
+  };
+  const body = { source: SOURCE, target: { vertex: 9 }, waypoints: [{ vertex: 5 }], barriers: [7] };
+  const curl = curlOf(state, SOURCE, HOST, false);
+  const python = pythonOf(state, SOURCE, HOST, false);
+
+  expect(curl).toContain(`curl '${HOST}/v1/meshes/m/path'`);
+  expect(python).toContain('print(answer["length"], answer["points"])');
+  expect([bodyOf(curl), bodyOf(python)]).toEqual([body, body]);
+});
+
+test("a key is named, and never written", () => {
+  expect(curlOf(STATE, SOURCE, HOST, false)).not.toContain("Authorization");
+  expect(pythonOf(STATE, SOURCE, HOST, false)).not.toContain("os.environ");
+  expect(curlOf(STATE, SOURCE, HOST, true)).toContain('"Authorization: Bearer $GEODESIC_KEY"');
+  const python = pythonOf(STATE, SOURCE, HOST, true);
+  expect(python).toContain('"Bearer " + os.environ["GEODESIC_KEY"]');
+  expect(python.split("\n")).toContain("import os");
+});

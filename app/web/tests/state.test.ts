@@ -1,0 +1,82 @@
+import { expect, test, vi } from "vitest";
+import { INITIAL, type State, Store, WITHOUT_POINTS } from "../src/state/state";
+
+test("a store begins with the initial state", () => {
+  expect(new Store().state).toEqual(INITIAL);
+});
+
+test("an update changes what it names and nothing else", () => {
+  const store = new Store();
+  store.update({ mesh: "m", error: 0.1 });
+  store.update({ sources: [{ vertex: 3 }] });
+
+  expect(store.state).toEqual({ ...INITIAL, mesh: "m", error: 0.1, sources: [{ vertex: 3 }] });
+});
+
+test("an update leaves the state before it as it was", () => {
+  const store = new Store();
+  const before = store.state;
+  store.update({ wireframe: true });
+
+  expect(store.state).not.toBe(before);
+  expect(before.wireframe).toBe(false);
+  expect(INITIAL.wireframe).toBe(false);
+});
+
+test("listeners are told the new state and the one before, in their order", () => {
+  const store = new Store();
+  const told: [string, State, State][] = [];
+  for (const name of ["first", "second"]) {
+    store.listen((state, before) => told.push([name, state, before]));
+  }
+  const before = store.state;
+  store.update({ method: "approximate" });
+
+  const { state } = store;
+  expect(told).toEqual([
+    ["first", state, before],
+    ["second", state, before],
+  ]);
+  expect(state.method).toBe("approximate");
+});
+
+test("a listener that updates is told of its own update too", () => {
+  const store = new Store();
+  const listener = vi.fn((state: State) => {
+    if (state.maxDistance === null) store.update({ maxDistance: 1 });
+  });
+  store.listen(listener);
+  store.update({ mesh: "m" });
+
+  expect(store.state).toEqual({ ...INITIAL, mesh: "m", maxDistance: 1 });
+  expect(listener).toHaveBeenCalledTimes(2);
+});
+
+test("a new mesh takes along the settings and none of the points", () => {
+  const store = new Store();
+  store.update({
+    mesh: "old",
+    sources: [{ vertex: 1 }],
+    target: { vertex: 2 },
+    waypoints: [{ vertex: 3 }],
+    barriers: [4],
+    maxDistance: 5,
+    view: [0, 1, 2, 0, 0, 0],
+    method: "approximate",
+    error: 0.1,
+    shade: "territories",
+    lines: null,
+    wireframe: true,
+  });
+  store.update({ ...WITHOUT_POINTS, mesh: "new" });
+
+  expect(store.state).toEqual({
+    ...INITIAL,
+    mesh: "new",
+    method: "approximate",
+    error: 0.1,
+    shade: "territories",
+    lines: null,
+    wireframe: true,
+  });
+});

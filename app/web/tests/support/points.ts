@@ -1,0 +1,15 @@
+// Random points of a surface, as the page writes them.
+import type { Point } from "../../src/api/types";
+import { rounded } from "../../src/state/point";
+import type { Random } from "./random";
+
+export function randomPoint(random: Random): Point {
+  const kind = random.pick(["vertex", "edge", "face"] as const);
+  if (kind === "vertex") return { vertex: random.below(5e6) };
+  if (kind === "edge") {
+    return { edge: [random.below(5e6), random.below(5e6)], t: random.next() };
+  }
+  const [a, b, c] = [random.next(), random.next(), random.next() + 1e-9];
+  const sum = a + b + c;
+  return rounded({ face: random.below(5e6), barycentric: [a / sum, b / sum, c / sum] });
+}
