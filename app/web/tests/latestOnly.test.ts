@@ -68,6 +68,20 @@ test("a superseded request is aborted after 100 ms, and not before", async () =>
   expect(server.fail).not.toHaveBeenCalled();
 });
 
+test("the patience with one request is not spent on the next", async () => {
+  const server = new Server(() => 90);
+  server.latestOnly.ask(1);
+  await vi.advanceTimersByTimeAsync(40);
+  server.latestOnly.ask(2);
+  await vi.advanceTimersByTimeAsync(60); // at 90 ms the second one begins
+  server.latestOnly.ask(3);
+  await vi.advanceTimersByTimeAsync(50); // at 140 ms the patience with the first one is over
+  expect(server.log).toEqual(["answered 1"]);
+  await vi.runAllTimersAsync();
+
+  expect(server.log).toEqual(["answered 1", "answered 2", "answered 3"]);
+});
+
 test("on a slow server a stream of requests is answered now and then", async () => {
   const server = new Server(() => 700);
   for (let request = 0; request < 300; request++) {

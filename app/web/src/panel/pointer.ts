@@ -110,7 +110,7 @@ export class Pointer {
     if (point) this.set(point, event.altKey ? "target" : this.tool(), adds);
   }
 
-  /** Set the point that ``tool`` stands for; ``adds`` keeps the sources there are. */
+  /** Set the point that ``tool`` stands for; ``adds`` joins a source to those there are. */
   set(point: Point, tool: Tool, adds: boolean): void {
     const { sources, waypoints } = this.store.state;
     if (tool === "source") this.store.update({ sources: adds ? [...sources, point] : [point] });
