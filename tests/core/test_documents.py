@@ -1,0 +1,101 @@
+"""What the documents say of the code is so: files, modules and functions exist, examples run."""
+
+import doctest
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+from geodesic_core import kernels, tolerances
+from tests.support.paths import ROOT
+
+DOCUMENTS = sorted(
+    [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "benchmarks" / "RESULTS.md"]
+)
+ROOMS = ["", "sweep.", "paths.", "isolines.", "mesh."]
+"""Of the kernels, which documents name without their package."""
+OBJECTS = ("field", "path", "solver", "mesh")
+"""Whose attributes are named like functions of a module."""
+BUILT = ("app/web/dist",)
+"""Folders that a build makes."""
+VARIABLES = ("NUMBA_", "GEODESIC_", "FORWARDED_", "HATCH_", "XDG_")
+"""Beginnings of environment variables."""
+COLUMNS = ("ENTRY_EDGE",)
+"""Of the state, which are no tolerances."""
+
+
+def texts(pattern: str) -> list[tuple[str, str]]:
+    """What a pattern finds between backticks in the documents, and where."""
+    return sorted(
+        {
+            (path.relative_to(ROOT).as_posix(), found)
+            for path in DOCUMENTS
+            for code in re.findall(r"`([^`\n]+)`", path.read_text())
+            for found in re.findall(pattern, code)
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("document", "name"),
+    texts(r"^(?:app|geodesic_core|tests|docs|scripts|openapi|kernels|docker|benchmarks)/[\w./-]+$"),
+)
+def test_files_that_documents_name_are_there(document: str, name: str) -> None:
+    if document != "CHANGELOG.md" and name not in BUILT:
+        places = [ROOT / name, ROOT / "geodesic_core" / name]
+        assert any(place.exists() or place.with_suffix(".py").exists() for place in places)
+
+
+@pytest.mark.parametrize(
+    ("document", "target"),
+    sorted(
+        {
+            (path, target)
+            for path in DOCUMENTS
+            for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text())
+        }
+    ),
+    ids=str,
+)
+def test_links_between_documents_lead_somewhere(document: Path, target: str) -> None:
+    assert (document.parent / target).exists()
+
+
+@pytest.mark.parametrize(
+    ("document", "module", "name"),
+    [
+        (document, module, name)
+        for document, (module, name) in (
+            (document, found.replace("/", ".").rsplit(".", 1))
+            for document, found in texts(r"^(?:\w+/)?[a-z_]+\.[a-z_]+$")
+        )
+        if document in ("docs/algorithm.md", "docs/accuracy.md")
+        and name not in ("py", "md")
+        and module not in OBJECTS
+    ],
+)
+def test_functions_that_documents_name_are_there(document: str, module: str, name: str) -> None:
+    for room in ROOMS:
+        try:
+            found = importlib.import_module(f"{kernels.__name__}.{room}{module}")
+        except ModuleNotFoundError:
+            continue
+        if hasattr(found, name):
+            return
+    pytest.fail(f"{document} names {module}.{name}, which is not there")
+
+
+@pytest.mark.parametrize("name", sorted({name for _, name in texts(r"^[A-Z]+_[A-Z_]+$")}))
+def test_tolerances_that_documents_name_are_there(name: str) -> None:
+    assert name.startswith(VARIABLES) or name in COLUMNS or hasattr(tolerances, name)
+
+
+def test_the_worked_sweep_is_what_the_code_does() -> None:
+    results = doctest.testfile(
+        str(ROOT / "docs" / "algorithm.md"),
+        module_relative=False,
+        optionflags=doctest.NORMALIZE_WHITESPACE,
+    )
+    assert results.attempted >= 4
+    assert results.failed == 0
