@@ -109,7 +109,7 @@ class View:
 
 def query_of(view: View) -> dict[str, list[str]]:
     """Return the parameters of the address that the page has written."""
-    view.page.wait_for_timeout(300)
+    view.page.locator("html:not([data-address-due])").wait_for()
     search: dict[str, list[str]] = view.page.evaluate(
         "() => { const q = new URLSearchParams(location.search); const r = {};"
         "for (const k of q.keys()) r[k] = q.getAll(k); return r; }"

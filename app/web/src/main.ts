@@ -86,15 +86,16 @@ async function showWires({ wireframe }: State): Promise<void> {
   stage.invalidate();
 }
 
-let isAddressDue = false;
+// Whether the address is behind the state: an attribute, so that tests can wait for it as well.
+const { dataset } = document.documentElement;
 function writeAddress(): void {
-  if (isAddressDue) return;
-  isAddressDue = true;
+  if (dataset.addressDue) return;
+  dataset.addressDue = "true";
   setTimeout(setAddress, ADDRESS_DELAY_MS);
 }
 
 function setAddress(): void {
-  isAddressDue = false;
+  delete dataset.addressDue;
   history.replaceState(null, "", writeState(store.state));
 }
 
@@ -121,7 +122,7 @@ function begin(): void {
 }
 
 status.onKey = () => {
-  if (isAddressDue) setAddress();
+  if (dataset.addressDue) setAddress();
   begin();
 };
 begin();
