@@ -16,7 +16,7 @@ from pydantic import (
 )
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-from app.api_keys import ApiKey, parse_keys
+from app.access import ApiKey, parse_keys
 
 PREFIX = "GEODESIC_"
 MIB = 2**20

@@ -1,16 +1,4 @@
-"""The store as a whole: one folder, of one layout, that belongs to one process at a time.
-
-::
-
-    store/
-        VERSION         the layout of all that is here
-        lock            held by whoever owns the store, for as long as its process lives
-        meshes/         see ``mesh_store``
-        results/        see ``result_store``
-        fields/         see ``field_store``
-        jobs.sqlite3    see ``jobs.book``
-        tmp/            what is being written
-"""
+"""Files that are written whole or not at all, and that survive a power cut."""
 
 import os
 import tempfile
@@ -20,82 +8,18 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-import orjson
-from filelock import FileLock, Timeout
-
-from app.settings import variable_of
-
-LAYOUT = 5
-"""Of the store that this code reads and writes. To be raised with every change of any of its files,
-the job book's tables among them."""
-
-JOB_BOOK, MESHES, RESULTS, FIELDS = "jobs.sqlite3", "meshes", "results", "fields"
-TEMPORARY = "tmp"
-
-_READ_AS_THEY_ARE = (4, LAYOUT)
-"""Layouts that differ by this number alone: up to 4 it was in each mesh's manifest."""
-
-
-class StoreError(Exception):
-    """The store cannot be used as it is; the message says why, and what to do."""
+_PARTIAL = "tmp"
+"""Prefix of the names of unfinished files"""
 
 
 @contextmanager
-def owned(root: Path) -> Iterator[None]:
-    """Own the store in the folder ``root`` while inside; it is made where it is not there.
+def atomic_write(path: Path) -> Iterator[IO[bytes]]:
+    """Yield a file that appears at ``path`` once the block has succeeded, and not otherwise.
 
-    The lock goes with the process, however that ends.
-
-    Raises
-    ------
-    StoreError
-        Another process owns it, it has a layout that this code does not read, or its folder cannot
-        be written.
-    """
-    # A lock that is a mere file would outlive the process: better none.
-    lock = FileLock(root / "lock", timeout=0, thread_local=False, fallback_to_soft=False)
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-        lock.acquire()
-    except Timeout:
-        setting = variable_of("store")
-        raise StoreError(
-            f"the store {root} is in use by another process, which must end first; "
-            f"a second service needs a store of its own, see {setting}"
-        ) from None
-    except OSError as error:
-        raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
-    try:
-        require_layout(root)
-        _write_layout(root)
-        yield
-    finally:
-        lock.release()
-
-
-def require_layout(root: Path) -> None:
-    """Raise ``StoreError`` where the store in ``root`` has a layout that is not read here."""
-    found = _layout(root)
-    if found is not None and found not in _READ_AS_THEY_ARE:
-        raise StoreError(
-            f"the store {root} has layout {found}, and this release reads {LAYOUT}: "
-            f"use the release that wrote it, or move it away and upload its meshes again"
-        )
-
-
-def is_store(root: Path) -> bool:
-    """Tell whether there is a store in ``root``."""
-    return (root / "VERSION").is_file() or (root / MESHES).is_dir()
-
-
-@contextmanager
-def written_whole(path: Path) -> Iterator[IO[bytes]]:
-    """Write a file that is either there, with all that was written inside, or not at all.
-
-    What a killed process leaves of it is for `remove_half_written`.
+    A killed process may leave an unfinished file; `remove_partial` deletes it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=_HALF_WRITTEN, delete=False) as file:
+    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=_PARTIAL, delete=False) as file:
         try:
             yield file
             file.close()
@@ -105,17 +29,14 @@ def written_whole(path: Path) -> Iterator[IO[bytes]]:
             raise
 
 
-_HALF_WRITTEN = "tmp"
-
-
-def remove_half_written(folder: Path) -> None:
-    """Remove from all folders in ``folder`` what `written_whole` did not finish."""
-    for path in folder.glob(f"*/{_HALF_WRITTEN}*"):
+def remove_partial(folder: Path) -> None:
+    """Remove the files that `atomic_write` did not finish from the folders in ``folder``."""
+    for path in folder.glob(f"*/{_PARTIAL}*"):
         path.unlink()
 
 
 def sync(path: Path) -> None:
-    """Have a file, or the names in a folder, survive a power cut."""
+    """Flush a file, or the names in a folder, to the disk."""
     number = os.open(path, os.O_RDONLY)
     try:
         os.fsync(number)
@@ -124,46 +45,11 @@ def sync(path: Path) -> None:
 
 
 def sync_all(folder: Path) -> None:
-    """Have a folder and the files in it survive a power cut.
+    """Flush a folder and the files in it to the disk.
 
-    In threads, which wait for the disk's journal together: 15 files took 10 ms, and 64 ms one after
-    the other.
+    The threads wait for the disk's journal together: 15 files take 10 ms, and one after the other
+    64 ms.
     """
     with ThreadPoolExecutor(16) as pool:
         list(pool.map(sync, folder.iterdir()))
     sync(folder)
-
-
-def _layout(root: Path) -> int | str | None:
-    try:
-        written = (root / "VERSION").read_text().strip()
-    except FileNotFoundError:
-        return _layout_of_manifests(root)
-    return int(written) if written.isdecimal() else repr(written)
-
-
-def _layout_of_manifests(root: Path) -> int | str | None:
-    """Return the layout of a store of before 5, where it has any mesh that tells."""
-    for path in (root / MESHES).glob("*/manifest.json"):
-        try:
-            version: int | str = orjson.loads(path.read_bytes())["version"]
-        except (ValueError, TypeError, KeyError):
-            continue  # damaged: it will say so when it is asked for
-        if version not in _READ_AS_THEY_ARE:
-            return version
-    return None
-
-
-def _write_layout(root: Path) -> None:
-    if _layout_is_written(root):
-        return
-    aside = root / "VERSION.new"
-    aside.write_text(f"{LAYOUT}\n")
-    sync(aside)
-    aside.replace(root / "VERSION")
-    sync(root)
-
-
-def _layout_is_written(root: Path) -> bool:
-    path = root / "VERSION"
-    return path.is_file() and path.read_text().strip() == str(LAYOUT)

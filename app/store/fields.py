@@ -17,7 +17,8 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from app.store.layout import FIELDS, remove_half_written, written_whole
+from app.store.atomic import atomic_write, remove_partial
+from app.store.layout import FIELDS
 
 logger = logging.getLogger(__name__)
 
@@ -40,7 +41,7 @@ class FieldStore:
 
     def prepare(self, meshes: Collection[str]) -> None:
         """Remove what was left half-written, and the fields of meshes that are gone."""
-        remove_half_written(self.folder)
+        remove_partial(self.folder)
         for folder in self.folder.glob("*"):
             if folder.name not in meshes:
                 self.forget_mesh(folder.name)
@@ -64,7 +65,7 @@ class FieldStore:
         if sum(array.nbytes for array in arrays.values()) > self._capacity:
             return
         try:
-            with written_whole(self._path(mesh_id, key)) as file:
+            with atomic_write(self._path(mesh_id, key)) as file:
                 np.savez(file, allow_pickle=False, **arrays, **{_CODE: np.array(code)})
             self._evict()
         except (OSError, MemoryError) as error:

@@ -12,18 +12,15 @@
         tmp/            what is being written
 """
 
-import os
-import tempfile
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO
 
 import orjson
 from filelock import FileLock, Timeout
 
 from app.settings import variable_of
+from app.store.atomic import sync
 
 LAYOUT = 5
 """Of the store that this code reads and writes. To be raised with every change of any of its files,
@@ -86,52 +83,6 @@ def require_layout(root: Path) -> None:
 def is_store(root: Path) -> bool:
     """Tell whether there is a store in ``root``."""
     return (root / "VERSION").is_file() or (root / MESHES).is_dir()
-
-
-@contextmanager
-def written_whole(path: Path) -> Iterator[IO[bytes]]:
-    """Write a file that is either there, with all that was written inside, or not at all.
-
-    What a killed process leaves of it is for `remove_half_written`.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=path.parent, prefix=_HALF_WRITTEN, delete=False) as file:
-        try:
-            yield file
-            file.close()
-            Path(file.name).rename(path)
-        except BaseException:
-            Path(file.name).unlink(missing_ok=True)
-            raise
-
-
-_HALF_WRITTEN = "tmp"
-
-
-def remove_half_written(folder: Path) -> None:
-    """Remove from all folders in ``folder`` what `written_whole` did not finish."""
-    for path in folder.glob(f"*/{_HALF_WRITTEN}*"):
-        path.unlink()
-
-
-def sync(path: Path) -> None:
-    """Have a file, or the names in a folder, survive a power cut."""
-    number = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(number)
-    finally:
-        os.close(number)
-
-
-def sync_all(folder: Path) -> None:
-    """Have a folder and the files in it survive a power cut.
-
-    In threads, which wait for the disk's journal together: 15 files took 10 ms, and 64 ms one after
-    the other.
-    """
-    with ThreadPoolExecutor(16) as pool:
-        list(pool.map(sync, folder.iterdir()))
-    sync(folder)
 
 
 def _layout(root: Path) -> int | str | None:

@@ -16,7 +16,8 @@ from pathlib import Path
 from uuid import uuid4
 
 from app.errors import over_limit
-from app.store.layout import TEMPORARY, sync, sync_all
+from app.store.atomic import sync, sync_all
+from app.store.layout import TEMPORARY
 from app.store.meshes import MeshStore, WrittenMesh, unknown
 
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from app.store.layout import remove_half_written, written_whole
+from app.store.atomic import atomic_write, remove_partial
 
 Buffer = bytes | memoryview
 
@@ -97,12 +97,12 @@ def _write(
 ) -> Written:
     """Write the files of a result, body first and seal last."""
     size = checksum = 0
-    with written_whole(_body(root, name)) as file:
+    with atomic_write(_body(root, name)) as file:
         for part in parts:
             size += file.write(part)
             checksum = zlib.crc32(part, checksum)
     seal = ResultManifest(headers=dict(headers), size=size, crc32=checksum, code=code)
-    with written_whole(_seal(root, name)) as file:
+    with atomic_write(_seal(root, name)) as file:
         file.write(seal.model_dump_json().encode())
     return Written(seal, None, has_files=True)
 
@@ -136,7 +136,7 @@ class ResultStore:
                 self._count(name, path.stat().st_size)
             else:
                 path.unlink()
-        remove_half_written(self._root)
+        remove_partial(self._root)
         self._evict()
 
     @property

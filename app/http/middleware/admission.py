@@ -4,8 +4,7 @@ import re
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from app.access import Caller, caller_at
-from app.api_keys import name_of_secret
+from app.access import Caller, caller_at, name_of_secret
 from app.errors import ProblemError, problem
 from app.http.middleware.rate_limits import Allowances
 from app.http.page import ASSETS

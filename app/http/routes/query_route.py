@@ -14,8 +14,12 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError, create_model
 
 from app.http.dependencies import require_json
-from app.http.routes.bodies import offload_if_large, parsed
-from app.http.routes.query_request import AskingHeaders, get_asked
+from app.http.routes.query_request import (
+    AskingHeaders,
+    get_asked,
+    offload_if_large,
+    parse_json,
+)
 
 
 class QueryRoute(APIRoute):
@@ -59,7 +63,7 @@ def read(model: type[BaseModel], written: dict[str, Any], body: bytes) -> Any:
         Something is not as the model has it.
     """
     if body:
-        written = {**written, "body": parsed(body)}
+        written = {**written, "body": parse_json(body)}
     try:
         return model.model_validate(written)
     except ValidationError as error:

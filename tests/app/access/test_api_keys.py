@@ -2,7 +2,7 @@ import pickle
 
 import pytest
 
-from app.api_keys import ApiKey, name_of_secret, parse_keys
+from app.access import ApiKey, name_of_secret, parse_keys
 
 ALICE, BOB = "alice-0123456789", "bob+/~._-0123456=="
 

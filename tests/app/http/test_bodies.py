@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.http.routes import bodies, query_route
+from app.http.routes import query_request, query_route
 from app.queries import DistancesQuery, LocateQuery
 from tests.support.service import check_problem
 
@@ -66,7 +66,9 @@ def test_large_bodies_are_checked_one_at_a_time(
 def test_small_bodies_need_no_thread(
     client: TestClient, plane: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(bodies.to_thread, "run_sync", lambda *_, **__: pytest.fail("a thread"))
+    monkeypatch.setattr(
+        query_request.to_thread, "run_sync", lambda *_, **__: pytest.fail("a thread")
+    )
     body = LocateQuery.model.model_validate({"points": [[0, 0, 0]]}).model_dump()
     assert client.post(f"/v1/meshes/{plane}/locate", json=body).status_code == 200
 
