@@ -1,4 +1,4 @@
-"""The application, built when asked for."""
+"""The application: settings, service, middleware and routes put together."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -10,10 +10,10 @@ from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
 from app.http import exception_handlers, page
-from app.http.metrics import MeasuringMiddleware, Metrics
+from app.http.metrics import Metrics, MetricsMiddleware
 from app.http.middleware.admission import AdmissionMiddleware
-from app.http.middleware.body_timeout import BodyDeadlineMiddleware
-from app.http.middleware.request_id import RequestMiddleware
+from app.http.middleware.body_timeout import BodyTimeoutMiddleware
+from app.http.middleware.request_id import RequestIdMiddleware
 from app.http.openapi import complete
 from app.http.routes import about, jobs, meshes, queries
 from app.service.service import Service
@@ -21,7 +21,7 @@ from app.settings import Settings
 
 
 def create_app(settings: Settings) -> FastAPI:
-    """Build the service; nothing runs, and nothing is on disk, before its lifespan begins."""
+    """Build the application; it starts nothing and writes nothing before its lifespan begins."""
     service = Service(settings)
 
     @asynccontextmanager
@@ -34,17 +34,17 @@ def create_app(settings: Settings) -> FastAPI:
         version=__version__,
         summary="Geodesic distances and paths on triangle meshes, exact or within a chosen error",
         lifespan=lifespan,
-        docs_url=None,  # its page loads scripts from elsewhere
+        docs_url=None,  # FastAPI's page loads scripts from elsewhere
         redoc_url=None,
     )
     app.state.service = service
     app.state.metrics = metrics = Metrics(service)
     app.state.large_bodies = CapacityLimiter(1)
-    # The last is the outermost.
-    app.add_middleware(BodyDeadlineMiddleware, settings=settings)
+    # The last one added is the outermost.
+    app.add_middleware(BodyTimeoutMiddleware, settings=settings)
     app.add_middleware(AdmissionMiddleware, settings=settings)
-    app.add_middleware(RequestMiddleware, settings=settings)
-    app.add_middleware(MeasuringMiddleware, metrics=metrics)
+    app.add_middleware(RequestIdMiddleware, settings=settings)
+    app.add_middleware(MetricsMiddleware, metrics=metrics)
     if settings.cors_origins:
         app.add_middleware(
             CORSMiddleware,
@@ -54,7 +54,7 @@ def create_app(settings: Settings) -> FastAPI:
             expose_headers=["*"],
         )
     exception_handlers.install(app, settings)
-    # Routes are tried one by one: those that are asked most go first.
+    # Routes are tried in order: the most frequent go first.
     app.include_router(queries.router, prefix="/v1", max_body_size=settings.max_query_bytes)
     app.include_router(meshes.router, prefix="/v1", max_body_size=settings.max_upload_bytes)
     app.include_router(jobs.router, prefix="/v1", max_body_size=settings.max_query_bytes)
@@ -66,7 +66,7 @@ def create_app(settings: Settings) -> FastAPI:
 
 class _Application(FastAPI):
     def openapi(self) -> dict[str, Any]:
-        """Return the interface document, made when it is first asked for."""
+        """Return the OpenAPI document, made on first use."""
         if self.openapi_schema is None:
             self.openapi_schema = complete(super().openapi())
         return self.openapi_schema

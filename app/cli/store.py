@@ -146,8 +146,8 @@ def _document(found: "Contents") -> dict[str, Any]:
             {
                 "id": job.id,
                 "status": job.status,
-                "mesh_id": job.errand.mesh_id,
-                "owner": job.errand.owner,
+                "mesh_id": job.spec.mesh_id,
+                "owner": job.spec.owner,
                 "created": job.created,
             }
             for job in found.jobs

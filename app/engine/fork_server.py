@@ -1,6 +1,6 @@
-"""The process that workers are forked from: it has imported all they need, and does nothing else.
+"""The fork server: a process that has imported what workers need, and forks them.
 
-Imports take 2 s and a fork 10 ms. To fork the service itself would copy its threads' locks.
+Imports take 2 s and a fork 10 ms. A fork of the service itself would copy its threads' locks.
 """
 
 import multiprocessing
@@ -11,5 +11,5 @@ CONTEXT.set_forkserver_preload(["app.engine.worker"])
 
 
 def start() -> None:
-    """Have it begin to import, where it does not run already; returns at once."""
+    """Start the fork server, unless it runs, and let it import; returns at once."""
     forkserver.ensure_running()

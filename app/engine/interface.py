@@ -1,4 +1,4 @@
-"""What the service expects of whatever computes its answers."""
+"""The interface between the service and whatever computes its answers."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,57 +7,59 @@ from typing import Protocol
 from app.engine.work import Task, TaskResult
 
 ProgressCallback = Callable[[float], None]
-"""Is told which share of some work is done: 0 when it begins, never less than before."""
+"""Receives the share of the work that is done: 0 when it begins, and never less than before"""
 
 
 @dataclass(frozen=True)
 class Load:
-    """What an engine is doing, and what became of workers and work since it began."""
+    """The state of an engine, and totals since its start."""
 
     waiting: int
-    """Orders in the queue"""
+    """Tasks in the queue"""
     idle: int
+    """Workers without a task"""
     busy: int
+    """Workers with a task"""
     missing: int
-    """Places without a worker: it is being started, or replaced"""
+    """Slots without a worker: it is being started, or replaced"""
     lost: int
-    """Workers that died, or were killed, so far"""
+    """Workers so far that died or were killed"""
     cancelled: int
-    """Work so far that was stopped since nobody waited for it any longer"""
+    """Tasks so far that were stopped because nobody waited for them any longer"""
 
 
 class Engine(Protocol):
-    """Runs work elsewhere than in the process that serves requests."""
+    """Runs tasks outside the process that serves requests."""
 
     @property
     def load(self) -> Load:
-        """What it is doing."""
+        """Its present state, and its totals."""
 
     @property
     def is_ready(self) -> bool:
-        """Whether work would begin now, or as soon as other work is done."""
+        """Whether a new task would begin at once, or as soon as others end."""
 
     @property
     def is_draining(self) -> bool:
-        """Whether new work is refused, since the engine is about to stop."""
+        """Whether new tasks are refused because the engine is about to stop."""
 
     async def start(self) -> None:
         """Begin to get ready; returns at once."""
 
     def drain(self) -> None:
-        """Refuse new work from now on; what runs or waits goes on."""
+        """Refuse new tasks from now on; those that run or wait go on."""
 
     async def stop(self) -> None:
-        """End all work."""
+        """End all tasks."""
 
     def refuse_when_full(self, client: str) -> None:
-        """Raise what ``run`` would, did the work of a client have to wait, and had no room to."""
+        """Raise the error of ``run`` where a client's task would have to wait without room."""
 
-    async def run(self, order: Task, told: ProgressCallback) -> TaskResult:
-        """Do the work of an order; cancel the call to stop it.
+    async def run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
+        """Do the work of a task; cancel the call to stop it.
 
         Raises
         ------
         ProblemError
-            The work was refused or failed, the queue is full, or nothing can run it.
+            The work was refused or failed, the queue is full, or no worker can be started.
         """

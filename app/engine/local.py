@@ -1,4 +1,4 @@
-"""Worker processes on this machine: one queue, several slots, each kept supplied with a worker."""
+"""The engine of one machine: a queue, and slots that are kept supplied with worker processes."""
 
 import asyncio
 import logging
@@ -19,27 +19,28 @@ from app.settings import Settings
 logger = logging.getLogger(__name__)
 
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 30.0
+"""Between attempts to start a worker"""
 _RETRY_AFTER = {"Retry-After": "1"}
-_TELL_S = 0.1
+_PROGRESS_PERIOD_S = 0.1
 _SMALL_S = 0.5
-"""Granted to small work: ten times what it is likely to take."""
+"""Time limit of small work: ten times what it is likely to take"""
 
 
 @dataclass(frozen=True, eq=False)
-class _Place:
-    """A place in the queue."""
+class _Waiter:
+    """A task in the queue, and the slot that it will be given."""
 
-    order: Task
+    task: Task
     slot: "asyncio.Future[Slot]"
 
 
 class LocalEngine:
     """The engine of a service on one machine.
 
-    One slot more than the setting asks for takes small work only: that never waits behind long
-    work. The others take it as well, but no more of it is done at once than the setting asks for,
-    for more than there are cores would only keep each other waiting. What proves not to be small is
-    begun anew as what it is.
+    It has one slot more than the setting ``workers`` asks for. That one takes only small work,
+    which therefore never waits behind long work. The other slots take small work as well, but never
+    more than ``workers`` at once: beyond the number of cores, workers only delay each other. Work
+    that proves not to be small is stopped and begun anew as long work.
     """
 
     def __init__(self, settings: Settings, results: Path) -> None:
@@ -47,15 +48,15 @@ class LocalEngine:
         config = WorkerConfig(settings, results)
         self._small = Slot(config)
         self._slots = [self._small, *(Slot(config) for _ in range(settings.workers))]
-        self._idle: list[Slot] = []
-        self._at_small: set[Slot] = set()
-        self._waiting: FairQueue[_Place] = FairQueue()
+        self._idle: list[Slot] = []  # the most recently used first
+        self._doing_small: set[Slot] = set()
+        self._waiting: FairQueue[_Waiter] = FairQueue()
         self._open: set[Slot] = set()
         self._lost = self._cancelled = 0
         self._is_failing = False
         self.is_draining = False
         self._kernels_are_compiled = asyncio.Event()
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._background: set[asyncio.Task[None]] = set()
 
     @property
     def is_ready(self) -> bool:
@@ -64,7 +65,7 @@ class LocalEngine:
 
     @property
     def load(self) -> Load:
-        """What it is doing, see ``Engine``."""
+        """Its present state, and its totals, see ``Engine``."""
         idle = sum(slot.is_alive for slot in self._idle)
         busy = sum(slot.is_alive for slot in self._open) - idle
         missing = len(self._slots) - idle - busy
@@ -73,91 +74,91 @@ class LocalEngine:
     async def start(self) -> None:
         """Start the workers, in the background."""
         for number, slot in enumerate(reversed(self._slots)):
-            self._spawn(self._keep(slot, goes_first=number == 0))
+            self._spawn(self._supervise(slot, goes_first=number == 0))
 
     def drain(self) -> None:
-        """Refuse new work, see ``Engine``."""
+        """Refuse new tasks, see ``Engine``."""
         self.is_draining = True
 
     async def stop(self) -> None:
         """Kill the workers."""
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
+        for background in self._background:
+            background.cancel()
+        await asyncio.gather(*self._background, return_exceptions=True)
         await asyncio.gather(*(slot.close() for slot in self._slots))
 
     def refuse_when_full(self, client: str) -> None:
-        """Refuse what would have to wait and has no room to, see ``Engine``."""
+        """Raise where a task would have to wait without room, see ``Engine``."""
         self._refuse_when_draining()
         if not any(self._takes(slot, is_small=False) for slot in self._idle):
             self._refuse_to_wait(client)
 
-    async def run(self, order: Task, told: ProgressCallback) -> TaskResult:
-        """Do the work of an order in the next free worker, see ``Engine``."""
+    async def run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
+        """Do the work of a task in the next free worker, see ``Engine``."""
         self._refuse_when_draining()
         start = perf_counter()
         deaths = 0
         while True:
-            slot = await self._take(order)
+            slot = await self._acquire(task)
             queued = perf_counter() - start
             try:
-                outcome = await self._run_in(slot, order, told)
+                outcome = await self._run_in(slot, task, on_progress)
             except WorkerLostError as error:
                 deaths += 1
                 if error.had_begun or deaths > len(self._slots):
                     raise problem(
                         "worker_died", "the worker process of this request died"
                     ) from None
-                continue  # it had died idle, unnoticed: nothing was tried yet
-            if outcome is None:  # it proved not to be small
-                order = replace(order, is_small=False)
+                continue  # the worker had died while idle: the work has not begun
+            if outcome is None:  # stopped, since it was not small after all
+                task = replace(task, is_small=False)
                 continue
             if isinstance(outcome, Problem):
                 raise ProblemError(outcome)
             return replace(outcome, seconds={"queue": queued, **outcome.seconds})
 
-    async def _run_in(self, slot: Slot, order: Task, told: ProgressCallback) -> Outcome:
-        outcome = slot.begin(order.work, is_small=order.is_small)
-        began = perf_counter()
-        told(0.0)
+    async def _run_in(self, slot: Slot, task: Task, on_progress: ProgressCallback) -> Outcome:
+        outcome = slot.begin(task.work, is_small=task.is_small)
+        start = perf_counter()
+        on_progress(0.0)
         try:
             while not outcome.done():
-                await asyncio.wait({outcome}, timeout=_TELL_S)
-                told(slot.progress)
-                if order.is_small and perf_counter() - began > _SMALL_S:
+                await asyncio.wait({outcome}, timeout=_PROGRESS_PERIOD_S)
+                on_progress(slot.progress)
+                if task.is_small and perf_counter() - start > _SMALL_S:
                     slot.ask_to_stop()
             result = outcome.result()
         except asyncio.CancelledError:
             self._cancelled += 1
-            self._spawn(self._end(slot, outcome, order.work))
+            self._spawn(self._stop_work(slot, outcome, task.work))
             raise
         except WorkerLostError:
-            slot.give_up()
+            slot.retire()
             raise
-        self._give_back(slot)
+        self._release(slot)
         return result
 
-    async def _end(self, slot: Slot, outcome: "asyncio.Future[Outcome]", work: Work) -> None:
-        """Stop work that nobody waits for: ask, if it listens, and kill where that fails."""
+    async def _stop_work(self, slot: Slot, outcome: "asyncio.Future[Outcome]", work: Work) -> None:
+        """Stop work that nobody waits for: ask first, and kill the worker if that fails."""
         slot.ask_to_stop()
         grace = self._settings.cancel_grace_s if work.stops_when_asked else 0
         await asyncio.wait({outcome}, timeout=grace)
         if outcome.done() and outcome.exception() is None:
-            self._give_back(slot)
+            self._release(slot)
         else:
-            slot.give_up()
+            slot.retire()
 
-    async def _keep(self, slot: Slot, *, goes_first: bool) -> None:
-        """Keep ``slot`` supplied with a living worker, for ever."""
+    async def _supervise(self, slot: Slot, *, goes_first: bool) -> None:
+        """Supply a slot with living workers, for ever."""
         pause = _FIRST_PAUSE_S
         if not goes_first:
-            # One worker compiles, the others find its kernels in the cache.
+            # One worker compiles; the others load its kernels from the cache.
             await self._kernels_are_compiled.wait()
         while True:
             try:
                 await slot.open()
             except WorkerLostError:
-                if not self.is_draining:  # else the interrupt came to the new worker as well
+                if not self.is_draining:  # an interrupt reaches a starting worker as well
                     logger.exception("a worker could not be started; next try in %g s", pause)
                 self._fail_if_none_is_open()
                 await slot.close()
@@ -168,60 +169,61 @@ class LocalEngine:
             self._is_failing = False
             self._kernels_are_compiled.set()
             self._open.add(slot)
-            self._give_back(slot)
-            await slot.until_dead()
+            self._release(slot)
+            await slot.wait_until_retired()
             self._lost += 1
             logger.warning("a worker is gone and will be replaced")
             self._open.discard(slot)
             if slot in self._idle:
                 self._idle.remove(slot)
-            self._at_small.discard(slot)
+            self._doing_small.discard(slot)
             self._offer_idle()
             await slot.close()
 
-    async def _take(self, order: Task) -> Slot:
-        """Wait for a free slot, best one that knows what the order is about."""
+    async def _acquire(self, task: Task) -> Slot:
+        """Wait for a free slot, preferably one whose worker has cached what the task needs."""
         self._idle = [slot for slot in self._idle if slot.is_alive]
-        fit = [slot for slot in self._idle if self._takes(slot, order.is_small)]
-        if fit:
-            slot = max(fit, key=lambda slot: self._fitness(slot, order))
+        suitable = [slot for slot in self._idle if self._takes(slot, task.is_small)]
+        if suitable:
+            slot = max(suitable, key=lambda slot: self._affinity(slot, task))
             self._idle.remove(slot)
-            self._note_taken(slot, order)
+            self._note_acquired(slot, task)
         else:
-            slot = await self._wait(order)
+            slot = await self._wait(task)
         slot.affinity_keys.extend(
-            topic for topic in order.affinity_keys if topic not in slot.affinity_keys
+            key for key in task.affinity_keys if key not in slot.affinity_keys
         )
         return slot
 
-    def _fitness(self, slot: Slot, order: Task) -> tuple[Any, ...]:
-        """Return what a slot has to do with an order; where nothing, the least it has with others.
+    def _affinity(self, slot: Slot, task: Task) -> tuple[Any, ...]:
+        """Score a slot's cache affinity; otherwise prefer the least used.
 
-        Of those that are equal the one that was used last has most in the processor's caches.
+        Of slots with equal scores the most recently used wins: its data is in the processor's
+        caches.
         """
-        known = tuple(topic in slot.affinity_keys for topic in order.affinity_keys)
-        others = 0 if any(known) else len(slot.affinity_keys)
-        return *known, order.is_small and slot is self._small, -others
+        matches = tuple(key in slot.affinity_keys for key in task.affinity_keys)
+        others = 0 if any(matches) else len(slot.affinity_keys)
+        return *matches, task.is_small and slot is self._small, -others
 
     def _takes(self, slot: Slot, is_small: bool) -> bool:
         if is_small:
-            return len(self._at_small) < self._settings.workers
+            return len(self._doing_small) < self._settings.workers
         return slot is not self._small
 
-    def _note_taken(self, slot: Slot, order: Task) -> None:
-        if order.is_small:
-            self._at_small.add(slot)
+    def _note_acquired(self, slot: Slot, task: Task) -> None:
+        if task.is_small:
+            self._doing_small.add(slot)
 
-    async def _wait(self, order: Task) -> Slot:
-        self._refuse_to_wait(order.client)
-        place = _Place(order, asyncio.get_running_loop().create_future())
-        self._waiting.put(order.client, place)
+    async def _wait(self, task: Task) -> Slot:
+        self._refuse_to_wait(task.client)
+        waiter = _Waiter(task, asyncio.get_running_loop().create_future())
+        self._waiting.put(task.client, waiter)
         try:
-            return await place.slot
+            return await waiter.slot
         except asyncio.CancelledError:
-            self._waiting.remove(order.client, place)
-            if place.slot.done() and not place.slot.cancelled():
-                self._give_back(place.slot.result())  # it came just as its taker left
+            self._waiting.remove(task.client, waiter)
+            if waiter.slot.done() and not waiter.slot.cancelled():
+                self._release(waiter.slot.result())  # given just as the call was cancelled
             raise
 
     def _refuse_when_draining(self) -> None:
@@ -232,7 +234,7 @@ class LocalEngine:
         if self._is_failing:
             raise _unavailable()
         size = self._settings.queue_size
-        # One client cannot lock out the others: a few more places are for who has nothing waiting.
+        # One client cannot lock out the others: some more places are for clients without a task.
         room = size if self._waiting.has(client) else size + 1 + size // 4
         if len(self._waiting) >= room:
             waiting = len(self._waiting) + 1
@@ -240,37 +242,38 @@ class LocalEngine:
                 "queue_full", "waiting requests", waiting, size, "queue_size", headers=_RETRY_AFTER
             )
 
-    def _give_back(self, slot: Slot) -> None:
-        self._at_small.discard(slot)
+    def _release(self, slot: Slot) -> None:
+        """Give a slot to the next task that it can take, or let it idle."""
+        self._doing_small.discard(slot)
         if not slot.is_alive:
-            return  # its keeper replaces it and gives it back then
-        place = self._waiting.take(
-            lambda place: not place.slot.done() and self._takes(slot, place.order.is_small)
+            return  # released again once `_supervise` has replaced its worker
+        waiter = self._waiting.take(
+            lambda waiter: not waiter.slot.done() and self._takes(slot, waiter.task.is_small)
         )
-        if place is None:
+        if waiter is None:
             self._idle.insert(0, slot)
         else:
-            self._note_taken(slot, place.order)
-            place.slot.set_result(slot)
+            self._note_acquired(slot, waiter.task)
+            waiter.slot.set_result(slot)
 
     def _offer_idle(self) -> None:
-        """Offer what is idle to who waits: a worker is gone, and less small work is under way."""
-        for slot in reversed(self._idle.copy()):  # so they keep their order
+        """Offer idle slots to waiting tasks: with a lost worker, less small work is under way."""
+        for slot in reversed(self._idle.copy()):  # keeps their order
             self._idle.remove(slot)
-            self._give_back(slot)
+            self._release(slot)
 
     def _fail_if_none_is_open(self) -> None:
         if self.is_ready:
             return
         self._is_failing = True
-        for place in self._waiting.take_all():
-            if not place.slot.done():
-                place.slot.set_exception(_unavailable())
+        for waiter in self._waiting.take_all():
+            if not waiter.slot.done():
+                waiter.slot.set_exception(_unavailable())
 
     def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.create_task(coroutine)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        background = asyncio.create_task(coroutine)
+        self._background.add(background)
+        background.add_done_callback(self._background.discard)
 
 
 def _unavailable() -> ProblemError:

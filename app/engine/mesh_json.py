@@ -1,4 +1,4 @@
-"""A mesh written as JSON: ``{"vertices": [[x, y, z], …], "faces": [[i, j, k], …]}``."""
+"""Reader of meshes in JSON: ``{"vertices": [[x, y, z], …], "faces": [[i, j, k], …]}``."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ _MEMBERS = ("vertices", "faces")
 
 
 def read_json_mesh(body: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return vertices and faces; whether they make a mesh is for ``TriangleMesh`` to say."""
+    """Return vertices and faces; `TriangleMesh` checks whether they make a mesh."""
     try:
         document = orjson.loads(body)
     except orjson.JSONDecodeError as error:
@@ -38,8 +38,8 @@ def _rows(document: dict[str, Any], name: str, kinds: str, what: str) -> NDArray
     if array.dtype.kind in kinds and array.ndim == 2 and array.shape[1] == 3:
         return array
     for i, row in enumerate(rows):
-        one = _as_array(row)
-        if one.dtype.kind not in kinds or one.shape != (3,):
+        values = _as_array(row)
+        if values.dtype.kind not in kinds or values.shape != (3,):
             raise _invalid(pointer(name, i), f"{name}[{i}] is not {what}")
     raise _invalid(pointer(name), f"{name} is not a list of {what} each")
 

@@ -1,4 +1,4 @@
-"""Who is next: clients take turns, and the requests of each keep their order."""
+"""A fair queue: clients take turns, and the items of each stay in order."""
 
 from collections import deque
 from collections.abc import Callable
@@ -8,9 +8,9 @@ T = TypeVar("T")
 
 
 class FairQueue(Generic[T]):
-    """What waits, by client.
+    """Waiting items by client.
 
-    A client that has much waiting gets no more turns than one that has little.
+    A client with many items gets no more turns than one with few.
     """
 
     def __init__(self) -> None:
@@ -20,15 +20,15 @@ class FairQueue(Generic[T]):
         return sum(map(len, self._waiting.values()))
 
     def has(self, client: str) -> bool:
-        """Tell whether anything of a client's waits."""
+        """Tell whether a client has an item in the queue."""
         return client in self._waiting
 
     def put(self, client: str, item: T) -> None:
-        """Let ``item`` wait, behind all else of the same client."""
+        """Add an item behind all others of its client."""
         self._waiting.setdefault(client, deque()).append(item)
 
     def take(self, fits: Callable[[T], bool]) -> T | None:
-        """Return the first item that ``fits`` of the client whose turn it is; None for none."""
+        """Remove and return the first item that ``fits``, by turns of clients; None without one."""
         for client, items in self._waiting.items():
             for item in items:
                 if fits(item):
@@ -39,7 +39,7 @@ class FairQueue(Generic[T]):
         return None
 
     def remove(self, client: str, item: T) -> None:
-        """Let ``item``, if it still waits, wait no longer."""
+        """Remove an item, if it is still in the queue."""
         items = self._waiting.get(client, deque())
         if item in items:
             items.remove(item)
@@ -47,7 +47,7 @@ class FairQueue(Generic[T]):
             self._waiting.pop(client, None)
 
     def take_all(self) -> list[T]:
-        """Return all that waits; nothing does then."""
+        """Remove and return all items."""
         items = [item for items in self._waiting.values() for item in items]
         self._waiting.clear()
         return items

@@ -1,4 +1,4 @@
-"""A place for one worker process: begins work, asks it to stop, gives it up."""
+"""A slot for one worker process: it hands over work, asks it to stop, and retires the worker."""
 
 import asyncio
 import pickle
@@ -11,11 +11,11 @@ from app.engine import worker
 from app.engine.fork_server import CONTEXT
 from app.engine.work import Outcome, Work
 
-_TOPICS = 64  # that are remembered
+_MAX_AFFINITY_KEYS = 64
 
 
 class WorkerLostError(Exception):
-    """The worker died, or was killed; ``had_begun`` tells whether it had taken up the work."""
+    """The worker died, or was killed; ``had_begun`` tells whether it had begun the work."""
 
     def __init__(self, *, had_begun: bool) -> None:
         super().__init__("the worker died")
@@ -23,50 +23,51 @@ class WorkerLostError(Exception):
 
 
 class Slot:
-    """A place that has a living worker between ``open`` and ``close``, and can be opened again.
+    """A slot that has a living worker between ``open`` and ``close``, and can be opened again.
 
-    A pool of a library would bring three threads for each worker, through which all messages pass:
-    half a millisecond a request. This has a socket on the event loop, whose other end closes when
-    the worker dies, whatever it was doing.
+    The pools of libraries need three threads for each worker, and pass all messages through them:
+    half a millisecond a request. A slot has a socket on the event loop instead. Its other end
+    closes when the worker dies, whatever the worker was doing.
     """
 
     def __init__(self, config: worker.WorkerConfig) -> None:
         self._config = config
         self._signals: worker.Signals = CONTEXT.RawValue(worker.Signals)
-        self._number = 0  # of the work given last
+        self._number = 0  # of the present work
         self._outcome: asyncio.Future[Outcome] | None = None
         self._process: ForkServerProcess | None = None
-        self._line: asyncio.StreamWriter | None = None
+        self._writer: asyncio.StreamWriter | None = None
         self._listening: asyncio.Task[None] | None = None
-        self._given_up = asyncio.Event()
-        self._given_up.set()
-        self.affinity_keys: deque[str] = deque(maxlen=_TOPICS)
+        self._retired = asyncio.Event()
+        self._retired.set()
+        self.affinity_keys: deque[str] = deque(maxlen=_MAX_AFFINITY_KEYS)
 
     async def open(self) -> None:
-        """Start a worker and warm its kernels; raises ``WorkerLostError`` when it cannot."""
+        """Start a worker and warm its kernels; raises ``WorkerLostError`` where that fails."""
         self.affinity_keys.clear()
         try:
-            line = await self._started()
-            reader, self._line = await asyncio.open_unix_connection(sock=line)
-            await _received(reader)  # says that it is ready
+            ours = await self._start()
+            reader, self._writer = await asyncio.open_unix_connection(sock=ours)
+            await _receive(reader)  # the worker is ready
         except (EOFError, OSError) as error:
             raise WorkerLostError(had_begun=False) from error
-        self._given_up.clear()
+        self._retired.clear()
         self._listening = asyncio.create_task(self._listen(reader))
 
-    async def _started(self) -> socket.socket:
-        starting = asyncio.create_task(asyncio.to_thread(self._start))
+    async def _start(self) -> socket.socket:
+        starting = asyncio.create_task(asyncio.to_thread(self._fork))
         try:
-            self._process, line = await asyncio.shield(starting)
+            self._process, ours = await asyncio.shield(starting)
         except asyncio.CancelledError:
-            # The thread goes on all the same: what it makes is to be closed, or killed.
+            # The thread goes on all the same. Its socket must be closed, and `close` kills the
+            # process.
             with suppress(OSError):
-                self._process, line = await starting
-                line.close()
+                self._process, ours = await starting
+                ours.close()
             raise
-        return line
+        return ours
 
-    def _start(self) -> tuple[ForkServerProcess, socket.socket]:
+    def _fork(self) -> tuple[ForkServerProcess, socket.socket]:
         ours, theirs = socket.socketpair()
         with theirs:
             arguments = (self._config, self._signals, theirs)
@@ -76,49 +77,49 @@ class Slot:
 
     @property
     def is_alive(self) -> bool:
-        """Whether work given to the slot now would be done."""
-        return not self._given_up.is_set()
+        """Whether the slot has a worker that can take work."""
+        return not self._retired.is_set()
 
     @property
     def progress(self) -> float:
-        """Which share of the work given last is done."""
+        """Share of the present work that is done."""
         return float(self._signals.progress)
 
-    async def until_dead(self) -> None:
-        """Wait until the worker is gone or given up."""
-        await self._given_up.wait()
+    async def wait_until_retired(self) -> None:
+        """Wait until the worker is dead or retired."""
+        await self._retired.wait()
 
-    def give_up(self) -> None:
-        """Say that this worker is not to be used again, so that its keeper replaces it."""
-        self._given_up.set()
+    def retire(self) -> None:
+        """Give this worker no more work, so that the engine replaces it."""
+        self._retired.set()
 
     def begin(self, work: Work, *, is_small: bool) -> "asyncio.Future[Outcome]":
-        """Hand ``work`` to the worker; the future fails with ``WorkerLostError`` if that dies.
+        """Hand ``work`` to the worker; its future fails with ``WorkerLostError`` if that dies.
 
-        What is not small lets all else on the machine go first.
+        Work that is not small runs at a lower priority.
         """
         self._number += 1
         self._signals.progress = 0.0
         self._outcome = asyncio.get_running_loop().create_future()
         if self.is_alive:
-            assert self._line is not None, "who is alive has a line"  # noqa: S101
-            self._line.write(pickle.dumps((self._number, work, is_small)))
+            assert self._writer is not None, "a living worker is connected"  # noqa: S101
+            self._writer.write(pickle.dumps((self._number, work, is_small)))
         else:
             self._lose_outcome()
         return self._outcome
 
     def ask_to_stop(self) -> None:
-        """Ask the work that is under way to stop; the sweep looks between its slices."""
+        """Ask the present work to stop; a sweep checks between its slices."""
         self._signals.stop_number = self._number
 
     async def close(self) -> None:
-        """Kill the worker, whatever it does."""
-        self.give_up()
+        """Kill the worker, whatever it is doing."""
+        self.retire()
         if self._listening is not None:
             self._listening.cancel()
-        if self._line is not None:
-            self._line.close()
-        process, self._process, self._line = self._process, None, None
+        if self._writer is not None:
+            self._writer.close()
+        process, self._process, self._writer = self._process, None, None
         self._lose_outcome()
         if process is not None:
             await asyncio.to_thread(_kill, process)
@@ -127,11 +128,11 @@ class Slot:
         try:
             with suppress(EOFError, OSError):
                 while True:
-                    outcome = await _received(reader)
+                    outcome = await _receive(reader)
                     if self._outcome is not None and not self._outcome.done():
                         self._outcome.set_result(outcome)
         finally:
-            self.give_up()
+            self.retire()
             self._lose_outcome()
 
     def _lose_outcome(self) -> None:
@@ -139,16 +140,16 @@ class Slot:
             return
         had_begun = self._signals.begun_number == self._number
         self._outcome.set_exception(WorkerLostError(had_begun=had_begun))
-        self._outcome.exception()  # who waited may have left: that is nothing to warn of
+        self._outcome.exception()  # marks it as seen: nobody may wait for it any more
 
 
-async def _received(reader: asyncio.StreamReader) -> Outcome:
+async def _receive(reader: asyncio.StreamReader) -> Outcome:
     size = int.from_bytes(await reader.readexactly(worker.SIZE_BYTES))
     outcome: Outcome = pickle.loads(await reader.readexactly(size))  # noqa: S301 - our own process
     return outcome
 
 
 def _kill(process: ForkServerProcess) -> None:
-    process.kill()  # it holds nothing that would need a farewell
+    process.kill()  # it holds nothing that needs cleaning up
     process.join()
     process.close()

@@ -1,4 +1,4 @@
-"""What a worker can be asked to do, and what it says when it has done it: small values only."""
+"""The work of worker processes, and its results: small values that pass through a socket."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from app.errors import Problem
 from app.queries import Estimate, Query
 from app.schemas.meshes import Merge
 from app.store.meshes import WrittenMesh
-from app.store.results import Written
+from app.store.results import Result
 
 
 @dataclass(frozen=True)
 class MeshFromFile:
-    """The mesh of an upload."""
+    """An uploaded mesh file."""
 
     path: Path
     file_type: str
     merge: Merge
     owner: str | None = None
-    """Who may delete it; None is everybody."""
+    """Name of the API key that may delete the mesh; None for everybody"""
 
 
 @dataclass(frozen=True)
 class MeshFromSample:
-    """A sample."""
+    """A sample mesh."""
 
     name: str
     faces: int
@@ -41,7 +41,7 @@ MeshInput = MeshFromFile | MeshFromSample
 class StoreMesh:
     """Read or make a mesh, check it, and write it into a new folder."""
 
-    origin: MeshInput
+    mesh_input: MeshInput
     folder: Path
 
     stops_when_asked: ClassVar[bool] = False
@@ -49,10 +49,10 @@ class StoreMesh:
 
 @dataclass(frozen=True)
 class RunQuery:
-    """Answer ``query`` into the result ``result_name``."""
+    """Answer a query, and write the answer as the result ``result_name``."""
 
     query: Query[Any]
-    form: Representation
+    representation: Representation
     result_name: str
 
     stops_when_asked: ClassVar[bool] = True
@@ -60,10 +60,10 @@ class RunQuery:
 
 @dataclass(frozen=True)
 class EstimateQuery:
-    """Tell what the answer to ``query`` would take."""
+    """Estimate the cost of the answer to a query."""
 
     query: Query[Any]
-    form: Representation
+    representation: Representation
 
     stops_when_asked: ClassVar[bool] = True
 
@@ -73,29 +73,26 @@ Work = StoreMesh | RunQuery | EstimateQuery
 
 @dataclass(frozen=True)
 class Task:
-    """Work, and what decides when and where it is done."""
+    """Work, and all that decides when and by which worker it is done."""
 
     work: Work
     client: str
-    """On whose behalf: clients take turns"""
+    """Name of the caller; callers take turns"""
     affinity_keys: tuple[str, ...] = ()
-    """What it is about, the most telling first: best done where that came up before"""
+    """Keys of what a worker may have cached, the most valuable first"""
     is_small: bool = False
-    """Whether it is likely to be done at once, so that it need not wait behind long work"""
+    """Whether the work is so short that it should not wait behind long work"""
 
 
 @dataclass(frozen=True)
 class TaskResult:
-    """What a worker reports: the seconds of each phase, and what the work was for.
-
-    Answers are files; only small ones come along.
-    """
+    """The report of a worker: seconds of each phase, and one result, of the kind of the work."""
 
     seconds: Mapping[str, float]
     mesh: WrittenMesh | None = None
-    answer: Written | None = None
+    result: Result | None = None
     estimate: Estimate | None = None
 
 
 Outcome = TaskResult | Problem | None
-"""Of work: done, refused, or stopped when asked to."""
+"""The end of work: done, refused, or stopped on request"""

@@ -1,4 +1,4 @@
-"""What runs inside a worker process."""
+"""The worker process: it does one piece of work at a time, with meshes and fields cached."""
 
 import logging
 import os
@@ -50,15 +50,15 @@ logger = logging.getLogger(__name__)
 
 TITLE = "geodesic-worker"
 SIZE_BYTES = 8
-"""Of the number before each outcome"""
+"""Length of the number before each outcome"""
 
-_STEP_BACK = 10
-"""Niceness of what is not small: small work and the API process go first."""
+_LONG_WORK_NICENESS = 10
+"""Niceness of long work: small work and the API process go first"""
 
 
 @dataclass(frozen=True)
 class WorkerConfig:
-    """What a worker is told when it starts."""
+    """The configuration of a worker process."""
 
     settings: Settings
     results: Path
@@ -69,14 +69,14 @@ class Signals(Structure):
 
     _fields_ = (
         ("stop_number", c_longlong),  # of the work to stop; earlier work has ended
-        ("begun_number", c_longlong),  # of the work that was taken up last
-        ("progress", c_double),  # which share of that is done
+        ("begun_number", c_longlong),  # of the work that was begun last
+        ("progress", c_double),  # share of that work that is done
     )
 
 
 @dataclass
 class Worker:
-    """The state of a worker process: its meshes, kept open while they fit."""
+    """The state of a worker process: open meshes and fields, cached while they fit."""
 
     config: WorkerConfig
     signals: Signals
@@ -85,20 +85,20 @@ class Worker:
         self.settings = self.config.settings
         self.store = MeshStore(self.settings.store)
         self.meshes: LRUCache[tuple[str, bytes], OpenMesh]
-        """By id and barriers"""
+        """Open meshes by id and barriers"""
         self.meshes = LRUCache(self.settings.worker_mesh_bytes, lambda opened: opened.nbytes)
         store = FieldStore(self.settings.store, self.settings.fields_bytes)
         self.fields = FieldCache(self.settings.worker_field_bytes, store, code_version())
-        self._writer = _thread_behind()
+        self._writer = _low_priority_thread()
 
     def do(self, number: int, work: Work) -> Outcome:
-        """Do ``work``; what goes wrong is a value, since not every exception survives a pipe."""
+        """Do ``work``; an error becomes a value, since not every exception can be pickled."""
         try:
             return self._do(number, work)
         except gc.errors.Cancelled:
             return None
         except MemoryError as error:
-            self._forget_all()  # what is kept counts as well
+            self._forget_all()  # caches count as well
             limit, setting = self.settings.worker_memory_bytes, variable_of("worker_memory_bytes")
             return replace(problem_of(error), limit=limit, setting=setting)
         except Exception as error:
@@ -108,10 +108,10 @@ class Worker:
             return problem
 
     def _do(self, number: int, work: Work) -> TaskResult:
-        """Do ``work``, unless the number of the work to stop reaches ``number``."""
+        """Do ``work`` until the number of the work to stop reaches ``number``."""
         clock = Clock()
 
-        def is_to_stop() -> bool:
+        def is_cancelled() -> bool:
             return bool(self.signals.stop_number >= number)
 
         match work:
@@ -119,23 +119,23 @@ class Worker:
                 return self._store(work, clock)
             case RunQuery():
                 try:
-                    return self._answer(work, clock, is_to_stop)
+                    return self._answer(work, clock, is_cancelled)
                 finally:
                     if self.fields.has_unwritten:
-                        self._writer.submit(self.fields.write)  # while the answer is on its way
+                        self._writer.submit(self.fields.write)  # while the answer is sent
             case EstimateQuery():
-                return self._estimate(work, clock, is_to_stop)
+                return self._estimate(work, clock, is_cancelled)
 
     def _store(self, work: StoreMesh, clock: "Clock") -> TaskResult:
         with clock.phase("load"):
-            mesh = _make_mesh(work.origin, self.settings.max_faces)
+            mesh = _make_mesh(work.mesh_input, self.settings.max_faces)
         with clock.phase("store"):
-            written = self.store.write_aside(mesh, work.folder, work.origin.owner)
+            written = self.store.write_aside(mesh, work.folder, work.mesh_input.owner)
         return TaskResult(clock.seconds, mesh=written)
 
     def _answer(self, work: RunQuery, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
         settings = self.settings
-        grant = ExecutionContext(
+        context = ExecutionContext(
             cancel,
             self._report,
             self.fields,
@@ -146,12 +146,12 @@ class Worker:
         with clock.phase("load"):
             opened = self._open(work.query)
         with clock.phase("compute"):
-            found = work.query.answer(opened, grant)
-        if work.form.media_type == JSON:
-            check_json_size(found.values, settings.max_json_values, work.query.hint)
+            answer = work.query.answer(opened, context)
+        if work.representation.media_type == JSON:
+            check_json_size(answer.values, settings.max_json_values, work.query.hint)
         with clock.phase("encode"):
-            encoded = encode(found, work.form)
-            written = write_result(
+            encoded = encode(answer, work.representation)
+            result = write_result(
                 self.config.results,
                 work.result_name,
                 encoded.parts,
@@ -159,7 +159,7 @@ class Worker:
                 code_version(),
                 is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
             )
-        return TaskResult(clock.seconds, answer=written)
+        return TaskResult(clock.seconds, result=result)
 
     def _estimate(
         self, work: EstimateQuery, clock: "Clock", cancel: Callable[[], bool]
@@ -167,117 +167,121 @@ class Worker:
         with clock.phase("load"):
             opened = self._open(work.query)
         with clock.phase("compute"):
-            found = estimate(work.query, work.form, opened, cancel)
-        return TaskResult(clock.seconds, estimate=found)
+            estimated = estimate(work.query, work.representation, opened, cancel)
+        return TaskResult(clock.seconds, estimate=estimated)
 
     def _report(self, share: float) -> None:
         self.signals.progress = share
 
     def _open(self, query: Query[Any]) -> OpenMesh:
-        """Return the mesh of a query, with its barriers."""
+        """Return the open mesh of a query, with its barriers."""
         barriers, mesh_id = query.barriers, query.mesh_id
-        opened = self._keep((mesh_id, b""), lambda: self.store.open(mesh_id))
+        opened = self._cached((mesh_id, b""), lambda: self.store.open(mesh_id))
         if len(barriers):
-            free = opened
-            opened = self._keep((mesh_id, barriers.tobytes()), lambda: query.with_barriers(free))
+            without_barriers = opened
+            opened = self._cached(
+                (mesh_id, barriers.tobytes()), lambda: query.with_barriers(without_barriers)
+            )
         return opened
 
-    def _keep(self, name: tuple[str, bytes], open_mesh: Callable[[], OpenMesh]) -> OpenMesh:
+    def _cached(self, name: tuple[str, bytes], open_mesh: Callable[[], OpenMesh]) -> OpenMesh:
         opened = self.meshes.find(name, open_mesh)
-        for unused in self.meshes.surplus(least=1):
-            self.fields.forget(unused)
+        for evicted in self.meshes.evict(spare=1):
+            self.fields.forget(evicted)
         return opened
 
     def _forget_all(self) -> None:
-        """Give back all memory that is only kept."""
+        """Empty all caches."""
         for name in list(self.meshes):
             self.fields.forget(name)
             self.meshes.drop(name)
 
 
 class Clock:
-    """Seconds by phase."""
+    """Stopwatch of the phases of a piece of work."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
-        """Measure what runs inside."""
+        """Measure the block as a phase."""
         start = perf_counter()
         yield
         self.seconds[name] = perf_counter() - start
 
 
-def _make_mesh(origin: MeshInput, max_faces: int) -> gc.TriangleMesh:
+def _make_mesh(mesh_input: MeshInput, max_faces: int) -> gc.TriangleMesh:
     faces: NDArray[np.int32] | NDArray[np.int64]
-    match origin:
+    match mesh_input:
         case MeshFromSample():
-            vertices, faces = gc.samples.SAMPLES[origin.name](origin.faces)
+            vertices, faces = gc.samples.SAMPLES[mesh_input.name](mesh_input.faces)
         case MeshFromFile(file_type="json"):
-            refuse_beyond_limit(_JSON_GROWS * origin.path.stat().st_size)
-            vertices, faces = read_json_mesh(origin.path.read_bytes())
+            refuse_beyond_limit(_JSON_GROWS * mesh_input.path.stat().st_size)
+            vertices, faces = read_json_mesh(mesh_input.path.read_bytes())
         case MeshFromFile():
-            return gc.load_mesh(origin.path, origin.file_type, origin.merge, max_faces=max_faces)
+            return gc.load_mesh(
+                mesh_input.path, mesh_input.file_type, mesh_input.merge, max_faces=max_faces
+            )
     if len(faces) > max_faces:
         raise gc.errors.TooManyFaces(len(faces), max_faces)
-    return gc.TriangleMesh(vertices, faces, merge=origin.merge)
+    return gc.TriangleMesh(vertices, faces, merge=mesh_input.merge)
 
 
 _JSON_GROWS = 40
-"""Bytes that orjson takes for one of JSON; 37 were the most measured. Lacking them, it crashes."""
+"""Bytes that orjson takes for each byte of JSON: at most 37 were measured. Without, it crashes."""
 
 
-def run(config: WorkerConfig, signals: Signals, line: socket.socket) -> None:
-    """Be a worker process, at the end of a ``line``: do what comes along it, until it is cut."""
+def run(config: WorkerConfig, signals: Signals, connection: socket.socket) -> None:
+    """Run a worker process: do the work that arrives on ``connection``, until that closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the service, which ends its workers
     setproctitle(TITLE)
-    threading.Thread(target=_die_with, args=(line,), daemon=True).start()
+    threading.Thread(target=_die_with, args=(connection,), daemon=True).start()
     worker = Worker(config, signals)
-    behind = _thread_behind()
+    low_priority = _low_priority_thread()
     warm_up(config.settings.worker_memory_bytes)
-    with line.makefile("rwb") as messages, suppress(EOFError, BrokenPipeError):
+    with connection.makefile("rwb") as messages, suppress(EOFError, BrokenPipeError):
         _send(messages, None)
         while True:
-            number, work, is_small = pickle.load(messages)  # noqa: S301 - of our own service
+            number, work, is_small = pickle.load(messages)  # noqa: S301 - from our own service
             signals.begun_number = number
             if is_small:
                 outcome = worker.do(number, work)
             else:
-                outcome = behind.submit(worker.do, number, work).result()
+                outcome = low_priority.submit(worker.do, number, work).result()
             _send(messages, outcome)
 
 
 def warm_up(allowed_memory: int) -> None:
-    """Compile the kernels, or load them; from then on memory is limited."""
+    """Compile the kernels, or load them, and then limit the memory."""
     gc.warm_up()
-    freeze()  # what is loaded now stays: a collection that looks through it takes 90 ms
+    freeze()  # loaded objects live for ever; each full collection over them takes 90 ms
     limit_memory(allowed_memory)
 
 
-def _thread_behind() -> ThreadPoolExecutor:
-    """Start a thread that lets others go first, when there is more to do than cores.
+def _low_priority_thread() -> ThreadPoolExecutor:
+    """Start a thread that yields to others when all cores are busy.
 
-    On Linux niceness is a thread's own. It cannot be taken back, so that a worker that stepped back
-    itself would do so for small work as well.
+    On Linux each thread has a niceness of its own, which cannot be lowered again. So a worker that
+    raised its own would keep it for small work as well.
     """
     thread = ThreadPoolExecutor(1)
-    thread.submit(os.nice, _STEP_BACK).result()
+    thread.submit(os.nice, _LONG_WORK_NICENESS).result()
     return thread
 
 
 def _send(messages: BufferedRWPair, outcome: Outcome) -> None:
-    """Send an outcome after its size, by which who reads without waiting knows when it is whole."""
+    """Send a length-prefixed outcome, so that a non-blocking reader knows when it is complete."""
     pickled = pickle.dumps(outcome)
     messages.write(len(pickled).to_bytes(SIZE_BYTES))
     messages.write(pickled)
     messages.flush()
 
 
-def _die_with(line: socket.socket) -> None:
-    # The other end closes with the service, however that ends, and with the slot. Who is busy does
-    # not read; PR_SET_PDEATHSIG would tell of the end of the process that forked us.
+def _die_with(connection: socket.socket) -> None:
+    # The other end closes when the service ends, however it ends, and when the slot does. A busy
+    # worker does not read. PR_SET_PDEATHSIG would watch the fork server instead.
     hung_up = select.poll()
-    hung_up.register(line, 0)
+    hung_up.register(connection, 0)
     hung_up.poll()
     os._exit(1)

@@ -1,7 +1,8 @@
-"""What handlers are given: the service, the deadline, the format, and a client that may hang up.
+"""Dependencies of handlers: service, caller, deadline and negotiated representation.
 
-Dependencies are coroutines, though they wait for nothing: FastAPI runs plain functions in a thread,
-each for a fifth of a millisecond. And they are few: each took 2 % of the time of a small request.
+Dependencies are coroutines, although they wait for nothing: FastAPI runs plain functions in a
+thread, for a fifth of a millisecond each. They are few, since each takes 2 % of the time of a small
+request.
 """
 
 import asyncio
@@ -30,7 +31,7 @@ def service_of(request: Request) -> Service:
 
 
 async def get_service(request: Request) -> Service:
-    """Return the same, as a dependency."""
+    """Return `service_of` as a dependency."""
     return service_of(request)
 
 
@@ -38,13 +39,13 @@ ServiceDep = Annotated[Service, Depends(get_service)]
 
 
 def caller_of(request: Request) -> Caller:
-    """Return who asks."""
+    """Return the caller that the middleware has found."""
     caller: Caller = request.state.caller
     return caller
 
 
 async def get_caller(request: Request) -> Caller:
-    """Return the same, as a dependency."""
+    """Return `caller_of` as a dependency."""
     return caller_of(request)
 
 
@@ -59,31 +60,31 @@ class TimeoutHeader(BaseModel):
     )
 
 
-def asker_of(request: Request, headers: TimeoutHeader) -> RequestContext:
-    """Return who asks, and the lower of how long they and the service would wait."""
+def context_of(request: Request, headers: TimeoutHeader) -> RequestContext:
+    """Return the context of a request; its deadline is the client's or the service's, if lower."""
     limit, own_ms = service_of(request).settings.deadline_s, headers.x_timeout_ms
     deadline_s = limit if own_ms is None else min(limit, own_ms / 1000)
     return RequestContext(caller_of(request), deadline_s, request.state.request_id)
 
 
-async def get_asker(
+async def get_context(
     request: Request, headers: Annotated[TimeoutHeader, Header()]
 ) -> RequestContext:
-    """Return the same, as a dependency."""
-    return asker_of(request, headers)
+    """Return `context_of` as a dependency."""
+    return context_of(request, headers)
 
 
-AskerDep = Annotated[RequestContext, Depends(get_asker)]
+ContextDep = Annotated[RequestContext, Depends(get_context)]
 
 
 def prefers_async(prefer: str | None) -> bool:
-    """Tell whether the header ``Prefer`` says that the client would rather have a job than wait."""
+    """Tell whether the header ``Prefer`` asks for a job instead of an answer."""
     preferences = [part.partition(";")[0].strip().lower() for part in (prefer or "").split(",")]
     return "respond-async" in preferences
 
 
 def require_json(request: Request) -> None:
-    """Refuse a body that does not say it is JSON, with what to do about it."""
+    """Refuse a body whose media type is not JSON."""
     media_type = request.headers.get("content-type", "")
     if not re.match(r"application/([\w.-]+\+)?json\b", media_type, re.IGNORECASE):
         hint = "send the header Content-Type: application/json"
@@ -91,10 +92,10 @@ def require_json(request: Request) -> None:
         raise problem("unsupported_media_type", detail, hint=hint)
 
 
-def form_of(
+def negotiated(
     request: Request, parameters: AnswerParameters, offers: Sequence[str]
 ) -> Representation:
-    """Return the form to answer in, its media type one of the ``offers``."""
+    """Return the representation to answer in, its media type one of the ``offers``."""
     headers = request.headers
     media_type = negotiate(headers.get("accept"), parameters.format, offers)
     if media_type is None:
@@ -109,7 +110,7 @@ def form_of(
 
 
 async def while_connected(request: Request, work: Coroutine[Any, Any, T]) -> T:
-    """Do ``work``, and cancel it when the client hangs up. The body has to be read before."""
+    """Do ``work``, and cancel it if the client disconnects. The body must have been read."""
     working = asyncio.ensure_future(work)
     listening = asyncio.ensure_future(_until_disconnect(request))
     try:

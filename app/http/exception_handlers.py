@@ -1,4 +1,4 @@
-"""What FastAPI is to do with exceptions: answer with the problem that ``errors`` makes of them."""
+"""Exception handlers for FastAPI: each answers with a problem."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -36,7 +36,7 @@ def install(app: FastAPI, settings: Settings) -> None:
         return _respond(request, problem_of_status(error.status_code, detail, headers))
 
     async def on_disconnect(_request: Request, _error: ClientDisconnect) -> Response:
-        return Response(status_code=499)  # nobody reads it, but the access log shows it
+        return Response(status_code=499)  # for the access log: no client reads it
 
     handlers: dict[Any, Any] = {
         ProblemError: on_problem,
@@ -48,7 +48,7 @@ def install(app: FastAPI, settings: Settings) -> None:
 
 
 def _allow(app: FastAPI, path: str) -> Mapping[str, str] | None:
-    # Starlette names the methods of the first route alone that has the path.
+    # Starlette names only the methods of the first route with this path.
     for template, operations in app.openapi()["paths"].items():
         if compile_path(template)[0].match(path):
             return {"Allow": ", ".join(sorted(method.upper() for method in operations))}
@@ -56,7 +56,7 @@ def _allow(app: FastAPI, path: str) -> Mapping[str, str] | None:
 
 
 def validation_problem(errors: Sequence[Any]) -> Problem:
-    """Return the problem for what pydantic found wrong."""
+    """Return the problem for pydantic's ``errors``."""
     faults = tuple(Fault(_place(error["loc"]), error["msg"]) for error in errors[:10])
     place = faults[0].pointer or "the body"
     return Problem("invalid_request", f"{place}: {faults[0].message}", errors=faults)

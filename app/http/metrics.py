@@ -1,4 +1,4 @@
-"""What operators watch: requests as they are served, and the state of the service when asked."""
+"""Metrics for operators: requests are counted, and the service's state is read when scraped."""
 
 from collections.abc import Iterator, Mapping
 from time import perf_counter
@@ -15,7 +15,7 @@ from app.schemas.service import JobStatus
 from app.service.service import Service
 
 _NONE = "none"
-"""The operation of a request that was refused before it came to one, or came to none"""
+"""Operation of a request that reached none"""
 _BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120)
 
 
@@ -47,41 +47,41 @@ class Metrics(Collector):
         self._requests.labels(operation, str(status)).inc()
         self._seconds.labels(operation).observe(seconds)
 
-    async def written(self, accept: str) -> tuple[bytes, str]:
-        """Return all metrics as text, in the format that ``accept`` asks for, and which that is."""
+    async def exposition(self, accept: str) -> tuple[bytes, str]:
+        """Return all metrics in the text format that ``accept`` asks for, and its media type."""
         self._jobs = await self._service.jobs.count()
         write, media_type = choose_encoder(accept)
         return write(self._registry), media_type
 
     def describe(self) -> Iterator[Metric]:
-        """Say nothing: names are distinct, and a service that has not started has no state."""
+        """Yield nothing: names are distinct, and a service that has not started has no state."""
         return iter(())
 
     def collect(self) -> Iterator[Metric]:
         """Yield the state of the service."""
         service, load = self._service, self._service.engine.load
-        books = service.mesh_books
+        catalog = service.mesh_catalog
         yield _gauge("geodesic_queue_length", "Requests that wait for a worker", load.waiting)
         workers = {"idle": load.idle, "busy": load.busy, "missing": load.missing}
         yield _gauges("geodesic_workers", "Places for worker processes", "state", workers)
         yield _counter("geodesic_workers_lost", "Workers that died or were killed", load.lost)
         stopped = "Work that was stopped, since nobody waited for it any longer"
         yield _counter("geodesic_cancellations", stopped, load.cancelled)
-        kept = "Answers that were looked for among those kept"
-        yield _counters("geodesic_results_lookups", kept, "outcome", service.lookups)
+        lookups = "Answers that were looked for among those kept"
+        yield _counters("geodesic_results_lookups", lookups, "outcome", service.lookups)
         answered, took = "Queries that workers answered", "What solving them took"
         yield _counters("geodesic_solves", answered, "kind", service.solves)
         yield _counters("geodesic_solve_seconds", took, "kind", service.solve_seconds)
         files = service.results.nbytes
         yield _gauge("geodesic_results_bytes", "Size of the kept answers that are files", files)
-        yield _gauge("geodesic_meshes", "Meshes in the store", len(books.ids))
-        yield _gauge("geodesic_meshes_bytes", "Size of the meshes in the store", books.total)
+        yield _gauge("geodesic_meshes", "Meshes in the store", len(catalog.ids))
+        yield _gauge("geodesic_meshes_bytes", "Size of the meshes in the store", catalog.total)
         jobs = {status: self._jobs.get(status, 0) for status in get_args(JobStatus)}
         yield _gauges("geodesic_jobs", "Jobs that are not forgotten yet", "status", jobs)
 
 
-class MeasuringMiddleware:
-    """Counts requests, and measures how long they take."""
+class MetricsMiddleware:
+    """Middleware that counts requests, and measures their time."""
 
     def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
         self.app = app

@@ -1,4 +1,4 @@
-"""The interface document: FastAPI's, with problems, headers and examples as they are here."""
+"""The OpenAPI document: FastAPI's, completed with problems, headers and examples."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -11,12 +11,12 @@ from app.http.responses import documented, problems
 
 _PACKAGED = Path(__file__).parents[1] / "examples"
 EXAMPLES = _PACKAGED if _PACKAGED.is_dir() else Path(__file__).parents[2] / "openapi" / "examples"
-"""A file for each operation, by its id: examples by name, of a request and its answer.
+"""Folder of examples: a file for each operation id, with requests and answers by name.
 
-In the wheel they are inside the package, in a checkout beside the document.
+In a wheel it is inside the package, in a checkout beside the document.
 """
 
-_FASTAPI_S_OWN = "Validation Error"  # what it supposes of each operation with parameters
+_FASTAPI_VALIDATION = "Validation Error"  # FastAPI adds it to each operation with parameters
 _TEXT, _NUMBER = {"type": "string"}, {"type": "integer"}
 _REFUSALS = ("unauthorized", "rate_limited")
 _PROBLEM = {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}
@@ -93,11 +93,11 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
 
 
 def _responses(operation: Mapping[str, Any], template: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the answers of an operation by status, problems as what they are."""
+    """Yield the answers of an operation by status, with problems as such."""
     found = {
         status: response
         for status, response in operation["responses"].items()
-        if response["description"] != _FASTAPI_S_OWN
+        if response["description"] != _FASTAPI_VALIDATION
     }
     added = ["internal_error"] if is_open(template) else ["internal_error", *_REFUSALS]
     for status, refusal in problems(*added).items():
@@ -113,7 +113,7 @@ def _responses(operation: Mapping[str, Any], template: str) -> Iterator[tuple[st
         if status >= "400":
             response["content"] = {PROBLEM_JSON: dict(_PROBLEM)}
         for content in response.get("content", {}).values():
-            if "itemSchema" in content:  # of OpenAPI 3.2, while the document is of 3.1
+            if "itemSchema" in content:  # belongs to OpenAPI 3.2, and the document to 3.1
                 content.clear()
                 content["schema"] = _TEXT
         yield status, response
@@ -125,7 +125,7 @@ def _examples(operation_id: str) -> dict[str, Any]:
 
 
 def _show(operation: dict[str, Any], name: str, example: Mapping[str, Any]) -> None:
-    """Write an example into the description of its operation, at each of the places it has."""
+    """Add an example to an operation: to its parameters, its body and its answer."""
     summary, answer = {"summary": example["summary"]}, example["response"]
     given = dict(example.get("parameters", {}))
     for parameter in operation.get("parameters", []):

@@ -1,4 +1,4 @@
-"""The page at ``/``: what Vite has made of ``app/web``, and how browsers are to keep it."""
+"""The page at ``/``, as Vite built it from ``app/web``, and its caching and security headers."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from starlette.types import Scope
 DIST = Path(__file__).parents[1] / "web" / "dist"
 ASSETS = "/assets"
 
-# Nothing is loaded from elsewhere, and nothing that is written in the page itself is run.
+# The page loads nothing from elsewhere, and runs no inline scripts.
 _POLICY = "; ".join(
     (
         "default-src 'none'",
@@ -34,17 +34,17 @@ _ASSET = {**_SAFE, "Cache-Control": "public, max-age=31536000, immutable"}
 
 
 def is_built() -> bool:
-    """Whether the page is part of this installation."""
+    """Tell whether the page is part of this installation."""
     return (DIST / "index.html").is_file()
 
 
 def wants_page(headers: Headers) -> bool:
-    """Whether a browser asks, to show what it gets: others do not name HTML."""
+    """Tell whether the request comes from a browser's window: only those accept HTML by name."""
     return "text/html" in headers.get("accept", "")
 
 
 def page_response(scope: Scope) -> Response:
-    """Return the page, or that it has not changed."""
+    """Return the page, or a 304."""
     path = DIST / "index.html"
     response = StaticFiles(directory=DIST).file_response(path, path.stat(), scope)
     response.headers.update(_INDEX)
@@ -58,7 +58,7 @@ class Assets(StaticFiles):
         super().__init__(directory=DIST / "assets")
 
     async def get_response(self, path: str, scope: Scope) -> Response:
-        """Return a file that may be kept for good."""
+        """Return a file that browsers may cache for ever."""
         response = await super().get_response(path, scope)
         response.headers.update(_ASSET)
         return response

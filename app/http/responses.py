@@ -1,4 +1,4 @@
-"""Problems and results as HTTP responses."""
+"""Responses: problems, results, estimates and jobs as HTTP has them."""
 
 import re
 from collections.abc import Mapping
@@ -17,7 +17,8 @@ from app.errors import CODES, PROBLEM_JSON, Problem
 from app.jobs import Job
 from app.queries import Estimate
 from app.schemas.service import ProblemDocument
-from app.service.service import Answered
+from app.service.service import Manifest, Seconds
+from app.store.meshes import PUBLIC_ARRAYS
 from app.store.results import Result, ResultStore
 
 NEGOTIATED = {"Vary": "Accept, Accept-Encoding, Prefer"}
@@ -26,9 +27,9 @@ IMMUTABLE = {"Cache-Control": "private, max-age=31536000, immutable"}
 UNSTORED = {"Cache-Control": "no-store"}
 REVALIDATED = {"Cache-Control": "private, no-cache"}
 
-OF_FILES = ("Accept-Ranges", "Cache-Control", "ETag", "Last-Modified")
-"""The headers of answers that are files of the store."""
-OF_WORK = (
+FILE_HEADERS = ("Accept-Ranges", "Cache-Control", "ETag", "Last-Modified")
+"""Headers of answers that are files of the store"""
+WORK_PROBLEMS = (
     "invalid_request",
     "limit_exceeded",
     "memory_limit",
@@ -40,9 +41,9 @@ OF_WORK = (
     "deadline_exceeded",
     "storage_full",
 )
-"""The problems that all can meet that a worker does."""
-ENDS = ("mesh_not_found", "result_too_large", "invalid_point", *OF_WORK)
-"""The problems that a query can meet when its body is right, at once or as a job."""
+"""Codes of the problems that any work can meet"""
+QUERY_PROBLEMS = ("mesh_not_found", "result_too_large", "invalid_point", *WORK_PROBLEMS)
+"""Codes of the problems that a well-formed query can meet, at once or as a job"""
 
 
 def problem_response(problem: Problem, instance: str, request_id: str) -> Response:
@@ -53,7 +54,7 @@ def problem_response(problem: Problem, instance: str, request_id: str) -> Respon
 
 
 def problems(*codes: str) -> dict[int | str, dict[str, Any]]:
-    """Describe the problems that an operation can answer with, for OpenAPI."""
+    """Return the problems that an operation can answer with, for OpenAPI."""
     by_status: dict[int | str, list[str]] = {}
     for code in codes:
         by_status.setdefault(CODES[code].status, []).append(code)
@@ -64,24 +65,24 @@ def problems(*codes: str) -> dict[int | str, dict[str, Any]]:
 
 
 def documented(*names: str) -> dict[str, Any]:
-    """Describe the headers of an answer, for OpenAPI."""
+    """Return the headers of an answer, for OpenAPI."""
     return {name: {"$ref": f"#/components/headers/{name}"} for name in names}
 
 
-def server_timing(seconds: Mapping[str, float]) -> dict[str, str]:
-    """Return the phases as a ``Server-Timing`` header, in milliseconds."""
+def server_timing(seconds: Seconds) -> dict[str, str]:
+    """Return the phases as a ``Server-Timing`` header, in ms; ``kept`` for a stored answer."""
     if not seconds:
         return {"Server-Timing": "kept"}
     return {"Server-Timing": ", ".join(f"{k};dur={1e3 * s:.1f}" for k, s in seconds.items())}
 
 
 def etag_of(name: str) -> str:
-    """Return the entity tag for content that its name defines."""
+    """Return the entity tag for content that ``name`` identifies."""
     return f'"{name}"'
 
 
 def not_modified(request: Request, etag: str, headers: Mapping[str, str]) -> Response | None:
-    """Return the 304 for a ``GET`` whose client has what ``etag`` stands for, else ``None``."""
+    """Return a 304 for a ``GET`` whose client has the content of ``etag``, else None."""
     known = request.headers.get("if-none-match", "")
     tags = [tag.strip().removeprefix("W/") for tag in known.split(",")]
     if request.method == "GET" and (etag in tags or known.strip() == "*"):
@@ -90,93 +91,122 @@ def not_modified(request: Request, etag: str, headers: Mapping[str, str]) -> Res
 
 
 def estimate_response(
-    mesh_id: str, estimate: Estimate, media_type: str, seconds: Mapping[str, float]
+    mesh_id: str, estimate: Estimate, media_type: str, seconds: Seconds
 ) -> Response:
-    """Return an estimate: what it is of may cost another time tomorrow."""
+    """Return an estimate, which no client should store: it depends on this machine."""
     members = {"mesh_id": mesh_id, "is_estimate": True, **vars(estimate), "media_type": media_type}
     return Response(orjson.dumps(members), 200, {**UNSTORED, **server_timing(seconds)}, JSON)
 
 
+def mesh_document(manifest: Manifest) -> dict[str, Any]:
+    """Return the document of a mesh: its report, and the links to its arrays."""
+    mesh_id = manifest["id"]
+    names = [name for name, stored in PUBLIC_ARRAYS.items() if stored in manifest["crc32"]]
+    return {
+        "id": mesh_id,
+        **manifest["report"],
+        "warnings": manifest["warnings"],
+        "created": manifest["created"],
+        "arrays": {name: f"/v1/meshes/{mesh_id}/arrays/{name}" for name in names},
+    }
+
+
 def job_document(job: Job) -> dict[str, Any]:
-    """Return a job as clients see it."""
+    """Return the document of a job."""
     here = f"/v1/jobs/{job.id}"
     members = {
         "id": job.id,
-        "kind": job.errand.kind,
-        "mesh_id": job.errand.mesh_id,
+        "kind": job.spec.kind,
+        "mesh_id": job.spec.mesh_id,
         "status": job.status,
         "progress": job.progress,
-        "created": _written(job.created),
-        "started": _written(job.started),
-        "finished": _written(job.finished),
+        "created": _rfc3339(job.created),
+        "started": _rfc3339(job.started),
+        "finished": _rfc3339(job.finished),
         "links": {"self": here, "results": f"{here}/results", "events": f"{here}/events"},
     }
     if job.problem is not None:
-        members["problem"] = job.problem.document(f"{here}/results", job.errand.request_id)
+        members["problem"] = job.problem.document(f"{here}/results", job.spec.request_id)
     return members
 
 
 def accepted_response(job: Job) -> Response:
-    """Return a job that a query has become."""
+    """Return the 202 for a query that has become a job."""
     document = job_document(job)
     location = {"Location": document["links"]["self"], "Preference-Applied": "respond-async"}
     return Response(orjson.dumps(document), 202, {**UNSTORED, **location}, JSON)
 
 
-def _written(moment: datetime | None) -> str | None:
+def _rfc3339(moment: datetime | None) -> str | None:
     return None if moment is None else moment.isoformat(timespec="milliseconds")
 
 
 class StoredFileResponse(FileResponse):
     """A file of the store, or a range of it."""
 
-    chunk_size = 2**18  # by Starlette's own 64 kB, 8 MB took twice as long
+    chunk_size = 2**18  # 8 MB take twice as long in Starlette's chunks of 64 kB
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the file."""
-        asked = Headers(scope=scope).get("range")
-        if asked is not None and not _makes_sense(asked):
-            # RFC 9110 has such a header ignored, where Starlette answers 400.
-            kept = [(name, value) for name, value in scope["headers"] if name != b"range"]
-            scope = {**scope, "headers": kept}
+        ranges = Headers(scope=scope).get("range")
+        if ranges is not None and not _is_valid(ranges):
+            # RFC 9110 says to ignore such a header, where Starlette answers 400.
+            headers = [(name, value) for name, value in scope["headers"] if name != b"range"]
+            scope = {**scope, "headers": headers}
         await super().__call__(scope, receive, send)
 
 
 def result_response(
     request: Request,
-    answered: Answered,
+    result: Result,
+    seconds: Seconds,
     media_type: str,
     store: ResultStore,
     headers: Mapping[str, str],
 ) -> Response:
-    """Return a result of the store: from memory where it is there; else its file, or a range."""
-    result, written = answered.result, answered.result.written
-    own = {"ETag": etag_of(result.key), **server_timing(answered.seconds)}
-    headers = {"Accept-Ranges": "bytes", **written.seal.headers, **own, **headers}
-    if written.body is None or "range" in request.headers:
+    """Return an acquired result, from memory or from its file, and release it once it is sent.
+
+    Parameters
+    ----------
+    request
+        The request; with a ``Range`` header, the result must have files.
+    result
+        The result, which ``store`` has handed out.
+    seconds
+        Seconds of each phase, for ``Server-Timing``.
+    media_type
+        Media type of the body.
+    store
+        The store to release the result to.
+    headers
+        Further headers, such as those of caching.
+    """
+    own = {"ETag": etag_of(result.key), **server_timing(seconds)}
+    headers = {"Accept-Ranges": "bytes", **result.manifest.headers, **own, **headers}
+    if result.body is None or "range" in request.headers:
         return _ResultFileResponse(result, media_type, store, headers)
-    store.give_back(result)
-    return Response(written.body, headers=headers, media_type=media_type)
+    store.release(result)
+    return Response(result.body, headers=headers, media_type=media_type)
 
 
 class _ResultFileResponse(StoredFileResponse):
-    """The file of a result, which stays there until it has been sent."""
+    """The file of a result, which the store protects until it has been sent."""
 
     def __init__(
         self, result: Result, media_type: str, store: ResultStore, headers: Mapping[str, str]
     ) -> None:
-        super().__init__(result.path, headers=headers, media_type=media_type)
-        self._give_back = partial(store.give_back, result)
+        super().__init__(store.body_path(result), headers=headers, media_type=media_type)
+        self._release = partial(store.release, result)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the result, and give it back to the store."""
+        """Send the result, and release it."""
         try:
             await super().__call__(scope, receive, send)
         finally:
-            self._give_back()
+            self._release()
 
 
-def _makes_sense(ranges: str) -> bool:
+def _is_valid(ranges: str) -> bool:
     unit, _, specs = ranges.partition("=")
     matches = [re.fullmatch(r"\s*(\d*)-(\d*)\s*", spec) for spec in specs.split(",")]
     return unit.strip().lower() == "bytes" and all(

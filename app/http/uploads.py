@@ -1,4 +1,4 @@
-"""The body of an upload, spooled to a file of the store without holding it in memory."""
+"""Uploads: the body goes to a file of the store, without being held in memory."""
 
 import shutil
 from collections.abc import AsyncIterator
@@ -29,16 +29,16 @@ _BLOCK = 2**20
 
 
 async def spool(request: Request, path: Path, file_format: str | None) -> str:
-    """Write the mesh file that ``request`` carries to ``path``; return its format."""
+    """Write the mesh file of a request to ``path``, and return its format."""
     media_type = _media_type(request.headers.get("content-type"))
     if media_type == "multipart/form-data":
-        found = await _spool_form(request, path)
+        guess = await _spool_form(request, path)
     else:
         await _write(path, request.stream())
-        found = _FORMAT_OF_TYPE.get(media_type)
+        guess = _FORMAT_OF_TYPE.get(media_type)
     if path.stat().st_size == 0:
         raise problem("invalid_mesh", "the body is empty: there is no mesh in it")
-    chosen = file_format or found
+    chosen = file_format or guess
     if chosen is None:
         hint = f"say ?format= with one of {', '.join(FORMATS)}, or send a Content-Type of a mesh"
         detail = f"{media_type or 'no Content-Type'} does not tell the format of the mesh"
@@ -59,7 +59,7 @@ async def _spool_form(request: Request, path: Path) -> str | None:
 
 
 async def _write(path: Path, chunks: AsyncIterator[bytes]) -> None:
-    # Whole blocks: a hop to a thread costs as much as writing a hundred kilobytes.
+    # In large blocks: a hop to a thread costs as much as writing a hundred kilobytes.
     block = bytearray()
     with path.open("wb") as file:
         async for chunk in chunks:

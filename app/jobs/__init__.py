@@ -1,7 +1,7 @@
-"""Long work that outlives its request: jobs, and the book that their records are kept in."""
+"""Jobs: queries that outlive their request, and their records in SQLite."""
 
 from app.jobs.job import Job, JobSpec
-from app.jobs.manager import Jobs
-from app.jobs.repository import JobRepository, read_book, require_whole
+from app.jobs.manager import JobManager
+from app.jobs.repository import JobRepository, read_jobs, require_intact
 
-__all__ = ["Job", "JobRepository", "JobSpec", "Jobs", "read_book", "require_whole"]
+__all__ = ["Job", "JobManager", "JobRepository", "JobSpec", "read_jobs", "require_intact"]

@@ -1,10 +1,10 @@
-"""What is known of a job."""
+"""The record of a job, from its acceptance to its end."""
 
 from datetime import UTC, datetime
 from typing import Any, Literal
 from uuid import uuid4
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AliasChoices, BaseModel, ConfigDict, Field
 
 from app.errors import Problem
 
@@ -12,70 +12,71 @@ Status = Literal["accepted", "running", "successful", "failed", "dismissed"]
 
 
 class JobSpec(BaseModel):
-    """What a job is to do, and for whom."""
+    """The query of a job, and its owner."""
 
     model_config = ConfigDict(frozen=True)
 
     owner: str | None
-    """Whose it is: nobody else sees it; None without keys"""
+    """Name of the API key; nobody else sees the job. None without keys"""
     kind: str
-    """Of question, such as ``distances``"""
+    """Kind of query, such as ``distances``"""
     mesh_id: str
     media_type: str
-    """Of the answer"""
+    """Media type of the answer"""
     fingerprint: str
-    """The same for the same question, and for no other"""
+    """Hash of the query and its representation"""
     idempotency_key: str | None = None
-    """Of the owner's choice: two errands with one key are one job"""
+    """Key that the owner chose: two requests with one key are one job"""
     request_id: str
-    """Of the request that brought it"""
+    """Id of the request that submitted the job"""
 
 
 class Job(BaseModel):
     """The state of a job; each change makes a new one."""
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, serialize_by_alias=True)
 
     id: str = Field(default_factory=lambda: uuid4().hex)
-    errand: JobSpec
+    spec: JobSpec = Field(
+        validation_alias=AliasChoices("spec", "errand"), serialization_alias="errand"
+    )
+    """Stored as ``errand``, its name in this layout of the store"""
     status: Status = "accepted"
     progress: float = 0.0
     version: int = 1
-    """How many states there have been with this one"""
+    """Number of states so far, this one included"""
     created: datetime = Field(default_factory=lambda: datetime.now(UTC))
     started: datetime | None = None
     finished: datetime | None = None
     problem: Problem | None = None
-    """Why it failed"""
+    """Reason of a failure"""
     result: str | None = None
-    """The name of its answer in the result store"""
+    """Name of the answer in the result store"""
 
     @property
     def is_finished(self) -> bool:
-        """Whether nothing more will become of it."""
+        """Whether this is the last state."""
         return self.finished is not None
 
-    def having(self, **changes: Any) -> "Job":
-        """Return the next state."""
-        return self.model_copy(update={"version": self.version + 1, **changes})
-
     def running(self, progress: float) -> "Job":
-        """Return the state once work on it has begun."""
+        """Return the state of a job that a worker has begun."""
         started = self.started or datetime.now(UTC)
-        return self.having(status="running", started=started, progress=progress)
+        return self._next(status="running", started=started, progress=progress)
 
     def successful(self, result: str) -> "Job":
-        """Return the state once it is answered."""
-        return self.having(status="successful", progress=1.0, result=result, **_ended())
+        """Return the state of a job with a result."""
+        return self._finish(status="successful", progress=1.0, result=result)
 
     def failed(self, problem: Problem) -> "Job":
-        """Return the state once there will be no answer."""
-        return self.having(status="failed", problem=problem, **_ended())
+        """Return the state of a job that met a problem."""
+        return self._finish(status="failed", problem=problem)
 
     def dismissed(self) -> "Job":
-        """Return the state once it has been cancelled."""
-        return self.having(status="dismissed", **_ended())
+        """Return the state of a job that was cancelled."""
+        return self._finish(status="dismissed")
 
+    def _finish(self, **changes: Any) -> "Job":
+        return self._next(**changes, finished=datetime.now(UTC))
 
-def _ended() -> dict[str, Any]:
-    return {"finished": datetime.now(UTC)}
+    def _next(self, **changes: Any) -> "Job":
+        return self.model_copy(update={"version": self.version + 1, **changes})

@@ -1,4 +1,4 @@
-"""The records of jobs, in SQLite: they outlive the process that wrote them."""
+"""The database of jobs, in SQLite: records outlive the process that wrote them."""
 
 import sqlite3
 from collections.abc import Sequence
@@ -30,27 +30,27 @@ CREATE INDEX IF NOT EXISTS jobs_by_end ON jobs (finished);
 
 
 class JobRepository:
-    """One row for each job; the newest come first in lists."""
+    """The rows of jobs, one for each; lists begin with the newest."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._database: aiosqlite.Connection | None = None
 
     async def open(self) -> None:
-        """Open the file, which is made where it is not there."""
+        """Open the database, which is created if missing."""
         self._database = await aiosqlite.connect(self._path, isolation_level=None)
         await self._database.execute("PRAGMA journal_mode = WAL")
         await self._database.execute("PRAGMA synchronous = NORMAL")
         await self._database.executescript(_SCHEMA)
 
     async def close(self) -> None:
-        """Close the file."""
+        """Close the database."""
         if self._database is not None:
             await self._database.close()
             self._database = None
 
     async def write(self, job: Job) -> None:
-        """Write the record of a job, in place of the one that there may be."""
+        """Insert or replace the record of a job."""
         await self._run(
             "INSERT INTO jobs (record) VALUES (?) "
             "ON CONFLICT (id) DO UPDATE SET record = excluded.record",
@@ -62,21 +62,21 @@ class JobRepository:
         await self._run("DELETE FROM jobs WHERE id = ?", job_id)
 
     async def find(self, owner: str | None, job_id: str) -> Job | None:
-        """Return the job of an owner with this id, if there is one."""
-        found = await self._jobs("WHERE owner IS ? AND id = ?", owner, job_id)
-        return found[0] if found else None
+        """Return the job of an owner with this id; None where there is none."""
+        jobs = await self._jobs("WHERE owner IS ? AND id = ?", owner, job_id)
+        return jobs[0] if jobs else None
 
     async def find_by_key(self, owner: str | None, key: str) -> Job | None:
-        """Return the newest job of an owner with this idempotency key, if there is one."""
-        found = await self._jobs(
+        """Return the newest job of an owner with this idempotency key; None where there is none."""
+        jobs = await self._jobs(
             "WHERE owner IS ? AND idempotency_key = ? ORDER BY number DESC LIMIT 1", owner, key
         )
-        return found[0] if found else None
+        return jobs[0] if jobs else None
 
     async def page(
         self, owner: str | None, limit: int, before: int | None
     ) -> tuple[list[Job], int | None]:
-        """Return ``limit`` jobs of an owner, and the number before which to go on, if any."""
+        """Return ``limit`` jobs of an owner, and the number to go on before; None at the end."""
         rows = await self._rows(
             "SELECT number, record FROM jobs WHERE owner IS ? AND number < ? "
             "ORDER BY number DESC LIMIT ?",
@@ -88,16 +88,16 @@ class JobRepository:
         return jobs, rows[limit - 1][0] if len(rows) > limit else None
 
     async def count_finished(self) -> dict[str, int]:
-        """Return how many jobs have finished, by status."""
-        counted = "SELECT status, COUNT(*) FROM jobs WHERE finished IS NOT NULL GROUP BY status"
-        return dict(await self._rows(counted))
+        """Return the number of finished jobs by status."""
+        statement = "SELECT status, COUNT(*) FROM jobs WHERE finished IS NOT NULL GROUP BY status"
+        return dict(await self._rows(statement))
 
     async def unfinished(self) -> list[Job]:
-        """Return the jobs of which something was still to become."""
+        """Return the jobs that have not finished."""
         return await self._jobs("WHERE finished IS NULL")
 
     async def with_results(self) -> list[Job]:
-        """Return the jobs that have been answered."""
+        """Return the jobs that have a result."""
         return await self._jobs("WHERE status = 'successful'")
 
     async def finished_before(self, moment: datetime) -> list[Job]:
@@ -121,21 +121,21 @@ class JobRepository:
 
     @property
     def _connection(self) -> aiosqlite.Connection:
-        assert self._database is not None, "the book is open while the service runs"  # noqa: S101
+        assert self._database is not None, "the database is open while the service runs"  # noqa: S101
         return self._database
 
 
-def read_book(path: Path) -> list[Job]:
-    """Return the jobs in the book at ``path``, the oldest first; none where there is no book."""
+def read_jobs(path: Path) -> list[Job]:
+    """Return the jobs in the database at ``path``, the oldest first; none where it is missing."""
     rows = _read(path, "SELECT record FROM jobs ORDER BY number")
     return [Job.model_validate_json(record) for (record,) in rows]
 
 
-def require_whole(path: Path) -> None:
-    """Raise ``StoreError`` where the book at ``path`` is damaged."""
-    found = _read(path, "PRAGMA quick_check(1)")
-    if found not in ([], [("ok",)]):
-        raise _damaged(path, found[0][0])
+def require_intact(path: Path) -> None:
+    """Raise ``StoreError`` where the database at ``path`` is damaged."""
+    rows = _read(path, "PRAGMA quick_check(1)")
+    if rows not in ([], [("ok",)]):
+        raise _damaged(path, rows[0][0])
 
 
 def _read(path: Path, statement: str) -> list[Any]:
@@ -149,5 +149,5 @@ def _read(path: Path, statement: str) -> list[Any]:
 
 
 def _damaged(path: Path, reason: object) -> StoreError:
-    in_a_line = " ".join(str(reason).split())
-    return StoreError(f"{path} is damaged ({in_a_line}): move it away, and jobs begin anew")
+    line = " ".join(str(reason).split())
+    return StoreError(f"{path} is damaged ({line}): move it away, and jobs begin anew")

@@ -46,7 +46,7 @@ class FieldCache:
         """Return the field that answers a question on a mesh: cached, stored, or solved now."""
         read_or_solve = partial(self._read_or_solve, opened, question, solve)
         field = self._fields.find((opened.name, question), read_or_solve)
-        list(self._fields.surplus())
+        self._fields.evict()
         return field
 
     @property

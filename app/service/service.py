@@ -1,10 +1,26 @@
-"""What the routes ask for: meshes in the store, and answers to queries, computed or kept."""
+"""Use cases of the service: meshes in the store, and answers to queries, stored or computed.
+
+A query takes these steps, one type for each::
+
+    wire model      the body of a request, such as ``DistancesRequest``        app.schemas
+    QueryRequest    the request: mesh, caller, deadline, preferences           app.http
+    Query           the validated question, with a stable hash                 app.queries
+    Representation  the form to answer in: media type, dtype, coding           app.encoding
+    Task            ``RunQuery``, the work of a worker, and its scheduling     app.engine
+    Answer          the members of the answer, as the query's solver found     app.encoding
+    Encoded         the parts of the body, and headers                         app.encoding
+    Result          the body and its ``ResultManifest``, in memory or files    app.store
+    TaskResult      the result on its way back, with the seconds it took       app.engine
+
+Task to TaskResult are skipped where the store has the result. A ``Job`` runs the same steps after
+its request has ended, and records the name of the result.
+"""
 
 import asyncio
 from collections import Counter, defaultdict
 from collections.abc import AsyncIterator, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from gc import collect, freeze
 from pathlib import Path
@@ -18,22 +34,24 @@ from app.engine.interface import Engine, ProgressCallback
 from app.engine.local import LocalEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, problem
-from app.jobs import Job, JobRepository, Jobs, JobSpec, require_whole
+from app.jobs import Job, JobManager, JobRepository, JobSpec, require_intact
 from app.queries import Estimate, MeshSize, Query, fingerprint, result_key
 from app.service.single_flight import SingleFlight
 from app.settings import Settings, variable_of
 from app.store.fields import FieldStore
-from app.store.layout import JOB_BOOK, RESULTS, owned
+from app.store.layout import JOB_DATABASE, RESULTS, owned
 from app.store.mesh_catalog import MeshCatalog
-from app.store.meshes import PUBLIC_ARRAYS, MeshStore
+from app.store.meshes import MeshStore
 from app.store.results import Result, ResultStore, result_name
 
+Manifest = Mapping[str, Any]
 Seconds = Mapping[str, float]
+"""Seconds of each phase of the work; empty where the store had the answer"""
 
 
 @dataclass(frozen=True)
 class RequestContext:
-    """Who asks, and how long they would wait."""
+    """The caller of a request, its deadline, and its id."""
 
     caller: Caller
     deadline_s: float
@@ -41,30 +59,22 @@ class RequestContext:
 
 
 @dataclass(frozen=True)
-class Answered:
-    """A result that is ready to be sent, and what it took."""
+class StoredMesh:
+    """A mesh that an upload has put into the store, or found there."""
 
-    result: Result
-    seconds: Seconds
-
-
-@dataclass(frozen=True)
-class Added:
-    """A mesh that is in the store, as clients see it, and what it took."""
-
-    mesh: Mapping[str, Any]
+    manifest: Manifest
     is_new: bool
     seconds: Seconds
 
 
 class Service:
-    """The parts of a running service, and what they do together."""
+    """The parts of a running service, and the use cases that combine them."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         results = settings.store / RESULTS
         self.meshes = MeshStore(settings.store)
-        self.mesh_books = MeshCatalog(
+        self.mesh_catalog = MeshCatalog(
             settings.store,
             self.meshes,
             settings.store_bytes,
@@ -73,24 +83,25 @@ class Service:
         self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
         self.fields = FieldStore(settings.store, settings.fields_bytes)
         self.engine: Engine = LocalEngine(settings, results)
-        self._job_book = settings.store / JOB_BOOK
-        self.jobs = Jobs(JobRepository(self._job_book), self.results, settings.job_ttl)
+        self._job_database = settings.store / JOB_DATABASE
+        self.jobs = JobManager(JobRepository(self._job_database), self.results, settings.job_ttl)
         self.lookups = {"hit": 0, "miss": 0}
-        """Whether answers asked for were kept"""
+        """Lookups of results in the store"""
         self.solves: Counter[str] = Counter()
-        """By kind of query"""
+        """Queries that workers answered, by kind"""
         self.solve_seconds: defaultdict[str, float] = defaultdict(float)
-        self._flights: SingleFlight[TaskResult] = SingleFlight()
+        """Seconds of solving, by kind of query"""
+        self._single_flight: SingleFlight[TaskResult] = SingleFlight()
 
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
-        """Own the store, keep workers, and run jobs while inside."""
+        """Own the store, supply workers and run jobs inside the block."""
         with self.owning_store():
-            self.mesh_books.prepare()
+            self.mesh_catalog.prepare()
             self.results.prepare()
-            self.fields.prepare(self.mesh_books.ids)
+            self.fields.prepare(self.mesh_catalog.ids)
             await self.engine.start()
-            # What is there by now stays. Looking through it for garbage takes 90 ms each time.
+            # Objects of the start live for ever. Each full collection over them takes 90 ms.
             collect()
             freeze()
             try:
@@ -101,64 +112,67 @@ class Service:
 
     @contextmanager
     def owning_store(self) -> Iterator[None]:
-        """Own the store while inside; raises ``StoreError`` where it cannot be used as it is."""
+        """Own the store inside the block; raises ``StoreError`` where it is not usable."""
         with owned(self.settings.store):
-            require_whole(self._job_book)
+            require_intact(self._job_database)
             yield
 
     def drain(self) -> None:
-        """Finish what runs, and refuse all else: the service is about to stop."""
+        """Prepare for the end: finish running work, and refuse new work."""
         self.engine.drain()
         self.jobs.end_events()
 
-    async def add_mesh(self, origin: MeshInput, asker: RequestContext) -> Added:
+    async def add_mesh(self, mesh_input: MeshInput, context: RequestContext) -> StoredMesh:
         """Have a worker read or make a mesh, and store it."""
-        async with self.mesh_books.scratch_folder() as scratch, self.within(asker.deadline_s):
-            order = Task(StoreMesh(origin, scratch / "mesh"), asker.caller.name)
-            done = await self.engine.run(order, ignore_progress)
+        async with (
+            self.mesh_catalog.scratch_folder() as scratch,
+            self.time_limit(context.deadline_s),
+        ):
+            task = Task(StoreMesh(mesh_input, scratch / "mesh"), context.caller.name)
+            done = await self.engine.run(task, ignore_progress)
             assert done.mesh is not None, "this kind of work writes a mesh"  # noqa: S101
-            kept = await self.mesh_books.keep(done.mesh)
-        for mesh_id in kept.evicted:
+            change = await self.mesh_catalog.add(done.mesh)
+        for mesh_id in change.evicted:
             await self._forget(mesh_id)
-        return Added(_described(done.mesh.manifest), kept.is_new, done.seconds)
+        return StoredMesh(done.mesh.manifest, change.is_new, done.seconds)
 
-    def describe(self, mesh_id: str) -> dict[str, Any]:
-        """Return the report of a mesh, as clients see it."""
-        self.mesh_books.use(mesh_id)
-        return _described(self.meshes.manifest(mesh_id))
+    def manifest(self, mesh_id: str) -> Manifest:
+        """Return the manifest of a mesh, and mark the mesh as used."""
+        self.mesh_catalog.use(mesh_id)
+        return self.meshes.manifest(mesh_id)
 
     def array_file(self, mesh_id: str, name: str) -> Path:
-        """Return the file of an array that clients may read."""
-        self.mesh_books.use(mesh_id)
+        """Return the file of an array that clients may read, and mark the mesh as used."""
+        self.mesh_catalog.use(mesh_id)
         return self.meshes.array_file(mesh_id, name)
 
     def size(self, mesh_id: str) -> MeshSize:
-        """Return how large a mesh is."""
+        """Return the counts of a mesh that checks and estimates need."""
         report = self.meshes.manifest(mesh_id)["report"]
         return MeshSize(report["vertices"], report["faces"], report["mean_edge_length"])
 
-    async def list_meshes(self, limit: int, after: str) -> tuple[list[dict[str, Any]], str | None]:
-        """Return the reports of ``limit`` meshes after an id, and where to go on, if anywhere."""
+    async def list_meshes(self, limit: int, after: str) -> tuple[list[Manifest], str | None]:
+        """Return the manifests of ``limit`` meshes after an id, and the id to go on after."""
         return await to_thread.run_sync(self._list_meshes, limit, after)
 
-    def _list_meshes(self, limit: int, after: str) -> tuple[list[dict[str, Any]], str | None]:
+    def _list_meshes(self, limit: int, after: str) -> tuple[list[Manifest], str | None]:
         ids, more = self.meshes.page(after, limit)
-        described = []
+        manifests = []
         for mesh_id in ids:
-            # Left out: what is deleted just now, or damaged, which it says when asked itself.
+            # Meshes deleted meanwhile are left out, and damaged ones, which say so by themselves.
             with suppress(ProblemError):
-                described.append(_described(self.meshes.manifest(mesh_id)))
-        return described, ids[-1] if more else None
+                manifests.append(self.meshes.manifest(mesh_id))
+        return manifests, ids[-1] if more else None
 
     async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
         """Remove a mesh and its results."""
         if not caller.may_delete(self.meshes.owner(mesh_id)):
             raise problem("forbidden", f"mesh {mesh_id} was stored with another API key")
-        await self.mesh_books.delete(mesh_id)
+        await self.mesh_catalog.delete(mesh_id)
         await self._forget(mesh_id)
 
     async def _forget(self, mesh_id: str) -> None:
-        """Remove what was found on a mesh that is gone."""
+        """Remove results and fields of a mesh that is gone."""
         self.results.forget_mesh(mesh_id)
         await to_thread.run_sync(self.fields.forget_mesh, mesh_id)
 
@@ -166,29 +180,42 @@ class Service:
         self,
         query: Query[Any],
         size: MeshSize,
-        form: Representation,
-        asker: RequestContext,
+        representation: Representation,
+        context: RequestContext,
         *,
         as_file: bool,
-    ) -> Answered:
-        """Answer ``query`` to a mesh of this ``size``: from a kept result, or by a worker."""
-        async with self.within(asker.deadline_s):
-            answered = await self._answer(query, size, form, asker.caller.name, ignore_progress)
+    ) -> tuple[Result, Seconds]:
+        """Answer a query to a mesh of this ``size``, from the store or by a worker.
+
+        The caller releases the result to ``results`` once it has been sent.
+        """
+        async with self.time_limit(context.deadline_s):
+            client = context.caller.name
+            result, seconds = await self._answer(
+                query, size, representation, client, ignore_progress
+            )
             if as_file:
-                return replace(answered, result=await self.results.with_files(answered.result))
-            return answered
+                result = await self.results.with_files(result)
+            return result, seconds
 
     async def estimate(
-        self, query: Query[Any], size: MeshSize, form: Representation, asker: RequestContext
+        self,
+        query: Query[Any],
+        size: MeshSize,
+        representation: Representation,
+        context: RequestContext,
     ) -> tuple[Estimate, Seconds]:
-        """Have a worker, which has the mesh, tell what the answer to ``query`` would take."""
-        query.check_answer(form.media_type, size, self.settings)
-        order = Task(
-            EstimateQuery(query, form), asker.caller.name, query.affinity_keys, is_small=True
+        """Have a worker, which has the mesh, estimate the cost of the answer to a query."""
+        query.check_answer(representation.media_type, size, self.settings)
+        task = Task(
+            EstimateQuery(query, representation),
+            context.caller.name,
+            query.affinity_keys,
+            is_small=True,
         )
-        async with self.within(asker.deadline_s):
-            with self.mesh_books.held(query.mesh_id):
-                done = await self.engine.run(order, ignore_progress)
+        async with self.time_limit(context.deadline_s):
+            with self.mesh_catalog.pinned(query.mesh_id):
+                done = await self.engine.run(task, ignore_progress)
         assert done.estimate is not None, "this kind of work estimates"  # noqa: S101
         return done.estimate, done.seconds
 
@@ -196,85 +223,76 @@ class Service:
         self,
         query: Query[Any],
         size: MeshSize,
-        form: Representation,
-        asker: RequestContext,
-        key: str | None,
+        representation: Representation,
+        context: RequestContext,
+        idempotency_key: str | None,
     ) -> Job:
-        """Accept a job that answers ``query``; one for all with the same idempotency ``key``."""
-        query.check_answer(form.media_type, size, self.settings)
-        self.engine.refuse_when_full(asker.caller.name)
+        """Accept a job that answers a query, or return the job with the same idempotency key."""
+        query.check_answer(representation.media_type, size, self.settings)
+        client = context.caller.name
+        self.engine.refuse_when_full(client)
 
-        async def solve(told: ProgressCallback) -> Result:
-            async with self.within(self.settings.job_deadline_s, "job_deadline_s"):
-                return (await self._answer(query, size, form, asker.caller.name, told)).result
+        async def solve(on_progress: ProgressCallback) -> Result:
+            async with self.time_limit(self.settings.job_deadline_s, "job_deadline_s"):
+                result, _ = await self._answer(query, size, representation, client, on_progress)
+                return result
 
-        errand = JobSpec(
-            owner=asker.caller.owner,
+        spec = JobSpec(
+            owner=context.caller.owner,
             kind=query.kind,
             mesh_id=query.mesh_id,
-            media_type=form.media_type,
-            fingerprint=fingerprint(query, form),
-            idempotency_key=key,
-            request_id=asker.request_id,
+            media_type=representation.media_type,
+            fingerprint=fingerprint(query, representation),
+            idempotency_key=idempotency_key,
+            request_id=context.request_id,
         )
-        return await self.jobs.submit(errand, solve)
+        return await self.jobs.submit(spec, solve)
 
     async def _answer(
         self,
         query: Query[Any],
         size: MeshSize,
-        form: Representation,
+        representation: Representation,
         client: str,
-        told: ProgressCallback,
-    ) -> Answered:
-        with self.mesh_books.held(query.mesh_id):
-            query.check_answer(form.media_type, size, self.settings)
-            name = result_name(query.mesh_id, result_key(query, form))
-            kept = await self.results.find(name)
-            self.lookups["miss" if kept is None else "hit"] += 1
-            if kept is not None:
-                return Answered(kept, {})
-            work = RunQuery(query, form, name)
-            order = Task(work, client, query.affinity_keys, query.is_small(size))
-            done = await self._flights.join(name, partial(self._solve, order, query.kind), told)
-            assert done.answer is not None, "this kind of work answers"  # noqa: S101
-            result = self.results.take_new(name, done.answer, is_kept=query.is_repeatable)
-            return Answered(result, done.seconds)
+        on_progress: ProgressCallback,
+    ) -> tuple[Result, Seconds]:
+        with self.mesh_catalog.pinned(query.mesh_id):
+            query.check_answer(representation.media_type, size, self.settings)
+            name = result_name(query.mesh_id, result_key(query, representation))
+            stored = await self.results.find(name)
+            self.lookups["miss" if stored is None else "hit"] += 1
+            if stored is not None:
+                return stored, {}
+            work = RunQuery(query, representation, name)
+            task = Task(work, client, query.affinity_keys, query.is_small(size))
+            start = partial(self._run, task, query.kind)
+            done = await self._single_flight.join(name, start, on_progress)
+            assert done.result is not None, "this kind of work answers"  # noqa: S101
+            result = self.results.add(done.result, is_reusable=query.is_repeatable)
+            return result, done.seconds
 
-    async def _solve(self, order: Task, kind: str, told: ProgressCallback) -> TaskResult:
-        done = await self.engine.run(order, told)
+    async def _run(self, task: Task, kind: str, on_progress: ProgressCallback) -> TaskResult:
+        done = await self.engine.run(task, on_progress)
         self.solves[kind] += 1
         self.solve_seconds[kind] += done.seconds["compute"]
         return done
 
     @asynccontextmanager
-    async def within(self, seconds: float, setting: str = "deadline_s") -> AsyncIterator[None]:
-        """Stop what runs inside after so many seconds, which ``setting`` bounds."""
+    async def time_limit(self, seconds: float, setting: str = "deadline_s") -> AsyncIterator[None]:
+        """Stop the block after ``seconds``, whose upper bound is a setting."""
         try:
             async with asyncio.timeout(seconds):
                 yield
         except TimeoutError:
-            own = seconds >= getattr(self.settings, setting)
+            is_ours = seconds >= getattr(self.settings, setting)
             detail = f"not finished within {seconds:g} s"
             raise problem(
                 "deadline_exceeded",
                 detail,
                 limit=seconds,
-                setting=variable_of(setting) if own else None,
+                setting=variable_of(setting) if is_ours else None,
             ) from None
 
 
-def _described(manifest: Mapping[str, Any]) -> dict[str, Any]:
-    mesh_id = manifest["id"]
-    names = [name for name, kept in PUBLIC_ARRAYS.items() if kept in manifest["crc32"]]
-    return {
-        "id": mesh_id,
-        **manifest["report"],
-        "warnings": manifest["warnings"],
-        "created": manifest["created"],
-        "arrays": {name: f"/v1/meshes/{mesh_id}/arrays/{name}" for name in names},
-    }
-
-
 def ignore_progress(_share: float) -> None:
-    """Tell nobody which share is done."""
+    """Do nothing: the progress callback of calls that nobody watches."""

@@ -1,4 +1,4 @@
-"""Once: who asks for what is being computed already waits for that."""
+"""Single-flight: concurrent requests for one result share one computation."""
 
 import asyncio
 from collections.abc import Callable, Coroutine
@@ -13,14 +13,14 @@ T = TypeVar("T")
 @dataclass(eq=False)
 class _Flight(Generic[T]):
     task: "asyncio.Task[T]"
-    told: list[ProgressCallback] = field(default_factory=list)
-    """Of those who wait, each its own"""
-    share: float = 0.0
+    listeners: list[ProgressCallback] = field(default_factory=list)
+    """One for each call that waits"""
+    progress: float = 0.0
     has_begun: bool = False
 
 
 class SingleFlight(Generic[T]):
-    """Work under way, by name. What is over, well or badly, is forgotten."""
+    """Computations under way, by name. A finished one is forgotten, whether it succeeded or not."""
 
     def __init__(self) -> None:
         self._flights: dict[str, _Flight[T]] = {}
@@ -32,34 +32,34 @@ class SingleFlight(Generic[T]):
         self,
         name: str,
         start: Callable[[ProgressCallback], Coroutine[Any, Any, T]],
-        told: ProgressCallback,
+        on_progress: ProgressCallback,
     ) -> T:
-        """Wait for the work ``name``, which ``start`` begins where nobody waits for it yet.
+        """Wait for the computation ``name``; ``start`` begins it where there is none.
 
-        Cancelling the call leaves; the work is cancelled when the last has left. All who wait are
-        ``told`` which share of it is done.
+        Cancelling a call leaves the computation to the others that wait. It is cancelled when the
+        last has left. Progress is reported to each.
         """
-        flight = self._flights.get(name) or self._depart(name, start)
-        flight.told.append(told)
+        flight = self._flights.get(name) or self._start(name, start)
+        flight.listeners.append(on_progress)
         if flight.has_begun:
-            told(flight.share)
+            on_progress(flight.progress)
         try:
             return await asyncio.shield(flight.task)
         finally:
-            flight.told.remove(told)
-            if not flight.told and not flight.task.done():
+            flight.listeners.remove(on_progress)
+            if not flight.listeners and not flight.task.done():
                 flight.task.cancel()
                 self._forget(name, flight)
 
-    def _depart(
+    def _start(
         self, name: str, start: Callable[[ProgressCallback], Coroutine[Any, Any, T]]
     ) -> _Flight[T]:
-        def tell(share: float) -> None:
-            flight.share, flight.has_begun = share, True
-            for told in flight.told:
-                told(share)
+        def report(share: float) -> None:
+            flight.progress, flight.has_begun = share, True
+            for on_progress in flight.listeners:
+                on_progress(share)
 
-        task = asyncio.create_task(start(tell), name=name)
+        task = asyncio.create_task(start(report), name=name)
         flight = self._flights[name] = _Flight(task)
         task.add_done_callback(lambda _: self._forget(name, flight))
         return flight

@@ -1,1 +1,1 @@
-"""The store on disk: meshes, answers and distance fields."""
+"""The store on disk: meshes, results and distance fields."""

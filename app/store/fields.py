@@ -1,7 +1,7 @@
-"""Distance fields on disk, where all workers find them, and those of the next start.
+"""Distance fields on disk, shared by all workers and by the next start.
 
-``fields/{mesh id}/{key}.npz`` has the arrays of a field, with their checksums, and which version of
-the code found it. There are no books: workers write, and each removes what is beyond the bound.
+``fields/{mesh id}/{key}.npz`` holds the arrays of a field, their checksums, and the version of the
+code that solved it. There is no index: workers write, and each removes files beyond the bound.
 """
 
 import logging
@@ -29,9 +29,9 @@ Arrays = Mapping[str, NDArray[Any]]
 
 
 class FieldStore:
-    """The fields in the store ``root``, at most ``capacity`` bytes; any number of processes use it.
+    """The fields in the store ``root``, at most ``capacity`` bytes, for any number of processes.
 
-    Those used least recently go first. One that is being read may go: it stays until it is read.
+    The least recently used go first. A field may be removed while it is read: the open file stays.
     """
 
     def __init__(self, root: Path, capacity: int) -> None:
@@ -40,28 +40,30 @@ class FieldStore:
         self._capacity = capacity
 
     def prepare(self, meshes: Collection[str]) -> None:
-        """Remove what was left half-written, and the fields of meshes that are gone."""
+        """Remove unfinished files, and the fields of meshes that are gone."""
         remove_partial(self.folder)
         for folder in self.folder.glob("*"):
             if folder.name not in meshes:
                 self.forget_mesh(folder.name)
 
     def read(self, mesh_id: str, key: str) -> Arrays | None:
-        """Return the arrays of a field, if it is there and whole."""
+        """Return the arrays of a field; None where it is missing or damaged."""
         path = self._path(mesh_id, key)
         try:
             arrays = _read(path)
-            path.touch()  # the order of use
+            path.touch()  # records the order of use
         except FileNotFoundError:
             return None
         except (*_DAMAGED, OSError) as error:
-            logger.warning("a kept field cannot be read, and is solved again: %s: %s", path, error)
+            logger.warning(
+                "a stored field cannot be read, and is solved again: %s: %s", path, error
+            )
             path.unlink(missing_ok=True)
             return None
         return arrays
 
     def write(self, mesh_id: str, key: str, arrays: Arrays, code: str) -> None:
-        """Keep a field, if there is room for it; what fails is told in the log only."""
+        """Store a field, if there is room for it; a failure is only logged."""
         if sum(array.nbytes for array in arrays.values()) > self._capacity:
             return
         try:
@@ -69,10 +71,10 @@ class FieldStore:
                 np.savez(file, allow_pickle=False, **arrays, **{_CODE: np.array(code)})
             self._evict()
         except (OSError, MemoryError) as error:
-            logger.warning("a field is not kept on disk: %s/%s: %s", mesh_id, key, error)
+            logger.warning("a field cannot be stored: %s/%s: %s", mesh_id, key, error)
 
     def forget_mesh(self, mesh_id: str) -> None:
-        """Remove the fields of a mesh; one that is being written may be left for `prepare`."""
+        """Remove the fields of a mesh; one that is being written may be left to `prepare`."""
         shutil.rmtree(self.folder / mesh_id, ignore_errors=True)
 
     def _evict(self) -> None:
@@ -89,22 +91,22 @@ class FieldStore:
 
 
 def field_files(root: Path) -> dict[Path, int]:
-    """Return the bytes of each file of a field in a store, those used least recently first."""
-    found = []
+    """Return the size of each field file in a store, the least recently used first."""
+    files = []
     for path in (root / FIELDS).glob("*/*.npz"):
-        with suppress(FileNotFoundError):  # it has just gone
+        with suppress(FileNotFoundError):  # evicted a moment ago
             status = path.stat()
-            found.append((status.st_mtime_ns, path, status.st_size))
-    return {path: size for _, path, size in sorted(found)}
+            files.append((status.st_mtime_ns, path, status.st_size))
+    return {path: size for _, path, size in sorted(files)}
 
 
 def name_of_field(path: Path) -> str:
-    """Return the name of the field in a file: its mesh and its key."""
+    """Return the name of the field in a file: mesh id and key."""
     return f"{path.parent.name}/{path.stem}"
 
 
 def code_of_field(path: Path) -> str | None:
-    """Return which version of the code found the field in a file; None where it is damaged."""
+    """Return the version of the code that solved the field in a file; None where it is damaged."""
     try:
         return str(_read(path)[_CODE])
     except (*_DAMAGED, OSError):
@@ -112,8 +114,8 @@ def code_of_field(path: Path) -> str | None:
 
 
 def _read(path: Path) -> Arrays:
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as kept:
-        bad = kept.zip.testzip()  # to load an array is not to read all of its file
-        if bad is not None or _CODE not in kept:  # which was written last
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        bad = archive.zip.testzip()  # loading an array does not read all of its file
+        if bad is not None or _CODE not in archive:  # written last
             raise BadZipFile(f"{bad or _CODE} is not what was written")
-        return dict(kept)
+        return dict(archive)

@@ -1,15 +1,15 @@
-"""The store as a whole: one folder, of one layout, that belongs to one process at a time.
+"""Layout and ownership of the store: one folder, which belongs to one process at a time.
 
 ::
 
     store/
-        VERSION         the layout of all that is here
-        lock            held by whoever owns the store, for as long as its process lives
-        meshes/         see ``mesh_store``
-        results/        see ``result_store``
-        fields/         see ``field_store``
-        jobs.sqlite3    see ``jobs.book``
-        tmp/            what is being written
+        VERSION         the number of this layout
+        lock            locked by the owner of the store while its process lives
+        meshes/         see ``app.store.meshes``
+        results/        see ``app.store.results``
+        fields/         see ``app.store.fields``
+        jobs.sqlite3    see ``app.jobs.repository``
+        tmp/            meshes that are being written
 """
 
 from collections.abc import Iterator
@@ -23,33 +23,33 @@ from app.settings import variable_of
 from app.store.atomic import sync
 
 LAYOUT = 5
-"""Of the store that this code reads and writes. To be raised with every change of any of its files,
-the job book's tables among them."""
+"""Number of the layout that this code reads and writes. Raise it with every change of any file,
+including the tables of jobs."""
 
-JOB_BOOK, MESHES, RESULTS, FIELDS = "jobs.sqlite3", "meshes", "results", "fields"
+JOB_DATABASE, MESHES, RESULTS, FIELDS = "jobs.sqlite3", "meshes", "results", "fields"
 TEMPORARY = "tmp"
 
-_READ_AS_THEY_ARE = (4, LAYOUT)
-"""Layouts that differ by this number alone: up to 4 it was in each mesh's manifest."""
+_READABLE = (4, LAYOUT)
+"""Layouts that differ only in this number: up to 4, each mesh's manifest had it."""
 
 
 class StoreError(Exception):
-    """The store cannot be used as it is; the message says why, and what to do."""
+    """An unusable store; the message says why, and what to do."""
 
 
 @contextmanager
 def owned(root: Path) -> Iterator[None]:
-    """Own the store in the folder ``root`` while inside; it is made where it is not there.
+    """Own the store in the folder ``root`` inside the block; the folder is created if missing.
 
-    The lock goes with the process, however that ends.
+    The lock ends with the process, however that ends.
 
     Raises
     ------
     StoreError
-        Another process owns it, it has a layout that this code does not read, or its folder cannot
-        be written.
+        Another process owns the store, its layout is not readable by this code, or its folder is
+        not writable.
     """
-    # A lock that is a mere file would outlive the process: better none.
+    # The soft fallback is a mere file, which would outlive the process.
     lock = FileLock(root / "lock", timeout=0, thread_local=False, fallback_to_soft=False)
     try:
         root.mkdir(parents=True, exist_ok=True)
@@ -71,9 +71,9 @@ def owned(root: Path) -> Iterator[None]:
 
 
 def require_layout(root: Path) -> None:
-    """Raise ``StoreError`` where the store in ``root`` has a layout that is not read here."""
+    """Raise ``StoreError`` where the store in ``root`` has a layout that this code cannot read."""
     found = _layout(root)
-    if found is not None and found not in _READ_AS_THEY_ARE:
+    if found is not None and found not in _READABLE:
         raise StoreError(
             f"the store {root} has layout {found}, and this release reads {LAYOUT}: "
             f"use the release that wrote it, or move it away and upload its meshes again"
@@ -81,7 +81,7 @@ def require_layout(root: Path) -> None:
 
 
 def is_store(root: Path) -> bool:
-    """Tell whether there is a store in ``root``."""
+    """Tell whether ``root`` holds a store."""
     return (root / "VERSION").is_file() or (root / MESHES).is_dir()
 
 
@@ -94,13 +94,13 @@ def _layout(root: Path) -> int | str | None:
 
 
 def _layout_of_manifests(root: Path) -> int | str | None:
-    """Return the layout of a store of before 5, where it has any mesh that tells."""
+    """Return the layout of a store older than 5, where a mesh of it tells; None elsewhere."""
     for path in (root / MESHES).glob("*/manifest.json"):
         try:
             version: int | str = orjson.loads(path.read_bytes())["version"]
         except (ValueError, TypeError, KeyError):
-            continue  # damaged: it will say so when it is asked for
-        if version not in _READ_AS_THEY_ARE:
+            continue  # damaged: reported when the mesh is read
+        if version not in _READABLE:
             return version
     return None
 

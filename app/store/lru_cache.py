@@ -1,4 +1,4 @@
-"""What is kept for the next time it is asked for, as long as it fits."""
+"""A cache of values by key, bounded in bytes."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator
@@ -11,8 +11,8 @@ V = TypeVar("V")
 class LRUCache(Generic[K, V]):
     """Values by key, at most ``capacity`` bytes; the least recently used go first.
 
-    A value may grow while it is used, until another is asked for. So the one and the other are
-    measured then, and no more: there may be thousands.
+    A value may grow while it is in use, until another is looked up. So a lookup measures two
+    values, the one used before and the one returned. There may be thousands of others.
     """
 
     def __init__(self, capacity: int, size_of: Callable[[V], int]) -> None:
@@ -23,16 +23,16 @@ class LRUCache(Generic[K, V]):
         self._total = 0
 
     def __iter__(self) -> Iterator[K]:
-        """Yield the keys, that which was used last at the end."""
+        """Yield the keys, the most recently used last."""
         return iter(self._values)
 
     @property
     def nbytes(self) -> int:
-        """Bytes of all values, each as it was when it was measured last."""
+        """Bytes of all values, each as measured last."""
         return self._total
 
     def find(self, key: K, make: Callable[[], V]) -> V:
-        """Return the value of a key, made now if it is not there."""
+        """Return the value of a key, which ``make`` makes where the cache has none."""
         if self._values:
             self._measure(next(reversed(self._values)))
         if key not in self._values:
@@ -41,19 +41,20 @@ class LRUCache(Generic[K, V]):
         self._measure(key)
         return self._values[key]
 
-    def surplus(self, least: int = 0) -> Iterator[K]:
-        """Drop what does not fit, but for the ``least`` that were used last, and yield its keys."""
-        while self._total > self._capacity and len(self._values) > least:
-            key = next(iter(self._values))
-            self.drop(key)
-            yield key
+    def evict(self, spare: int = 0) -> list[K]:
+        """Drop values until the rest fit, but not the ``spare`` used last; return their keys."""
+        evicted = []
+        while self._total > self._capacity and len(self._values) > spare:
+            evicted.append(next(iter(self._values)))
+            self.drop(evicted[-1])
+        return evicted
+
+    def drop(self, key: K) -> None:
+        """Remove a key and its value."""
+        del self._values[key]
+        self._total -= self._sizes.pop(key)
 
     def _measure(self, key: K) -> None:
         size = self._size_of(self._values[key])
         self._total += size - self._sizes.get(key, 0)
         self._sizes[key] = size
-
-    def drop(self, key: K) -> None:
-        """Keep the value of a key no longer."""
-        del self._values[key]
-        self._total -= self._sizes.pop(key)

@@ -1,8 +1,8 @@
-"""Which meshes there are, how large they are and when they were used: kept by one process.
+"""The catalog of stored meshes: sizes and order of use, known to one process.
 
-What is on disk are the books: each change is one rename, made together with its entry here, so that
-a crash leaves a mesh either there or not, and the next start counts anew. Workers write meshes
-aside, in a folder that is lent to them; what they leave there, killed or not, is removed with it.
+The directory is the source of truth. Each change is one rename, made together with its entry here:
+a crash leaves a mesh either there or not, and the next start counts anew. Workers write new meshes
+into a scratch folder, which is removed with everything left in it.
 """
 
 import asyncio
@@ -18,23 +18,23 @@ from uuid import uuid4
 from app.errors import over_limit
 from app.store.atomic import sync, sync_all
 from app.store.layout import TEMPORARY
-from app.store.meshes import MeshStore, WrittenMesh, unknown
+from app.store.meshes import MeshStore, WrittenMesh, mesh_not_found
 
 
 @dataclass(frozen=True)
-class Kept:
-    """What has become of a mesh that was written aside."""
+class CatalogChange:
+    """The effect of adding a mesh."""
 
     is_new: bool
     evicted: Sequence[str] = ()
-    """The meshes that went, so that it had room"""
+    """Ids of the meshes that were removed to make room"""
 
 
 class MeshCatalog:
     """The meshes of a store, at most ``capacity`` bytes.
 
-    What finds no room is refused; or, where it ``evicts``, the meshes go that were used least
-    recently, but none that is held.
+    A mesh that finds no room is refused. With ``evicts``, the least recently used meshes are
+    removed instead, but none that is pinned.
     """
 
     def __init__(self, root: Path, store: MeshStore, capacity: int, *, evicts: bool) -> None:
@@ -43,10 +43,10 @@ class MeshCatalog:
         self._capacity = capacity
         self._evicts = evicts
         self._sizes: OrderedDict[str, int] = OrderedDict()  # the least recently used first
-        self._held: Counter[str] = Counter()
+        self._pins: Counter[str] = Counter()
 
     def prepare(self) -> None:
-        """Sweep what a former service left half-written, and count what is there."""
+        """Remove what a former service left unfinished, and measure the meshes."""
         self._store.folder.mkdir(exist_ok=True)
         self._temporary.mkdir(exist_ok=True)
         _remove(*self._temporary.iterdir())
@@ -54,7 +54,7 @@ class MeshCatalog:
 
     @property
     def ids(self) -> Collection[str]:
-        """Which meshes there are."""
+        """Ids of all meshes."""
         return self._sizes.keys()
 
     @property
@@ -64,21 +64,21 @@ class MeshCatalog:
 
     @asynccontextmanager
     async def scratch_folder(self) -> AsyncIterator[Path]:
-        """Lend an empty folder on the store's disk; all that is in it goes afterwards."""
+        """Lend an empty folder on the store's disk, and remove it after the block."""
         folder = Path(tempfile.mkdtemp(dir=self._temporary))
         try:
             yield folder
         finally:
-            # Renamed first: a worker that is about to be killed has no place to write to any more.
+            # Rename first: then a worker that is about to be killed can no longer write into it.
             gone = self._new_name()
             try:
                 folder.rename(gone)
-            except OSError:  # no room for another name
+            except OSError:  # the disk has no room for another name
                 gone = folder
             await asyncio.to_thread(_remove, gone)
 
-    async def keep(self, written: WrittenMesh) -> Kept:
-        """Move in what has been written aside, for good; a mesh that is there already is used.
+    async def add(self, written: WrittenMesh) -> CatalogChange:
+        """Move a mesh from its scratch folder into the store; if it is there, mark it as used.
 
         Raises
         ------
@@ -88,11 +88,11 @@ class MeshCatalog:
         mesh_id = written.mesh_id
         if written.folder is None or mesh_id in self._sizes:
             self.use(mesh_id)
-            return Kept(is_new=False)
+            return CatalogChange(is_new=False)
         await asyncio.to_thread(sync_all, written.folder)
-        if mesh_id in self._sizes:  # another was faster
-            return Kept(is_new=False)
-        evicted = self._chosen_to_go(written.size)
+        if mesh_id in self._sizes:  # another upload was faster
+            return CatalogChange(is_new=False)
+        evicted = self._choose_evicted(written.size)
         gone: list[Path] = []
         try:
             gone.extend(self._move_out(old) for old in evicted)
@@ -101,52 +101,52 @@ class MeshCatalog:
             await asyncio.to_thread(sync, self._store.folder)
         except OSError:
             if mesh_id in self._sizes:
-                gone.append(self._move_out(mesh_id))  # a power cut might take it: better told now
+                gone.append(self._move_out(mesh_id))  # a power cut might lose it: fail now
             raise
         finally:
             await asyncio.to_thread(_remove, *gone)
-        return Kept(is_new=True, evicted=evicted)
+        return CatalogChange(is_new=True, evicted=evicted)
 
     async def delete(self, mesh_id: str) -> None:
-        """Remove a mesh at once; processes that have it open keep what they mapped."""
+        """Remove a mesh at once; processes that have it open can go on reading it."""
         if mesh_id not in self._sizes:
-            raise unknown(mesh_id)
+            raise mesh_not_found(mesh_id)
         gone = self._move_out(mesh_id)
         await asyncio.to_thread(_remove, gone)
 
     def use(self, mesh_id: str) -> None:
-        """Note that a mesh is used now, if it is there."""
+        """Mark a mesh as the most recently used, if it is there."""
         if mesh_id in self._sizes:
             self._sizes.move_to_end(mesh_id)
             self._store.note_use(mesh_id)
 
     @contextmanager
-    def held(self, mesh_id: str) -> Iterator[None]:
-        """Do not let a mesh go while inside, unless it is deleted."""
+    def pinned(self, mesh_id: str) -> Iterator[None]:
+        """Protect a mesh from eviction inside the block; it can still be deleted."""
         self.use(mesh_id)
-        self._held[mesh_id] += 1
+        self._pins[mesh_id] += 1
         try:
             yield
         finally:
-            self._held[mesh_id] -= 1
-            if not self._held[mesh_id]:
-                del self._held[mesh_id]
+            self._pins[mesh_id] -= 1
+            if not self._pins[mesh_id]:
+                del self._pins[mesh_id]
 
-    def _chosen_to_go(self, size: int) -> list[str]:
-        """Return the meshes that have to go for so many bytes more, or refuse these."""
-        free = [mesh_id for mesh_id in self._sizes if mesh_id not in self._held]
-        going: list[str] = []
+    def _choose_evicted(self, size: int) -> list[str]:
+        """Return the meshes to evict for ``size`` bytes more; raise where that is not enough."""
+        free = [mesh_id for mesh_id in self._sizes if mesh_id not in self._pins]
+        evicted: list[str] = []
         total = self.total + size
         if self._evicts and size <= self._capacity:
-            while total > self._capacity and len(going) < len(free):
-                going.append(free[len(going)])
-                total -= self._sizes[going[-1]]
+            while total > self._capacity and len(evicted) < len(free):
+                evicted.append(free[len(evicted)])
+                total -= self._sizes[evicted[-1]]
         if total > self._capacity:
             hint = "delete meshes that are not needed any more"
             raise over_limit(
                 "storage_full", "bytes of meshes", total, self._capacity, "store_bytes", hint=hint
             )
-        return going
+        return evicted
 
     def _move_out(self, mesh_id: str) -> Path:
         gone = self._new_name()

@@ -1,14 +1,14 @@
-"""Meshes on disk: one folder each, named by its content, read by memory mapping.
+"""Meshes on disk: a folder for each, named by a hash of its content and read by memory mapping.
 
 ::
 
     meshes/{id}/manifest.json      report, warnings, owner, and the checksum of each array
-    meshes/{id}/{array}.npy        one file per array of ``TriangleMesh.arrays()``
+    meshes/{id}/{array}.npy        one file for each array of ``TriangleMesh.arrays()``
 
-The id is a hash over the canonical arrays (vertices, faces, both maps), not over the bytes of the
-upload: the same mesh as PLY, as JSON or as a sample is one entry with one set of results; and a
-later reader that gets other arrays out of the same file also gets another id, so that no kept
-result can be taken for one of another mesh.
+The id is a hash of the canonical arrays (vertices, faces, both maps), not of the uploaded bytes. So
+the same mesh as PLY, as JSON or as a sample is one entry with one set of results. A later reader
+that gets other arrays from the same file gets another id, so that no stored result is ever taken
+for that of another mesh.
 """
 
 import hashlib
@@ -38,7 +38,7 @@ PUBLIC_ARRAYS = {
     "face_map": "face_map",
     "components": "component",
 }
-"""The names under which clients read arrays, and those that ``TriangleMesh.arrays`` gives them."""
+"""Names of the arrays that clients may read, and the names ``TriangleMesh.arrays`` gives them"""
 
 _ID_BYTES = 16
 _ID = re.compile(f"[0-9a-f]{{{2 * _ID_BYTES}}}")
@@ -47,10 +47,10 @@ _DEFINING_ARRAYS = ("vertices", "faces", "vertex_map", "face_map")
 
 @dataclass(frozen=True)
 class OpenMesh:
-    """A mesh over memory-mapped arrays, its solver, and what its reader said of the file."""
+    """A mesh over memory-mapped arrays, its solver, and the warnings of its reader."""
 
     name: tuple[str, bytes]
-    """Its id, and its barriers"""
+    """Mesh id, and barriers as bytes"""
     solver: Solver
     warnings: Sequence[str]
 
@@ -60,25 +60,25 @@ class OpenMesh:
         return self.solver.mesh
 
     def with_barriers(self, faces: NDArray[np.int64]) -> "OpenMesh":
-        """Return the same with some faces blocked; see `TriangleMesh.with_barriers`."""
+        """Return the mesh with some faces blocked; see `TriangleMesh.with_barriers`."""
         name = self.name[0], faces.tobytes()
         return OpenMesh(name, Solver(self.mesh.with_barriers(faces)), self.warnings)
 
     @property
     def nbytes(self) -> int:
-        """Size of the mesh, and of what its solver keeps; that grows while paths are asked for."""
+        """Bytes of the mesh and of its solver's caches, which grow as paths are found."""
         return self.mesh.nbytes + self.solver.nbytes
 
 
 @dataclass(frozen=True)
 class WrittenMesh:
-    """A mesh that has been written aside, or was found to be in the store already."""
+    """A mesh in a scratch folder, or one that is in the store already."""
 
     manifest: Mapping[str, Any]
     folder: Path | None
-    """Where it waits to be moved in; None where it was in the store"""
+    """The scratch folder; None for a mesh that is in the store already"""
     size: int = 0
-    """In bytes, on disk"""
+    """Bytes on disk"""
 
     @property
     def mesh_id(self) -> str:
@@ -87,15 +87,15 @@ class WrittenMesh:
 
 
 class MeshStore:
-    """The meshes under ``root``; any number of processes may read, and write aside."""
+    """The meshes under ``root``; any number of processes may read, and write to scratch folders."""
 
     def __init__(self, root: Path) -> None:
         self.folder = root / MESHES
 
     def write_aside(self, mesh: TriangleMesh, folder: Path, owner: str | None) -> WrittenMesh:
-        """Write ``mesh`` into a new ``folder``, unless it is stored.
+        """Write ``mesh`` into a new scratch ``folder``, unless it is in the store.
 
-        A mesh that is stored stays ``owner``'s who stored it first.
+        A mesh in the store belongs to the ``owner`` that stored it first.
         """
         arrays = mesh.arrays()
         mesh_id = _content_hash(arrays)
@@ -116,21 +116,21 @@ class MeshStore:
         return WrittenMesh(manifest, folder, _bytes_in(folder))
 
     def manifest(self, mesh_id: str) -> Mapping[str, Any]:
-        """Return what is known of a mesh without opening its arrays."""
+        """Return the manifest of a mesh; its arrays are not opened."""
         path = f"{self._path(mesh_id)}/manifest.json"
         try:
             changed = os.stat(path).st_mtime_ns  # noqa: PTH116 - see _path
             manifest = _read_manifest(path, changed)
             is_its_own = manifest["id"] == mesh_id
         except (OSError, ValueError, TypeError, KeyError) as error:
-            self._folder(mesh_id)  # refuses a mesh that is not there at all
+            self._folder(mesh_id)  # raises where there is no such mesh
             raise _damaged(mesh_id, "its manifest cannot be read") from error
         if not is_its_own:
             raise _damaged(mesh_id, "its manifest is that of another mesh")
         return manifest
 
     def owner(self, mesh_id: str) -> str | None:
-        """Return who stored a mesh, where that was with a key and its manifest can be read."""
+        """Return the owner of a mesh; None where it has none, or its manifest cannot be read."""
         try:
             owner: str | None = self.manifest(mesh_id).get("owner")
         except ProblemError as error:
@@ -140,14 +140,14 @@ class MeshStore:
         return owner
 
     def open(self, mesh_id: str) -> OpenMesh:
-        """Return the mesh over memory-mapped arrays, once their checksums are found right."""
+        """Return a mesh over memory-mapped arrays, after a check of their checksums."""
         manifest = self.manifest(mesh_id)
         arrays = {name: self._array(mesh_id, name) for name in manifest["crc32"]}
         solver = Solver(TriangleMesh.from_arrays(arrays))
         return OpenMesh((mesh_id, b""), solver, manifest["warnings"])
 
     def damage(self, mesh_id: str) -> Iterator[ProblemError]:
-        """Yield all that is damaged of a mesh; raises ``ProblemError`` where there is none such."""
+        """Yield each damage of a mesh; raises ``ProblemError`` where there is no such mesh."""
         try:
             names = self.manifest(mesh_id)["crc32"]
         except ProblemError as error:
@@ -183,43 +183,44 @@ class MeshStore:
         path = folder / f"{PUBLIC_ARRAYS[name]}.npy"
         if not path.is_file():
             # TriangleMesh has no map where it is the identity.
-            kept = "vertices" if name == "vertex_map" else "faces"
-            raise problem("not_found", f"the mesh has no {name}: it keeps the {kept} of its file")
+            unchanged = "vertices" if name == "vertex_map" else "faces"
+            detail = f"the mesh has no {name}: it keeps the {unchanged} of its file"
+            raise problem("not_found", detail)
         return path
 
     def page(self, after: str, limit: int) -> tuple[list[str], bool]:
-        """Return the ``limit`` ids that follow ``after``, in order, and whether there are more."""
+        """Return the next ``limit`` ids after ``after``, in order, and whether more follow."""
         ids = sorted(entry.name for entry in self.folder.iterdir())
         first = bisect_right(ids, after)
         return ids[first : first + limit], len(ids) > first + limit
 
     def sizes(self) -> dict[str, int]:
-        """Return the bytes of each mesh on disk, those that were used least recently first."""
+        """Return the bytes of each mesh on disk, the least recently used first."""
         folders = [entry for entry in self.folder.glob("*") if entry.is_dir()]
         folders.sort(key=lambda folder: folder.stat().st_mtime_ns)
         return {folder.name: _bytes_in(folder) for folder in folders}
 
     def last_used(self, mesh_id: str) -> datetime:
-        """Return when a mesh was used last."""
+        """Return the time of a mesh's last use."""
         return datetime.fromtimestamp(self._folder(mesh_id).stat().st_mtime, UTC)
 
     def note_use(self, mesh_id: str) -> None:
-        """Note that a mesh is used now, where a restart finds it: the time of its folder."""
+        """Record a use of a mesh as the time of its folder, which a restart reads."""
         try:
             os.utime(self._path(mesh_id))
         except FileNotFoundError:
-            raise unknown(mesh_id) from None
+            raise mesh_not_found(mesh_id) from None
 
     def _folder(self, mesh_id: str) -> Path:
         folder = Path(self._path(mesh_id))
         if not folder.is_dir():
-            raise unknown(mesh_id)
+            raise mesh_not_found(mesh_id)
         return folder
 
     def _path(self, mesh_id: str) -> str:
-        """Return where a mesh would be: as text, for each request asks, and a `Path` takes long."""
+        """Return the path of a mesh, as text: each request needs it, and a `Path` is slow."""
         if not _ID.fullmatch(mesh_id):
-            raise unknown(mesh_id)
+            raise mesh_not_found(mesh_id)
         return f"{self.folder}/{mesh_id}"
 
 
@@ -244,7 +245,7 @@ def _checksum(array: NDArray[Any]) -> int:
 
 
 def _write_array(path: Path, array: NDArray[Any]) -> None:
-    # As np.save does, which on a full disk raises an OSError that does not tell why.
+    # Like np.save, whose OSError does not tell that the disk is full.
     array = np.ascontiguousarray(array)
     with path.open("wb") as file:
         np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(array))
@@ -260,8 +261,8 @@ def _open_array(path: Path) -> NDArray[Any]:
     return mapped.view(np.ndarray)
 
 
-def unknown(mesh_id: str) -> ProblemError:
-    """Return the refusal of a mesh that is not there."""
+def mesh_not_found(mesh_id: str) -> ProblemError:
+    """Return the error for a mesh that is not in the store."""
     return problem("mesh_not_found", f"there is no mesh {mesh_id!r}")
 
 

@@ -1,8 +1,9 @@
-"""Finished answers: files, written by workers and sent by the API; and small ones, in memory.
+"""Results: encoded answers, stored as files that workers write and the API sends.
 
-``results/{mesh id}/{key}.body`` is what goes out; ``{key}.json`` beside it, written last, says that
-it is complete: its headers, its size and its checksum. What is small and was found at once has no
-files: two of them took half as long as all else that its worker did.
+``results/{mesh id}/{key}.body`` is the body. The manifest ``{key}.json`` beside it is written last,
+so that it marks the result as complete; it holds headers, size and checksum. A small result that
+was cheap to compute stays in memory and has no files: two files took half as long as all other work
+on it.
 """
 
 import os
@@ -22,11 +23,11 @@ Buffer = bytes | memoryview
 
 
 _SMALL = 2**16
-"""Bytes of an answer that is kept in memory as well: most, but for fields and long lines"""
+"""Bytes of a body that is also held in memory: most of them, but for fields and long lines"""
 
 
 class ResultManifest(BaseModel):
-    """What is known of an answer that is complete."""
+    """Headers, size and checksum of a complete result, as stored beside its body."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -34,33 +35,24 @@ class ResultManifest(BaseModel):
     size: int
     crc32: int
     code: str = ""
-    """Which version of the code found it"""
-
-
-@dataclass(frozen=True)
-class Written:
-    """An answer that is complete."""
-
-    seal: ResultManifest
-    body: bytes | None
-    """All of it, where it is small"""
-    has_files: bool
+    """Version of the code that computed the answer"""
 
 
 @dataclass(frozen=True)
 class Result:
-    """An answer that was taken from the store."""
+    """A complete result: in memory, in files, or both."""
 
     name: str
-    path: Path
-    """Of its body, where it has files"""
-    written: Written
-    is_kept: bool = True
-    """Whether it stays when it has been sent."""
+    manifest: ResultManifest
+    body: bytes | None
+    """The whole body, where it is small"""
+    has_files: bool
+    is_reusable: bool = True
+    """Whether it stays in the store once it has been sent"""
 
     @property
     def key(self) -> str:
-        """The hash that names the answer, without its mesh."""
+        """The hash that names the result, without its mesh."""
         return self.name.rpartition("/")[2]
 
 
@@ -72,10 +64,25 @@ def write_result(
     code: str,
     *,
     is_cheap: bool,
-) -> Written:
-    """Write the result ``name`` under ``root``; one that is small as well as ``is_cheap`` is not.
+) -> Result:
+    """Write a result under ``root``, unless it is both small and cheap.
 
-    The parts are written as they are made, so that they need not be in memory together.
+    The parts are written as they are produced, so that they need not be in memory together.
+
+    Parameters
+    ----------
+    root
+        Folder of all results.
+    name
+        Name of the result, see `result_name`.
+    parts
+        Parts of the body, in order.
+    headers
+        Headers of the answer that depend on its content.
+    code
+        Version of the code that computed the answer.
+    is_cheap
+        Whether computing the answer again costs about as little as writing it.
     """
     rest = iter(parts)
     first: list[Buffer] = []
@@ -85,54 +92,54 @@ def write_result(
             return _write(root, name, chain(first, rest), headers, code)
     body = b"".join(first)
     if is_cheap:
-        seal = ResultManifest(
+        manifest = ResultManifest(
             headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code
         )
-        return Written(seal, body, has_files=False)
+        return Result(name, manifest, body, has_files=False)
     return replace(_write(root, name, [body], headers, code), body=body)
 
 
 def _write(
     root: Path, name: str, parts: Iterable[Buffer], headers: Mapping[str, str], code: str
-) -> Written:
-    """Write the files of a result, body first and seal last."""
+) -> Result:
+    """Write the files of a result, the body first and the manifest last."""
     size = checksum = 0
-    with atomic_write(_body(root, name)) as file:
+    with atomic_write(_body_path(root, name)) as file:
         for part in parts:
             size += file.write(part)
             checksum = zlib.crc32(part, checksum)
-    seal = ResultManifest(headers=dict(headers), size=size, crc32=checksum, code=code)
-    with atomic_write(_seal(root, name)) as file:
-        file.write(seal.model_dump_json().encode())
-    return Written(seal, None, has_files=True)
+    manifest = ResultManifest(headers=dict(headers), size=size, crc32=checksum, code=code)
+    with atomic_write(_manifest_path(root, name)) as file:
+        file.write(manifest.model_dump_json().encode())
+    return Result(name, manifest, None, has_files=True)
 
 
 class ResultStore:
     """The results under ``root``, at most ``capacity`` bytes; the least recently used go first.
 
-    Small ones are in memory, up to ``memory`` bytes: all those that have no files, and some others.
-    One process keeps the books. A result taken is not removed before it is given back, one that is
-    held not before it is released.
+    Up to ``memory`` bytes of small results are held in memory: all those without files, and some of
+    the others. One process owns the store and its index. `find` and `add` acquire a result, which
+    protects its files until `release`; a pinned one stays until `unpin`.
     """
 
     def __init__(self, root: Path, capacity: int, memory: int) -> None:
         self._root = root
         self._capacity = capacity
         self._memory = memory
-        self._small: OrderedDict[str, Written] = OrderedDict()
+        self._small: OrderedDict[str, Result] = OrderedDict()
         self._small_total = 0
         self._sizes: OrderedDict[str, int] = OrderedDict()
         self._total = 0
-        self._taken: Counter[str] = Counter()
-        self._held: Counter[str] = Counter()
+        self._in_use: Counter[str] = Counter()
+        self._pins: Counter[str] = Counter()
 
     def prepare(self) -> None:
-        """Count what a former service left, the oldest first, and remove what has no seal."""
+        """Index the results of a former service, the oldest first, and remove incomplete ones."""
         self._root.mkdir(parents=True, exist_ok=True)
         bodies = sorted(self._root.glob("*/*.body"), key=lambda path: path.stat().st_mtime)
         for path in bodies:
             name = path.relative_to(self._root).with_suffix("").as_posix()
-            if _seal(self._root, name).exists():
+            if _manifest_path(self._root, name).exists():
                 self._count(name, path.stat().st_size)
             else:
                 path.unlink()
@@ -141,96 +148,102 @@ class ResultStore:
 
     @property
     def nbytes(self) -> int:
-        """Size of all files of results."""
+        """Bytes of all bodies that are files."""
         return self._total
 
+    def body_path(self, result: Result) -> Path:
+        """Return the file of a body, for a result that has files."""
+        return _body_path(self._root, result.name)
+
     async def find(self, name: str) -> Result | None:
-        """Take the result ``name``, if it is there and whole."""
+        """Acquire a result; None where it is missing or damaged."""
         if name in self._small:
             self._small.move_to_end(name)
-            return self._take(name, self._small[name])
+            return self._acquire(self._small[name])
         if name not in self._sizes:
             return None
-        self._taken[name] += 1  # held while it is read, off the event loop
+        self._in_use[name] += 1  # protects the files while a thread reads them
         try:
-            written = await to_thread.run_sync(_read, self._root, name)
-            if written is not None:
-                os.utime(_body(self._root, name))  # the order of use, for the next start
-                self._keep_small(name, written)
-                return self._take(name, written)
+            result = await to_thread.run_sync(_read, self._root, name)
+            if result is not None:
+                os.utime(_body_path(self._root, name))  # the order of use, for the next start
+                self._cache_small(result)
+                return self._acquire(result)
         finally:
-            self._let_go(name)
+            self._decrement_use(name)
         self._remove(name)
         return None
 
-    def take_new(self, name: str, written: Written, *, is_kept: bool = True) -> Result:
-        """Take the result that a worker has just written."""
-        if is_kept:
-            self._keep_small(name, written)
-        return replace(self._take(name, written), is_kept=is_kept)
+    def add(self, result: Result, *, is_reusable: bool = True) -> Result:
+        """Acquire a result that a worker has just written."""
+        if is_reusable:
+            self._cache_small(result)
+            return self._acquire(result)
+        return self._acquire(replace(result, is_reusable=False))
 
-    def give_back(self, result: Result) -> None:
-        """Say that ``result`` has been sent."""
-        self._let_go(result.name)
-        if not result.is_kept and result.name not in self._held:
+    def release(self, result: Result) -> None:
+        """End the use of a result that was acquired."""
+        self._decrement_use(result.name)
+        if not result.is_reusable and result.name not in self._pins:
             self._remove(result.name)
         self._evict()
 
     async def with_files(self, result: Result) -> Result:
-        """Return a result that was taken, with files: written now, where it had none.
+        """Return an acquired result with files, which are written now where it had none.
 
-        It is given back where that fails.
+        The result is released where that fails.
         """
-        written = result.written
-        if written.has_files:
+        if result.has_files:
             return result
-        assert written.body is not None, "what has no files is in memory"  # noqa: S101
-        seal, body = written.seal, [written.body]
+        assert result.body is not None, "a result without files is in memory"  # noqa: S101
+        name, manifest, body = result.name, result.manifest, [result.body]
         try:
-            await to_thread.run_sync(_write, self._root, result.name, body, seal.headers, seal.code)
+            await to_thread.run_sync(
+                _write, self._root, name, body, manifest.headers, manifest.code
+            )
         except BaseException:
-            self.give_back(result)
+            self.release(result)
             raise
-        self._count(result.name, seal.size)
-        filed = replace(written, has_files=True)
-        if result.name in self._small:
-            self._small[result.name] = filed
-        return replace(result, written=filed)
+        self._count(name, manifest.size)
+        filed = replace(result, has_files=True)
+        if name in self._small:
+            self._small[name] = filed
+        return filed
 
-    def has_room_to_hold(self, name: str) -> bool:
-        """Tell whether all that is held would fit with the result ``name``."""
-        return sum(self._sizes.get(held, 0) for held in {*self._held, name}) <= self._capacity
+    def can_pin(self, name: str) -> bool:
+        """Tell whether all pinned results would fit together with this one."""
+        return sum(self._sizes.get(pinned, 0) for pinned in {*self._pins, name}) <= self._capacity
 
-    def hold(self, name: str) -> None:
-        """Do not remove the result ``name``, be it used or not."""
-        self._held[name] += 1
+    def pin(self, name: str) -> None:
+        """Protect a result from eviction until `unpin`."""
+        self._pins[name] += 1
 
-    def release(self, name: str) -> None:
-        """Say that whoever held the result ``name`` does so no longer."""
-        self._held -= Counter([name])
+    def unpin(self, name: str) -> None:
+        """Take one pin off a result."""
+        self._pins -= Counter([name])
         self._evict()
 
     def forget_mesh(self, mesh_id: str) -> None:
-        """Remove all results of a mesh that are neither held nor just being sent."""
+        """Remove the results of a mesh, except those that are pinned or in use."""
         names = {*self._sizes, *self._small}
         for name in [name for name in names if name.startswith(f"{mesh_id}/")]:
             if self._is_free(name):
                 self._remove(name)
 
-    def _take(self, name: str, written: Written) -> Result:
-        if written.has_files:
-            self._count(name, written.seal.size)
-        self._taken[name] += 1
-        return Result(name, _body(self._root, name), written)
+    def _acquire(self, result: Result) -> Result:
+        if result.has_files:
+            self._count(result.name, result.manifest.size)
+        self._in_use[result.name] += 1
+        return result
 
     def _count(self, name: str, size: int) -> None:
         self._total += size - self._sizes.pop(name, 0)
         self._sizes[name] = size
 
-    def _let_go(self, name: str) -> None:
-        self._taken[name] -= 1
-        if not self._taken[name]:
-            del self._taken[name]
+    def _decrement_use(self, name: str) -> None:
+        self._in_use[name] -= 1
+        if not self._in_use[name]:
+            del self._in_use[name]
 
     def _evict(self) -> None:
         if self._total <= self._capacity:
@@ -242,24 +255,24 @@ class ResultStore:
                 return
 
     def _is_free(self, name: str) -> bool:
-        return name not in self._taken and name not in self._held
+        return name not in self._in_use and name not in self._pins
 
-    def _keep_small(self, name: str, written: Written) -> None:
-        if written.body is None or name in self._small:
+    def _cache_small(self, result: Result) -> None:
+        if result.body is None or result.name in self._small:
             return
-        self._small[name] = written
-        self._small_total += written.seal.size
+        self._small[result.name] = result
+        self._small_total += result.manifest.size
         while self._small_total > self._memory:
-            self._forget_small(next(iter(self._small)))
+            self._drop_small(next(iter(self._small)))
 
-    def _forget_small(self, name: str) -> None:
+    def _drop_small(self, name: str) -> None:
         if name in self._small:
-            self._small_total -= self._small.pop(name).seal.size
+            self._small_total -= self._small.pop(name).manifest.size
 
     def _remove(self, name: str) -> None:
-        self._forget_small(name)
-        _seal(self._root, name).unlink(missing_ok=True)
-        _body(self._root, name).unlink(missing_ok=True)
+        self._drop_small(name)
+        _manifest_path(self._root, name).unlink(missing_ok=True)
+        _body_path(self._root, name).unlink(missing_ok=True)
         self._total -= self._sizes.pop(name, 0)
 
 
@@ -268,36 +281,38 @@ def result_name(mesh_id: str, key: str) -> str:
     return f"{mesh_id}/{key}"
 
 
-def sealed_results(root: Path) -> dict[str, tuple[Path, Path]]:
-    """Return the files of each result that is complete on disk, by name."""
-    seals = sorted(root.glob("*/*.json"))
-    names = [seal.relative_to(root).with_suffix("").as_posix() for seal in seals]
+def complete_results(root: Path) -> dict[str, tuple[Path, Path]]:
+    """Return manifest and body of each complete result on disk, by name."""
+    manifests = sorted(root.glob("*/*.json"))
+    names = [path.relative_to(root).with_suffix("").as_posix() for path in manifests]
     return {
-        name: (_seal(root, name), _body(root, name)) for name in names if _body(root, name).exists()
+        name: (_manifest_path(root, name), _body_path(root, name))
+        for name in names
+        if _body_path(root, name).exists()
     }
 
 
-def read_seal(root: Path, name: str) -> ResultManifest | None:
-    """Return the seal of the result ``name``, where it is what was written."""
-    written = _read(root, name)
-    return None if written is None else written.seal
+def read_manifest(root: Path, name: str) -> ResultManifest | None:
+    """Return the manifest of a result; None where the result is missing or damaged."""
+    result = _read(root, name)
+    return None if result is None else result.manifest
 
 
-def _body(root: Path, name: str) -> Path:
+def _body_path(root: Path, name: str) -> Path:
     return root / f"{name}.body"
 
 
-def _seal(root: Path, name: str) -> Path:
+def _manifest_path(root: Path, name: str) -> Path:
     return root / f"{name}.json"
 
 
-def _read(root: Path, name: str) -> Written | None:
-    """Return a result, if it is whole."""
+def _read(root: Path, name: str) -> Result | None:
+    """Return a result from its files; None where it is missing or damaged."""
     checksum = size = 0
     small: list[bytes] = []
     try:
-        seal = ResultManifest.model_validate_json(_seal(root, name).read_bytes())
-        with _body(root, name).open("rb") as file:
+        manifest = ResultManifest.model_validate_json(_manifest_path(root, name).read_bytes())
+        with _body_path(root, name).open("rb") as file:
             while chunk := file.read(2**20):
                 checksum = zlib.crc32(chunk, checksum)
                 size += len(chunk)
@@ -305,6 +320,6 @@ def _read(root: Path, name: str) -> Written | None:
                     small.append(chunk)
     except (FileNotFoundError, ValidationError):
         return None
-    if (size, checksum) != (seal.size, seal.crc32):
+    if (size, checksum) != (manifest.size, manifest.crc32):
         return None
-    return Written(seal, b"".join(small) if size <= _SMALL else None, has_files=True)
+    return Result(name, manifest, b"".join(small) if size <= _SMALL else None, has_files=True)

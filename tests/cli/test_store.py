@@ -168,16 +168,16 @@ def test_prune(run: Run, left: Left) -> None:
     (held,) = left.results(1)
     damage(damaged)
     for body in (outdated, held):
-        seal = ResultManifest.model_validate_json(body.with_suffix(".json").read_bytes())
-        assert seal.code
-        written = seal.model_copy(update={"code": "an older one"}).model_dump_json()
+        manifest = ResultManifest.model_validate_json(body.with_suffix(".json").read_bytes())
+        assert manifest.code
+        written = manifest.model_copy(update={"code": "an older one"}).model_dump_json()
         body.with_suffix(".json").write_text(written)
     shutil.rmtree(left.root / "meshes" / left.ids[1])
     orphan = left.root / "results" / ("0" * 32)
     orphan.mkdir()
     shutil.copy(kept, orphan)
     shutil.copy(kept.with_suffix(".json"), orphan)
-    shutil.copy(kept, kept.with_name("unsealed.body"))
+    shutil.copy(kept, kept.with_name("incomplete.body"))
     kept.with_name("tmp123").write_bytes(b"1234567")
     (left.root / "tmp" / "upload").mkdir()
     (left.root / "tmp" / "upload" / "mesh").write_bytes(b"12345")

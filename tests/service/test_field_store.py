@@ -105,7 +105,7 @@ def test_what_cannot_be_written_is_told(
     monkeypatch.setattr(np, "savez", _no_space)
     store.write(MESH, "k", ARRAYS, "code")
 
-    assert "a field is not kept on disk" in caplog.text
+    assert "a field cannot be stored" in caplog.text
     assert "No space left" in caplog.text
     assert list((store.folder / MESH).iterdir()) == []
 
@@ -147,7 +147,7 @@ def test_another_worker_finds_the_field(
         name = result_name(mesh_id, result_key(query, form))
         done = state.do(1, RunQuery(query, form, name))
         wait_until(lambda: field_files(tmp_path))
-        return state, done.answer.body
+        return state, done.result.body
 
     first, body = answer()
     second, again = answer()

@@ -90,7 +90,7 @@ def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> s
     async def keep() -> str:
         async with books.scratch_folder() as folder:
             written = store.write_aside(mesh, folder / "mesh", owner)
-            await books.keep(written)
+            await books.add(written)
             return written.mesh_id
 
     with owned(root):

@@ -1,1 +1,1 @@
-"""Checks that every request passes before it reaches a route."""
+"""Middleware: checks that every request passes before it reaches a route."""

@@ -1,4 +1,4 @@
-"""Who may come in: a request with a key where keys are set, and no more than a caller may make."""
+"""Admission: API keys, where they are set, and the rate limits of each caller."""
 
 import re
 
@@ -6,7 +6,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.access import Caller, caller_at, name_of_secret
 from app.errors import ProblemError, problem
-from app.http.middleware.rate_limits import Allowances
+from app.http.middleware.rate_limits import RateLimits
 from app.http.page import ASSETS
 from app.settings import Settings
 
@@ -16,17 +16,17 @@ _BEARER = re.compile(rb"bearer +([A-Za-z0-9._~+/-]+=*)", re.IGNORECASE)
 
 
 def is_open(path: str) -> bool:
-    """Whether ``path`` needs no key and counts for no limit; all else does, if it exists or not."""
+    """Tell whether a path needs no key and counts for no limit."""
     return path in _OPEN or path.startswith(_OPEN_FOLDERS)
 
 
 class AdmissionMiddleware:
-    """Finds out who asks (``request.state.caller``), and refuses who may not, or not so much."""
+    """Middleware that finds the caller (``request.state.caller``), and admits or refuses it."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self.app = app
         self.keys = settings.api_keys
-        self.allowances = Allowances(settings.rate_limit, settings.max_concurrent)
+        self.rate_limits = RateLimits(settings.rate_limit, settings.max_concurrent)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
@@ -34,7 +34,7 @@ class AdmissionMiddleware:
             await self.app(scope, receive, send)
             return
         scope["state"]["caller"] = caller = self._caller(scope)
-        with self.allowances.one_of(caller):
+        with self.rate_limits.counting(caller):
             await self.app(scope, receive, send)
 
     def _caller(self, scope: Scope) -> Caller:
@@ -43,7 +43,7 @@ class AdmissionMiddleware:
         given = [value for name, value in scope["headers"] if name == b"authorization"]
         if not given:
             raise _unauthorized("the request has no API key", "Bearer")
-        # uvicorn leaves blanks at the end of a header.
+        # uvicorn does not strip headers.
         credentials = _BEARER.fullmatch(given[0].strip(b" \t")) if len(given) == 1 else None
         name = name_of_secret(self.keys, credentials[1]) if credentials else None
         if name is None:

@@ -1,4 +1,4 @@
-"""A limit of time for bodies: who sends one drop by drop is not waited for for ever."""
+"""A timeout for bodies, against clients that send theirs drop by drop."""
 
 import asyncio
 
@@ -9,8 +9,8 @@ from app.errors import problem
 from app.settings import Settings, variable_of
 
 
-class BodyDeadlineMiddleware:
-    """Refuses requests whose body is not there within the time that a request may take."""
+class BodyTimeoutMiddleware:
+    """Middleware that refuses a request whose body is not complete by its deadline."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self.app = app
@@ -25,7 +25,7 @@ class BodyDeadlineMiddleware:
         async def receive_in_time() -> Message:
             nonlocal is_complete
             if is_complete:
-                return await receive()  # until the client hangs up
+                return await receive()  # waits for the client to disconnect
             try:
                 async with asyncio.timeout_at(end):
                     message = await receive()
@@ -39,7 +39,7 @@ class BodyDeadlineMiddleware:
             return message
 
         async def send_and_close(message: Message) -> None:
-            # Whoever refused it, the query's own deadline or this one: it would go on to drip.
+            # Whichever deadline refused the request: without this its body would go on arriving.
             if message["type"] == "http.response.start" and not is_complete and clock() >= end:
                 MutableHeaders(scope=message)["Connection"] = "close"
             await send(message)

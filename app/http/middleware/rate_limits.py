@@ -1,4 +1,4 @@
-"""How much each caller may ask for: requests a minute, and at the same time."""
+"""Rate limits of each caller: requests a minute, and concurrent requests."""
 
 from collections import Counter, OrderedDict
 from collections.abc import Iterator
@@ -12,29 +12,30 @@ from app.access import Caller
 from app.errors import over_limit
 
 _REMEMBERED = 10_000
-"""Callers of whom it is known how much they asked, in some 200 bytes each.
+"""Callers whose rates are remembered, in some 200 bytes each.
 
-Who was forgotten begins anew: who has ten thousand addresses has as many allowances anyway.
+A forgotten caller starts afresh: a client with ten thousand addresses has ten thousand limits
+anyway.
 """
 
 
-class Allowances:
-    """What callers have left; ``None`` stands for any amount."""
+class RateLimits:
+    """The limits of each caller; ``None`` stands for no limit."""
 
     def __init__(self, a_minute: int | None, at_once: int | None) -> None:
         self._rates = [Rate(a_minute, Duration.MINUTE)] if a_minute else []
         self._at_once = at_once
         self._running: Counter[str] = Counter()
-        # The generic cell rate algorithm knows a caller by one number. The library's own Limiter
-        # would add buckets that are never forgotten, and a thread that looks after them.
+        # The generic cell rate algorithm needs one number for each caller. The library's Limiter
+        # would add buckets that are never dropped, and a thread that looks after them.
         self._policy = GCRA()
         self._known: OrderedDict[str, tuple[float, ...]] = OrderedDict()
 
     @contextmanager
-    def one_of(self, caller: Caller) -> Iterator[None]:
-        """Count what runs inside as one request, or refuse it with ``rate_limited``."""
-        self._refuse_another(caller.name)
-        self._spend(caller.name)
+    def counting(self, caller: Caller) -> Iterator[None]:
+        """Count the block as one request, or refuse it with ``rate_limited``."""
+        self._refuse_concurrent(caller.name)
+        self._refuse_rate(caller.name)
         self._running[caller.name] += 1
         try:
             yield
@@ -43,14 +44,14 @@ class Allowances:
             if not self._running[caller.name]:
                 del self._running[caller.name]
 
-    def _refuse_another(self, name: str) -> None:
+    def _refuse_concurrent(self, name: str) -> None:
         running = self._running[name] + 1
         if self._at_once is not None and running > self._at_once:
             what, headers = "requests at the same time", {"Retry-After": "1"}
             setting = "max_concurrent"
             raise over_limit("rate_limited", what, running, self._at_once, setting, headers=headers)
 
-    def _spend(self, name: str) -> None:
+    def _refuse_rate(self, name: str) -> None:
         if not self._rates:
             return
         before = self._known.get(name) or self._policy.initial(self._rates)

@@ -1,4 +1,4 @@
-"""Around every request: its id, and the promise that each error is a problem."""
+"""Request ids, and the guarantee that each error is answered with a problem."""
 
 import logging
 import re
@@ -17,8 +17,8 @@ logger = logging.getLogger(__name__)
 _SANE_ID = re.compile(r"[\w.:-]{1,128}")
 
 
-class RequestMiddleware:
-    """Gives each request an id, and turns errors that nobody made a problem of into one."""
+class RequestIdMiddleware:
+    """Middleware that gives each request an id, and turns remaining errors into problems."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self.app = app
@@ -60,11 +60,11 @@ class RequestMiddleware:
             await answer(problem_of(error))
 
     def _framework_problem(self, status: int, headers: Headers, scope: Scope) -> Problem:
-        """Make a problem of what Starlette answers in plain text: bodies and ranges too large."""
+        """Return the problem for a plain-text error of Starlette: a body or range too large."""
         if status == 413:
             return body_too_large(scope, self.settings)
-        kept = {"Content-Range": headers["content-range"]} if "content-range" in headers else {}
-        return problem_of_status(status, "", kept)
+        retained = {"Content-Range": headers["content-range"]} if "content-range" in headers else {}
+        return problem_of_status(status, "", retained)
 
 
 def body_too_large(scope: Scope, settings: Settings) -> Problem:

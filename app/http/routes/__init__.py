@@ -1,1 +1,1 @@
-"""The addresses of the service, a module per kind of thing behind them."""
+"""Routes: a module for each kind of resource, and one for the service itself."""

@@ -1,4 +1,4 @@
-"""The service itself: index, health, limits, and the meaning of its errors."""
+"""Routes of the service itself: index, health, limits, metrics and error codes."""
 
 from typing import get_args
 
@@ -116,7 +116,7 @@ async def get_about(service: ServiceDep) -> About:
 async def get_metrics(request: Request) -> Response:
     """Return what an operator watches: requests, workers, queue, results, jobs."""
     metrics: Metrics = request.app.state.metrics
-    text, media_type = await metrics.written(request.headers.get("accept", ""))
+    text, media_type = await metrics.exposition(request.headers.get("accept", ""))
     return Response(text, headers={**UNSTORED, "Content-Type": media_type})
 
 

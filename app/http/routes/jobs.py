@@ -1,4 +1,4 @@
-"""Jobs: queries that are answered whether their client waits or not."""
+"""Routes of jobs: queries that are answered whether their client waits or not."""
 
 from collections.abc import AsyncIterator
 from typing import Annotated, Any
@@ -10,8 +10,8 @@ from app.encoding import JSON
 from app.errors import problem
 from app.http.dependencies import CallerDep, ServiceDep
 from app.http.responses import (
-    ENDS,
-    OF_FILES,
+    FILE_HEADERS,
+    QUERY_PROBLEMS,
     REVALIDATED,
     UNSTORED,
     documented,
@@ -24,17 +24,16 @@ from app.http.responses import (
 from app.jobs import Job
 from app.schemas.meshes import ListParameters
 from app.schemas.service import JobDocument, JobList
-from app.service.service import Answered
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
 
-async def get_job_asked_for(job_id: str, service: ServiceDep, caller: CallerDep) -> Job:
-    """Return the job that the address names."""
+async def get_job_of_path(job_id: str, service: ServiceDep, caller: CallerDep) -> Job:
+    """Return the job that the path names."""
     return await service.jobs.find(caller.owner, job_id)
 
 
-JobDep = Annotated[Job, Depends(get_job_asked_for)]
+JobDep = Annotated[Job, Depends(get_job_of_path)]
 
 
 @router.get(
@@ -104,15 +103,19 @@ async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> di
         200: {
             "description": "What the query itself would have been answered with",
             "content": {JSON: {"schema": {}}},
-            "headers": documented("Server-Timing", *OF_FILES),
+            "headers": documented("Server-Timing", *FILE_HEADERS),
         },
         206: {
             "description": "The range asked for",
-            "headers": documented("Server-Timing", "Content-Range", *OF_FILES),
+            "headers": documented("Server-Timing", "Content-Range", *FILE_HEADERS),
         },
         304: {"description": "The answer is the one that is known", "headers": documented("ETag")},
         **problems(
-            "job_not_found", "job_not_finished", "job_dismissed", *ENDS, "range_not_satisfiable"
+            "job_not_found",
+            "job_not_finished",
+            "job_dismissed",
+            *QUERY_PROBLEMS,
+            "range_not_satisfiable",
         ),
     },
 )
@@ -123,10 +126,10 @@ async def get_job_results(
     job, result = await service.jobs.result(caller.owner, job_id)
     unchanged = not_modified(request, etag_of(result.key), REVALIDATED)
     if unchanged is not None:
-        service.results.give_back(result)
+        service.results.release(result)
         return unchanged
-    answered = Answered(result, {})
-    return result_response(request, answered, job.errand.media_type, service.results, REVALIDATED)
+    media_type = job.spec.media_type
+    return result_response(request, result, {}, media_type, service.results, REVALIDATED)
 
 
 @router.get(
@@ -156,7 +159,7 @@ async def watch_job(
 
 
 def _version(event_id: str | None) -> int:
-    # What is no id of ours stands for having seen nothing, as the specification has it.
+    # Any other id means that nothing was seen, as the specification says.
     return int(event_id) if event_id is not None and event_id.isdecimal() else 0
 
 

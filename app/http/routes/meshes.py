@@ -1,4 +1,4 @@
-"""Meshes: upload, list, describe, read arrays, delete."""
+"""Routes of meshes: upload, list, describe, read arrays, delete."""
 
 from collections.abc import Mapping
 from typing import Annotated
@@ -9,22 +9,23 @@ from app.access import Caller
 from app.encoding import NPY
 from app.engine.work import MeshFromFile, MeshFromSample
 from app.errors import Fault, over_limit, problem
-from app.http.dependencies import AskerDep, CallerDep, ServiceDep, while_connected
+from app.http.dependencies import CallerDep, ContextDep, ServiceDep, while_connected
 from app.http.responses import (
+    FILE_HEADERS,
     IMMUTABLE,
-    OF_FILES,
-    OF_WORK,
     REVALIDATED,
+    WORK_PROBLEMS,
     StoredFileResponse,
     documented,
     etag_of,
+    mesh_document,
     not_modified,
     problems,
     server_timing,
 )
 from app.http.uploads import spool
 from app.schemas.meshes import ListParameters, MeshDocument, MeshList, UploadParameters
-from app.service.service import Added, RequestContext, Service
+from app.service.service import RequestContext, Service, StoredMesh
 
 router = APIRouter(prefix="/meshes", tags=["meshes"])
 
@@ -93,7 +94,7 @@ _BODIES = {
             "upload_too_large",
             "unsupported_media_type",
             "invalid_mesh",
-            *OF_WORK,
+            *WORK_PROBLEMS,
         ),
     },
     openapi_extra=_BODIES,
@@ -103,7 +104,7 @@ async def create_mesh(
     request: Request,
     response: Response,
     service: ServiceDep,
-    asker: AskerDep,
+    context: ContextDep,
 ) -> Mapping[str, object]:
     """Read, check and store a mesh; the id is a hash of its content.
 
@@ -112,14 +113,14 @@ async def create_mesh(
     triangles in their place, and `face_map` leads back to them.
     """
     if parameters.sample is None:
-        added = await _add_upload(service, parameters, request, asker)
+        stored = await _add_upload(service, parameters, request, context)
     else:
-        making = service.add_mesh(_sample(service, parameters, asker.caller), asker)
-        added = await while_connected(request, making)
-    response.status_code = 201 if added.is_new else 200
-    response.headers.update(server_timing(added.seconds))
-    response.headers["Location"] = f"/v1/meshes/{added.mesh['id']}"
-    return added.mesh
+        making = service.add_mesh(_sample(service, parameters, context.caller), context)
+        stored = await while_connected(request, making)
+    response.status_code = 201 if stored.is_new else 200
+    response.headers.update(server_timing(stored.seconds))
+    response.headers["Location"] = f"/v1/meshes/{stored.manifest['id']}"
+    return mesh_document(stored.manifest)
 
 
 @router.get(
@@ -133,8 +134,8 @@ async def list_meshes(
     parameters: Annotated[ListParameters, Query()], service: ServiceDep
 ) -> dict[str, object]:
     """List the reports of the meshes by id, `limit` at a time."""
-    meshes, cursor = await service.list_meshes(parameters.limit, parameters.cursor or "")
-    return {"meshes": meshes, "next_cursor": cursor}
+    manifests, cursor = await service.list_meshes(parameters.limit, parameters.cursor or "")
+    return {"meshes": [mesh_document(each) for each in manifests], "next_cursor": cursor}
 
 
 @router.get(
@@ -152,10 +153,10 @@ async def get_mesh(
     mesh_id: str, request: Request, response: Response, service: ServiceDep
 ) -> Response | dict[str, object]:
     """Return the report that the upload was answered with."""
-    described = service.describe(mesh_id)
-    kept = {**REVALIDATED, "ETag": etag_of(mesh_id)}
-    response.headers.update(kept)
-    return not_modified(request, etag_of(mesh_id), kept) or described
+    manifest = service.manifest(mesh_id)
+    headers = {**REVALIDATED, "ETag": etag_of(mesh_id)}
+    response.headers.update(headers)
+    return not_modified(request, etag_of(mesh_id), headers) or mesh_document(manifest)
 
 
 @router.delete(
@@ -182,12 +183,12 @@ async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> N
         200: {
             "content": {NPY: _BINARY},
             "description": "The array in numpy's own format",
-            "headers": documented(*OF_FILES),
+            "headers": documented(*FILE_HEADERS),
         },
         206: {
             "content": {NPY: _BINARY},
             "description": "The range asked for",
-            "headers": documented("Content-Range", *OF_FILES),
+            "headers": documented("Content-Range", *FILE_HEADERS),
         },
         304: {"description": "The array is the one that is known", "headers": documented("ETag")},
         **problems("mesh_not_found", "not_found", "range_not_satisfiable"),
@@ -205,16 +206,19 @@ async def get_mesh_array(
 
 
 async def _add_upload(
-    service: Service, parameters: UploadParameters, request: Request, asker: RequestContext
-) -> Added:
+    service: Service, parameters: UploadParameters, request: Request, context: RequestContext
+) -> StoredMesh:
     if parameters.faces is not None:
         fault = Fault("/query/faces", "only a sample can be asked for with so many faces")
         raise problem("invalid_request", fault.message, errors=(fault,))
-    async with service.mesh_books.scratch_folder() as folder, service.within(asker.deadline_s):
+    async with (
+        service.mesh_catalog.scratch_folder() as folder,
+        service.time_limit(context.deadline_s),
+    ):
         path = folder / "upload"
         file_format = await spool(request, path, parameters.format)
-        origin = MeshFromFile(path, file_format, parameters.merge, asker.caller.owner)
-        return await while_connected(request, service.add_mesh(origin, asker))
+        mesh_input = MeshFromFile(path, file_format, parameters.merge, context.caller.owner)
+        return await while_connected(request, service.add_mesh(mesh_input, context))
 
 
 def _sample(service: Service, parameters: UploadParameters, caller: Caller) -> MeshFromSample:

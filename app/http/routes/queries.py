@@ -1,4 +1,4 @@
-"""Queries on a mesh: one handler for each kind."""
+"""Routes of queries: one handler for each kind."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any
@@ -7,8 +7,8 @@ from fastapi import APIRouter, Query, Response
 
 from app.encoding import CSV, GEOJSON, JSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
 from app.encoding.representation import ARRAYS, TEXTS
-from app.http.responses import ENDS, OF_FILES, documented, problems
-from app.http.routes.query_request import AskedDep
+from app.http.responses import FILE_HEADERS, QUERY_PROBLEMS, documented, problems
+from app.http.routes.query_request import QueryRequestDep
 from app.http.routes.query_route import QueryRoute
 from app.queries import (
     DistancesQuery,
@@ -47,15 +47,15 @@ from app.schemas.service import JobDocument
 
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"], route_class=QueryRoute)
 
-_CODES = ("not_acceptable", *ENDS, "range_not_satisfiable")
+_CODES = ("not_acceptable", *QUERY_PROBLEMS, "range_not_satisfiable")
 _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
 
 
 def _answers(model: type, description: str, *others: str) -> dict[int | str, dict[str, Any]]:
-    """Describe an answer in JSON, and in ``others``, which have no room for all of it."""
+    """Return an answer for OpenAPI: in JSON, and in ``others``, which hold only a part of it."""
     description += ". In formats other than JSON the rest comes as `Geodesic-…` headers"
     content = {name: {"schema": _TEXT if name in TEXTS else _BINARY} for name in others}
-    described = documented("Vary", "Server-Timing", *OF_FILES)
+    described = documented("Vary", "Server-Timing", *FILE_HEADERS)
     accepted = documented("Location", "Preference-Applied", "Cache-Control")
     if any(name in ARRAYS for name in others):
         described |= documented("Geodesic-Dtype", "Geodesic-Shape")
@@ -74,7 +74,7 @@ def _answers(model: type, description: str, *others: str) -> dict[int | str, dic
         206: {
             "content": {name: {"schema": _BINARY} for name in (JSON, *others)},
             "description": "The range asked for",
-            "headers": documented("Vary", "Server-Timing", "Content-Range", *OF_FILES),
+            "headers": documented("Vary", "Server-Timing", "Content-Range", *FILE_HEADERS),
         },
     }
 
@@ -86,7 +86,7 @@ _PATH = "The path; its points in binary"
 
 
 def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[str, Any]:
-    """Return what is said of a query whose points come as JSON."""
+    """Return the description of a query whose points come as JSON."""
     return {
         "operation_id": name,
         "summary": summary,
@@ -114,10 +114,10 @@ Parameters = Annotated[AnswerParameters, Query()]
     ),
 )
 async def compute_distances(
-    body: DistancesRequest, parameters: Parameters, asked: AskedDep
+    body: DistancesRequest, parameters: Parameters, query_request: QueryRequestDep
 ) -> Response:
     """Return the distance along the surface from the nearest source to each vertex."""
-    return await asked.answer(DistancesQuery, body, parameters)
+    return await query_request.answer(DistancesQuery, body, parameters)
 
 
 @router.post(
@@ -131,11 +131,13 @@ async def compute_distances(
 async def compute_path(
     body: PathRequest,
     parameters: Annotated[PathAnswerParameters, Query()],
-    asked: AskedDep,
+    query_request: QueryRequestDep,
 ) -> Response:
     """Return the points of the path, from source to target, and the faces it crosses."""
     explain = body.explain or parameters.explain
-    return await asked.answer(PathQuery, body.model_copy(update={"explain": explain}), parameters)
+    return await query_request.answer(
+        PathQuery, body.model_copy(update={"explain": explain}), parameters
+    )
 
 
 @router.get(
@@ -152,10 +154,12 @@ async def compute_path(
         **problems(*_CODES),
     },
 )
-async def get_path(parameters: Annotated[PathParameters, Query()], asked: AskedDep) -> Response:
+async def get_path(
+    parameters: Annotated[PathParameters, Query()], query_request: QueryRequestDep
+) -> Response:
     """Return the same as `POST`, for points written as `v12` or `f7:0.2,0.3,0.5`."""
     with naming_parameters():
-        return await asked.answer(PathQuery, written_request(parameters), parameters)
+        return await query_request.answer(PathQuery, written_request(parameters), parameters)
 
 
 @router.post(
@@ -166,9 +170,11 @@ async def get_path(parameters: Annotated[PathParameters, Query()], asked: AskedD
         _answers(PathsAnswer, "The paths, in the order of the targets", *_LINES),
     ),
 )
-async def compute_paths(body: PathsRequest, parameters: Parameters, asked: AskedDep) -> Response:
+async def compute_paths(
+    body: PathsRequest, parameters: Parameters, query_request: QueryRequestDep
+) -> Response:
     """Return a path to each target, or the reason why there is none."""
-    return await asked.answer(PathsQuery, body, parameters)
+    return await query_request.answer(PathsQuery, body, parameters)
 
 
 @router.post(
@@ -180,10 +186,10 @@ async def compute_paths(body: PathsRequest, parameters: Parameters, asked: Asked
     ),
 )
 async def compute_isolines(
-    body: IsolinesRequest, parameters: Parameters, asked: AskedDep
+    body: IsolinesRequest, parameters: Parameters, query_request: QueryRequestDep
 ) -> Response:
     """Return the polylines of points at each level, exact where they cross edges."""
-    return await asked.answer(IsolinesQuery, body, parameters)
+    return await query_request.answer(IsolinesQuery, body, parameters)
 
 
 @router.post(
@@ -201,12 +207,14 @@ async def compute_isolines(
         ),
     ),
 )
-async def compute_matrix(body: MatrixRequest, parameters: Parameters, asked: AskedDep) -> Response:
+async def compute_matrix(
+    body: MatrixRequest, parameters: Parameters, query_request: QueryRequestDep
+) -> Response:
     """Return a distance for each source and target, or for each pair.
 
     In binary, a dense matrix and pairs come as npy and octets, a sparse matrix as npz.
     """
-    return await asked.answer(MatrixQuery, body, parameters)
+    return await query_request.answer(MatrixQuery, body, parameters)
 
 
 @router.post(
@@ -217,9 +225,11 @@ async def compute_matrix(body: MatrixRequest, parameters: Parameters, asked: Ask
         _answers(NearestAnswer, "The candidates, nearest first", CSV, GEOJSON),
     ),
 )
-async def find_nearest(body: NearestRequest, parameters: Parameters, asked: AskedDep) -> Response:
+async def find_nearest(
+    body: NearestRequest, parameters: Parameters, query_request: QueryRequestDep
+) -> Response:
     """Return the `k` nearest candidates, or as many as can be reached."""
-    return await asked.answer(NearestQuery, body, parameters)
+    return await query_request.answer(NearestQuery, body, parameters)
 
 
 @router.post(
@@ -230,9 +240,11 @@ async def find_nearest(body: NearestRequest, parameters: Parameters, asked: Aske
         _answers(LocateAnswer, "The points, in the order of the positions", CSV, GEOJSON),
     ),
 )
-async def locate_points(body: LocateRequest, parameters: Parameters, asked: AskedDep) -> Response:
+async def locate_points(
+    body: LocateRequest, parameters: Parameters, query_request: QueryRequestDep
+) -> Response:
     """Return the nearest point for each position, `null` where it is farther than `max_distance`.
 
     A point that is nearer to a vertex or an edge than 1e-12 of the bounding box is on it.
     """
-    return await asked.answer(LocateQuery, body, parameters)
+    return await query_request.answer(LocateQuery, body, parameters)

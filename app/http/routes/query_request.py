@@ -16,8 +16,8 @@ from pydantic import Field
 from app.errors import problem
 from app.http.dependencies import (
     TimeoutHeader,
-    asker_of,
-    form_of,
+    context_of,
+    negotiated,
     prefers_async,
     service_of,
     while_connected,
@@ -68,47 +68,53 @@ def parse_json(body: bytes) -> Any:
 
 @dataclass(frozen=True)
 class QueryRequest:
-    """Of what a query is asked, by whom, and how it is to be answered."""
+    """A request for a query: the mesh, the caller and the preferences, all but the query itself."""
 
     mesh_id: str
     request: Request
-    asker: RequestContext
+    context: RequestContext
     is_async: bool
-    key: str | None
+    idempotency_key: str | None
 
     async def answer(
         self, kind: type[Query[Any]], body: Any, parameters: AnswerParameters
     ) -> Response:
-        """Answer the query of a kind that a body asks, or tell what that would take."""
-        request, asker = self.request, self.asker
+        """Validate the query in ``body``, and respond with its answer, an estimate or a job."""
+        request, context = self.request, self.context
         service = service_of(request)
         size = service.size(self.mesh_id)
 
-        def ask() -> Query[Any]:
+        def make_query() -> Query[Any]:
             query = kind.ask(self.mesh_id, size, body, service.settings)
-            query.written  # noqa: B018 - kept by it
+            query.written  # noqa: B018 - computes and caches it
             return query
 
-        query = await offload_if_large(request, ask)
-        form = form_of(request, parameters, query.offers)
+        query = await offload_if_large(request, make_query)
+        representation = negotiated(request, parameters, query.offers)
+        media_type = representation.media_type
         if parameters.estimate:
-            estimating = service.estimate(query, size, form, asker)
+            estimating = service.estimate(query, size, representation, context)
             estimate, seconds = await while_connected(request, estimating)
-            return estimate_response(self.mesh_id, estimate, form.media_type, seconds)
+            return estimate_response(self.mesh_id, estimate, media_type, seconds)
         if self.is_async:
-            return accepted_response(await service.submit(query, size, form, asker, self.key))
+            key = self.idempotency_key
+            return accepted_response(
+                await service.submit(query, size, representation, context, key)
+            )
         is_cacheable = request.method == "GET" and query.is_repeatable
         headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
         if is_cacheable:
-            unchanged = not_modified(request, etag_of(result_key(query, form)), headers)
+            etag = etag_of(result_key(query, representation))
+            unchanged = not_modified(request, etag, headers)
             if unchanged is not None:
                 return unchanged
-        answering = service.answer(query, size, form, asker, as_file="range" in request.headers)
-        answered = await while_connected(request, answering)
-        return result_response(request, answered, form.media_type, service.results, headers)
+        as_file = "range" in request.headers
+        answering = service.answer(query, size, representation, context, as_file=as_file)
+        result, seconds = await while_connected(request, answering)
+        return result_response(request, result, seconds, media_type, service.results, headers)
 
 
-class AskingHeaders(TimeoutHeader):
+class QueryHeaders(TimeoutHeader):
     """The headers of a request for a query."""
 
     prefer: str | None = Field(
@@ -123,14 +129,12 @@ class AskingHeaders(TimeoutHeader):
     )
 
 
-async def get_asked(
-    mesh_id: str, request: Request, headers: Annotated[AskingHeaders, Header()]
+async def get_query_request(
+    mesh_id: str, request: Request, headers: Annotated[QueryHeaders, Header()]
 ) -> QueryRequest:
-    """Return what a request for a query says beside the query."""
-    is_async = prefers_async(headers.prefer)
-    return QueryRequest(
-        mesh_id, request, asker_of(request, headers), is_async, headers.idempotency_key
-    )
+    """Return the request for a query, as a dependency."""
+    context, is_async = context_of(request, headers), prefers_async(headers.prefer)
+    return QueryRequest(mesh_id, request, context, is_async, headers.idempotency_key)
 
 
-AskedDep = Annotated[QueryRequest, Depends(get_asked)]
+QueryRequestDep = Annotated[QueryRequest, Depends(get_query_request)]

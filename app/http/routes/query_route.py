@@ -1,7 +1,7 @@
-"""The routes of queries: FastAPI describes them, and pydantic reads what they are asked.
+"""The route class of queries: FastAPI documents them, and one pydantic model reads a request.
 
-FastAPI finds out anew for each request what kinds its parameters are, which took a fifth of all
-that a small one costs the service. So all that a query is asked is one model, made once.
+FastAPI works out the kinds of parameters anew for each request, which took a fifth of the time of a
+small one. So each route has one model for headers, parameters and body, made once.
 """
 
 from collections.abc import Callable, Coroutine
@@ -15,24 +15,24 @@ from pydantic import BaseModel, ValidationError, create_model
 
 from app.http.dependencies import require_json
 from app.http.routes.query_request import (
-    AskingHeaders,
-    get_asked,
+    QueryHeaders,
+    get_query_request,
     offload_if_large,
     parse_json,
 )
 
 
 class QueryRoute(APIRoute):
-    """A route whose handler takes ``asked``, ``parameters`` and, but for a ``GET``, a ``body``.
+    """A route whose handler takes ``query_request``, ``parameters`` and, unless ``GET``, ``body``.
 
     The latter two are models.
     """
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:
-        """Return what reads a request, and has the handler answer it."""
+        """Return the function that reads a request and calls the handler."""
         takes_body = self.body_field is not None
         parameters: Any = self.dependant.query_params[0].field_info.annotation
-        parts: dict[str, Any] = {"header": (AskingHeaders, ...), "query": (parameters, ...)}
+        parts: dict[str, Any] = {"header": (QueryHeaders, ...), "query": (parameters, ...)}
         if self.body_field is not None:
             parts["body"] = (self.body_field.field_info.annotation, ...)
         model = create_model("Request", **parts)
@@ -41,37 +41,40 @@ class QueryRoute(APIRoute):
         async def answer(request: Request) -> Response:
             if takes_body:
                 require_json(request)
-            written = {"header": _headers(request), "query": _parameters(request, lists)}
+            head = {"header": _headers(request), "query": _parameters(request, lists)}
             body = await request.body() if takes_body else b""
-            whole = await offload_if_large(request, partial(read, model, written, body))
-            asked = await get_asked(request.path_params["mesh_id"], request, whole.header)
-            given = {"body": whole.body} if takes_body else {}
-            response: Response = await self.endpoint(asked=asked, parameters=whole.query, **given)
+            whole = await offload_if_large(request, partial(read, model, head, body))
+            mesh_id = request.path_params["mesh_id"]
+            response: Response = await self.endpoint(
+                query_request=await get_query_request(mesh_id, request, whole.header),
+                parameters=whole.query,
+                **({"body": whole.body} if takes_body else {}),
+            )
             return response
 
         return answer
 
 
-def read(model: type[BaseModel], written: dict[str, Any], body: bytes) -> Any:
-    """Return the model of what is ``written`` in a request and of its ``body``, which is JSON.
+def read(model: type[BaseModel], head: dict[str, Any], body: bytes) -> Any:
+    """Return the model of a request, from the values of its head and its JSON body.
 
     Raises
     ------
     ProblemError
         The body is not JSON.
     RequestValidationError
-        Something is not as the model has it.
+        A value does not fit the model.
     """
     if body:
-        written = {**written, "body": parse_json(body)}
+        head = {**head, "body": parse_json(body)}
     try:
-        return model.model_validate(written)
+        return model.model_validate(head)
     except ValidationError as error:
         raise RequestValidationError(error.errors(include_url=False)) from None
 
 
 def _headers(request: Request) -> dict[str, str]:
-    """Return the headers; one that is given again is the same as a list with commas (RFC 9110)."""
+    """Return the headers; repeated ones are joined by commas (RFC 9110)."""
     values: dict[str, str] = {}
     for name, value in request.headers.items():
         values[name] = f"{values[name]}, {value}" if name in values else value
@@ -79,9 +82,9 @@ def _headers(request: Request) -> dict[str, str]:
 
 
 def _parameters(request: Request, lists: frozenset[str]) -> dict[str, str | list[str]]:
-    """Return the query string's parameters; of one that is given again the last, or ``lists``."""
-    given = request.query_params
-    return {name: given.getlist(name) if name in lists else given[name] for name in given}
+    """Return the query parameters; of repeated ones the last, but all values of ``lists``."""
+    query = request.query_params
+    return {name: query.getlist(name) if name in lists else query[name] for name in query}
 
 
 def _lists_of(model: type[BaseModel]) -> frozenset[str]:

@@ -7,7 +7,7 @@ import pytest
 from app.access import Caller, caller_at
 from app.errors import Problem, ProblemError
 from app.http.middleware import rate_limits
-from app.http.middleware.rate_limits import Allowances
+from app.http.middleware.rate_limits import RateLimits
 
 
 class Clock:
@@ -30,16 +30,16 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 ALICE, BOB = Caller("alice", has_key=True), Caller("bob", has_key=True)
 
 
-def refusal_of(given: Allowances, caller: Caller) -> Problem | None:
+def refusal_of(given: RateLimits, caller: Caller) -> Problem | None:
     try:
-        with given.one_of(caller):
+        with given.counting(caller):
             return None
     except ProblemError as error:
         return error.problem
 
 
 def test_as_many_as_the_rate_at_once_then_one_by_one(clock: Clock) -> None:
-    given = Allowances(a_minute=3, at_once=None)
+    given = RateLimits(a_minute=3, at_once=None)
 
     assert [refusal_of(given, ALICE) for _ in range(3)] == [None] * 3
     refused: Any = refusal_of(given, ALICE)
@@ -59,7 +59,7 @@ def test_as_many_as_the_rate_at_once_then_one_by_one(clock: Clock) -> None:
 
 @pytest.mark.parametrize("a_minute", [1, 7, 60, 1000, 100_000])
 def test_over_a_while_the_rate_is_kept(clock: Clock, a_minute: int) -> None:
-    given = Allowances(a_minute, at_once=None)
+    given = RateLimits(a_minute, at_once=None)
     asked = 2 * a_minute + 10
     let_in = 0
     for _ in range(asked):
@@ -70,10 +70,10 @@ def test_over_a_while_the_rate_is_kept(clock: Clock, a_minute: int) -> None:
 
 
 def test_requests_at_the_same_time() -> None:
-    given = Allowances(a_minute=None, at_once=2)
+    given = RateLimits(a_minute=None, at_once=2)
 
-    with given.one_of(ALICE):
-        with given.one_of(ALICE):
+    with given.counting(ALICE):
+        with given.counting(ALICE):
             refused: Any = refusal_of(given, ALICE)
             assert (refused.code, refused.limit, refused.actual) == ("rate_limited", 2, 3)
             assert refused.setting == "GEODESIC_MAX_CONCURRENT"
@@ -84,24 +84,24 @@ def test_requests_at_the_same_time() -> None:
 
 
 def test_what_fails_has_ended_too() -> None:
-    given = Allowances(a_minute=None, at_once=1)
+    given = RateLimits(a_minute=None, at_once=1)
 
-    with pytest.raises(KeyError), given.one_of(ALICE):
+    with pytest.raises(KeyError), given.counting(ALICE):
         raise KeyError
 
     assert refusal_of(given, ALICE) is None
 
 
 def test_a_request_too_many_at_once_costs_no_rate() -> None:
-    given = Allowances(a_minute=2, at_once=1)
+    given = RateLimits(a_minute=2, at_once=1)
 
-    with given.one_of(ALICE):
+    with given.counting(ALICE):
         assert refusal_of(given, ALICE).setting == "GEODESIC_MAX_CONCURRENT"  # type: ignore[union-attr]
     assert refusal_of(given, ALICE) is None
 
 
 def test_without_limits_nothing_is_kept() -> None:
-    given = Allowances(None, None)
+    given = RateLimits(None, None)
 
     assert all(refusal_of(given, ALICE) is None for _ in range(1000))
     assert not given._known
@@ -109,7 +109,7 @@ def test_without_limits_nothing_is_kept() -> None:
 
 def test_a_hundred_thousand_addresses_take_bounded_memory_and_no_thread() -> None:
     threads = threading.active_count()
-    given = Allowances(a_minute=1, at_once=1)
+    given = RateLimits(a_minute=1, at_once=1)
     tracemalloc.start()
     for n in range(100_000):
         refusal_of(given, Caller(f"10.{n >> 16}.{n >> 8 & 255}.{n & 255}", has_key=False))

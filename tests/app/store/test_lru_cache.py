@@ -24,7 +24,7 @@ def test_the_least_recently_used_go_first() -> None:
     for key in "abac":
         values.find(key, lambda: Value(4))
 
-    assert list(values.surplus()) == ["b"]
+    assert values.evict() == ["b"]
     assert list(values) == ["a", "c"]
     assert values.nbytes == 8
 
@@ -46,7 +46,7 @@ def test_what_has_grown_since_is_measured_anew() -> None:
     values.find("c", lambda: Value(1))
 
     assert values.nbytes == 22
-    assert list(values.surplus()) == ["a", "b"]
+    assert values.evict() == ["a", "b"]
     assert values.nbytes == 1
 
 
@@ -55,8 +55,8 @@ def test_the_last_may_stay_though_it_is_too_large() -> None:
     for key in "ab":
         values.find(key, lambda: Value(20))
 
-    assert list(values.surplus(least=1)) == ["a"]
-    assert list(values.surplus()) == ["b"]
+    assert values.evict(spare=1) == ["a"]
+    assert values.evict() == ["b"]
     assert (list(values), values.nbytes) == ([], 0)
 
 

@@ -23,11 +23,11 @@ import pytest
 import geodesic_core as gc
 from app.engine.work import RunQuery, Task
 from app.errors import ProblemError
-from app.jobs import require_whole
+from app.jobs import require_intact
 from app.settings import MIB
 from app.store import mesh_catalog, meshes
 from app.store.layout import LAYOUT, StoreError, owned
-from app.store.mesh_catalog import Kept, MeshCatalog
+from app.store.mesh_catalog import CatalogChange, MeshCatalog
 from app.store.meshes import MeshStore
 from tests.service.test_process import Server
 from tests.support.paths import ROOT
@@ -146,17 +146,17 @@ def test_an_older_store_is_refused(tmp_path: Path) -> None:
 
 def test_a_damaged_job_book_is_refused(tmp_path: Path) -> None:
     book = tmp_path / "jobs.sqlite3"
-    require_whole(book)
+    require_intact(book)
     with sqlite3.connect(book) as database:
         database.execute("CREATE TABLE jobs (record TEXT)")
         database.executemany("INSERT INTO jobs VALUES (?)", [("x" * 1000,)] * 100)
     database.close()
-    require_whole(book)
+    require_intact(book)
     content = book.read_bytes()
     for damaged in (b"no database" * 100, content[:20000] + bytes(9000) + content[29000:]):
         book.write_bytes(damaged)
         with pytest.raises(StoreError, match=r"jobs.sqlite3 is damaged .*: move it away"):
-            require_whole(book)
+            require_intact(book)
 
 
 # Its bound
@@ -167,19 +167,19 @@ Store = tuple[MeshStore, MeshCatalog]
 @contextmanager
 def opened(root: Path, capacity: int = 2**60, *, evicts: bool = False) -> Iterator[Store]:
     store = MeshStore(root)
-    books = MeshCatalog(root, store, capacity, evicts=evicts)
+    catalog = MeshCatalog(root, store, capacity, evicts=evicts)
     with owned(root):
-        books.prepare()
-        yield store, books
+        catalog.prepare()
+        yield store, catalog
 
 
-def add(opened: Store, mesh: gc.TriangleMesh) -> tuple[str, Kept]:
-    store, books = opened
+def add(opened: Store, mesh: gc.TriangleMesh) -> tuple[str, CatalogChange]:
+    store, catalog = opened
 
-    async def run() -> tuple[str, Kept]:
-        async with books.scratch_folder() as folder:
+    async def run() -> tuple[str, CatalogChange]:
+        async with catalog.scratch_folder() as folder:
             written = store.write_aside(mesh, folder / "mesh", None)
-            return written.mesh_id, await books.keep(written)
+            return written.mesh_id, await catalog.add(written)
 
     return anyio.run(run)
 
@@ -203,7 +203,7 @@ def test_what_finds_no_room_is_refused_and_leaves_nothing(tmp_path: Path) -> Non
         assert (problem.limit, problem.actual) == (first + second - 1, first + second)
         assert problem.setting == "GEODESIC_STORE_BYTES"
         assert files_in(tmp_path / "store") == before
-        assert add(store, plane(50)) == (mesh_id, Kept(is_new=False)), "it takes no room"
+        assert add(store, plane(50)) == (mesh_id, CatalogChange(is_new=False)), "it takes no room"
         anyio.run(store[1].delete, mesh_id)
         assert add(store, plane(200))[1].is_new
 
@@ -242,11 +242,11 @@ def test_what_is_held_does_not_go(tmp_path: Path) -> None:
     with opened(tmp_path / "store", first + second, evicts=True) as store:
         held, _ = add(store, plane(50))
         other, _ = add(store, plane(72))
-        with store[1].held(held):
+        with store[1].pinned(held):
             with pytest.raises(ProblemError):
                 add(store, plane(98))
             assert set(store[0].sizes()) == {held, other}, "nothing goes in vain"
-            with store[1].held(held):
+            with store[1].pinned(held):
                 pass
             assert add(store, plane(32))[1].evicted == [other]
         assert third < first + second
@@ -264,17 +264,17 @@ def test_nothing_goes_for_what_would_never_fit(tmp_path: Path) -> None:
 
 def test_two_that_write_one_mesh(tmp_path: Path) -> None:
     with opened(tmp_path) as store:
-        meshes, books = store
+        meshes, catalog = store
 
         async def run() -> list[bool]:
-            async with books.scratch_folder() as folder:
+            async with catalog.scratch_folder() as folder:
                 both = [meshes.write_aside(plane(), folder / name, None) for name in "ab"]
-                kept = await asyncio.gather(*map(books.keep, both))
+                kept = await asyncio.gather(*map(catalog.add, both))
                 return [each.is_new for each in kept]
 
         assert sorted(anyio.run(run)) == [False, True]
         assert len(meshes.sizes()) == 1
-        assert books.total == sum(meshes.sizes().values())
+        assert catalog.total == sum(meshes.sizes().values())
         assert files_in(tmp_path / "tmp") == set()
 
 
@@ -282,20 +282,20 @@ def test_uploads_at_the_same_time_do_not_exceed_the_bound(tmp_path: Path) -> Non
     kinds = (50, 72, 98, 128)
     room = sum(sizes(tmp_path, *kinds)[:2])
     with opened(tmp_path / "store", room) as store:
-        meshes, books = store
+        meshes, catalog = store
 
         async def run() -> list[Any]:
-            async with books.scratch_folder() as folder:
+            async with catalog.scratch_folder() as folder:
                 written = [
                     meshes.write_aside(plane(faces), folder / str(faces), None) for faces in kinds
                 ]
-                return await asyncio.gather(*map(books.keep, written), return_exceptions=True)
+                return await asyncio.gather(*map(catalog.add, written), return_exceptions=True)
 
         kept = anyio.run(run)
         refused = [each for each in kept if isinstance(each, ProblemError)]
         assert len(refused) >= 2
         assert len(meshes.sizes()) == len(kinds) - len(refused) >= 1
-        assert books.total == sum(meshes.sizes().values()) <= room
+        assert catalog.total == sum(meshes.sizes().values()) <= room
         assert files_in(tmp_path / "store" / "tmp") == set()
 
 
@@ -328,7 +328,7 @@ def test_over_http(tmp_path: Path) -> None:
         check_problem(client.get(f"/v1/meshes/{first}"), 404, "mesh_not_found")
         assert client.get(f"{job}/results").status_code == 200, "a job keeps its answer"
         assert len(list((store / "results" / first).glob("*.body"))) == 1
-        total = client.app.state.service.mesh_books.total
+        total = client.app.state.service.mesh_catalog.total
         assert total == sum(MeshStore(store).sizes().values()) <= room
 
 
@@ -349,7 +349,7 @@ def test_a_mesh_stays_while_a_query_waits(tmp_path: Path, monkeypatch: pytest.Mo
 
         monkeypatch.setattr(service.engine, "run", run_later)
         waiting = threads.submit(distances, client, asked)
-        wait_until(lambda: asked in service.mesh_books._held)
+        wait_until(lambda: asked in service.mesh_catalog._pins)
         client.get(f"/v1/meshes/{other}")
         third = upload_sample(client, "plane", 32)
         stored = {mesh["id"] for mesh in client.get("/v1/meshes").json()["meshes"]}
@@ -357,7 +357,7 @@ def test_a_mesh_stays_while_a_query_waits(tmp_path: Path, monkeypatch: pytest.Mo
 
         assert stored == {asked, third}
         assert waiting.result().status_code == 200
-        assert not service.mesh_books._held
+        assert not service.mesh_catalog._pins
 
 
 # Crashes
@@ -407,7 +407,7 @@ def test_a_crash_at_any_step_leaves_a_mesh_whole_or_not_there(tmp_path: Path) ->
             count_down(patch, step, Crash())
             try:
                 written = store[0].write_aside(plane(), folder / "mesh", None)
-                anyio.run(store[1].keep, written)
+                anyio.run(store[1].add, written)
             except Crash:
                 has_crashed = True
             else:

@@ -139,13 +139,13 @@ def write(root: Path, name: str, size: int = 40, *, is_cheap: bool = False):
 
 
 def put(results: ResultStore, root: Path, name: str, size: int = 40, **how: bool) -> None:
-    results.give_back(results.take_new(name, write(root, name, size, **how)))
+    results.release(results.add(write(root, name, size, **how)))
 
 
 def find(results: ResultStore, name: str):
     found = anyio.run(results.find, name)
     if found is not None:
-        results.give_back(found)
+        results.release(found)
     return found
 
 
@@ -155,8 +155,8 @@ def test_a_result_comes_back(results: ResultStore, tmp_path: Path) -> None:
     found = find(results, "m/a")
 
     assert found is not None
-    assert found.path.read_bytes() == b"x" * 40
-    assert found.written.seal.headers == {"A": "b"}
+    assert results.body_path(found).read_bytes() == b"x" * 40
+    assert found.manifest.headers == {"A": "b"}
     assert found.key == "a"
 
 
@@ -171,13 +171,13 @@ def test_the_least_recently_used_go_first(results: ResultStore, tmp_path: Path) 
 
 
 def test_what_is_being_sent_stays(results: ResultStore, tmp_path: Path) -> None:
-    sent = results.take_new("m/a", write(tmp_path, "m/a", 90))
+    sent = results.add(write(tmp_path, "m/a", 90))
     put(results, tmp_path, "m/b")
 
-    assert sent.path.exists()
-    results.give_back(sent)
+    assert results.body_path(sent).exists()
+    results.release(sent)
     put(results, tmp_path, "m/c")
-    assert not sent.path.exists()
+    assert not results.body_path(sent).exists()
 
 
 def test_a_changed_result_is_not_served(results: ResultStore, tmp_path: Path) -> None:
@@ -188,7 +188,7 @@ def test_a_changed_result_is_not_served(results: ResultStore, tmp_path: Path) ->
     assert find(results, "m/a") is None
 
 
-def test_a_broken_seal_is_not_served(results: ResultStore, tmp_path: Path) -> None:
+def test_a_broken_manifest_is_not_served(results: ResultStore, tmp_path: Path) -> None:
     put(results, tmp_path, "m/a")
     (tmp_path / "results" / "m" / "a.json").write_bytes(b"{")
 
@@ -199,7 +199,7 @@ def test_results_survive_a_restart(results: ResultStore, tmp_path: Path) -> None
     for key, second in (("old", 1), ("new", 2)):
         put(results, tmp_path, f"m/{key}")
         os.utime(tmp_path / "results" / "m" / f"{key}.body", (second, second))
-    (tmp_path / "results" / "m" / "unsealed.body").write_bytes(b"x")
+    (tmp_path / "results" / "m" / "incomplete.body").write_bytes(b"x")
     (tmp_path / "results" / "m" / "tmpabc").write_bytes(b"x")
 
     restarted = ResultStore(tmp_path / "results", 50, memory=0)
@@ -228,26 +228,26 @@ def test_small_results_are_in_memory_as_far_as_they_fit(tmp_path: Path) -> None:
         put(results, tmp_path, f"m/{key}")
     put(results, tmp_path, "m/large", 2**17)
 
-    found = {key: find(results, f"m/{key}").written.body for key in ("c", "b", "large", "a")}
+    found = {key: find(results, f"m/{key}").body for key in ("c", "b", "large", "a")}
     assert found == {"c": b"x" * 40, "b": b"x" * 40, "large": None, "a": b"x" * 40}
     damage(tmp_path / "results" / "m" / "a.body")
-    assert find(results, "m/a").written.body == b"x" * 40, "read a moment ago"
+    assert find(results, "m/a").body == b"x" * 40, "read a moment ago"
     results.forget_mesh("m")
     assert find(results, "m/a") is None
 
 
 def test_what_is_held_stays_until_it_is_released(results: ResultStore, tmp_path: Path) -> None:
     put(results, tmp_path, "m/a")
-    results.hold("m/a")
-    assert results.has_room_to_hold("m/a")
-    other = results.take_new("m/b", write(tmp_path, "m/b", 61))
-    assert not results.has_room_to_hold("m/b")
-    results.give_back(other)
+    results.pin("m/a")
+    assert results.can_pin("m/a")
+    other = results.add(write(tmp_path, "m/b", 61))
+    assert not results.can_pin("m/b")
+    results.release(other)
     results.forget_mesh("m")
 
     assert find(results, "m/a") is not None
     assert find(results, "m/b") is None
-    results.release("m/a")
+    results.unpin("m/a")
     put(results, tmp_path, "m/c", 61)
     assert find(results, "m/a") is None
 
@@ -271,7 +271,7 @@ def test_what_is_small_and_found_at_once_has_no_files(roomy: ResultStore, tmp_pa
     put(roomy, tmp_path, "m/small", is_cheap=True)
     put(roomy, tmp_path, "m/large", 2**17, is_cheap=True)
 
-    assert find(roomy, "m/small").written.body == b"x" * 40
+    assert find(roomy, "m/small").body == b"x" * 40
     assert roomy.nbytes == 2**17
     names = sorted(path.name for path in (tmp_path / "results").glob("m/*"))
     assert names == ["large.body", "large.json"]
@@ -282,27 +282,29 @@ def test_what_is_small_and_found_at_once_has_no_files(roomy: ResultStore, tmp_pa
     assert find(roomy, "m/a") is None
 
 
-@pytest.mark.parametrize("is_kept", [True, False])
-def test_files_come_when_they_are_needed(roomy: ResultStore, tmp_path: Path, is_kept: bool) -> None:
+@pytest.mark.parametrize("is_reusable", [True, False])
+def test_files_come_when_they_are_needed(
+    roomy: ResultStore, tmp_path: Path, is_reusable: bool
+) -> None:
     written = write(tmp_path, "m/a", is_cheap=True)
-    taken = roomy.take_new("m/a", written, is_kept=is_kept)
+    taken = roomy.add(written, is_reusable=is_reusable)
 
     filed = anyio.run(roomy.with_files, taken)
-    roomy.hold("m/a")
-    roomy.give_back(filed)
+    roomy.pin("m/a")
+    roomy.release(filed)
 
-    assert filed.path.read_bytes() == b"x" * 40
-    assert filed.written.seal == taken.written.seal
+    assert roomy.body_path(filed).read_bytes() == b"x" * 40
+    assert filed.manifest == taken.manifest
     assert anyio.run(roomy.with_files, filed) is filed
     restarted = ResultStore(tmp_path / "results", 10**6, memory=0)
     restarted.prepare()
-    assert find(restarted, "m/a").written.body == b"x" * 40
+    assert find(restarted, "m/a").body == b"x" * 40
 
 
 def test_what_gets_no_files_is_given_back(roomy: ResultStore, tmp_path: Path) -> None:
-    taken = roomy.take_new("m/a", write(tmp_path, "m/a", is_cheap=True))
+    taken = roomy.add(write(tmp_path, "m/a", is_cheap=True))
     (tmp_path / "results" / "m").write_bytes(b"in the way")
 
     with pytest.raises(FileExistsError):
         anyio.run(roomy.with_files, taken)
-    assert not roomy._taken
+    assert not roomy._in_use
