@@ -1,4 +1,4 @@
-"""Every error the service answers with, and the one table from exceptions to them."""
+"""Problems: every error that the service answers with, and the table of exceptions."""
 
 import errno
 import sqlite3
@@ -14,7 +14,7 @@ PROBLEM_JSON = "application/problem+json"
 
 @dataclass(frozen=True)
 class Code:
-    """One row of the error table: what ``GET /problems/{code}`` explains."""
+    """One row of the error table, which ``GET /problems/{code}`` explains."""
 
     status: int
     title: str
@@ -91,7 +91,7 @@ CODES: Mapping[str, Code] = {
 
 @dataclass(frozen=True)
 class Fault:
-    """One element of the request, by JSON pointer, and what is wrong with it."""
+    """A faulty element of the request, by JSON pointer, with a message."""
 
     pointer: str
     message: str
@@ -99,7 +99,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Problem:
-    """An error as a value, so that it can leave a worker process."""
+    """An error as a value, which a worker process can send."""
 
     code: str
     detail: str
@@ -112,11 +112,11 @@ class Problem:
 
     @property
     def status(self) -> int:
-        """HTTP status of the code."""
+        """The HTTP status of the code."""
         return CODES[self.code].status
 
     def document(self, instance: str, request_id: str) -> dict[str, Any]:
-        """Return the body of the answer (RFC 9457), members without a value left out."""
+        """Return the body of the response (RFC 9457), without members that have no value."""
         members = {
             "type": f"/problems/{self.code}",
             "title": CODES[self.code].title,
@@ -135,7 +135,7 @@ class Problem:
 
 
 class ProblemError(Exception):
-    """A problem on its way to the client."""
+    """The exception that carries a problem to the client."""
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem.detail)
@@ -150,7 +150,21 @@ def problem(code: str, detail: str, **members: Any) -> ProblemError:
 def over_limit(
     code: str, what: str, actual: int, limit: int, setting: str, **members: Any
 ) -> ProblemError:
-    """Return the exception for ``actual`` of something where ``setting`` allows ``limit``."""
+    """Return the exception for ``actual`` elements where ``setting`` allows ``limit``.
+
+    Parameters
+    ----------
+    code
+        Code of the problem.
+    what
+        Name of the elements, plural.
+    actual, limit
+        The number of elements, and the largest number allowed.
+    setting
+        The setting that has the limit, such as ``max_faces``.
+    members
+        Further members of the problem.
+    """
     detail = f"{actual} {what}, where at most {limit} are allowed"
     variable = variable_of(setting)
     return problem(code, detail, limit=limit, actual=actual, setting=variable, **members)
@@ -170,8 +184,8 @@ def _mesh_faults(error: core.InvalidMesh) -> Sequence[Fault]:
         return ()
     faults = []
     for element in error.elements:
-        place = "-".join(map(str, element)) if isinstance(element, tuple) else element
-        faults.append(Fault(pointer(array, place), f"{error.kind} {place} is at fault"))
+        index = "-".join(map(str, element)) if isinstance(element, tuple) else element
+        faults.append(Fault(pointer(array, index), f"{error.kind} {index} is at fault"))
     return faults
 
 
@@ -209,7 +223,7 @@ def _internal_error(error: BaseException) -> Problem:
     return Problem("internal_error", f"unexpected {type(error).__name__}")
 
 
-# The first row whose type fits is taken.
+# The first row whose type matches is used.
 EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (ProblemError, lambda error: error.problem),
     (core.TooManyFaces, _too_many_faces),
@@ -227,7 +241,7 @@ EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
 
 
 def problem_of(error: BaseException) -> Problem:
-    """Return the problem that answers ``error``."""
+    """Return the problem for an exception."""
     return next(make(error) for kind, make in EXCEPTIONS if isinstance(error, kind))
 
 
@@ -243,6 +257,6 @@ _CODE_OF_STATUS = {
 def problem_of_status(
     status: int, detail: str, headers: Mapping[str, str] | None = None
 ) -> Problem:
-    """Return the problem for an error that the framework found by itself."""
+    """Return the problem for an error that the web framework raised."""
     code = _CODE_OF_STATUS.get(status, "malformed_body")
     return Problem(code, detail or CODES[code].meaning, headers=headers or {})

@@ -1,4 +1,4 @@
-"""What an operator can set: environment variables that begin with ``GEODESIC_``."""
+"""Settings: environment variables that begin with ``GEODESIC_``."""
 
 import os
 import re
@@ -22,7 +22,7 @@ PREFIX = "GEODESIC_"
 MIB = 2**20
 GIB = 2**30
 LEAST_WORKER_MEMORY = 512 * MIB
-"""What compiling a kernel takes."""
+"""Bytes that compiling a kernel takes"""
 
 
 def available_cores() -> int:
@@ -31,15 +31,15 @@ def available_cores() -> int:
 
 
 def _memory() -> int:
-    """Return the bytes of memory there are for this process, or its container."""
+    """Return the bytes of memory of this machine, or of its container if fewer."""
     physical = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     limit = Path("/sys/fs/cgroup/memory.max")
-    granted = limit.read_text().strip() if limit.is_file() else "max"
-    return min(physical, int(granted)) if granted.isdigit() else physical
+    allowed = limit.read_text().strip() if limit.is_file() else "max"
+    return min(physical, int(allowed)) if allowed.isdigit() else physical
 
 
 def _worker_memory(data: dict[str, Any]) -> int:
-    # The API process, the disk cache and everyone else have the rest.
+    # The rest is for the API process, the disk cache and other programs.
     return max(GIB, _memory() * 4 // 5 // int(data["workers"]))
 
 
@@ -52,19 +52,19 @@ def _query_memory(data: dict[str, Any]) -> int:
 
 
 def _listed(value: object) -> object:
-    """Return the items of a text that separates them by commas."""
+    """Return the items of a comma-separated text; any other value stays as it is."""
     if not isinstance(value, str):
         return value
     return [item.strip() for item in value.split(",")] if value.strip() else []
 
 
 def folder_of(store: str) -> Path:
-    """Return the folder that a setting names, by its path or by a URL of the scheme ``file``.
+    """Return the folder of a store, from its path or a URL of the scheme ``file``.
 
     Raises
     ------
     ValueError
-        It names none, or something else than a folder of this machine.
+        The text is empty, or a URL of another scheme or machine.
     """
     url = urlsplit(store) if "://" in store else None
     if url is None and store:
@@ -90,9 +90,9 @@ _ORIGIN = re.compile(r"\*|https?://[^/\s?#@A-Z]+")
 
 
 class Settings(BaseSettings):
-    """Every setting, validated at start; one that does not exist, or contradicts another, stops it.
+    """All settings, validated at the start; an unknown one, or a contradiction, is an error.
 
-    One store belongs to one service: it is swept of half-written entries at start.
+    One store belongs to one service, which removes unfinished files from it at the start.
     """
 
     model_config = SettingsConfigDict(
@@ -100,29 +100,29 @@ class Settings(BaseSettings):
         frozen=True,
         extra="forbid",
         use_attribute_docstrings=True,
-        hide_input_in_errors=True,  # it may be a key
+        hide_input_in_errors=True,  # the input may be an API key
     )
 
     store: Annotated[Path, BeforeValidator(_store)] = Path("geodesic-store")
-    """Folder of meshes, results and fields, or its `file://` URL; created where it is not there."""
+    """Folder of meshes, results and fields, or its `file://` URL; created if missing."""
     workers: PositiveInt = Field(default_factory=available_cores)
     """Worker processes; one for each core, unless set."""
     worker_memory_bytes: int = Field(ge=LEAST_WORKER_MEMORY, default_factory=_worker_memory)
-    """Memory of a worker for its work, whatever that is; what it maps (meshes) does not count."""
+    """Memory of a worker beyond its kernels; mapped files (meshes) do not count."""
     worker_mesh_bytes: PositiveInt = 2 * GIB
-    """Size of the meshes that a worker keeps open, and of what it keeps for paths on them."""
+    """Size of the meshes that a worker holds open, and of its solvers for paths on them."""
     worker_field_bytes: PositiveInt = 512 * MIB
-    """Size of the distance fields that a worker keeps, so that what is asked next is there."""
+    """Size of the distance fields that a worker caches."""
     store_bytes: PositiveInt = 64 * GIB
-    """Size of the meshes that the store keeps; what finds no room is refused."""
+    """Size of the stored meshes; an upload that finds no room is refused."""
     store_evict: Literal["off", "lru"] = "off"
-    """`lru` lets the least recently used meshes go instead."""
+    """`lru` removes the least recently used meshes instead."""
     results_bytes: PositiveInt = 4 * GIB
-    """Size of the finished results that the store keeps."""
+    """Size of the stored results."""
     results_memory_bytes: PositiveInt = 256 * MIB
-    """Size of the small ones in memory: some of them, and all that have no files."""
+    """Size of the small results cached in memory; some of them have no files."""
     fields_bytes: PositiveInt = 4 * GIB
-    """Size of the distance fields that the store keeps: those that took more than 50 ms."""
+    """Size of the stored distance fields, those that took more than 50 ms."""
     max_upload_bytes: PositiveInt = 512 * MIB
     """Largest body of an upload."""
     max_query_bytes: PositiveInt = Field(default_factory=_query_bytes)
@@ -132,7 +132,7 @@ class Settings(BaseSettings):
     max_sources: PositiveInt = 10_000
     """Most sources of a query; each point of a curve counts."""
     max_matrix_cells: PositiveInt = 10_000_000
-    """Most cells of a matrix: sources by targets, pairs, or what is reached of a sparse one."""
+    """Most cells of a matrix: sources times targets, pairs, or the reached ones if sparse."""
     max_waypoints: PositiveInt = 100
     """Most waypoints of a path."""
     max_levels: PositiveInt = 1000
@@ -148,19 +148,19 @@ class Settings(BaseSettings):
     job_deadline_s: Seconds = 86_400.0
     """Seconds that a job may take."""
     job_ttl: Seconds = 86_400.0
-    """Seconds for which a job is kept after it has finished, with its answer."""
+    """Seconds until a finished job is removed, with its answer."""
     drain_s: Seconds = 20.0
-    """Seconds granted to what runs when the service is told to stop."""
+    """Seconds that running requests get when the service is told to stop."""
     cancel_grace_s: Seconds = 2.0
-    """Seconds in which a query has to stop when asked to, before its worker is killed."""
+    """Seconds that a query gets to stop, before its worker is killed."""
     auth: Literal["on", "off"] = "on"
-    """`off` serves without keys on any address, as behind a proxy that asks for them."""
+    """`off` serves without keys on any address, for instance behind a proxy with its own."""
     api_keys: Annotated[tuple[ApiKey, ...], NoDecode, BeforeValidator(_keys)] = ()
     """Keys that clients must have, as `name:secret`, separated by commas; none on loopback."""
     rate_limit: PositiveInt | None = None
     """Requests a minute that a caller may make; as many may come at once."""
     max_concurrent: PositiveInt | None = None
-    """Requests of one caller that may run at the same time."""
+    """Requests of a caller that may run at the same time."""
     cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
     """Origins whose pages may use the service, separated by commas, or `*`."""
 
@@ -203,7 +203,7 @@ _AT_MOST = (
     ("max_query_bytes", "max_upload_bytes"),
     ("query_memory_bytes", "worker_memory_bytes"),
 )
-"""Pairs of settings of which the first must not be larger than the second."""
+"""Pairs of settings of which the first must not exceed the second"""
 
 
 def variable_of(field: str) -> str:

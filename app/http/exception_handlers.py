@@ -57,12 +57,12 @@ def _allow(app: FastAPI, path: str) -> Mapping[str, str] | None:
 
 def validation_problem(errors: Sequence[Any]) -> Problem:
     """Return the problem for pydantic's ``errors``."""
-    faults = tuple(Fault(_place(error["loc"]), error["msg"]) for error in errors[:10])
+    faults = tuple(Fault(_pointer(error["loc"]), error["msg"]) for error in errors[:10])
     place = faults[0].pointer or "the body"
     return Problem("invalid_request", f"{place}: {faults[0].message}", errors=faults)
 
 
-def _place(location: Sequence[str | int]) -> str:
+def _pointer(location: Sequence[str | int]) -> str:
     named = [part for part in location if part not in POINT_TAGS.values()]
     return pointer(*(named[1:] if named[0] == "body" else named))
 

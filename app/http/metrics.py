@@ -39,7 +39,9 @@ class Metrics(Collector):
             buckets=_BUCKETS,
             registry=self._registry,
         )
-        Info("geodesic_build", "What runs", registry=self._registry).info({"version": __version__})
+        Info("geodesic_build", "Version of the service", registry=self._registry).info(
+            {"version": __version__}
+        )
         self._registry.register(self)
 
     def note(self, operation: str, status: int, seconds: float) -> None:
@@ -63,21 +65,21 @@ class Metrics(Collector):
         catalog = service.mesh_catalog
         yield _gauge("geodesic_queue_length", "Requests that wait for a worker", load.waiting)
         workers = {"idle": load.idle, "busy": load.busy, "missing": load.missing}
-        yield _gauges("geodesic_workers", "Places for worker processes", "state", workers)
+        yield _gauges("geodesic_workers", "Slots for worker processes", "state", workers)
         yield _counter("geodesic_workers_lost", "Workers that died or were killed", load.lost)
-        stopped = "Work that was stopped, since nobody waited for it any longer"
+        stopped = "Tasks stopped while they ran: by hang-up, deadline, or dismissal of a job"
         yield _counter("geodesic_cancellations", stopped, load.cancelled)
-        lookups = "Answers that were looked for among those kept"
+        lookups = "Lookups of answers in the store"
         yield _counters("geodesic_results_lookups", lookups, "outcome", service.lookups)
-        answered, took = "Queries that workers answered", "What solving them took"
+        answered, took = "Queries that workers answered", "Seconds that solving them took"
         yield _counters("geodesic_solves", answered, "kind", service.solves)
         yield _counters("geodesic_solve_seconds", took, "kind", service.solve_seconds)
         files = service.results.nbytes
-        yield _gauge("geodesic_results_bytes", "Size of the kept answers that are files", files)
+        yield _gauge("geodesic_results_bytes", "Size of the stored answers that are files", files)
         yield _gauge("geodesic_meshes", "Meshes in the store", len(catalog.ids))
         yield _gauge("geodesic_meshes_bytes", "Size of the meshes in the store", catalog.total)
         jobs = {status: self._jobs.get(status, 0) for status in get_args(JobStatus)}
-        yield _gauges("geodesic_jobs", "Jobs that are not forgotten yet", "status", jobs)
+        yield _gauges("geodesic_jobs", "Jobs that have not been removed", "status", jobs)
 
 
 class MetricsMiddleware:

@@ -83,7 +83,7 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
                 if status in operation["responses"]:
                     operation.setdefault("parameters", []).append(dict(parameter))
             for name, example in _examples(operation["operationId"]).items():
-                _show(operation, name, example)
+                _add_example(operation, name, example)
     components = document["components"]
     for name in ("HTTPValidationError", "ValidationError"):
         components["schemas"].pop(name, None)
@@ -94,21 +94,21 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
 
 def _responses(operation: Mapping[str, Any], template: str) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield the answers of an operation by status, with problems as such."""
-    found = {
+    answers = {
         status: response
         for status, response in operation["responses"].items()
         if response["description"] != _FASTAPI_VALIDATION
     }
     added = ["internal_error"] if is_open(template) else ["internal_error", *_REFUSALS]
     for status, refusal in problems(*added).items():
-        known = found.get(str(status), {"description": ""})["description"]
-        meant = ", ".join(filter(None, [known, refusal["description"]]))
-        found[str(status)] = {"description": meant}
-    for status in sorted(found):
+        described = answers.get(str(status), {"description": ""})["description"]
+        codes = ", ".join(filter(None, [described, refusal["description"]]))
+        answers[str(status)] = {"description": codes}
+    for status in sorted(answers):
         names = ("X-Request-ID", *_HEADERS_OF_STATUS.get(status, ()))
         response = {
-            **found[status],
-            "headers": found[status].get("headers", {}) | documented(*names),
+            **answers[status],
+            "headers": answers[status].get("headers", {}) | documented(*names),
         }
         if status >= "400":
             response["content"] = {PROBLEM_JSON: dict(_PROBLEM)}
@@ -120,24 +120,24 @@ def _responses(operation: Mapping[str, Any], template: str) -> Iterator[tuple[st
 
 
 def _examples(operation_id: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((EXAMPLES / f"{operation_id}.json").read_bytes())
-    return found
+    examples: dict[str, Any] = json.loads((EXAMPLES / f"{operation_id}.json").read_bytes())
+    return examples
 
 
-def _show(operation: dict[str, Any], name: str, example: Mapping[str, Any]) -> None:
+def _add_example(operation: dict[str, Any], name: str, example: Mapping[str, Any]) -> None:
     """Add an example to an operation: to its parameters, its body and its answer."""
     summary, answer = {"summary": example["summary"]}, example["response"]
-    given = dict(example.get("parameters", {}))
+    parameters = dict(example.get("parameters", {}))
     for parameter in operation.get("parameters", []):
-        if parameter["name"] in given:
-            shown = {**summary, "value": given.pop(parameter["name"])}
+        if parameter["name"] in parameters:
+            shown = {**summary, "value": parameters.pop(parameter["name"])}
             parameter.setdefault("examples", {})[name] = shown
-    if given:
-        raise ValueError(f"{operation['operationId']} has no parameter {', '.join(given)}")
+    if parameters:
+        raise ValueError(f"{operation['operationId']} has no parameter {', '.join(parameters)}")
     bodies = [(operation.get("requestBody"), example.get("body"))]
     bodies.append((operation["responses"][str(answer["status"])], answer.get("body")))
-    for place, body in bodies:
-        if place is not None and body is not None:
+    for part, body in bodies:
+        if part is not None and body is not None:
             shown = {**summary, "value": body["value"]}
-            content = place["content"][body["media_type"]]
+            content = part["content"][body["media_type"]]
             content.setdefault("examples", {})[name] = shown

@@ -17,7 +17,7 @@ from app.errors import CODES, PROBLEM_JSON, Problem
 from app.jobs import Job
 from app.queries import Estimate
 from app.schemas.service import ProblemDocument
-from app.service.service import Manifest, Seconds
+from app.service.service import Manifest, PhaseSeconds
 from app.store.meshes import PUBLIC_ARRAYS
 from app.store.results import Result, ResultStore
 
@@ -69,7 +69,7 @@ def documented(*names: str) -> dict[str, Any]:
     return {name: {"$ref": f"#/components/headers/{name}"} for name in names}
 
 
-def server_timing(seconds: Seconds) -> dict[str, str]:
+def server_timing(seconds: PhaseSeconds) -> dict[str, str]:
     """Return the phases as a ``Server-Timing`` header, in ms; ``kept`` for a stored answer."""
     if not seconds:
         return {"Server-Timing": "kept"}
@@ -91,7 +91,7 @@ def not_modified(request: Request, etag: str, headers: Mapping[str, str]) -> Res
 
 
 def estimate_response(
-    mesh_id: str, estimate: Estimate, media_type: str, seconds: Seconds
+    mesh_id: str, estimate: Estimate, media_type: str, seconds: PhaseSeconds
 ) -> Response:
     """Return an estimate, which no client should store: it depends on this machine."""
     members = {"mesh_id": mesh_id, "is_estimate": True, **vars(estimate), "media_type": media_type}
@@ -159,7 +159,7 @@ class StoredFileResponse(FileResponse):
 def result_response(
     request: Request,
     result: Result,
-    seconds: Seconds,
+    seconds: PhaseSeconds,
     media_type: str,
     store: ResultStore,
     headers: Mapping[str, str],

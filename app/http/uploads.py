@@ -12,7 +12,7 @@ from starlette.requests import Request
 from app.errors import problem
 from app.schemas.meshes import MeshFormat
 
-FORMATS = get_args(MeshFormat)
+MESH_FORMATS = get_args(MeshFormat)
 _FORMAT_OF_TYPE = {
     "application/json": "json",
     "model/obj": "obj",
@@ -40,7 +40,9 @@ async def spool(request: Request, path: Path, file_format: str | None) -> str:
         raise problem("invalid_mesh", "the body is empty: there is no mesh in it")
     chosen = file_format or guess
     if chosen is None:
-        hint = f"say ?format= with one of {', '.join(FORMATS)}, or send a Content-Type of a mesh"
+        hint = (
+            f"say ?format= with one of {', '.join(MESH_FORMATS)}, or send a Content-Type of a mesh"
+        )
         detail = f"{media_type or 'no Content-Type'} does not tell the format of the mesh"
         raise problem("unsupported_media_type", detail, hint=hint)
     return chosen
@@ -54,7 +56,7 @@ async def _spool_form(request: Request, path: Path) -> str | None:
         with path.open("wb") as target:
             await to_thread.run_sync(shutil.copyfileobj, file.file, target, _BLOCK)
         suffix = Path(file.filename or "").suffix.lower().removeprefix(".")
-        by_suffix = suffix if suffix in (*FORMATS, "json") else None
+        by_suffix = suffix if suffix in (*MESH_FORMATS, "json") else None
         return by_suffix or _FORMAT_OF_TYPE.get(_media_type(file.content_type))
 
 

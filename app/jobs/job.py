@@ -1,14 +1,13 @@
 """The record of a job, from its acceptance to its end."""
 
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Any
 from uuid import uuid4
 
 from pydantic import AliasChoices, BaseModel, ConfigDict, Field
 
 from app.errors import Problem
-
-Status = Literal["accepted", "running", "successful", "failed", "dismissed"]
+from app.schemas.service import JobStatus
 
 
 class JobSpec(BaseModel):
@@ -41,7 +40,7 @@ class Job(BaseModel):
         validation_alias=AliasChoices("spec", "errand"), serialization_alias="errand"
     )
     """Stored as ``errand``, its name in this layout of the store"""
-    status: Status = "accepted"
+    status: JobStatus = "accepted"
     progress: float = 0.0
     version: int = 1
     """Number of states so far, this one included"""

@@ -45,7 +45,7 @@ from app.store.meshes import MeshStore
 from app.store.results import Result, ResultStore, result_name
 
 Manifest = Mapping[str, Any]
-Seconds = Mapping[str, float]
+PhaseSeconds = Mapping[str, float]
 """Seconds of each phase of the work; empty where the store had the answer"""
 
 
@@ -64,7 +64,7 @@ class StoredMesh:
 
     manifest: Manifest
     is_new: bool
-    seconds: Seconds
+    seconds: PhaseSeconds
 
 
 class Service:
@@ -184,7 +184,7 @@ class Service:
         context: RequestContext,
         *,
         as_file: bool,
-    ) -> tuple[Result, Seconds]:
+    ) -> tuple[Result, PhaseSeconds]:
         """Answer a query to a mesh of this ``size``, from the store or by a worker.
 
         The caller releases the result to ``results`` once it has been sent.
@@ -204,7 +204,7 @@ class Service:
         size: MeshSize,
         representation: Representation,
         context: RequestContext,
-    ) -> tuple[Estimate, Seconds]:
+    ) -> tuple[Estimate, PhaseSeconds]:
         """Have a worker, which has the mesh, estimate the cost of the answer to a query."""
         query.check_answer(representation.media_type, size, self.settings)
         task = Task(
@@ -255,7 +255,7 @@ class Service:
         representation: Representation,
         client: str,
         on_progress: ProgressCallback,
-    ) -> tuple[Result, Seconds]:
+    ) -> tuple[Result, PhaseSeconds]:
         with self.mesh_catalog.pinned(query.mesh_id):
             query.check_answer(representation.media_type, size, self.settings)
             name = result_name(query.mesh_id, result_key(query, representation))
