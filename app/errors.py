@@ -34,7 +34,7 @@ CODES: Mapping[str, Code] = {
         405, "Method not allowed", "The address exists, but not for this method; see `Allow`."
     ),
     "not_acceptable": Code(
-        406, "Not acceptable", "None of the formats asked for is one this answer comes in."
+        406, "Not acceptable", "The answer comes in none of the accepted formats."
     ),
     "job_not_finished": Code(409, "Job not finished", "The job has no result yet; try again."),
     "job_dismissed": Code(410, "Job dismissed", "The job was cancelled and has no result."),
@@ -48,7 +48,7 @@ CODES: Mapping[str, Code] = {
         415, "Unsupported media type", "The body comes in a format that cannot be read here."
     ),
     "range_not_satisfiable": Code(
-        416, "Range not satisfiable", "The range asked for lies outside the content."
+        416, "Range not satisfiable", "The requested range lies outside the content."
     ),
     "invalid_request": Code(
         422, "Invalid request", "A field is missing, unknown, or outside its domain; see `errors`."
@@ -73,7 +73,7 @@ CODES: Mapping[str, Code] = {
         500, "Worker died", "The process that computed the answer died; it has been replaced."
     ),
     "mesh_damaged": Code(
-        500, "Mesh damaged", "What the store holds of this mesh is not what was written."
+        500, "Mesh damaged", "The stored files of this mesh are not as they were written."
     ),
     "queue_full": Code(
         503, "Queue full", "Too many requests wait for a worker; see `Retry-After`."

@@ -56,7 +56,10 @@ class TimeoutHeader(BaseModel):
     """The header of a request for work."""
 
     x_timeout_ms: int | None = Field(
-        default=None, alias="x-timeout-ms", gt=0, description="Milliseconds the client would wait"
+        default=None,
+        alias="x-timeout-ms",
+        gt=0,
+        description="Milliseconds that the client waits at most",
     )
 
 

@@ -23,7 +23,7 @@ _PROBLEM = {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}
 _SECURITY_SCHEME = {
     "type": "http",
     "scheme": "bearer",
-    "description": "A key of this service, where it asks for one.",
+    "description": "An API key, where the service has any.",
 }
 
 
@@ -32,23 +32,23 @@ def _header(meaning: str, schema: Mapping[str, Any] = _TEXT) -> dict[str, Any]:
 
 
 _HEADERS = {
-    "Accept-Ranges": _header("`bytes`: ranges of the answer can be asked for"),
-    "Cache-Control": _header("Who may keep the answer, and for how long"),
+    "Accept-Ranges": _header("`bytes`: ranges of the answer can be requested"),
+    "Cache-Control": _header("Caching of the answer: where, and for how long"),
     "ETag": _header("Names the content of the answer, in its format and coding"),
     "Last-Modified": _header("When the file of the answer was written"),
-    "Content-Range": _header("Which bytes these are, of how many"),
+    "Content-Range": _header("Range of these bytes, and the total"),
     "Geodesic-Dtype": _header("Of the numbers in `npy`, `npz` and `octets`: `<f8` or `<f4`"),
     "Geodesic-Shape": _header("Of the array in these formats, `rows,columns` of a matrix"),
     "Location": _header("Where the mesh or the job is"),
     "Preference-Applied": _header("`respond-async`"),
-    "Retry-After": _header("Seconds after which it is worth to try again", _NUMBER),
+    "Retry-After": _header("Seconds to wait before the next attempt", _NUMBER),
     "Server-Timing": _header(
         "Milliseconds of each phase, as `queue;dur=0.1, load;dur=0.0, compute;dur=3.2, "
-        "encode;dur=0.3`; `kept` where the answer was there already"
+        "encode;dur=0.3`; `kept` where the store had the answer"
     ),
-    "Vary": _header("Which headers of the request decide on the answer"),
-    "WWW-Authenticate": _header("`Bearer`, and what is wrong with the key that came"),
-    "X-Request-ID": _header("That of the request, or a new one; the log names it"),
+    "Vary": _header("Headers of the request that the answer depends on"),
+    "WWW-Authenticate": _header("`Bearer`, with the error if a key was sent"),
+    "X-Request-ID": _header("The id of the request, its own or a new one; the log has it"),
 }
 _HEADERS_OF_STATUS = {
     "401": ("WWW-Authenticate",),
@@ -60,14 +60,14 @@ _CONDITION = {
     "name": "If-None-Match",
     "in": "header",
     "required": False,
-    "description": "The `ETag` of an answer that is known; where it is the same still, 304",
+    "description": "The `ETag` of an answer that the client has; 304 if it has not changed",
     "schema": _TEXT,
 }
 _RANGE = {
     "name": "Range",
     "in": "header",
     "required": False,
-    "description": "Which bytes of the answer to send, RFC 9110; it comes without a content coding",
+    "description": "Bytes of the answer to send, RFC 9110; they come without a content coding",
     "schema": _TEXT,
 }
 

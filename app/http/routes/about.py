@@ -44,7 +44,7 @@ _LIMITS = (
 @router.get(
     "/",
     operation_id="getIndex",
-    summary="Where to find what",
+    summary="Links to begin with",
     response_model=Index,
     responses={
         200: {
@@ -55,7 +55,7 @@ _LIMITS = (
     },
 )
 async def get_index(request: Request, response: Response) -> Response | Index:
-    """Return the addresses to begin with; to a browser, the page."""
+    """Return links to begin with; to a browser, the page."""
     if page.is_built() and page.wants_page(request.headers):
         return page.page_response(request.scope)
     response.headers["Vary"] = "Accept"
@@ -64,7 +64,7 @@ async def get_index(request: Request, response: Response) -> Response | Index:
     return Index(service="geodesic", version=__version__, page=shown, links=links)
 
 
-@router.get("/livez", operation_id="getLiveness", summary="Is the process alive?")
+@router.get("/livez", operation_id="getLiveness", summary="Liveness")
 async def get_liveness() -> Health:
     """Return 200 as soon as the service listens."""
     return Health(status="ok")
@@ -73,7 +73,7 @@ async def get_liveness() -> Health:
 @router.get(
     "/readyz",
     operation_id="getReadiness",
-    summary="Can it compute?",
+    summary="Readiness",
     response_model=Health,
     responses=problems("engine_unavailable", "draining"),
 )
@@ -89,7 +89,7 @@ async def get_readiness(service: ServiceDep) -> Health:
 
 @router.get("/v1", operation_id="getAbout", summary="Version, formats and limits in force")
 async def get_about(service: ServiceDep) -> About:
-    """Return what this service can do, and how much of it."""
+    """Return version, methods, formats and samples, and the limits in force."""
     limits = {variable_of(name): getattr(service.settings, name) for name in _LIMITS}
     return About(
         version=__version__,
@@ -104,7 +104,7 @@ async def get_about(service: ServiceDep) -> About:
 @router.get(
     "/metrics",
     operation_id="getMetrics",
-    summary="Metrics, as Prometheus reads them",
+    summary="Metrics in Prometheus's text format",
     response_class=PlainTextResponse,
     responses={
         200: {
@@ -114,7 +114,7 @@ async def get_about(service: ServiceDep) -> About:
     },
 )
 async def get_metrics(request: Request) -> Response:
-    """Return what an operator watches: requests, workers, queue, results, jobs."""
+    """Return metrics for operators: requests, workers, queue, results, jobs."""
     metrics: Metrics = request.app.state.metrics
     text, media_type = await metrics.exposition(request.headers.get("accept", ""))
     return Response(text, headers={**UNSTORED, "Content-Type": media_type})
@@ -123,7 +123,7 @@ async def get_metrics(request: Request) -> Response:
 @router.get(
     "/problems/{code}",
     operation_id="getProblem",
-    summary="What an error code means",
+    summary="Meaning of an error code",
     response_model=ProblemCode,
     responses={
         200: {"description": "The meaning", "headers": documented("Cache-Control")},

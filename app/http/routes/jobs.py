@@ -64,7 +64,7 @@ async def list_jobs(
 @router.get(
     "/{job_id}",
     operation_id="getJob",
-    summary="How far is a job?",
+    summary="State of a job",
     response_model=JobDocument,
     response_model_exclude_unset=True,
     responses={
@@ -73,7 +73,7 @@ async def list_jobs(
     },
 )
 async def get_job(job: JobDep, response: Response) -> dict[str, Any]:
-    """Return the state of a job; the status is 200 whatever has become of it."""
+    """Return the state of a job; the status is 200 in every state."""
     response.headers.update(UNSTORED)
     return job_document(job)
 
@@ -81,15 +81,15 @@ async def get_job(job: JobDep, response: Response) -> dict[str, Any]:
 @router.delete(
     "/{job_id}",
     operation_id="dismissJob",
-    summary="Stop a job, or forget one that has finished",
+    summary="Stop a job, or remove one that has finished",
     response_model=JobDocument,
     response_model_exclude_unset=True,
     responses=problems("job_not_found"),
 )
 async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> dict[str, Any]:
-    """Stop a job that is waiting or running: it is `dismissed` then.
+    """Stop a job that waits or runs; its state becomes `dismissed`.
 
-    One that has finished, also a dismissed one, is removed with its answer.
+    A job that has finished or was dismissed is removed, with its answer.
     """
     return job_document(await service.jobs.dismiss(caller.owner, job.id))
 
@@ -101,15 +101,15 @@ async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> di
     response_class=Response,
     responses={
         200: {
-            "description": "What the query itself would have been answered with",
+            "description": "The answer to the query",
             "content": {JSON: {"schema": {}}},
             "headers": documented("Server-Timing", *FILE_HEADERS),
         },
         206: {
-            "description": "The range asked for",
+            "description": "The requested range",
             "headers": documented("Server-Timing", "Content-Range", *FILE_HEADERS),
         },
-        304: {"description": "The answer is the one that is known", "headers": documented("ETag")},
+        304: {"description": "The answer has not changed", "headers": documented("ETag")},
         **problems(
             "job_not_found",
             "job_not_finished",
@@ -122,7 +122,7 @@ async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> di
 async def get_job_results(
     job_id: str, request: Request, service: ServiceDep, caller: CallerDep
 ) -> Response:
-    """Return the answer, in the format that the query asked for; or the problem that it met."""
+    """Return the answer in the format of the query, or the problem that the query met."""
     job, result = await service.jobs.result(caller.owner, job_id)
     unchanged = not_modified(request, etag_of(result.key), REVALIDATED)
     if unchanged is not None:
@@ -146,13 +146,13 @@ async def watch_job(
     job: JobDep,
     service: ServiceDep,
     last_event_id: Annotated[
-        str | None, Header(description="The id of the last event that was seen")
+        str | None, Header(description="The id of the last event that the client saw")
     ] = None,
 ) -> AsyncIterator[ServerSentEvent]:
     """Send the job, as `GET` returns it, whenever it changes, until it has finished.
 
-    The id of an event counts the states of the job; a client that comes back with the last one it
-    saw is not sent that again. A comment comes every 15 s.
+    The id of an event counts the states of the job. A client that reconnects with the last id it
+    saw gets only later states. A comment is sent every 15 s.
     """
     async for state in service.jobs.watch(job, _version(last_event_id)):
         yield ServerSentEvent(data=job_document(state), id=str(state.version))

@@ -145,14 +145,14 @@ async def list_meshes(
     response_model=MeshDocument,
     responses={
         200: {"description": "The report", "headers": documented("ETag", "Cache-Control")},
-        304: {"description": "The report is the one that is known", "headers": documented("ETag")},
+        304: {"description": "The report has not changed", "headers": documented("ETag")},
         **problems("mesh_not_found", "mesh_damaged"),
     },
 )
 async def get_mesh(
     mesh_id: str, request: Request, response: Response, service: ServiceDep
 ) -> Response | dict[str, object]:
-    """Return the report that the upload was answered with."""
+    """Return the report of a mesh, the same as after its upload."""
     manifest = service.manifest(mesh_id)
     headers = {**REVALIDATED, "ETag": etag_of(mesh_id)}
     response.headers.update(headers)
@@ -167,9 +167,9 @@ async def get_mesh(
     responses=problems("forbidden", "mesh_not_found"),
 )
 async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> None:
-    """Remove a mesh; queries that run on it end as if it were there.
+    """Remove a mesh; queries that run on it are still answered.
 
-    Where keys are asked for, it needs the one that stored the mesh first.
+    Where keys are set, only the key that stored the mesh first may remove it.
     """
     await service.delete_mesh(mesh_id, caller)
 
@@ -187,10 +187,10 @@ async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> N
         },
         206: {
             "content": {NPY: _BINARY},
-            "description": "The range asked for",
+            "description": "The requested range",
             "headers": documented("Content-Range", *FILE_HEADERS),
         },
-        304: {"description": "The array is the one that is known", "headers": documented("ETag")},
+        304: {"description": "The array has not changed", "headers": documented("ETag")},
         **problems("mesh_not_found", "not_found", "range_not_satisfiable"),
     },
 )

@@ -73,7 +73,7 @@ def _answers(model: type, description: str, *others: str) -> dict[int | str, dic
         },
         206: {
             "content": {name: {"schema": _BINARY} for name in (JSON, *others)},
-            "description": "The range asked for",
+            "description": "The requested range",
             "headers": documented("Vary", "Server-Timing", "Content-Range", *FILE_HEADERS),
         },
     }

@@ -125,7 +125,7 @@ class QueryHeaders(TimeoutHeader):
         alias="idempotency-key",
         min_length=1,
         max_length=255,
-        description="Of a job, freely chosen: what is sent again with it is the same job",
+        description="Freely chosen name of a job: a request sent again with it gets the same job",
     )
 
 
