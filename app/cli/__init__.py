@@ -1,6 +1,6 @@
-"""The ``geodesic`` command: serve, and the library's answers as files.
+"""The ``geodesic`` command: it runs the service, and writes answers of queries into files.
 
-What is slow to import (the kernels, the server) is imported by the command that needs it.
+Slow imports (the kernels, the server) are in the commands that need them.
 """
 
 from app.cli.program import main

@@ -1,33 +1,32 @@
-"""Arguments that several commands share."""
+"""Arguments of several commands, and their parsers."""
 
+import math
 import re
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 
-USUAL_ERROR = 1e-3
-"""The relative error of approximate answers, where none is named."""
-
 
 class Merge(StrEnum):
-    """Which vertices of a file become one."""
+    """Merging of the vertices of a file."""
 
     NONE = "none"
     EXACT = "exact"
 
 
 class Method(StrEnum):
-    """How exact an answer has to be."""
+    """Methods of solving."""
 
     EXACT = "exact"
     APPROXIMATE = "approximate"
 
 
 class Layout(StrEnum):
-    """How a matrix is laid out."""
+    """Layouts of a matrix."""
 
     DENSE = "dense"
     SPARSE = "sparse"
@@ -35,7 +34,7 @@ class Layout(StrEnum):
 
 
 class SampleName(StrEnum):
-    """Meshes that can be made."""
+    """Names of sample meshes."""
 
     KNOT = "knot"
     SPHERE = "sphere"
@@ -44,8 +43,9 @@ class SampleName(StrEnum):
     PLANE = "plane"
 
 
-class Point(NamedTuple):
-    """A point of the mesh, as it was written."""
+@dataclass(frozen=True)
+class Point:
+    """A point of the mesh, as it was written and as it was parsed."""
 
     text: str
     point: Any
@@ -60,28 +60,49 @@ class Point(NamedTuple):
         except ValueError as error:
             raise typer.BadParameter(str(error)) from None
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the point as a member of a request."""
+        return dict(vars(self.point))
+
 
 _INDEX = re.compile(r"-?[0-9]+")
 
 
-class PointOrCurve(NamedTuple):
-    """A point, or the points of a curve, where paths start, as they were written."""
+@dataclass(frozen=True)
+class PointOrCurve:
+    """A point, or the points of a curve, as they were written."""
 
-    text: str
     points: Sequence[Point]
 
     @classmethod
     def parse(cls, text: str) -> "PointOrCurve":
         """Return the point or the curve that an option names."""
-        return cls(text, [Point.parse(part) for part in text.split("/")])
+        return cls([Point.parse(part) for part in text.split("/")])
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the point or the curve as a member of a request."""
+        parts = [point.as_json() for point in self.points]
+        return parts[0] if len(parts) == 1 else {"polyline": parts}
 
 
-def position(text: str) -> Point:
-    """Return the position that an option names."""
-    try:
-        return Point(text, Point.parse(f"p{text}").point)
-    except typer.BadParameter:
-        raise typer.BadParameter(f"{text!r} is not a position: write it as x,y,z") from None
+@dataclass(frozen=True)
+class Position:
+    """A position in space, as it was written and as it was parsed."""
+
+    text: str
+    coordinates: tuple[float, float, float]
+
+    @classmethod
+    def parse(cls, text: str) -> "Position":
+        """Return the position that an option names."""
+        try:
+            return cls(text, Point.parse(f"p{text}").point.position)
+        except typer.BadParameter:
+            raise typer.BadParameter(f"{text!r} is not a position: write it as x,y,z") from None
+
+    def as_json(self) -> tuple[float, float, float]:
+        """Return the position as a member of a request."""
+        return self.coordinates
 
 
 def faces(text: str) -> Sequence[int]:
@@ -98,10 +119,12 @@ def faces(text: str) -> Sequence[int]:
 _FACES = re.compile(r"[0-9]{1,9}(-[0-9]{1,9})?(,[0-9]{1,9}(-[0-9]{1,9})?)*")
 
 
-def writable(*suffixes: str) -> Callable[[Path], Path]:
-    """Return a check of an output path, made before any work begins."""
+def writable(*suffixes: str) -> Callable[[Path | None], Path | None]:
+    """Return a check of an output path that is made before any work begins."""
 
-    def check(path: Path) -> Path:
+    def check(path: Path | None) -> Path | None:
+        if path is None:
+            return None
         if path.suffix.lower() not in suffixes:
             *others, last = suffixes
             ends = f"{', '.join(others)} or {last}" if others else last
@@ -121,7 +144,13 @@ MeshFile = Annotated[
 MergeOption = Annotated[
     Merge, typer.Option("--merge", help="'exact' joins vertices at equal positions.")
 ]
-MaxDistance = Annotated[float | None, typer.Option(help="Go no farther than this, in mesh units.")]
+MaxDistance = Annotated[
+    float | None,
+    typer.Option(
+        help="Go no farther than this, in mesh units.",
+        callback=lambda limit: None if limit == math.inf else limit,
+    ),
+]
 CURVES = "or a curve: points that are each in a face with the next, as 12/e13-14:0.5/15"
 Sources = Annotated[
     list[Point],
@@ -132,7 +161,7 @@ Sources = Annotated[
         help=f"A source, {SPELLINGS}; may be given again.",
     ),
 ]
-Origins = Annotated[
+PointOrCurveSources = Annotated[
     list[PointOrCurve],
     typer.Option(
         "--source",
@@ -141,13 +170,13 @@ Origins = Annotated[
         help=f"A source, {SPELLINGS}, {CURVES}; may be given again.",
     ),
 ]
-OriginOption = Annotated[
+PointOrCurveSource = Annotated[
     PointOrCurve,
     typer.Option(
         "--source",
         parser=PointOrCurve.parse,
         metavar="POINT",
-        help=f"What to start from, {SPELLINGS}, {CURVES}.",
+        help=f"The point to start from, {SPELLINGS}, {CURVES}.",
     ),
 ]
 Source = Annotated[
@@ -169,13 +198,13 @@ Barriers = Annotated[
     ),
 ]
 MethodOption = Annotated[
-    Method, typer.Option("--method", help="'approximate' is faster, within the error asked for.")
+    Method, typer.Option("--method", help="'approximate' is faster, within an allowed error.")
 ]
 RelativeError = Annotated[
     float | None,
     typer.Option(
-        help="For approximate: the error granted, as a share of the distance; "
-        f"{USUAL_ERROR} where no error is named."
+        help="For approximate: the allowed error, as a share of the distance; 0.001 where no "
+        "error is named."
     ),
 ]
 AbsoluteError = Annotated[
@@ -184,14 +213,13 @@ AbsoluteError = Annotated[
 ]
 
 
-def granted_errors(
+def accuracy(
     method: Method, relative_error: float | None, absolute_error: float | None
-) -> tuple[float | None, float | None] | None:
-    """Return the relative and the absolute error to solve with; None where the method is exact."""
-    is_named = relative_error is not None or absolute_error is not None
-    if method is Method.APPROXIMATE:
-        return (relative_error, absolute_error) if is_named else (USUAL_ERROR, None)
-    if is_named:
-        name = "--absolute-error" if relative_error is None else "--relative-error"
-        raise typer.BadParameter(f"{name} goes with --method approximate only")
-    return None
+) -> dict[str, Any]:
+    """Return the members of a request that state its accuracy; exact answers have no errors."""
+    errors = {"relative_error": relative_error, "absolute_error": absolute_error}
+    given = [name for name, error in errors.items() if error is not None]
+    if given and method is not Method.APPROXIMATE:
+        option = "--" + given[0].replace("_", "-")
+        raise typer.BadParameter(f"{option} goes with --method approximate only")
+    return {"method": method.value, **errors}

@@ -1,4 +1,4 @@
-"""Files, each written as a whole or not at all."""
+"""Output files: each is written as a whole or not at all."""
 
 from collections.abc import Iterable
 from contextlib import suppress

@@ -1,4 +1,4 @@
-"""Commands about a mesh itself."""
+"""Commands that check a mesh, or make one."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -6,16 +6,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli import files
-from app.cli.arguments import Merge, MergeOption, MeshFile, Point, SampleName, position, writable
-from app.cli.steps import point_of, read, showing
+from app.cli.arguments import Merge, MergeOption, MeshFile, SampleName, writable
+from app.cli.steps import read
 
 if TYPE_CHECKING:
-    from geodesic_core import SurfacePoint
+    pass
 
 
 def info(mesh_file: MeshFile, merge: MergeOption = Merge.NONE) -> None:
-    """Check a mesh and tell what is in it."""
-    mesh, seconds = read(mesh_file, merge)
+    """Check a mesh, and print a report."""
+    opened, seconds = read(mesh_file, merge)
+    mesh = opened.mesh
     for name, value in mesh.report.as_dict().items():
         typer.echo(f"{name.replace('_', ' '):26}{_in_words(value)}")
     typer.echo(f"{'read in':26}{seconds:.3f} s")
@@ -23,35 +24,15 @@ def info(mesh_file: MeshFile, merge: MergeOption = Merge.NONE) -> None:
         typer.echo(f"warning: {warning}")
 
 
-def locate(
-    mesh_file: MeshFile,
-    at: Annotated[
-        Point, typer.Option(parser=position, metavar="X,Y,Z", help="The position, mesh units.")
-    ],
-    merge: MergeOption = Merge.NONE,
-) -> None:
-    """Find the point of the surface that is nearest to a position."""
-    mesh, _ = read(mesh_file, merge)
-    import numpy as np
-
-    with showing("Looking for the point"):
-        place = point_of(mesh, "--at", at)
-    position = mesh.position(place)
-    away = float(np.linalg.norm(position - at.point.position))
-    typer.echo(f"point       {_written(place)}")
-    typer.echo(f"position    {','.join(map(repr, position.tolist()))}")
-    typer.echo(f"distance    {away!r}")
-
-
 def sample(
-    name: Annotated[SampleName, typer.Argument(help="Which one.")],
+    name: Annotated[SampleName, typer.Argument(help="Name of the sample.")],
     out: Annotated[
         Path,
-        typer.Argument(metavar="OUT.ply", callback=writable(".ply"), help="Where it goes."),
+        typer.Argument(metavar="OUT.ply", callback=writable(".ply"), help="The file to write."),
     ],
     faces: Annotated[int, typer.Option(help="About how many faces.")] = 20_000,
 ) -> None:
-    """Make a mesh to try things on."""
+    """Make a sample mesh."""
     import geodesic_core as gc
     from app.encoding import Surface
     from app.encoding.ply_mesh import ply_of
@@ -75,10 +56,3 @@ def _in_words(value: Any) -> str:
             return " to ".join("(" + ", ".join(map(repr, end)) + ")" for end in (low, high))
         case _:
             return repr(value)
-
-
-def _written(place: "SurfacePoint") -> str:
-    """Return a point as options take it."""
-    if place.vertex_index is not None:
-        return f"v{place.vertex_index}"
-    return f"f{place.face_index}:{','.join(map(repr, place.barycentric))}"

@@ -1,4 +1,4 @@
-"""Prints the OpenAPI document: ``python -m app.cli.openapi > openapi/openapi.json``."""
+"""Print the OpenAPI document: ``python -m app.cli.openapi > openapi/openapi.json``."""
 
 import json
 import sys

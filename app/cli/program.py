@@ -1,4 +1,4 @@
-"""The ``geodesic`` command as a whole: its options, and how it ends."""
+"""The ``geodesic`` command: its subcommands, its messages and its exit codes."""
 
 import sys
 from typing import Annotated
@@ -71,7 +71,7 @@ for command in (
     queries.isolines,
     queries.matrix,
     queries.nearest,
-    meshes.locate,
+    queries.locate,
     meshes.sample,
 ):
     cli.command()(command)

@@ -1,12 +1,14 @@
-"""Commands that answer questions on a mesh."""
+"""Commands that ask queries of a mesh.
+
+They write the same documents as the service. Each option is a parameter, as typer reads them.
+"""
 
 from pathlib import Path
-from time import perf_counter
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.cli import answers, files
+from app.cli import files
 from app.cli.arguments import (
     AbsoluteError,
     Barriers,
@@ -17,28 +19,40 @@ from app.cli.arguments import (
     MeshFile,
     Method,
     MethodOption,
-    OriginOption,
-    Origins,
     Point,
+    PointOrCurveSource,
+    PointOrCurveSources,
+    Position,
     RelativeError,
     Source,
     Sources,
     Targets,
-    granted_errors,
+    accuracy,
     writable,
 )
-from app.cli.steps import origin_of, point_of, read, showing
+from app.cli.ask import Answered, WrittenMembers, ask
+from app.cli.steps import Failure
 
 if TYPE_CHECKING:
-    from geodesic_core import ErrorBound, GeodesicPath, Retain, TriangleMesh
+    from collections.abc import Mapping
+
+    from app.encoding import Answer
 
 LINES = ".obj", ".csv", ".svg", ".geojson", ".json"
-"""What lines can be written to."""
+"""Suffixes of files that hold lines."""
+
+PointsOut = Annotated[
+    Path | None,
+    typer.Option(
+        help="Where the points go as well: .csv, .geojson or .json.",
+        callback=writable(".csv", ".geojson", ".json"),
+    ),
+]
 
 
 def distance(
     mesh_file: MeshFile,
-    source: Origins,
+    source: PointOrCurveSources,
     out: Annotated[
         Path,
         typer.Option(
@@ -62,34 +76,26 @@ def distance(
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute the distance of every vertex from the nearest source."""
-    granted = granted_errors(method, relative_error, absolute_error)
-    mesh, seconds = read(mesh_file, merge, barriers)
+    members = accuracy(method, relative_error, absolute_error)
+    members["include"] = ["nearest_source", *(["gradient"] if gradient else [])]
+    members |= {"max_distance": max_distance, "barriers": barriers or []}
+    points: WrittenMembers = {"sources": source}
+    asked = ask("distances", mesh_file, merge, "Computing distances", points, members)
     import numpy as np
 
-    from geodesic_core import approximate_distance, exact_distance
-
-    sources = [origin_of(mesh, "--source", written) for written in source]
-    with showing("Computing distances") as step:
-        retain: Retain = "paths" if gradient else "distances"
-        if granted is None:
-            field = exact_distance(mesh, sources, max_distance, retain=retain, **step._asdict())
-        else:
-            field = approximate_distance(
-                mesh, sources, *granted, max_distance, retain=retain, **step._asdict()
-            )
+    found = asked.answer.members
+    distances = found["distances"]
     if gradient and out.suffix.lower() == ".npy":
-        table = np.column_stack([field.distances, field.gradient])
-        files.write_answer(out, answers.of_array(table))
+        files.write_answer(out, _array(np.column_stack([distances, found["gradient"]])))
     else:
-        files.write_answer(out, answers.of_distances(field, gradient=gradient))
-    reached = np.isfinite(field.distances)
-    farthest = int(np.argmax(np.where(reached, field.distances, -1.0)))
-    _tell_size(mesh)
+        files.write_answer(out, asked.answer)
+    reached = np.isfinite(distances)
+    farthest = int(np.argmax(np.where(reached, distances, -1.0)))
+    _print_size(asked)
     typer.echo(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
-    typer.echo(f"farthest    vertex {farthest} at {float(field.distances[farthest])!r}")
-    typer.echo(f"error bound {_bound_in_words(field.error_bound)}")
-    typer.echo(f"took        {seconds:.3f} s to read, {field.stats.seconds:.3f} s to solve")
-    typer.echo(f"written     {out}")
+    typer.echo(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
+    typer.echo(f"error bound {_bound_in_words(found['error_bound'])}")
+    _print_end(asked, out)
 
 
 def path(
@@ -127,44 +133,33 @@ def path(
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute a shortest path over the surface between two points."""
-    granted = granted_errors(method, relative_error, absolute_error)
-    if granted is not None and (via or explain):
+    members = accuracy(method, relative_error, absolute_error)
+    if method is Method.APPROXIMATE and (via or explain):
         name = "--via" if via else "--explain"
         raise typer.BadParameter(f"{name} goes with --method exact only")
-    mesh, seconds = read(mesh_file, merge, barriers)
-    from geodesic_core import approximate_distance, shortest_path
-
-    first, last = point_of(mesh, "--source", source), point_of(mesh, "--target", target)
-    between = [point_of(mesh, "--via", written) for written in via or ()]
-    with showing("Computing the path") as step:
-        start = perf_counter()
-        if granted is None:
-            found = shortest_path(
-                mesh, first, last, between, max_distance, explain=explain, **step._asdict()
-            )
-        else:
-            field = approximate_distance(
-                mesh, first, *granted, max_distance, [last], retain="paths", **step._asdict()
-            )
-            found = field.path_to(last)
-        solved = perf_counter() - start
-    files.write_answer(out, answers.of_path(found))
-    _tell_size(mesh)
-    typer.echo(f"length      {found.length!r}")
-    typer.echo(f"points      {len(found.points)}")
-    typer.echo(f"error bound {_bound_in_words(found.error_bound)}")
-    typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
-    for part in found.steps or ():
+    members |= {"max_distance": max_distance, "explain": explain, "barriers": barriers or []}
+    points: WrittenMembers = {"source": source, "target": target, "waypoints": via or []}
+    asked = ask("path", mesh_file, merge, "Computing the path", points, members)
+    found = asked.answer.members
+    if found["status"] != "ok":
+        raise Failure(_NO_PATH[found["reason"]].format(limit=max_distance))
+    files.write_answer(out, asked.answer)
+    _print_size(asked)
+    typer.echo(f"length      {found['length']!r}")
+    typer.echo(f"points      {len(found['points'])}")
+    typer.echo(f"error bound {_bound_in_words(found['error_bound'])}")
+    _print_seconds(asked)
+    for step in found.get("steps", ()):
         typer.echo(
-            f"leg {part.leg}, {part.name:12} {1e3 * part.seconds:8.2f} ms, bound {part.bound!r}, "
-            f"{part.windows} windows, {len(part.faces)} faces"
+            f"leg {step.leg}, {step.name:12} {1e3 * step.seconds:8.2f} ms, bound {step.bound!r}, "
+            f"{step.windows} windows, {len(step.faces)} faces"
         )
     typer.echo(f"written     {out}")
 
 
 def paths(
     mesh_file: MeshFile,
-    source: OriginOption,
+    source: PointOrCurveSource,
     target: Targets,
     out: Annotated[
         Path,
@@ -181,43 +176,24 @@ def paths(
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute shortest paths from one point to several others, in one sweep."""
-    granted = granted_errors(method, relative_error, absolute_error)
-    mesh, seconds = read(mesh_file, merge, barriers)
-    from geodesic_core import approximate_distance, exact_distance
-    from geodesic_core.errors import NoPath
-
-    start = origin_of(mesh, "--source", source)
-    ends = [point_of(mesh, "--target", written) for written in target]
-    found: list[GeodesicPath | NoPath] = []
-    with showing("Computing the paths") as step:
-        began = perf_counter()
-        if granted is None:
-            field = exact_distance(mesh, start, max_distance, ends, **step._asdict())
+    members = accuracy(method, relative_error, absolute_error)
+    members |= {"max_distance": max_distance, "barriers": barriers or []}
+    points: WrittenMembers = {"source": source, "targets": target}
+    asked = ask("paths", mesh_file, merge, "Computing the paths", points, members)
+    files.write_answer(out, asked.answer)
+    _print_size(asked)
+    for written, path in zip(target, asked.answer.members["paths"], strict=True):
+        if path["status"] == "ok":
+            bound = _bound_in_words(path["error_bound"])
+            typer.echo(f"path        to {written.text}: {path['length']!r}, error bound {bound}")
         else:
-            field = approximate_distance(
-                mesh, start, *granted, max_distance, ends, retain="paths", **step._asdict()
-            )
-        for end in ends:
-            try:
-                found.append(field.path_to(end))
-            except NoPath as error:
-                found.append(error)
-        solved = perf_counter() - began
-    files.write_answer(out, answers.of_paths(found))
-    _tell_size(mesh)
-    for written, path in zip(target, found, strict=True):
-        if isinstance(path, NoPath):
-            typer.echo(f"no path     to {written.text}: {path.reason}")
-        else:
-            bound = _bound_in_words(path.error_bound)
-            typer.echo(f"path        to {written.text}: {path.length!r}, error bound {bound}")
-    typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
-    typer.echo(f"written     {out}")
+            typer.echo(f"no path     to {written.text}: {path['reason']}")
+    _print_end(asked, out)
 
 
 def isolines(
     mesh_file: MeshFile,
-    source: Origins,
+    source: PointOrCurveSources,
     out: Annotated[
         Path,
         typer.Option(
@@ -245,37 +221,27 @@ def isolines(
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Draw lines of equal distance from the nearest source."""
-    granted = granted_errors(method, relative_error, absolute_error)
+    members = accuracy(method, relative_error, absolute_error)
     if (count is None) == (level is None):
         raise typer.BadParameter("give --count, or --level at least once, and not both")
-    mesh, seconds = read(mesh_file, merge, barriers)
-    from geodesic_core import approximate_distance, exact_distance
-
-    sources = [origin_of(mesh, "--source", written) for written in source]
-    began = perf_counter()
-    with showing("Computing distances") as step:
-        options = step._asdict()
-        if granted is None:
-            field = exact_distance(mesh, sources, max_distance, **options)
-        else:
-            field = approximate_distance(
-                mesh, sources, *granted, max_distance, retain="windows", **options
-            )
-    levels = level or field.levels(count or 0).tolist()
-    with showing("Drawing isolines") as step:
-        found = field.isolines(levels, chord_error, **step._asdict())
-    solved = perf_counter() - began
-    files.write_answer(out, answers.of_isolines(field, levels, found))
-    _tell_size(mesh)
-    for distance, lines in zip(levels, found, strict=True):
-        closed, length = sum(line.closed for line in lines), sum(line.length for line in lines)
+    members |= {"levels": level, "count": count, "chord_error": chord_error}
+    members |= {"max_distance": max_distance, "barriers": barriers or []}
+    points: WrittenMembers = {"sources": source}
+    asked = ask("isolines", mesh_file, merge, "Drawing isolines", points, members)
+    files.write_answer(out, asked.answer)
+    _print_size(asked)
+    for each in asked.answer.members["isolines"]:
+        lines = each["lines"]
+        closed, length = (
+            sum(line["closed"] for line in lines),
+            sum(line["length"] for line in lines),
+        )
         typer.echo(
-            f"level       {distance!r}: {closed} closed, {len(lines) - closed} open, "
+            f"level       {each['level']!r}: {closed} closed, {len(lines) - closed} open, "
             f"{float(length)!r} long"
         )
-    typer.echo(f"error bound {_bound_in_words(field.error_bound)}")
-    typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
-    typer.echo(f"written     {out}")
+    typer.echo(f"error bound {_bound_in_words(asked.answer.members['error_bound'])}")
+    _print_end(asked, out)
 
 
 def matrix(
@@ -302,32 +268,24 @@ def matrix(
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute the distances from several points to several others."""
-    is_sparse = layout is Layout.SPARSE
-    other = ".npy" if is_sparse else ".npz"
+    other = ".npy" if layout is Layout.SPARSE else ".npz"
     if out.suffix.lower() == other:
         raise typer.BadParameter(f"{other} does not go with --layout {layout.value}")
     if layout is Layout.PAIRS and len(source) != len(target):
         raise typer.BadParameter(
             f"there are {len(source)} sources and {len(target)} targets; pairs need as many"
         )
-    mesh, seconds = read(mesh_file, merge, barriers)
+    members = {"layout": layout.value, "max_distance": max_distance, "barriers": barriers or []}
+    points: WrittenMembers = {"sources": source, "targets": target}
+    asked = ask("matrix", mesh_file, merge, "Computing the matrix", points, members)
     import numpy as np
 
-    from geodesic_core import distance_matrix
-
-    starts = [point_of(mesh, "--source", written) for written in source]
-    ends = [point_of(mesh, "--target", written) for written in target]
-    with showing("Computing the matrix") as step:
-        began = perf_counter()
-        found = distance_matrix(mesh, starts, ends, max_distance, layout.value, **step._asdict())
-        solved = perf_counter() - began
-    files.write_answer(out, answers.of_matrix(found))
-    values = found.data if is_sparse else found
+    files.write_answer(out, asked.answer)
+    reached = np.count_nonzero(np.isfinite(asked.answer.members["distances"]))
     cells = len(source) if layout is Layout.PAIRS else len(source) * len(target)
-    _tell_size(mesh)
-    typer.echo(f"reached     {np.count_nonzero(np.isfinite(values))} of {cells} distances")
-    typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
-    typer.echo(f"written     {out}")
+    _print_size(asked)
+    typer.echo(f"reached     {reached} of {cells} distances")
+    _print_end(asked, out)
 
 
 def nearest(
@@ -338,6 +296,7 @@ def nearest(
         typer.Option(parser=Point.parse, metavar="POINT", help="A candidate; may be given again."),
     ],
     k: Annotated[int, typer.Option("-k", min=1, help="How many to find.")] = 1,
+    out: PointsOut = None,
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
@@ -345,25 +304,75 @@ def nearest(
     """Find the candidates that are nearest to a point along the surface."""
     if k > len(candidate):
         raise typer.BadParameter(f"-k is {k}, but there are only {len(candidate)} candidates")
-    mesh, seconds = read(mesh_file, merge, barriers)
-    from geodesic_core import nearest
-
-    start = point_of(mesh, "--source", source)
-    places = [point_of(mesh, "--candidate", written) for written in candidate]
-    with showing("Looking for the nearest") as step:
-        began = perf_counter()
-        found = nearest(mesh, start, places, k, max_distance, **step._asdict())
-        solved = perf_counter() - began
-    _tell_size(mesh)
-    typer.echo(f"found       {len(found.indices)} of {k}")
-    for i, away in zip(found.indices.tolist(), found.distances.tolist(), strict=True):
-        typer.echo(f"nearest     {candidate[i].text} at {away!r}")
-    typer.echo(f"took        {seconds:.3f} s to read, {solved:.3f} s to solve")
+    members = {"k": k, "max_distance": max_distance, "barriers": barriers or []}
+    points: WrittenMembers = {"source": source, "candidates": candidate}
+    asked = ask("nearest", mesh_file, merge, "Looking for the nearest", points, members)
+    found = asked.answer.members["nearest"]
+    if out is not None:
+        files.write_answer(out, asked.answer)
+    _print_size(asked)
+    typer.echo(f"found       {len(found)} of {k}")
+    for each in found:
+        typer.echo(f"nearest     {candidate[each['candidate']].text} at {each['distance']!r}")
+    _print_end(asked, out)
 
 
-def _tell_size(mesh: "TriangleMesh") -> None:
+def locate(
+    mesh_file: MeshFile,
+    at: Annotated[
+        Position,
+        typer.Option(parser=Position.parse, metavar="X,Y,Z", help="The position, mesh units."),
+    ],
+    out: PointsOut = None,
+    merge: MergeOption = Merge.NONE,
+) -> None:
+    """Find the point of the surface that is nearest to a position."""
+    asked = ask("locate", mesh_file, merge, "Looking for the point", {"points": [at]}, {})
+    (point,) = asked.answer.members["points"]
+    if out is not None:
+        files.write_answer(out, asked.answer)
+    typer.echo(f"point       {_as_option(point)}")
+    typer.echo(f"position    {','.join(map(repr, point['position']))}")
+    typer.echo(f"distance    {point['distance']!r}")
+    if out is not None:
+        typer.echo(f"written     {out}")
+
+
+_NO_PATH = {
+    "disconnected": "there is no path: the points are in different connected components",
+    "beyond_max_distance": "there is no path within max_distance = {limit:g}",
+}
+
+
+def _array(array: Any) -> "Answer":
+    from app.encoding import Answer
+
+    return Answer({"array": array}, ("array",))
+
+
+def _print_size(asked: Answered) -> None:
+    mesh = asked.mesh
     typer.echo(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
 
 
-def _bound_in_words(bound: "ErrorBound") -> str:
-    return f"{bound.value!r} ({bound.type}, {bound.kind})"
+def _print_seconds(asked: Answered) -> None:
+    typer.echo(
+        f"took        {asked.read_seconds:.3f} s to read, {asked.solve_seconds:.3f} s to solve"
+    )
+
+
+def _print_end(asked: Answered, out: Path | None) -> None:
+    _print_seconds(asked)
+    if out is not None:
+        typer.echo(f"written     {out}")
+
+
+def _bound_in_words(bound: "Mapping[str, Any]") -> str:
+    return f"{bound['value']!r} ({bound['type']}, {bound['kind']})"
+
+
+def _as_option(point: "Mapping[str, Any]") -> str:
+    """Return a described point in the spelling of options."""
+    if "vertex" in point:
+        return f"v{point['vertex']}"
+    return f"f{point['face']}:{','.join(map(repr, point['barycentric']))}"

@@ -1,72 +1,39 @@
-"""What commands do before they answer: read a mesh, find points, and show that they are at it."""
+"""Steps of commands: read a mesh, show progress, end at Ctrl-C."""
 
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 from types import FrameType
 from typing import TYPE_CHECKING, NamedTuple
 
-from app.cli.arguments import Merge, Point, PointOrCurve
+from app.cli.arguments import Merge
 
 if TYPE_CHECKING:
-    from geodesic_core import Curve, SurfacePoint, TriangleMesh
+    from app.store.meshes import OpenMesh
 
 
 class Failure(Exception):  # noqa: N818 - not an error of this program
-    """A one-line message for the user, who can do something about it."""
+    """A failure that the user can do something about, told in one line."""
 
 
-def read(
-    mesh_file: Path, merge: Merge, barriers: Sequence[int] | None = None
-) -> "tuple[TriangleMesh, float]":
-    """Return the mesh of a file, with its barriers.
-
-    Also the seconds that took once the kernels were there.
-    """
+def read(mesh_file: Path, merge: Merge) -> "tuple[OpenMesh, float]":
+    """Return the mesh of a file, and the seconds of reading it once the kernels are loaded."""
     with showing("Loading kernels (compiled on the first run)"):
+        from app.store.meshes import OpenMesh
         from geodesic_core import load_mesh, warm_up
 
         warm_up()
     with showing(f"Reading {mesh_file.name}"):
         start = perf_counter()
-        mesh = load_mesh(mesh_file, merge=merge.value).with_barriers(barriers or ())
+        opened = OpenMesh.of(load_mesh(mesh_file, merge=merge.value))
         seconds = perf_counter() - start
-    return mesh, seconds
-
-
-def point_of(mesh: "TriangleMesh", option: str, written: Point) -> "SurfacePoint":
-    """Return the point of the mesh that an option names."""
-    from app.queries.points import resolve_point
-    from geodesic_core.errors import InvalidPoint
-
-    try:
-        return resolve_point(mesh, written.point)
-    except InvalidPoint as error:
-        raise Failure(f"{option} {written.text}: {error}") from None
-
-
-def origin_of(mesh: "TriangleMesh", option: str, written: PointOrCurve) -> "SurfacePoint | Curve":
-    """Return the point or the curve that an option names."""
-    points = [point_of(mesh, option, point) for point in written.points]
-    if len(points) == 1:
-        return points[0]
-    from itertools import pairwise
-
-    from geodesic_core import Curve, share_a_face
-
-    for i, (start, end) in enumerate(pairwise(points)):
-        if not share_a_face(mesh, start, end):
-            raise Failure(
-                f"{option} {written.text}: the points {i} and {i + 1} of the curve, {start} and "
-                f"{end}, have no face in common"
-            )
-    return Curve(points)
+    return opened, seconds
 
 
 class Step(NamedTuple):
-    """How a step reports its progress, and learns that Ctrl-C was pressed."""
+    """The callbacks of a step: to report its progress, and to look for Ctrl-C."""
 
     progress: Callable[[float], None]
     cancel: Callable[[], bool]
@@ -76,9 +43,8 @@ class Step(NamedTuple):
 def showing(label: str) -> Iterator[Step]:
     """Show a bar on standard error, where that is a terminal, until the step is over.
 
-    Ctrl-C ends the step at its next look-up: a KeyboardInterrupt that is raised in the midst of
-    importing or of calling compiled code gets lost there, or becomes a SystemError. Pressed again,
-    it works as usual.
+    Ctrl-C ends the step at its next checkpoint: a KeyboardInterrupt raised during an import or in
+    compiled code gets lost, or becomes a SystemError. The second Ctrl-C works as usual.
     """
     from rich.console import Console
     from rich.progress import Progress
@@ -101,7 +67,7 @@ def showing(label: str) -> Iterator[Step]:
             )
     except Exception:
         if not pressed:
-            raise  # else it is what the step made of being cancelled
+            raise  # else the step failed because it was cancelled
     finally:
         signal.signal(signal.SIGINT, usual)
     if pressed:

@@ -4,6 +4,9 @@ A `Query` is a validated request. Its class knows all of its kind: the checks be
 asked, the formats of the answer, how it is computed, and its expected cost.
 """
 
+from collections.abc import Mapping
+from typing import Any
+
 from app.queries.base import (
     SMALL_SECONDS,
     ExecutionContext,
@@ -23,7 +26,22 @@ from app.queries.path import PathQuery, naming_parameters, written_request
 from app.queries.paths import PathsQuery
 from app.queries.validation import MeshSize
 
+KINDS: Mapping[str, type[Query[Any]]] = {
+    kind.kind: kind
+    for kind in (
+        DistancesQuery,
+        PathQuery,
+        PathsQuery,
+        IsolinesQuery,
+        MatrixQuery,
+        NearestQuery,
+        LocateQuery,
+    )
+}
+"""The kinds of queries, by name."""
+
 __all__ = [
+    "KINDS",
     "SMALL_SECONDS",
     "DistancesQuery",
     "Estimate",

@@ -54,6 +54,11 @@ class OpenMesh:
     solver: Solver
     warnings: Sequence[str]
 
+    @classmethod
+    def of(cls, mesh: TriangleMesh) -> "OpenMesh":
+        """Return a mesh in memory, under the id that it would have in the store."""
+        return cls((content_hash(mesh.arrays()), b""), Solver(mesh), mesh.warnings)
+
     @property
     def mesh(self) -> TriangleMesh:
         """The mesh itself."""
@@ -98,7 +103,7 @@ class MeshStore:
         A mesh in the store belongs to the ``owner`` that stored it first.
         """
         arrays = mesh.arrays()
-        mesh_id = _content_hash(arrays)
+        mesh_id = content_hash(arrays)
         if (self.folder / mesh_id).is_dir():
             return WrittenMesh(self.manifest(mesh_id), folder=None)
         manifest = {
@@ -161,7 +166,7 @@ class MeshStore:
                 arrays[name] = self._array(mesh_id, name)
             except ProblemError as error:
                 yield error
-        if len(arrays) == len(names) and _content_hash(arrays) != mesh_id:
+        if len(arrays) == len(names) and content_hash(arrays) != mesh_id:
             yield _damaged(mesh_id, "its name is not that of its content")
 
     def _array(self, mesh_id: str, name: str) -> NDArray[Any]:
@@ -230,7 +235,8 @@ def _read_manifest(path: str, _changed: int) -> Mapping[str, Any]:
     return manifest
 
 
-def _content_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
+def content_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Return the id of a mesh with these arrays."""
     digest = hashlib.blake2b(digest_size=_ID_BYTES)
     for name in _DEFINING_ARRAYS:
         if name in arrays:

@@ -312,7 +312,6 @@ def test_all_spellings_of_a_point_give_one_answer(run: Run, knot: Path) -> None:
     for text in (start, f"v{start}", f"e{start}-{end}:0", f"e{end}-{start}:1", f"p{at_start}"):
         assert run("distance", knot, *one, text).code == 0
         answer = json.loads(Path("d.json").read_text())
-        del answer["stats"]["seconds"]
         answers.add(json.dumps(answer))
         stops = ["--source", text, "--target", 7, "--via", "v30", "--via", text]
         assert run("path", knot, *stops, "--out", "p.obj").code == 0
@@ -558,19 +557,19 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
                 ("--via", "--source 1 --target 2"),
             )
             for text, message in (
-                ("-1", "the point is vertex -1, but vertices are numbered 0 to 120"),
-                ("v121", "the point is vertex 121"),
+                ("-1", "vertex -1 is not one of 0 to 120"),
+                ("v121", "vertex 121 is not one of 0 to 120"),
                 ("e0-120:0.5", "no edge joins the vertices 0 and 120"),
-                ("e0-121:0.5", "the end of the edge is vertex 121"),
+                ("e0-121:0.5", "vertex 121 is not one of 0 to 120"),
                 ("e0-1:1.5", "t is 1.5"),
-                ("f200:1,0,0", "the point is face 200"),
+                ("f200:1,0,0", "face 200 is not one of 0 to 199"),
                 ("f0:1,1,0", "the point has the weights (1.0, 1.0, 0.0) in face 0"),
                 ("p0,0,1e99", "the position is"),
             )
         ),
         (
             "paths plane.ply --source 0 --target 1 --target 121 --out p.obj",
-            "--target 121: the point is vertex 121",
+            "--target 121: vertex 121 is not one of",
         ),
         (
             "paths plane.ply --source 0 --target 1 --max-distance -1 --out p.json",
@@ -578,7 +577,7 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
         ),
         (
             "matrix plane.ply --source 0 --target v-1 --out m.npy",
-            "--target v-1: the point is vertex -1",
+            "--target v-1: vertex -1 is not one of",
         ),
         (
             "matrix plane.ply --source e0-120:0.5 --target 1 --out m.npy",
@@ -587,15 +586,18 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
         ("matrix plane.ply --source 0 --target 1 --max-distance nan --out m.npy", "max_distance"),
         (
             "nearest plane.ply --source 0 --candidate f200:1,0,0",
-            "--candidate f200:1,0,0: the point is face 200",
+            "--candidate f200:1,0,0: face 200 is not one of",
         ),
         ("nearest plane.ply --source 0 --candidate 1 --max-distance -1", "max_distance"),
         ("path plane.ply --source 0 --target 1 --max-distance -1 --out p.obj", "max_distance"),
         (
             "distance plane.ply --source 0/120 --out d.npy",
-            "--source 0/120: the points 0 and 1 of the curve",
+            "--source 120: shares no face with the point before it",
         ),
-        ("paths plane.ply --source 0/999 --target 1 --out p.obj", "--source 999: the point is"),
+        (
+            "paths plane.ply --source 0/999 --target 1 --out p.obj",
+            "--source 999: vertex 999 is not one of",
+        ),
         ("locate plane.ply --at 0,0,-1e99", "--at 0,0,-1e99: the position is"),
         ("locate nowhere.ply --at 0,0,0", "cannot read nowhere.ply"),
         *(
@@ -781,7 +783,7 @@ def test_an_output_that_cannot_be_written_is_an_error(run: Run, plane: Path) -> 
 def test_ctrl_c_stops_the_sweep_and_leaves_nothing(
     run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    solve = gc.exact_distance
+    solve = gc.Solver.exact_distance
 
     def press_ctrl_c_at_the_first_look(
         *arguments: Any, cancel: Callable[[], bool], **_: Any
@@ -795,7 +797,7 @@ def test_ctrl_c_stops_the_sweep_and_leaves_nothing(
     monkeypatch.setattr(
         "geodesic_core.fields.sweep._FIRST_BUDGET", 10
     )  # looks soon, on so small a mesh
-    monkeypatch.setattr(gc, "exact_distance", press_ctrl_c_at_the_first_look)
+    monkeypatch.setattr(gc.Solver, "exact_distance", press_ctrl_c_at_the_first_look)
     ran = run("distance", plane, "--source", 0, "--out", "d.npy")
     assert (ran.code, ran.out, ran.err) == (130, "", "error: interrupted\n")
     assert list(Path().iterdir()) == [plane]
@@ -846,7 +848,7 @@ def test_an_error_of_the_program_itself_is_not_hidden(
     def break_down(*_: Any, **__: Any) -> None:
         raise gc.errors.InternalError("the sweep is broken")
 
-    monkeypatch.setattr(gc, "exact_distance", break_down)
+    monkeypatch.setattr(gc.Solver, "exact_distance", break_down)
     with pytest.raises(gc.errors.InternalError):
         run("distance", plane, "--source", 0, "--out", "d.npy")
 

@@ -1,0 +1,111 @@
+"""Queries asked in this process: the same answers as the service's, without its limits."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from app.cli.arguments import Merge, Point, PointOrCurve, Position
+from app.cli.steps import Failure, read, showing
+
+if TYPE_CHECKING:
+    from pydantic import ValidationError
+
+    from app.encoding import Answer
+    from app.errors import Problem
+    from geodesic_core import TriangleMesh
+
+Written = Point | PointOrCurve | Position
+WrittenMembers = Mapping[str, Written | Sequence[Written]]
+"""Points by the member of the request that they become."""
+
+_OPTIONS = {
+    "sources": "--source",
+    "targets": "--target",
+    "waypoints": "--via",
+    "candidates": "--candidate",
+    "points": "--at",
+}
+"""Options whose names differ from their members."""
+
+
+class Answered(NamedTuple):
+    """An answer, the mesh of the query, and the seconds of reading and of solving."""
+
+    answer: "Answer"
+    mesh: "TriangleMesh"
+    read_seconds: float
+    solve_seconds: float
+
+
+def ask(
+    kind: str,
+    mesh_file: Path,
+    merge: Merge,
+    label: str,
+    points: WrittenMembers,
+    members: Mapping[str, Any],
+) -> Answered:
+    """Return the answer to a query of a kind, whose request has these points and other members.
+
+    Shows a bar with the ``label`` while solving. Raises `Failure` where the service would refuse
+    the query, and as the solver does.
+    """
+    opened, read_seconds = read(mesh_file, merge)
+    from pydantic import ValidationError
+
+    from app.errors import ProblemError
+    from app.queries import KINDS, ExecutionContext, MeshSize
+
+    report = opened.mesh.report
+    size = MeshSize(report.vertices, report.faces, report.mean_edge_length)
+    query_class = KINDS[kind]
+    body = {**{name: _as_json(value) for name, value in points.items()}, **members}
+    try:
+        with showing(label) as step:
+            start = perf_counter()
+            request = query_class.model.model_validate(body)
+            query = query_class.ask(opened.name[0], size, request)
+            if len(query.barriers):
+                opened = query.with_barriers(opened)
+            answer = query.answer(opened, ExecutionContext(step.cancel, step.progress))
+            solve_seconds = perf_counter() - start
+    except ValidationError as error:
+        raise Failure(_first_fault(error)) from None
+    except ProblemError as error:
+        raise Failure(_message(error.problem, points)) from None
+    return Answered(answer, opened.mesh, read_seconds, solve_seconds)
+
+
+def _as_json(written: Written | Sequence[Written]) -> Any:
+    if isinstance(written, Written):
+        return written.as_json()
+    return [each.as_json() for each in written]
+
+
+def _first_fault(error: "ValidationError") -> str:
+    """Return the message for the first member that a model refuses."""
+    fault = error.errors(include_url=False)[0]
+    name = " ".join(map(str, fault["loc"]))
+    return f"{name} is {fault['input']!r}; {fault['msg'].replace('Input', 'it', 1)}"
+
+
+def _message(problem: "Problem", points: WrittenMembers) -> str:
+    """Return the message for a problem, which names the option at fault as it was written."""
+    if not problem.errors:
+        return problem.detail
+    fault = problem.errors[0]
+    name, *parts = fault.pointer.removeprefix("/").split("/")
+    option = _OPTIONS.get(name, "--" + name.replace("_", "-"))
+    if name in points:
+        option += f" {_text_at(points[name], parts)}"
+    return f"{option}: {fault.message}"
+
+
+def _text_at(written: Written | Sequence[Written], parts: list[str]) -> str:
+    """Return the point at a pointer as it was written."""
+    if not isinstance(written, Written):
+        written, parts = written[int(parts[0])], parts[1:]
+    if isinstance(written, PointOrCurve):
+        written = written.points[int(parts[1]) if parts[0] == "polyline" else 0]
+    return written.text
