@@ -36,18 +36,18 @@ def serve(
         raise typer.BadParameter("; ".join(faults).replace("Value error, ", "")) from error
     if not _is_loopback(host) and not settings.api_keys and settings.auth == "on":
         raise typer.BadParameter(
-            f"whoever reaches {host} could use the service: set GEODESIC_API_KEYS, or "
+            f"anybody who reaches {host} could use the service: set GEODESIC_API_KEYS, or "
             f"GEODESIC_AUTH=off where something before it asks for keys"
         )
     app = create_app(settings)
     try:
         with app.state.service.owning_store():
-            pass  # tried before the server does so for good, and shows a refusal as a traceback
+            pass  # the server itself would show a refusal as a traceback
     except StoreError as error:
         raise Failure(str(error)) from error
 
     class Server(uvicorn.Server):
-        """Tells the service at once that it is to stop: uvicorn itself does so last of all."""
+        """A server that drains the service as soon as it is to stop, where uvicorn does so last."""
 
         def handle_exit(self, sig: int, frame: FrameType | None) -> None:
             app.state.service.drain()

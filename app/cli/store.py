@@ -1,4 +1,4 @@
-"""``geodesic store``: what is in a store, whether it is whole, and what may go."""
+"""``geodesic store``: list the contents of a store, check them, and remove leftovers."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ _DEFAULT = Path("geodesic-store")
 
 @store.command()
 def ls(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
-    """List the meshes, and sum up results, distance fields and jobs."""
+    """List the meshes, and the totals of results, distance fields and jobs."""
     from app.service.maintenance import contents
 
     with _store_at(root):
@@ -65,13 +65,13 @@ def ls(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
     typer.echo(f"results     {found.results}, {found.result_bytes} bytes")
     typer.echo(f"fields      {found.fields}, {found.field_bytes} bytes")
     states = Counter(job.status for job in found.jobs)
-    told = "".join(f", {count} {status}" for status, count in sorted(states.items()))
-    typer.echo(f"jobs        {len(found.jobs)}{told}")
+    by_status = "".join(f", {count} {status}" for status, count in sorted(states.items()))
+    typer.echo(f"jobs        {len(found.jobs)}{by_status}")
 
 
 @store.command()
 def check(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
-    """Read all there is and hold it against its checksums; the exit code is 1 if any is damaged."""
+    """Read everything and verify checksums; the exit code is 1 if anything is damaged."""
     from app.service.maintenance import damage
 
     with _store_at(root), showing("Reading"):
@@ -90,13 +90,13 @@ def check(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
 def prune(
     root: Root = _DEFAULT,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Only tell what would be removed.")
+        bool, typer.Option("--dry-run", help="Only list what would be removed.")
     ] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Remove what is half-written; results and fields that are damaged, outdated or of no mesh.
+    """Remove half-written files, and results and fields that are damaged, outdated or without mesh.
 
-    No service may run on the store. Meshes stay, and so do the answers of jobs.
+    No service may run on the store. Meshes and the answers of jobs stay.
     """
     from app.queries import code_version
     from app.service.maintenance import leftovers, remove
@@ -125,7 +125,7 @@ _ROW = "{:32}  {:>9}  {:>13}  {:25}  {:25}  {}"
 
 @contextmanager
 def _store_at(root: Path) -> Iterator[None]:
-    """Refuse what is no store that can be read, and say what goes wrong in a line."""
+    """Fail in one line where there is no readable store."""
     from app.store.layout import StoreError, is_store, require_layout
 
     if not is_store(root):

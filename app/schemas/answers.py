@@ -10,7 +10,7 @@ StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "
 
 
 class ErrorBound(BaseModel):
-    """How far an answer can be from the exact one.
+    """Bound of the difference between an answer and the exact one.
 
     Approximate distances are too short by that much at most; the length of an approximate path is
     too long by that much at most.
@@ -22,11 +22,11 @@ class ErrorBound(BaseModel):
 
 
 class ResolvedPoint(BaseModel):
-    """A point as it was understood: in one spelling, however it was written."""
+    """A resolved point, in one spelling for all that mean the same."""
 
     vertex: int | None = Field(default=None, description="Where the point is a vertex")
     face: int | None = Field(
-        default=None, description="Where it is none: the lowest face that it is in"
+        default=None, description="Where it is no vertex: the lowest face that contains it"
     )
     barycentric: tuple[float, float, float] | None = Field(
         default=None, description="The weights of that face's corners"
@@ -35,25 +35,25 @@ class ResolvedPoint(BaseModel):
 
 
 class ResolvedCurve(BaseModel):
-    """A curve as it was understood."""
+    """A resolved curve."""
 
     polyline: list[ResolvedPoint]
 
 
 class ResolvedSource(ResolvedPoint):
-    """A source as it was understood."""
+    """A resolved source."""
 
     start_distance: float
 
 
 class ResolvedCurveSource(ResolvedCurve):
-    """A source that is a curve, as it was understood."""
+    """A resolved source that is a curve."""
 
     start_distance: float
 
 
 class Unreachable(BaseModel):
-    """How many distances there are not, by reason."""
+    """Number of missing distances, by reason."""
 
     disconnected: int
     beyond_max_distance: int
@@ -70,12 +70,12 @@ class DistancesAnswer(BaseModel):
     targets: list[ResolvedPoint] | None = Field(default=None, description="Where given")
     distances: list[float | None]
     nearest_source: list[int | None] | None = Field(
-        default=None, description="Index into `sources` for each distance, where asked for"
+        default=None, description="Index into `sources` for each distance, where included"
     )
     gradient: list[tuple[float | None, float | None, float | None]] | None = Field(
         default=None,
         description="A unit vector at each vertex, against the direction in which its shortest "
-        "path sets out, where asked for; `null` three times at sources and where unreachable",
+        "path sets out, where included; `null` three times at sources and where unreachable",
     )
     unreachable: Unreachable
     stats: dict[str, Any]
@@ -90,7 +90,7 @@ class IsolineDocument(BaseModel):
     )
     length: float
     points: list[tuple[float, float, float]]
-    faces: list[int] = Field(description="The face that each piece lies in")
+    faces: list[int] = Field(description="The face of each segment")
 
 
 class IsolineLevel(BaseModel):
@@ -110,7 +110,9 @@ class IsolinesAnswer(BaseModel):
     method: Method
     exact: bool
     error_bound: ErrorBound = Field(description="Of the distance that each line is at")
-    chord_error: float = Field(description="How far chords stray from lines at most, mesh units")
+    chord_error: float = Field(
+        description="Largest distance of chords from exact lines, mesh units"
+    )
     sources: list[ResolvedSource | ResolvedCurveSource]
     isolines: list[IsolineLevel]
     stats: dict[str, Any]
@@ -125,7 +127,7 @@ class Location(BaseModel):
 
 
 class SearchStep(BaseModel):
-    """What a step of the search for a leg did: a leg leads from one stop to the next."""
+    """A step of the search for a leg; a leg leads from one stop to the next."""
 
     leg: int = Field(description="From 0")
     name: StepName
@@ -147,7 +149,7 @@ class Outline(BaseModel):
     points: list[tuple[float, float, float]] | None
     locations: list[Location] | None = None
     faces: list[int] | None = Field(
-        default=None, description="The face that each piece of the path crosses"
+        default=None, description="The face of each segment of the path"
     )
     error_bound: ErrorBound
 
@@ -162,7 +164,7 @@ class PathAnswer(Outline):
     target: ResolvedPoint
     waypoints: list[ResolvedPoint]
     steps: list[SearchStep] | None = Field(
-        default=None, description="Of the search, leg by leg, where asked for by `explain`"
+        default=None, description="Steps of the search, leg by leg, with `explain`"
     )
     warnings: list[str]
 
@@ -189,8 +191,8 @@ class MatrixEnd(ResolvedPoint):
     """A source or target of a matrix."""
 
     component: int = Field(
-        description="The connected component of the mesh that it is in: where source and target "
-        "differ in it, there is no path; else what is missing is beyond `max_distance`"
+        description="The connected component of the mesh that contains it: no path joins different "
+        "components; other missing distances are beyond `max_distance`"
     )
 
 
@@ -213,7 +215,7 @@ class MatrixAnswer(BaseModel):
     )
     distances: list[list[float | None]] | list[float | None] = Field(
         description="Dense: a row for each source. Pairs: one for each. Both `null` where "
-        "unreachable. Sparse: those that can be reached, zeros too"
+        "unreachable. Sparse: the finite ones, zeros too"
     )
     unreachable: Unreachable
     warnings: list[str]
@@ -234,17 +236,15 @@ class NearestAnswer(BaseModel):
     exact: bool
     error_bound: ErrorBound
     source: ResolvedPoint
-    nearest: list[NearestPoint] = Field(
-        description="There are fewer than `k` where fewer can be reached"
-    )
+    nearest: list[NearestPoint] = Field(description="Fewer than `k` where fewer are reachable")
     unreachable: Unreachable | None = Field(
-        default=None, description="Why the other candidates are none, where there are fewer"
+        default=None, description="The reasons for those that are missing, where there are fewer"
     )
     warnings: list[str]
 
 
 class Estimate(BaseModel):
-    """What an answer is likely to take, told without computing it."""
+    """The expected cost of an answer, without computing it."""
 
     mesh_id: str
     is_estimate: Literal[True]
@@ -266,7 +266,7 @@ class Estimate(BaseModel):
 class LocatedPoint(ResolvedPoint):
     """The point of the surface that is nearest to a position."""
 
-    distance: float = Field(description="How far it is from there")
+    distance: float = Field(description="Distance from the position, mesh units")
 
 
 class LocateAnswer(BaseModel):

@@ -12,23 +12,27 @@ SampleName = Literal["knot", "sphere", "terrain", "obstacles", "plane"]
 
 
 class UploadParameters(StrictModel):
-    """How the mesh of an upload is to be read, or which sample to make."""
+    """Options for reading the mesh of an upload, or the sample to make."""
 
     format: MeshFormat | None = Field(default=None, description="Overrides `Content-Type`")
     merge: Merge = Field(default="none", description="`exact` joins vertices at the same position")
-    sample: SampleName | None = Field(default=None, description="Make this instead of reading one")
-    faces: PositiveInt | None = Field(default=None, description="Faces of the sample, about; 20000")
+    sample: SampleName | None = Field(
+        default=None, description="The sample to make, instead of reading a mesh"
+    )
+    faces: PositiveInt | None = Field(
+        default=None, description="Number of faces of the sample, about; 20000 if not given"
+    )
 
 
 class ListParameters(StrictModel):
-    """Which part of a list to answer with."""
+    """The part of a list to answer with."""
 
     limit: int = Field(default=50, ge=1, le=1000)
     cursor: str | None = Field(default=None, description="`next_cursor` of the previous part")
 
 
 class Sample(BaseModel):
-    """How many elements of a kind there are, and the ids of the first ten; an edge has two."""
+    """Number of elements of a kind, and the ids of the first ten; an edge has two."""
 
     count: int
     ids: list[int | tuple[int, int]]
@@ -42,7 +46,7 @@ class MeshDocument(BaseModel):
     faces: int = Field(description="All of them, those that repeat a vertex as well")
     warnings: list[str] = Field(description="A sentence or two each, with the remedy")
     created: str = Field(description="When it was stored, RFC 3339")
-    arrays: dict[str, str] = Field(description="Where its arrays can be read, by name")
+    arrays: dict[str, str] = Field(description="Paths of its arrays, by name")
     edges: int
     triangulated_polygons: int = Field(
         description="Polygons that became several faces; the array `face_map` leads back to them"
@@ -62,10 +66,10 @@ class MeshDocument(BaseModel):
         description="Made of fewer than three different vertices: no part of the surface"
     )
     zero_length_edges: Sample = Field(
-        description="Between different vertices at one position: their ends are one place"
+        description="Between different vertices at one position: their ends are one point"
     )
     collapsed_faces: Sample = Field(
-        description="With such an edge: what is left is an edge of other faces, or a vertex"
+        description="With such an edge: they shrink to an edge of other faces, or to a vertex"
     )
     duplicate_faces: Sample = Field(description="Of the same three vertices as an earlier one")
     degenerate_faces: Sample = Field(description="Of the surface, but without area")

@@ -48,15 +48,15 @@ class PositionPoint(StrictModel):
 
     position: Triple = Field(description="x, y, z in mesh units", examples=[[1.0, 2.0, 3.0]])
     max_distance: NonNegative | None = Field(
-        default=None, description="How far the surface may be from there"
+        default=None, description="Largest distance of the surface from the position, in mesh units"
     )
 
 
 class Start(StrictModel):
-    """What a source adds to a point."""
+    """The member that a source adds to a point."""
 
     start_distance: NonNegative = Field(
-        default=0.0, description="What distances count from, instead of 0"
+        default=0.0, description="The distance at the source itself"
     )
 
 
@@ -77,13 +77,12 @@ class PositionSource(PositionPoint, Start):
 
 
 POINT_TAGS = {name: f"by {name}" for name in ("vertex", "edge", "face", "position", "polyline")}
-"""What tells points, written in any way, and curves apart: a field that each has, and what pydantic
-calls it."""
+"""The tag of each spelling of a point, and of curves, by the member that only it has."""
 
 
-def _tag(written: Any) -> str | None:
-    # Called for every point that is read or written down; a query may have 100 000.
-    fields = written if isinstance(written, dict) else getattr(written, "__dict__", ())
+def _tag(value: Any) -> str | None:
+    # Called for every point that is validated or serialized; a query may have 100 000.
+    fields = value if isinstance(value, dict) else getattr(value, "__dict__", ())
     for name, tag in POINT_TAGS.items():
         if name in fields:
             return tag
@@ -106,11 +105,11 @@ Point = Annotated[
     | Annotated[PositionPoint, Tag(POINT_TAGS["position"])],
     _BY_FIELD,
 ]
-"""A point of the surface, in any of four ways."""
+"""A point of the surface, in one of four spellings."""
 
 
 class Polyline(StrictModel):
-    """A curve on the surface: straight from each point to the next, in a face that both are in."""
+    """A curve on the surface: straight from each point to the next, in a face of both."""
 
     polyline: list[Point] = Field(
         min_length=1,
@@ -131,7 +130,7 @@ PointOrCurve = Annotated[
     | Annotated[Polyline, Tag(POINT_TAGS["polyline"])],
     _BY_FIELD_OR_CURVE,
 ]
-"""A point, or a curve, where paths start."""
+"""A point or a curve where paths start."""
 Source = Annotated[
     Annotated[VertexSource, Tag(POINT_TAGS["vertex"])]
     | Annotated[EdgeSource, Tag(POINT_TAGS["edge"])]
@@ -140,4 +139,4 @@ Source = Annotated[
     | Annotated[CurveSource, Tag(POINT_TAGS["polyline"])],
     _BY_FIELD_OR_CURVE,
 ]
-"""A point, or a curve, where distances start, at ``start_distance``."""
+"""A point or a curve where distances start, at ``start_distance``."""

@@ -19,7 +19,7 @@ Layout = Literal["dense", "sparse", "pairs"]
 
 
 class Accuracy(StrictModel):
-    """How exact the answer has to be."""
+    """The accuracy of an answer."""
 
     method: Method = "exact"
     relative_error: Annotated[FiniteFloat, Field(gt=0, lt=1)] | None = Field(
@@ -35,7 +35,7 @@ class Accuracy(StrictModel):
 
 
 class AmongBarriers(StrictModel):
-    """A question that is asked of a mesh without some of its faces."""
+    """A query on a mesh with blocked faces."""
 
     barriers: list[StrictInt] = Field(
         default=[],
@@ -62,13 +62,13 @@ class DistancesRequest(Accuracy, AmongBarriers):
     sources: list[Source] = Field(min_length=1)
     targets: list[Point] | None = Field(default=None, min_length=1)
     max_distance: NonNegative | None = Field(
-        default=None, description="What is farther than this is left unreached"
+        default=None, description="Points farther than this, in mesh units, count as unreachable"
     )
     include: list[Literal["nearest_source", "gradient"]] = Field(
         default=[],
-        description="What else to tell of each, in JSON, CSV and PLY: `nearest_source`, its index "
-        "in `sources`; `gradient`, the direction in which distance grows fastest, of all vertices "
-        "only",
+        description="Further values of each point, in JSON, CSV and PLY: `nearest_source`, an "
+        "index into `sources`; `gradient`, the direction in which distance grows fastest, for all "
+        "vertices only",
     )
 
 
@@ -86,25 +86,25 @@ class IsolinesRequest(Accuracy, AmongBarriers):
 
     sources: list[Source] = Field(min_length=1)
     levels: list[Positive] | None = Field(
-        default=None, min_length=1, description="Distances in mesh units; these or `count`"
+        default=None, min_length=1, description="Distances in mesh units; give these or `count`"
     )
     count: Annotated[StrictInt, Field(ge=1)] | None = Field(
         default=None,
-        description="How many levels to space evenly between 0 and the largest distance of a "
-        "vertex that is reached, both left out",
+        description="Number of levels, evenly spaced between 0 and the largest distance of a "
+        "reachable vertex, both left out",
     )
     max_distance: NonNegative | None = Field(
         default=None, description="There are no lines at levels above this"
     )
     chord_error: Positive | None = Field(
         default=None,
-        description="How far lines may stray inside of faces, in mesh units: there they are arcs, "
-        "of which the answer has chords. A thousandth of the mean edge length if not given, a "
-        "billionth of the bounding box's diagonal at least",
+        description="Largest distance of lines from exact ones inside faces, in mesh units: "
+        "the exact ones are arcs, the answer has chords. At least a billionth of the bounding "
+        "box's diagonal; a thousandth of the mean edge length if not given",
     )
 
 
-_LONGEST = "There is no path that is longer than this, past all waypoints"
+_LONGEST = "Longest path to look for, past all waypoints, in mesh units"
 
 
 class PathRequest(Accuracy, AmongBarriers):
@@ -128,8 +128,8 @@ class PathRequest(Accuracy, AmongBarriers):
     max_distance: NonNegative | None = Field(default=None, description=_LONGEST)
     explain: StrictBool = Field(
         default=False,
-        description="Also tell what each step of the search did, in `steps`; for `exact` and JSON "
-        "only, and not cacheable, since it tells seconds",
+        description="Add `steps`, an account of each step of the search; for `exact` and JSON "
+        "only. Such an answer is not cached, since it states seconds",
     )
 
 
@@ -145,7 +145,7 @@ class PathsRequest(Accuracy, AmongBarriers):
     source: PointOrCurve
     targets: list[Point] = Field(min_length=1)
     max_distance: NonNegative | None = Field(
-        default=None, description="There is no path to what is farther than this"
+        default=None, description="Targets farther than this, in mesh units, have no path"
     )
 
 
@@ -166,12 +166,12 @@ class MatrixRequest(AmongBarriers):
     sources: list[Point] = Field(min_length=1)
     targets: list[Point] = Field(min_length=1)
     max_distance: NonNegative | None = Field(
-        default=None, description="What is farther than this is left unreached"
+        default=None, description="Points farther than this, in mesh units, count as unreachable"
     )
     layout: Layout = Field(
         default="dense",
-        description="`dense`: a row for each source; `sparse`: what can be reached, with its row "
-        "and column; `pairs`: from each source to the target of the same index",
+        description="`dense`: a row for each source; `sparse`: the finite distances, with row and "
+        "column; `pairs`: from each source to the target of the same index",
     )
 
 
@@ -189,7 +189,7 @@ class NearestRequest(AmongBarriers):
     source: Point
     candidates: list[Point] = Field(min_length=1)
     k: Annotated[StrictInt, Field(ge=1)] = Field(
-        default=1, description="How many to find, at most the number of candidates"
+        default=1, description="Number of candidates to find, at most all of them"
     )
     max_distance: NonNegative | None = Field(
         default=None, description="Candidates farther than this are left out"
@@ -205,7 +205,7 @@ class LocateRequest(StrictModel):
 
     points: list[Triple] = Field(min_length=1, description="Positions: x, y, z in mesh units")
     max_distance: NonNegative | None = Field(
-        default=None, description="How far the surface may be from each"
+        default=None, description="Largest distance of the surface from a position, in mesh units"
     )
 
 
@@ -213,7 +213,7 @@ AnswerFormat = Literal["json", "npy", "npz", "octets", "obj", "ply", "csv", "svg
 
 
 class AnswerParameters(StrictModel):
-    """How the answer is to be written, or whether only to tell what it would take."""
+    """The representation of the answer, or an estimate instead of it."""
 
     format: AnswerFormat | None = Field(default=None, description="Overrides `Accept`")
     dtype: Literal["float64", "float32"] = Field(
@@ -221,21 +221,21 @@ class AnswerParameters(StrictModel):
     )
     estimate: bool = Field(
         default=False,
-        description="Do not compute: answer with an `Estimate` of what it would take, in JSON",
+        description="Do not compute; answer with an `Estimate` of the cost, in JSON",
     )
 
 
 class PathAnswerParameters(AnswerParameters):
-    """How the answer is to be written, and whether with the steps of the search."""
+    """The representation of a path, and whether with the steps of the search."""
 
     explain: bool = Field(
-        default=False, description="Also tell what each step of the search did, in `steps`"
+        default=False, description="Add `steps`, an account of each step of the search"
     )
 
 
-_WRITTEN = (
+_SPELLINGS = (
     "A vertex as `v12`, a point of the edge between two vertices as `e12-13:0.3`, of a face as "
-    "`f7:0.2,0.3,0.5`, or what is nearest to a position as `p1,2,3`"
+    "`f7:0.2,0.3,0.5`, or the point nearest to a position as `p1,2,3`"
 )
 
 
@@ -246,11 +246,11 @@ class PathParameters(PathAnswerParameters, Accuracy):
     ``f7:0.2,0.3,0.5``, or a position as ``p1,2,3``.
     """
 
-    source: str = Field(alias="from", description=_WRITTEN, examples=["v0"])
-    target: str = Field(alias="to", description=_WRITTEN, examples=["f7:0.2,0.3,0.5"])
+    source: str = Field(alias="from", description=_SPELLINGS, examples=["v0"])
+    target: str = Field(alias="to", description=_SPELLINGS, examples=["f7:0.2,0.3,0.5"])
     via: list[str] = Field(
         default=[],
-        description="A waypoint, written likewise; may be given again, in order",
+        description="A waypoint, in the same spellings; repeat it for several, in order",
         examples=[["v7"]],
     )
     max_distance: NonNegative | None = Field(default=None, description=_LONGEST)

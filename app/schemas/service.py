@@ -1,4 +1,4 @@
-"""The service itself: jobs, problems, health, and what it offers."""
+"""Jobs, problems, health, and the offers of the service."""
 
 from typing import Literal
 
@@ -34,7 +34,7 @@ class ProblemDocument(BaseModel):
 
 
 class JobDocument(BaseModel):
-    """A query that is answered whether its client waits or not."""
+    """A query that is answered in the background."""
 
     id: str
     kind: str = Field(description="Of query, such as `distances`")
@@ -45,7 +45,7 @@ class JobDocument(BaseModel):
     started: str | None = Field(default=None, description="When a worker began")
     finished: str | None = None
     problem: ProblemDocument | None = Field(default=None, description="Of one that failed")
-    links: dict[str, str] = Field(description="Where its results and events are")
+    links: dict[str, str] = Field(description="Paths of its results and events")
 
 
 class JobList(BaseModel):
@@ -56,17 +56,17 @@ class JobList(BaseModel):
 
 
 class Health(BaseModel):
-    """Whether the service lives, or is ready."""
+    """State of the service."""
 
     status: Literal["ok", "starting"]
 
 
 class Index(BaseModel):
-    """Where to find what."""
+    """Links to the parts of the service."""
 
     service: str
     version: str
-    page: str = Field(description="Whether this address has a page to show to browsers")
+    page: str = Field(description="Whether this address has a page for browsers")
     links: dict[str, str]
 
 
@@ -82,7 +82,7 @@ class About(BaseModel):
 
 
 class ProblemCode(BaseModel):
-    """What an error code means."""
+    """Meaning of an error code."""
 
     code: str
     status: int

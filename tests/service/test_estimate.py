@@ -77,7 +77,7 @@ def query_of(name: str) -> Query[Any]:
     operation, body, _, _ = QUERIES[name]
     kind = KINDS[operation]
     request: StrictModel = kind.model.model_validate(body)
-    return kind("m", kind.normal(request))
+    return kind("m", kind.normalized(request))
 
 
 @pytest.fixture(scope="module")

@@ -131,7 +131,7 @@ def test_the_grant_is_in_force_throughout(
 ) -> None:
     opened = OpenMesh(("", b""), gc.Solver(gc.TriangleMesh(*gc.samples.knot(3000))), [])
     request = IsolinesQuery.model.model_validate({"sources": [INSIDE], "count": 4, **method})
-    query = IsolinesQuery("m", IsolinesQuery.normal(request))
+    query = IsolinesQuery("m", IsolinesQuery.normalized(request))
     watched: list[dict[str, Any]] = []
     run, asked = RepeatableSweep.run, 0
 

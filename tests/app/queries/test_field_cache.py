@@ -24,7 +24,7 @@ def opened() -> OpenMesh:
 
 
 def ask(opened: OpenMesh, fields: FieldCache, kind: Any, **body: Any) -> bytes:
-    query = kind("id", kind.normal(kind.model(**body)))
+    query = kind("id", kind.normalized(kind.model(**body)))
     answer = query.answer(opened, granted(fields=fields))
     return b"".join(encode(answer, Representation("application/json")).parts)
 
@@ -140,7 +140,7 @@ def test_the_size_of_a_field_is_that_of_its_arrays() -> None:
 
 def test_questions_about_one_field_go_to_one_worker() -> None:
     def affinity_keys(kind: Any, **body: Any) -> Any:
-        return kind("id", kind.normal(kind.model(**body))).affinity_keys
+        return kind("id", kind.normalized(kind.model(**body))).affinity_keys
 
     about = affinity_keys(DistancesQuery, sources=[{"vertex": 3}])
     assert about[1:] == ("id",)
