@@ -17,7 +17,8 @@ MANY = {"sources": [{"vertex": 0}], "targets": [{"vertex": i % 100} for i in ran
 
 
 @pytest.mark.parametrize(
-    ("owner", "name"), [(query_route, "read"), (DistancesQuery, "ask"), (DistancesQuery, "normal")]
+    ("owner", "name"),
+    [(query_route, "read"), (DistancesQuery, "ask"), (DistancesQuery, "normalized")],
 )
 def test_others_are_answered_while_a_large_body_is_checked(
     client: TestClient, plane: str, owner: Any, name: str, monkeypatch: pytest.MonkeyPatch
