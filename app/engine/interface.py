@@ -33,7 +33,7 @@ class Engine(Protocol):
 
     @property
     def load(self) -> Load:
-        """Its present state, and its totals."""
+        """The present state, and totals."""
 
     @property
     def is_ready(self) -> bool:

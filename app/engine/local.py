@@ -65,7 +65,7 @@ class LocalEngine:
 
     @property
     def load(self) -> Load:
-        """Its present state, and its totals, see ``Engine``."""
+        """The present state, and totals, see ``Engine``."""
         idle = sum(slot.is_alive for slot in self._idle)
         busy = sum(slot.is_alive for slot in self._open) - idle
         missing = len(self._slots) - idle - busy

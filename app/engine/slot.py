@@ -59,8 +59,7 @@ class Slot:
         try:
             self._process, ours = await asyncio.shield(starting)
         except asyncio.CancelledError:
-            # The thread goes on all the same. Its socket must be closed, and `close` kills the
-            # process.
+            # The thread goes on all the same: close its socket. `close` kills its process.
             with suppress(OSError):
                 self._process, ours = await starting
                 ours.close()

@@ -45,7 +45,7 @@ class Metrics(Collector):
         self._registry.register(self)
 
     def note(self, operation: str, status: int, seconds: float) -> None:
-        """Count a request."""
+        """Count a request, and its seconds."""
         self._requests.labels(operation, str(status)).inc()
         self._seconds.labels(operation).observe(seconds)
 

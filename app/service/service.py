@@ -101,7 +101,7 @@ class Service:
             self.results.prepare()
             self.fields.prepare(self.mesh_catalog.ids)
             await self.engine.start()
-            # Objects of the start live for ever. Each full collection over them takes 90 ms.
+            # Objects of the start live for ever; each full collection over them takes 90 ms.
             collect()
             freeze()
             try:
@@ -159,7 +159,7 @@ class Service:
         ids, more = self.meshes.page(after, limit)
         manifests = []
         for mesh_id in ids:
-            # Meshes deleted meanwhile are left out, and damaged ones, which say so by themselves.
+            # Left out: meshes deleted meanwhile, and damaged ones. Reading those alone says why.
             with suppress(ProblemError):
                 manifests.append(self.meshes.manifest(mesh_id))
         return manifests, ids[-1] if more else None

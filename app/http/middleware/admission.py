@@ -43,7 +43,7 @@ class AdmissionMiddleware:
         given = [value for name, value in scope["headers"] if name == b"authorization"]
         if not given:
             raise _unauthorized("the request has no API key", "Bearer")
-        # uvicorn does not strip headers.
+        # uvicorn leaves spaces at the end of a header.
         credentials = _BEARER.fullmatch(given[0].strip(b" \t")) if len(given) == 1 else None
         name = name_of_secret(self.keys, credentials[1]) if credentials else None
         if name is None:
