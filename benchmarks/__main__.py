@@ -1,11 +1,11 @@
-"""Run benchmarks, print their tables and keep them in ``RESULTS.md``."""
+"""Run benchmarks, print their tables and write them to ``RESULTS.md``."""
 
 import argparse
 from pathlib import Path
 
 from benchmarks import approximate, exact, load, matrix, page, path, service, topology
 from benchmarks.inputs import Inputs
-from benchmarks.tables import keep
+from benchmarks.tables import write
 
 BENCHMARKS = {
     "topology": topology.run,
@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def main() -> None:
-    """Parse the arguments and run what they name: everything, by default."""
+    """Run the benchmarks that the arguments name, by default all of them."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="name", help=f"any of {', '.join(BENCHMARKS)}")
     parser.add_argument("--runs", type=int, default=5, help="runs of which the median counts")
@@ -44,7 +44,7 @@ def main() -> None:
     for name in arguments.names or BENCHMARKS:
         section = BENCHMARKS[name](inputs, arguments.runs)
         print(section.text())
-        keep(section, Path(__file__).with_name("RESULTS.md"))
+        write(section, Path(__file__).with_name("RESULTS.md"))
 
 
 if __name__ == "__main__":

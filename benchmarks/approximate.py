@@ -1,4 +1,4 @@
-"""Approximate distances from vertex 0: against potpourri3d, against our exact ones, and growth."""
+"""Approximate distances from vertex 0: against potpourri3d, against exact ones, and growth."""
 
 from collections.abc import Callable
 from functools import partial
@@ -17,11 +17,11 @@ ERROR = 1e-3
 COARSE = 1e-2
 
 PATIENCE_S = 10.0
-"""After this no further round begins: a heat solver of icosphere 7 takes that long to factorise."""
+"""Seconds after which no further round begins: a heat solver of icosphere 7 factorises as long."""
 
 
 class Peers(NamedTuple):
-    """How many times faster than each peer we should be, and slower than a factorised query."""
+    """Targets against peers: times faster than each, and times slower than a factorised query."""
 
     heat: float
     marching: float
@@ -35,11 +35,11 @@ PEERS = {
     "icosphere 7": Peers(heat=30.0, marching=2.5, query=1.0),
 }
 ACCURACY = 10.0
-"""How many times our mean error is smaller than the more accurate peer's, at least."""
+"""The mean error of the more accurate peer, as a multiple of ours, at least."""
 
 
 class Merging(NamedTuple):
-    """How many times faster than exact a merging sweep should be, and its windows per edge."""
+    """Targets of a merging sweep: times faster than an exact one, and windows per edge."""
 
     faster: float = 1.0
     kept: float | None = None
@@ -61,7 +61,7 @@ MEAN_ERROR = 0.04
 """Percent, at most."""
 
 PATHS_MEMORY = 1.2
-"""Memory of a solve that keeps what paths need, at most, as a share of the mesh's own arrays."""
+"""Memory of a solve that retains paths, at most, as a share of the mesh's own arrays."""
 
 LEVELS = range(4, 9)
 EXPONENT = 1.1
@@ -145,7 +145,7 @@ def run_merging(inputs: Inputs, runs: int) -> Section:
             solve,
             partial(solve, retain="paths"),
         ]
-        (exact_s, exact), (seconds, field), (_, kept) = by_turns(calls, runs, PATIENCE_S)
+        (exact_s, exact), (seconds, field), (_, with_paths) = by_turns(calls, runs, PATIENCE_S)
         errors = 100 * _errors(field.distances, exact.distances)
         asked = MERGING[name]
         rows.append(
@@ -160,7 +160,7 @@ def run_merging(inputs: Inputs, runs: int) -> Section:
                 rated(errors.mean(), MEAN_ERROR, at_least=False, digits=4),
                 f"{errors.max():.3f}",
                 f"{field.stats.peak_bytes / mesh.nbytes:.2f}",
-                rated(kept.stats.peak_bytes / mesh.nbytes, PATHS_MEMORY, at_least=False),
+                rated(with_paths.stats.peak_bytes / mesh.nbytes, PATHS_MEMORY, at_least=False),
             ]
         )
     return Section(
@@ -237,7 +237,7 @@ def _cold_marching(vertices: Floats, faces: Ints) -> Floats:
 
 
 def _errors(distances: Floats, exact: Floats) -> Floats:
-    """Return the relative errors where there is a distance to be wrong about."""
+    """Return the relative errors where the exact distance is finite and not 0."""
     reached = np.isfinite(exact) & (exact > 0)
     errors: Floats = np.abs(distances[reached] - exact[reached]) / exact[reached]
     return errors

@@ -22,7 +22,7 @@ TARGETS = {
     "dragon100k.ply": None,
     "icosphere 6": 20.0,
 }
-"""Meshes, and how many times faster than the peer the issue asks for."""
+"""Meshes, and the target on each: times faster than the peer."""
 
 MEMORY = 0.6
 """Peak memory of a solve, at most, as a share of the mesh's own arrays."""

@@ -1,4 +1,4 @@
-"""The meshes that are measured: made here, or found in a folder."""
+"""The meshes of the benchmarks: made here, or read from a folder."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ REFINED = {"Loop": subdivide_loop, "split": subdivide}
 
 @dataclass(frozen=True)
 class Inputs:
-    """Meshes by name; files that the folder lacks are left out, with a word on the screen."""
+    """Meshes by name; files that the folder lacks are left out, with a message."""
 
     folder: Path
 

@@ -1,4 +1,4 @@
-"""How small questions fare: alone, many at once, and while long ones keep the workers busy."""
+"""Latency of small queries: alone, many at once, and beside long ones."""
 
 import json
 import threading
@@ -21,10 +21,10 @@ from benchmarks.timing import timed
 
 SMALL_FACES, LONG_FACES = 5_000, 1_000_000
 SECONDS = 8.0
-"""How long clients ask, for each row."""
+"""Seconds of requests, for each row."""
 WORKERS = 2
 HEAVY = 120
-"""Long questions asked at once."""
+"""Long queries at once."""
 
 
 def run(_inputs: Inputs, _runs: int) -> Section:
@@ -44,7 +44,7 @@ def run(_inputs: Inputs, _runs: int) -> Section:
             if clients == 1:
                 rested_s = _solve_seconds(rest_s=median(alone) - solve_s)
             for busy in range(1, WORKERS + 1):
-                with _kept_busy(port, long, busy):
+                with _busy_workers(port, long, busy):
                     rows.append(_row(f"while {busy} long", clients, asked(), solve_s, alone))
         rows.append(_cached_path(Client(port), small))
         stopping = _stopping(Client(port), long)
@@ -101,7 +101,7 @@ _seeds = count()
 
 
 def _ask_from(pool: ProcessPoolExecutor, clients: int, port: int, mesh: str) -> list[float]:
-    """Return how long each request took, of some clients at once."""
+    """Return the seconds of each request, of some clients at once."""
     asking = [pool.submit(_ask_paths, port, mesh, next(_seeds)) for _ in range(clients)]
     return [seconds for task in asking for seconds in task.result()]
 
@@ -121,14 +121,14 @@ _starts = count()
 
 
 def _long_question() -> dict[str, object]:
-    """Return a question that nobody has asked before."""
+    """Return a query that has no stored answer."""
     start = {"vertex": 0, "start_distance": next(_starts)}
     return {"sources": [start], "targets": [{"vertex": 1}]}
 
 
 @contextmanager
-def _kept_busy(port: int, mesh: str, count: int) -> Iterator[None]:
-    """Keep some workers busy with long questions."""
+def _busy_workers(port: int, mesh: str, count: int) -> Iterator[None]:
+    """Keep some workers busy with long queries."""
     over = threading.Event()
 
     def ask() -> None:
@@ -148,7 +148,7 @@ def _kept_busy(port: int, mesh: str, count: int) -> Iterator[None]:
 
 
 def _cached_path(client: Client, mesh: str) -> list[str]:
-    """Ask for paths to vertices from a source whose distances are known already."""
+    """Ask for paths to vertices from a source whose field is cached."""
     client.get(f"{mesh}/distances", {"sources": [{"vertex": 0}]})
     times = []
     for vertex in range(1, 301):
@@ -160,7 +160,7 @@ def _cached_path(client: Client, mesh: str) -> list[str]:
 
 
 def _stopping(client: Client, mesh: str) -> str:
-    """Dismiss jobs that keep all workers busy; return how long other work waits for one then."""
+    """Dismiss jobs on all workers; return the seconds that other work then waits for one."""
     times = []
     medium = client.upload_sample("sphere", 100_000)
     for _ in range(10):
@@ -182,7 +182,7 @@ def _stopping(client: Client, mesh: str) -> str:
 
 
 def _many_heavy(port: int, mesh: str, pool: Executor) -> str:
-    """Ask many long questions at once; return what became of them, and of a small one meanwhile.
+    """Ask many long queries at once; return their outcomes, and that of a small one meanwhile.
 
     They are asked in another process, whose threads would keep this one from looking at its clock.
     """
@@ -206,7 +206,7 @@ def _many_heavy(port: int, mesh: str, pool: Executor) -> str:
 def _ask_heavy(
     port: int, mesh: str, questions: Sequence[dict[str, object]]
 ) -> list[tuple[int, bool]]:
-    """Return the status of each answer, and whether it is one that was to be expected."""
+    """Return the status of each answer, and whether it is an expected one."""
 
     def ask(question: dict[str, object]) -> tuple[int, bool]:
         client = Client(port)

@@ -12,10 +12,10 @@ from geodesic_core.search.threads import available_cores
 
 SEED = 5
 POINTS = 100
-"""Sources, and as many targets."""
+"""Number of sources, and of targets."""
 
 MESHES = {"horse97k.ply": 1.8, "dragon100k.ply": None}
-"""How many times faster two cores must be than one."""
+"""Speed of two cores, as a multiple of one, at least."""
 
 
 def run(inputs: Inputs, runs: int) -> Section:

@@ -1,4 +1,4 @@
-"""How fast the page is: the first picture of a dropped file, and paths that follow the pointer."""
+"""Speed of the page: the first picture of a dropped file, and paths that follow the pointer."""
 
 import base64
 import json
@@ -67,7 +67,7 @@ _FOLLOW = """async places => {
 
 
 def run(inputs: Inputs, runs: int) -> Section:
-    """Drop a mesh on the page, and drag a target over it; ask the same over HTTP without a page."""
+    """Drop a mesh on the page, and drag a target over it; send the same requests without a page."""
     path = inputs.folder / NAME
     rows: list[list[str]] = []
     if path.exists():
@@ -138,7 +138,7 @@ def _drop(page: Page, address: str, body: bytes) -> dict[str, Any]:
 
 
 def _follow(page: Page, address: str, body: bytes) -> float:
-    """Drag a target over the mesh; return how many paths a second are drawn."""
+    """Drag a target over the mesh; return the number of paths drawn per second."""
     page.goto(address)
     page.wait_for_selector("html[data-state=ready]")
     page.evaluate(_DROP, [NAME, base64.b64encode(body).decode()])

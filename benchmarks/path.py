@@ -40,15 +40,15 @@ NEAR = 0.05
 
 
 class Asked(NamedTuple):
-    """The far pairs of a mesh, and what is asked of their paths."""
+    """The far pairs of a mesh, and the targets of their paths."""
 
     faster: float | None = None
-    """How many times faster than full sweeps, by the medians."""
+    """Times faster than full sweeps, by the medians."""
     each_faster: float | None = None
     slowest_ms: float | None = None
     apart: tuple[float, float] = FAR
     swept: int = PAIRS
-    """How many of the pairs, for each of the runs, a full sweep follows."""
+    """Number of pairs, for each of the runs, that a full sweep follows."""
 
 
 LARGEST = Asked(slowest_ms=300.0, apart=(0.45, 0.55), swept=1)
@@ -62,9 +62,9 @@ MESHES = {
 }
 NEAR_MS = 2.0
 FLIPS = 1.0
-"""How many times faster than edge flips, at least."""
+"""Times faster than edge flips, at least."""
 FEWER = 2.0
-"""How many times fewer faces step 2 visits with landmarks, at least."""
+"""Times fewer faces that step 2 visits with landmarks, at least."""
 
 Pair = tuple[int, int]
 
@@ -76,11 +76,11 @@ class EdgeFlips:
         self._solver = potpourri3d.EdgeFlipGeodesicSolver(vertices, faces)
 
     def find(self, source: int, target: int) -> Any:
-        """Return a path, as it comes."""
+        """Return a path in the peer's own form."""
         return self._solver.find_geodesic_path(source, target)
 
     def points(self, found: Any) -> Floats:
-        """Return the points of what was found."""
+        """Return the points of a path."""
         points: Floats = found
         return points
 
@@ -92,14 +92,14 @@ class AStar:
         self._mesh = mrmeshnumpy.meshFromFacesVerts(faces, vertices)
 
     def find(self, source: int, target: int) -> Any:
-        """Return the ends, and where a path crosses edges between them."""
+        """Return the ends of a path, and its crossings of edges between them."""
         topology = self._mesh.topology
         ends = [mrmeshpy.MeshTriPoint(topology, mrmeshpy.VertId(v)) for v in (source, target)]
         way = mrmeshpy.GeodesicPathApprox.DijkstraAStar
         return ends, mrmeshpy.computeGeodesicPath(self._mesh, *ends, way)
 
     def points(self, found: Any) -> Floats:
-        """Return the points of what was found."""
+        """Return the points of a path."""
         (first, last), crossings = found
         mesh = self._mesh
         points = [mesh.triPoint(first), *map(mesh.edgePoint, crossings), mesh.triPoint(last)]
@@ -316,7 +316,7 @@ def _add_landmarks(solver: gc.Solver, far: Iterator[Pair]) -> list[float]:
 
 
 def _near_seconds(solver: gc.Solver, rng: np.random.Generator) -> list[float]:
-    """Return the seconds of paths that are short: two points may be near only across a gap."""
+    """Return the seconds of short paths: points that are near may be so only across a gap."""
     longest = NEAR * _extent(solver.mesh)
     near = _pairs(solver.mesh, rng, 0.0, NEAR)
     calls = (timed(partial(solver.shortest_path, *pair)) for pair in near)

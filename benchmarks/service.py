@@ -1,4 +1,4 @@
-"""What HTTP costs over the solve: upload, and distances as JSON and as npy, also a million."""
+"""Cost of HTTP over the solve: upload, and distances as JSON and as npy, also a million."""
 
 import json
 import time
@@ -19,10 +19,10 @@ UPLOAD_S = 2.0
 OVERHEAD = {"application/json": 25.0, "application/x-npy": 10.0}
 """Percent over the solve, at most, by media type."""
 WRITING_S = 0.1
-"""In which a worker has written its field: beside that a solve is slower."""
+"""Seconds until a worker has written its field, which slows a solve beside it down."""
 LARGE_FACES = 2_000_000
 LARGE = {"application/json": 2.0, "application/x-npy": 200.0}
-"""How many times the seconds of orjson encoding may take; how many MB a second it has to be."""
+"""Limits by media type: multiple of the seconds of orjson, or MB a second."""
 
 
 def run(inputs: Inputs, runs: int) -> Section:

@@ -1,4 +1,4 @@
-"""A service to measure, in processes of its own, and the least client that can ask it."""
+"""A service to measure, in processes of its own, and a minimal client."""
 
 import http.client
 import json
@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from typing import Any
 
 SERVE = "from app.cli import main; main()"
-"""What the console script `geodesic` runs; it may not be on the path."""
+"""The code of the console script `geodesic`, which may not be on the path."""
 
 
 @contextmanager
@@ -38,7 +38,7 @@ def serving(**settings: str) -> Iterator[int]:
 
 
 class Client:
-    """A connection that is kept."""
+    """A persistent connection."""
 
     def __init__(self, port: int) -> None:
         self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=300)
@@ -55,7 +55,7 @@ class Client:
         return response, response.read()
 
     def get(self, path: str, body: Any = None, headers: Mapping[str, str] = {}) -> bytes:
-        """Do the same, and insist on an answer."""
+        """Send a request; fail unless the answer is a success."""
         response, answer = self.ask(path, body, headers)
         if response.status not in (200, 201):
             raise RuntimeError(f"{path} answered {response.status}: {answer[:500]!r}")
@@ -72,7 +72,7 @@ class Client:
 
 
 def phases_of(response: http.client.HTTPResponse) -> dict[str, float]:
-    """Return the seconds of each phase that an answer tells of."""
+    """Return the seconds of each phase that an answer states."""
     phases = re.findall(r"(\w+);dur=([\d.]+)", response.headers.get("server-timing", ""))
     return {name: float(milliseconds) / 1e3 for name, milliseconds in phases}
 

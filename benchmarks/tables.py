@@ -28,13 +28,13 @@ class Section:
         return "\n".join([*lines, ""])
 
 
-def keep(section: Section, path: Path) -> None:
-    """Put the section into the file, in the place of the one of the same title if there is one."""
+def write(section: Section, path: Path) -> None:
+    """Write the section into the file, replacing a section of the same title."""
     text = path.read_text(encoding="utf-8") if path.exists() else HEADING
     heading, *sections = text.split("\n## ")
-    kept = {part.split("\n", 1)[0]: part.rstrip() for part in sections}
-    kept[section.title] = section.text().removeprefix("## ").rstrip()
-    path.write_text("\n\n## ".join([heading.rstrip(), *kept.values()]) + "\n", encoding="utf-8")
+    by_title = {part.split("\n", 1)[0]: part.rstrip() for part in sections}
+    by_title[section.title] = section.text().removeprefix("## ").rstrip()
+    path.write_text("\n\n## ".join([heading.rstrip(), *by_title.values()]) + "\n", encoding="utf-8")
 
 
 def machine() -> str:
@@ -52,13 +52,13 @@ def machine() -> str:
 
 
 def verdict(value: float, target: float, *, at_least: bool, unit: str = "") -> str:
-    """Return the target and whether it is met, for a table's last column."""
+    """Return a target and whether it is met, for the last column of a table."""
     met = value >= target if at_least else value <= target
     return f"{'≥' if at_least else '≤'} {target:g}{unit} {'met' if met else '**missed**'}"
 
 
 def rated(value: float, target: float | None, *, at_least: bool, digits: int = 2) -> str:
-    """Return a value, and beside it its target and whether it is met, where there is one."""
+    """Return a value, with its target and whether it is met, where there is one."""
     beside = "" if target is None else f" ({verdict(value, target, at_least=at_least)})"
     return f"{value:.{digits}f}{beside}"
 

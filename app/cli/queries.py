@@ -80,22 +80,22 @@ def distance(
     members["include"] = ["nearest_source", *(["gradient"] if gradient else [])]
     members |= {"max_distance": max_distance, "barriers": barriers or []}
     points: WrittenMembers = {"sources": source}
-    asked = ask("distances", mesh_file, merge, "Computing distances", points, members)
+    answered = ask("distances", mesh_file, merge, "Computing distances", points, members)
     import numpy as np
 
-    found = asked.answer.members
+    found = answered.answer.members
     distances = found["distances"]
     if gradient and out.suffix.lower() == ".npy":
         files.write_answer(out, _array(np.column_stack([distances, found["gradient"]])))
     else:
-        files.write_answer(out, asked.answer)
+        files.write_answer(out, answered.answer)
     reached = np.isfinite(distances)
     farthest = int(np.argmax(np.where(reached, distances, -1.0)))
-    _print_size(asked)
+    _print_size(answered)
     typer.echo(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
     typer.echo(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
     typer.echo(f"error bound {_bound_in_words(found['error_bound'])}")
-    _print_end(asked, out)
+    _print_end(answered, out)
 
 
 def path(
@@ -139,16 +139,16 @@ def path(
         raise typer.BadParameter(f"{name} goes with --method exact only")
     members |= {"max_distance": max_distance, "explain": explain, "barriers": barriers or []}
     points: WrittenMembers = {"source": source, "target": target, "waypoints": via or []}
-    asked = ask("path", mesh_file, merge, "Computing the path", points, members)
-    found = asked.answer.members
+    answered = ask("path", mesh_file, merge, "Computing the path", points, members)
+    found = answered.answer.members
     if found["status"] != "ok":
         raise Failure(_NO_PATH[found["reason"]].format(limit=max_distance))
-    files.write_answer(out, asked.answer)
-    _print_size(asked)
+    files.write_answer(out, answered.answer)
+    _print_size(answered)
     typer.echo(f"length      {found['length']!r}")
     typer.echo(f"points      {len(found['points'])}")
     typer.echo(f"error bound {_bound_in_words(found['error_bound'])}")
-    _print_seconds(asked)
+    _print_seconds(answered)
     for step in found.get("steps", ()):
         typer.echo(
             f"leg {step.leg}, {step.name:12} {1e3 * step.seconds:8.2f} ms, bound {step.bound!r}, "
@@ -179,16 +179,16 @@ def paths(
     members = accuracy(method, relative_error, absolute_error)
     members |= {"max_distance": max_distance, "barriers": barriers or []}
     points: WrittenMembers = {"source": source, "targets": target}
-    asked = ask("paths", mesh_file, merge, "Computing the paths", points, members)
-    files.write_answer(out, asked.answer)
-    _print_size(asked)
-    for written, path in zip(target, asked.answer.members["paths"], strict=True):
+    answered = ask("paths", mesh_file, merge, "Computing the paths", points, members)
+    files.write_answer(out, answered.answer)
+    _print_size(answered)
+    for written, path in zip(target, answered.answer.members["paths"], strict=True):
         if path["status"] == "ok":
             bound = _bound_in_words(path["error_bound"])
             typer.echo(f"path        to {written.text}: {path['length']!r}, error bound {bound}")
         else:
             typer.echo(f"no path     to {written.text}: {path['reason']}")
-    _print_end(asked, out)
+    _print_end(answered, out)
 
 
 def isolines(
@@ -227,10 +227,10 @@ def isolines(
     members |= {"levels": level, "count": count, "chord_error": chord_error}
     members |= {"max_distance": max_distance, "barriers": barriers or []}
     points: WrittenMembers = {"sources": source}
-    asked = ask("isolines", mesh_file, merge, "Drawing isolines", points, members)
-    files.write_answer(out, asked.answer)
-    _print_size(asked)
-    for each in asked.answer.members["isolines"]:
+    answered = ask("isolines", mesh_file, merge, "Drawing isolines", points, members)
+    files.write_answer(out, answered.answer)
+    _print_size(answered)
+    for each in answered.answer.members["isolines"]:
         lines = each["lines"]
         closed, length = (
             sum(line["closed"] for line in lines),
@@ -240,8 +240,8 @@ def isolines(
             f"level       {each['level']!r}: {closed} closed, {len(lines) - closed} open, "
             f"{float(length)!r} long"
         )
-    typer.echo(f"error bound {_bound_in_words(asked.answer.members['error_bound'])}")
-    _print_end(asked, out)
+    typer.echo(f"error bound {_bound_in_words(answered.answer.members['error_bound'])}")
+    _print_end(answered, out)
 
 
 def matrix(
@@ -277,15 +277,15 @@ def matrix(
         )
     members = {"layout": layout.value, "max_distance": max_distance, "barriers": barriers or []}
     points: WrittenMembers = {"sources": source, "targets": target}
-    asked = ask("matrix", mesh_file, merge, "Computing the matrix", points, members)
+    answered = ask("matrix", mesh_file, merge, "Computing the matrix", points, members)
     import numpy as np
 
-    files.write_answer(out, asked.answer)
-    reached = np.count_nonzero(np.isfinite(asked.answer.members["distances"]))
+    files.write_answer(out, answered.answer)
+    reached = np.count_nonzero(np.isfinite(answered.answer.members["distances"]))
     cells = len(source) if layout is Layout.PAIRS else len(source) * len(target)
-    _print_size(asked)
+    _print_size(answered)
     typer.echo(f"reached     {reached} of {cells} distances")
-    _print_end(asked, out)
+    _print_end(answered, out)
 
 
 def nearest(
@@ -306,15 +306,15 @@ def nearest(
         raise typer.BadParameter(f"-k is {k}, but there are only {len(candidate)} candidates")
     members = {"k": k, "max_distance": max_distance, "barriers": barriers or []}
     points: WrittenMembers = {"source": source, "candidates": candidate}
-    asked = ask("nearest", mesh_file, merge, "Looking for the nearest", points, members)
-    found = asked.answer.members["nearest"]
+    answered = ask("nearest", mesh_file, merge, "Looking for the nearest", points, members)
+    found = answered.answer.members["nearest"]
     if out is not None:
-        files.write_answer(out, asked.answer)
-    _print_size(asked)
+        files.write_answer(out, answered.answer)
+    _print_size(answered)
     typer.echo(f"found       {len(found)} of {k}")
     for each in found:
         typer.echo(f"nearest     {candidate[each['candidate']].text} at {each['distance']!r}")
-    _print_end(asked, out)
+    _print_end(answered, out)
 
 
 def locate(
@@ -327,10 +327,10 @@ def locate(
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Find the point of the surface that is nearest to a position."""
-    asked = ask("locate", mesh_file, merge, "Looking for the point", {"points": [at]}, {})
-    (point,) = asked.answer.members["points"]
+    answered = ask("locate", mesh_file, merge, "Looking for the point", {"points": [at]}, {})
+    (point,) = answered.answer.members["points"]
     if out is not None:
-        files.write_answer(out, asked.answer)
+        files.write_answer(out, answered.answer)
     typer.echo(f"point       {_as_option(point)}")
     typer.echo(f"position    {','.join(map(repr, point['position']))}")
     typer.echo(f"distance    {point['distance']!r}")
@@ -350,19 +350,18 @@ def _array(array: Any) -> "Answer":
     return Answer({"array": array}, ("array",))
 
 
-def _print_size(asked: Answered) -> None:
-    mesh = asked.mesh
+def _print_size(answered: Answered) -> None:
+    mesh = answered.mesh
     typer.echo(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
 
 
-def _print_seconds(asked: Answered) -> None:
-    typer.echo(
-        f"took        {asked.read_seconds:.3f} s to read, {asked.solve_seconds:.3f} s to solve"
-    )
+def _print_seconds(answered: Answered) -> None:
+    read, solve = answered.read_seconds, answered.solve_seconds
+    typer.echo(f"took        {read:.3f} s to read, {solve:.3f} s to solve")
 
 
-def _print_end(asked: Answered, out: Path | None) -> None:
-    _print_seconds(asked)
+def _print_end(answered: Answered, out: Path | None) -> None:
+    _print_seconds(answered)
     if out is not None:
         typer.echo(f"written     {out}")
 

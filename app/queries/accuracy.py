@@ -22,7 +22,7 @@ _DEFAULT_ERROR = 1e-3
 """The relative error of approximate answers where the request names none."""
 
 CERTAIN: Mapping[str, Any] = {"type": "relative", "value": 0.0, "kind": "guaranteed"}
-"""The bound of what is known without error: exact answers, and that there is no path."""
+"""The bound of answers without error: exact ones, and that there is no path."""
 
 
 def with_default_error(request: A) -> A:

@@ -135,7 +135,7 @@ class Query(ABC, Generic[R]):
 
     @property
     def affinity_keys(self) -> tuple[str, ...]:
-        """What a worker may have cached of an earlier query: a field, then the mesh."""
+        """Keys of what a worker may have cached: a field, then the mesh."""
         return (self.mesh_id,)
 
     @property
@@ -174,7 +174,7 @@ class Query(ABC, Generic[R]):
         """Refuse a request that one of the ``offers`` has no room for."""
 
     def value_count(self, size: MeshSize) -> int:
-        """Return the number of values of the answer in JSON; 0 where only solving tells it."""
+        """Return the number of values of the answer in JSON; 0 where only solving yields it."""
         return 0
 
     def written_points(self) -> WrittenPoints:
@@ -183,7 +183,7 @@ class Query(ABC, Generic[R]):
 
     @abstractmethod
     def rough_seconds(self, size: MeshSize) -> float:
-        """Return about how long `solve` takes, as far as the size of the mesh tells."""
+        """Return the expected seconds of `solve`, by the size of the mesh alone."""
 
     @abstractmethod
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
@@ -234,7 +234,7 @@ def _revived(kind: type[Query[Any]], mesh_id: str, request: bytes) -> Query[Any]
 
 @cache
 def code_version() -> str:
-    """Return the version that tells answers of different code apart: release and kernels."""
+    """Return the version of the code that answers: release and digest of the kernels."""
     return f"{__version__}+{gc.kernel_digest()}"
 
 

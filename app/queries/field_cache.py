@@ -30,7 +30,7 @@ class FieldCache:
     """Fields of open meshes, at most ``capacity`` bytes; the least recently used go first.
 
     Other fields may be in the ``store``, written by any worker of the same ``code``. Solving again
-    would give the same field to the bit, so that no answer tells whether its field was cached.
+    would give the same field to the bit, so that no answer depends on what was cached.
     """
 
     def __init__(self, capacity: int, store: FieldStore, code: str) -> None:

@@ -5,7 +5,7 @@
     v12               a vertex
     e12-13:0.3        on the edge between two vertices, at this share of the way
     f7:0.2,0.3,0.5    in a face, by the weights of its corners
-    p1,2,3            what is nearest to a position
+    p1,2,3            the point nearest to a position
 """
 
 import re
