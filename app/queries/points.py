@@ -88,7 +88,7 @@ def resolve_points(
 def checkpoint(cancel: Callable[[], bool]) -> None:
     """Raise ``Cancelled`` if the query is to stop."""
     if cancel():
-        raise gc.errors.Cancelled("cancelled while points were resolved")
+        raise gc.errors.Cancelled("cancelled while points were looked for")
 
 
 def to_point_or_curve(
