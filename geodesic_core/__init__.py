@@ -1,8 +1,15 @@
 """Geodesic distances and shortest paths on triangle meshes, exact or within a chosen error.
 
 The methods of Surazhsky, Surazhsky, Kirsanov, Gortler and Hoppe, *Fast Exact and Approximate
-Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then
-`exact_distance` or `approximate_distance`.
+Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then `exact_distance` or
+`approximate_distance`. Examples in docstrings assume ``import geodesic_core as gc`` and
+``import numpy as np``.
+
+Examples
+--------
+>>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+>>> gc.exact_distance(mesh, 0).distances.round(3).tolist()
+[0.0, 1.0, 1.0, 1.414]
 """
 
 from geodesic_core import errors, samples

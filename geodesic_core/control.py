@@ -20,20 +20,51 @@ _FIRST_ITEMS = 256
 
 @dataclass(frozen=True)
 class Control:
-    """How a caller watches a call and stops it."""
+    """Progress, cancelling, deadline and memory limit of a call.
+
+    Every solver takes the first four as arguments of the same names, and so does each method of a
+    field that may still have to compute.
+
+    Parameters
+    ----------
+    progress
+        Called about every 50 ms with the share that is done, from 0 to 1, never decreasing.
+    cancel
+        Called about every 50 ms; the call stops with `Cancelled` once it returns true.
+    deadline_s
+        Seconds granted from the start of the call, above 0; then it stops with `DeadlineExceeded`.
+    memory_limit
+        Bytes granted for the state of the call, above 0, without the mesh; a call that needs more
+        stops with `MemoryLimitExceeded`.
+    bytes_beside
+        Bytes that the call holds beside the state of its present sweep.
+    began
+        Start of the call, a `time.perf_counter` value; now by default.
+
+    Raises
+    ------
+    InvalidArgument
+        The deadline or the limit is not a number above 0.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> shares = []
+    >>> field = gc.exact_distance(mesh, 0, progress=shares.append, deadline_s=60)
+    >>> shares[-1]
+    1.0
+    >>> gc.exact_distance(mesh, 0, cancel=lambda: True)
+    Traceback (most recent call last):
+        ...
+    geodesic_core.errors.Cancelled: cancelled with 0% done
+    """
 
     progress: Callable[[float], None] | None = None
-    """Called about every 50 ms with the share that is done, from 0 to 1, never decreasing."""
     cancel: Callable[[], bool] | None = None
-    """Asked about every 50 ms; the call stops once it answers true."""
     deadline_s: float | None = None
-    """Seconds granted, from the call."""
     memory_limit: int | None = None
-    """Bytes granted for the state of the call, the mesh itself not counted."""
     bytes_beside: int = 0
-    """Bytes that the call holds besides the state of its present sweep."""
     began: float = field(default_factory=time.perf_counter)
-    """When the call began."""
 
     def __post_init__(self) -> None:
         for name in ("deadline_s", "memory_limit"):
@@ -42,7 +73,23 @@ class Control:
                 raise InvalidArgument(f"{name} is {value!r}; it must be a number above 0")
 
     def checkpoint(self, share: float) -> None:
-        """Report progress; raise if the call is to stop."""
+        """Report progress, and stop the call if it is to stop.
+
+        Parameters
+        ----------
+        share
+            Share of the call that is done, 0 to 1.
+
+        Raises
+        ------
+        Cancelled, DeadlineExceeded
+            The call is to stop.
+
+        Examples
+        --------
+        >>> gc.Control(progress=print).checkpoint(0.25)
+        0.25
+        """
         if self.progress is not None:
             self.progress(share)
         if self.cancel is not None and self.cancel():
@@ -51,32 +98,83 @@ class Control:
             raise DeadlineExceeded(f"not finished within {self.deadline_s:g} s: {share:.0%} done")
 
     def for_part(self, part: int, parts: int, count: int = 1) -> "Control":
-        """Return the control of one of several equal parts of the call, or of some in a row."""
+        """Return the control of one of several equal parts of the call, or of some in a row.
+
+        Parameters
+        ----------
+        part
+            Number of the part, from 0.
+        parts
+            Number of all parts.
+        count
+            Number of parts in a row.
+
+        Returns
+        -------
+        Control
+            Whose progress is a share of this one's.
+
+        Examples
+        --------
+        >>> gc.Control(progress=print).for_part(1, 2).checkpoint(0.5)
+        0.75
+        """
         progress = self.progress
         if progress is None:
             return self
         return replace(self, progress=lambda share: progress((part + count * share) / parts))
 
     def holding(self, bytes_beside: int) -> "Control":
-        """Return the control of a sweep beside which the call holds so many more bytes."""
+        """Return the control of a sweep beside which the call holds more memory.
+
+        Parameters
+        ----------
+        bytes_beside
+            Bytes held beside the state of the sweep.
+
+        Returns
+        -------
+        Control
+            Whose memory limit counts them.
+
+        Examples
+        --------
+        >>> gc.Control(memory_limit=1000).holding(600).bytes_beside
+        600
+        """
         return replace(self, bytes_beside=self.bytes_beside + bytes_beside)
 
     def check_memory(self, needed: int) -> None:
-        """Raise if the call needs more memory than it may take."""
+        """Stop the call if it needs more memory than it may take.
+
+        Parameters
+        ----------
+        needed
+            Bytes of the state of its present sweep.
+
+        Raises
+        ------
+        MemoryLimitExceeded
+            With the bytes that the call holds beside, these are too many.
+
+        Examples
+        --------
+        >>> gc.Control(memory_limit=1000).check_memory(900)
+        """
         needed += self.bytes_beside
         if self.memory_limit is not None and needed > self.memory_limit:
             raise MemoryLimitExceeded(needed, self.memory_limit)
 
 
 def in_slices(count: int, work: Callable[[int, int], int], control: Control) -> None:
-    """Do ``work`` on all of some items, from a first up to a last of them at a time.
+    """Do ``work`` on all of ``count`` items, slice by slice, as ``work(first, end)``.
 
-    It returns how many there are by then: there may be more than at first.
+    It returns the number of items by then, which may have grown.
 
     Raises
     ------
     Cancelled, DeadlineExceeded
-        As the control says, which is asked before each slice.
+        At the checkpoint before each slice.
     """
     done, size, shown = 0, _FIRST_ITEMS, 0.0
     while done < count:

@@ -1,6 +1,6 @@
-"""What can go wrong, as types.
+"""Errors: every refusal and every early stop of the library.
 
-Every refusal and every early stop of the library is one of these::
+They form a tree::
 
     GeodesicError
     ├── InvalidMesh             the vertices, the faces or the file cannot be used
@@ -19,20 +19,37 @@ from collections.abc import Sequence
 
 
 class GeodesicError(Exception):
-    """Base of all exceptions of this library."""
+    """Base of all exceptions of this library.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> try:
+    ...     gc.exact_distance(mesh, 7)
+    ... except gc.GeodesicError as error:
+    ...     print(error)
+    the source 0 is vertex 7, but vertices are numbered 0 to 3
+    """
 
 
 class InvalidMesh(GeodesicError):  # noqa: N818 - the contract's names read as the refusal itself
-    """The mesh cannot be used.
+    """A mesh that cannot be used.
 
     Parameters
     ----------
     message
-        Which element is wrong, and what to do about it.
+        The element at fault, and the remedy.
+    kind
+        Kind of the ids: ``"vertex"``, ``"face"``, ``"edge"`` (pairs of vertices) or ``"file"``.
     elements
         Ids of (at most ten of) the elements at fault.
-    kind
-        What the ids count: ``"vertex"``, ``"face"``, ``"edge"`` (pairs of vertices) or ``"file"``.
+
+    Examples
+    --------
+    >>> gc.TriangleMesh([[0.0, 0.0, 0.0]], [[0, 1, 2]])
+    Traceback (most recent call last):
+        ...
+    geodesic_core.errors.InvalidMesh: face 0 is [0, 1, 2], but vertices are numbered 0 to 0
     """
 
     def __init__(
@@ -44,7 +61,23 @@ class InvalidMesh(GeodesicError):  # noqa: N818 - the contract's names read as t
 
 
 class TooManyFaces(InvalidMesh):
-    """A file holds, or claims to hold, more than ``max_faces`` faces."""
+    r"""A file with more than ``max_faces`` faces, by its header or by count.
+
+    Parameters
+    ----------
+    faces
+        Number of faces.
+    max_faces
+        Number allowed.
+
+    Examples
+    --------
+    >>> text = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    >>> gc.load_mesh(text, "off", max_faces=0)
+    Traceback (most recent call last):
+        ...
+    geodesic_core.errors.TooManyFaces: 1 faces, where at most 0 are allowed
+    """
 
     def __init__(self, faces: int, max_faces: int) -> None:
         super().__init__(f"{faces} faces, where at most {max_faces} are allowed", kind="face")
@@ -53,15 +86,49 @@ class TooManyFaces(InvalidMesh):
 
 
 class InvalidPoint(GeodesicError):  # noqa: N818
-    """A source or a target that is not a point of the mesh."""
+    """A source or a target that is not a point of the mesh.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh.point(-1)
+    Traceback (most recent call last):
+        ...
+    geodesic_core.errors.InvalidPoint: the point is vertex -1, but vertices are numbered 0 to 3
+    """
 
 
 class InvalidArgument(GeodesicError):  # noqa: N818
-    """An argument outside its domain."""
+    """An argument outside its domain.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> gc.exact_distance(mesh, 0, max_distance=-1.0)
+    Traceback (most recent call last):
+        ...
+    geodesic_core.errors.InvalidArgument: max_distance is -1.0; it must be a number, 0 or more
+    """
 
 
 class NoPath(GeodesicError):  # noqa: N818
-    """No path joins the points: ``reason`` is ``"disconnected"`` or ``"beyond_max_distance"``."""
+    """Points that no path joins.
+
+    Parameters
+    ----------
+    message
+        The points, and the limit.
+    reason
+        ``"disconnected"`` or ``"beyond_max_distance"``.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> gc.shortest_path(mesh, 0, 3, max_distance=1.0)
+    Traceback (most recent call last):
+        ...
+    geodesic_core.errors.NoPath: the path from vertex 0 to vertex 3 is longer than max_distance = 1
+    """
 
     def __init__(self, message: str, reason: str) -> None:
         super().__init__(message)
@@ -69,15 +136,50 @@ class NoPath(GeodesicError):  # noqa: N818
 
 
 class Cancelled(GeodesicError):  # noqa: N818
-    """The ``cancel`` callback of the caller said stop."""
+    """A call that the caller's ``cancel`` stopped.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> gc.exact_distance(mesh, 0, cancel=lambda: True)
+    Traceback (most recent call last):
+        ...
+    geodesic_core.errors.Cancelled: cancelled with 0% done
+    """
 
 
 class DeadlineExceeded(GeodesicError):  # noqa: N818
-    """The sweep did not finish within ``deadline_s``."""
+    """A call that did not finish within ``deadline_s``.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> gc.exact_distance(mesh, 0, deadline_s=1e-9)
+    Traceback (most recent call last):
+        ...
+    geodesic_core.errors.DeadlineExceeded: not finished within 1e-09 s: 0% done
+    """
 
 
 class MemoryLimitExceeded(GeodesicError):  # noqa: N818
-    """The call needs more than ``memory_limit`` bytes: ``needed``, or more."""
+    """A call that needs more than ``memory_limit`` bytes.
+
+    Parameters
+    ----------
+    needed
+        Bytes that it needs, at least.
+    memory_limit
+        Bytes granted.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> try:
+    ...     gc.exact_distance(mesh, 0, memory_limit=1)
+    ... except gc.errors.MemoryLimitExceeded as error:
+    ...     print(error.needed > error.memory_limit)
+    True
+    """
 
     def __init__(self, needed: int, memory_limit: int) -> None:
         super().__init__(f"the call needs {needed} bytes or more; memory_limit is {memory_limit}")
@@ -86,8 +188,20 @@ class MemoryLimitExceeded(GeodesicError):  # noqa: N818
 
 
 class NotConverged(GeodesicError):  # noqa: N818
-    """An approximate sweep propagated the windows of one edge too often, and was given up."""
+    """An approximate sweep that propagated the windows of one edge too often, and gave up.
+
+    Examples
+    --------
+    >>> issubclass(gc.errors.NotConverged, gc.GeodesicError)
+    True
+    """
 
 
 class InternalError(GeodesicError):
-    """An invariant of the algorithm does not hold: a defect of this library."""
+    """An invariant of the algorithm that does not hold: a defect of this library.
+
+    Examples
+    --------
+    >>> issubclass(gc.errors.InternalError, gc.GeodesicError)
+    True
+    """

@@ -1,4 +1,4 @@
-"""Procedural meshes, for whoever has no file at hand."""
+"""Samples: procedural meshes of any number of faces, to begin with without a file."""
 
 from collections.abc import Callable
 from itertools import combinations
@@ -26,7 +26,30 @@ _WALLS = ((1.0, 0.0), (0.0, 1.0), (0.8, 0.6), (-0.6, 0.8), (0.6, 0.8), (-0.8, 0.
 
 
 def knot(faces: int) -> Sample:
-    """Return a tube along a trefoil knot: closed, smooth, of genus 1; about 6 units wide."""
+    """Return a tube along a trefoil knot: closed, smooth, of genus 1; about 6 units wide.
+
+    Parameters
+    ----------
+    faces
+        Wanted number of faces, 500 to 50 million; the sample has about as many.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        (V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside or
+        above.
+
+    Raises
+    ------
+    InvalidArgument
+        The number is out of its range.
+
+    Examples
+    --------
+    >>> vertices, faces = gc.samples.knot(500)
+    >>> vertices.shape, faces.shape
+    ((250, 3), (500, 3))
+    """
     _refuse_count(faces, fewest=500)
     around = ceil(sqrt(0.5 * faces * 2.0 * pi * _TUBE_RADIUS / _KNOT_LENGTH))
     along = round(faces / (2 * around))
@@ -54,7 +77,30 @@ def knot(faces: int) -> Sample:
 
 
 def sphere(faces: int) -> Sample:
-    """Return the unit sphere as an icosahedron whose faces are cut into n² each; 20 n² faces."""
+    """Return the unit sphere as an icosahedron whose faces are cut into n² each; 20 n² faces.
+
+    Parameters
+    ----------
+    faces
+        Wanted number of faces, 20 to 50 million; the sample has about as many.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        (V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside or
+        above.
+
+    Raises
+    ------
+    InvalidArgument
+        The number is out of its range.
+
+    Examples
+    --------
+    >>> vertices, faces = gc.samples.sphere(80)
+    >>> vertices.shape, faces.shape
+    ((42, 3), (80, 3))
+    """
     _refuse_count(faces, fewest=20)
     n = max(1, round(sqrt(faces / 20)))
     corners, triangles = _icosahedron()
@@ -82,7 +128,30 @@ def sphere(faces: int) -> Sample:
 
 
 def plane(faces: int) -> Sample:
-    """Return the unit square in the plane z = 0, as a grid with a boundary, seen from above."""
+    """Return the unit square in the plane z = 0, as a grid with a boundary, seen from above.
+
+    Parameters
+    ----------
+    faces
+        Wanted number of faces, 2 to 50 million; the sample has about as many.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        (V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside or
+        above.
+
+    Raises
+    ------
+    InvalidArgument
+        The number is out of its range.
+
+    Examples
+    --------
+    >>> vertices, faces = gc.samples.plane(2)
+    >>> faces.tolist()
+    [[0, 1, 3], [0, 3, 2]]
+    """
     _refuse_count(faces, fewest=2)
     rows = max(1, round(sqrt(faces / 2)))
     columns = max(1, round(faces / (2 * rows)))
@@ -98,7 +167,29 @@ def terrain(faces: int) -> Sample:
     """Return mountains and valleys over a square, 10 units wide, seen from above.
 
     Ridges of noise on ever finer lattices, as fine as the grid of vertices has room for. Heights
-    are the same to the bit on every machine, since only arithmetic goes into them.
+    are the same to the bit on every machine, since they come from arithmetic alone.
+
+    Parameters
+    ----------
+    faces
+        Wanted number of faces, 200 to 50 million; the sample has about as many.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        (V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside or
+        above.
+
+    Raises
+    ------
+    InvalidArgument
+        The number is out of its range.
+
+    Examples
+    --------
+    >>> vertices, faces = gc.samples.terrain(200)
+    >>> vertices.shape, faces.shape
+    ((121, 3), (200, 3))
     """
     _refuse_count(faces, fewest=200)
     rows = round(sqrt(faces / 2))
@@ -123,7 +214,30 @@ def terrain(faces: int) -> Sample:
 
 
 def obstacles(faces: int) -> Sample:
-    """Return a gently curved sheet with 16 holes, pillars and walls to pass; 8 units wide."""
+    """Return a gently curved sheet with 16 holes, pillars and walls to pass; 8 units wide.
+
+    Parameters
+    ----------
+    faces
+        Wanted number of faces, 500 to 50 million; the sample has about as many.
+
+    Returns
+    -------
+    tuple of numpy.ndarray
+        (V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside or
+        above.
+
+    Raises
+    ------
+    InvalidArgument
+        The number is out of its range.
+
+    Examples
+    --------
+    >>> vertices, faces = gc.samples.obstacles(500)
+    >>> vertices.shape, faces.shape
+    ((321, 3), (512, 3))
+    """
     _refuse_count(faces, fewest=500)
     side, rings = _tile_counts(faces)
     # Around a hole in a tile go rings of points, from the border of the tile to that of the hole.
@@ -171,7 +285,7 @@ SAMPLES: dict[str, Callable[[int], Sample]] = {
 
 
 def _tile_counts(faces: int) -> tuple[int, int]:
-    """Return how many points a side of a tile has, and how many rings, for about so many faces."""
+    """Return the numbers of points a side of a tile and of rings, for about ``faces`` faces."""
     wanted = faces / (8 * _TILES * _TILES)
     middle = round(sqrt(2.0 * wanted))
     sides = range(max(2, middle - 3), middle + 4)
@@ -248,8 +362,8 @@ def _noise(x: Floats, y: Floats, seed: int) -> Floats:
     s, t = (w * w * w * (w * (6.0 * w - 15.0) + 10.0) for w in (u, v))
     lower = corners[0] + s * (corners[1] - corners[0])
     upper = corners[2] + s * (corners[3] - corners[2])
-    found: Floats = lower + t * (upper - lower)
-    return found
+    value: Floats = lower + t * (upper - lower)
+    return value
 
 
 def _hashed(i: Longs, j: Longs, seed: int) -> Longs:

@@ -1,4 +1,4 @@
-"""The solvers: arguments in, sweeps, results out."""
+"""Solvers: arguments in, sweeps and searches, results out."""
 
 import math
 import time
@@ -55,13 +55,13 @@ def exact_distance(
         A vertex index, a `SurfacePoint`, a `Curve`, a `Source` with a start distance, or several
         of these.
     max_distance
-        Vertices farther than this (mesh units) are not looked for; they count as unreachable.
+        Limit of the sweep, mesh units; None for no limit. Vertices beyond it count as unreachable.
     targets
-        Points whose distances are found on the way, so that `DistanceField.distance_at` and
+        Points whose distances the same sweep finds, so that `DistanceField.distance_at` and
         `DistanceField.path_to` know them without a search of their own.
     barriers
-        Ids of faces that act as holes, for this call: the field is that of
-        `TriangleMesh.with_barriers`, which makes the same mesh once for many calls.
+        Ids of faces that act as holes, for this call. The field is that of
+        `TriangleMesh.with_barriers`, which prepares the blocked mesh once for many calls.
     retain
         What the field holds in memory; the rest is found by a second sweep when it is first needed.
         ``"distances"``: distances and nearest sources. ``"paths"``: also what
@@ -73,21 +73,38 @@ def exact_distance(
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
+    Returns
+    -------
+    DistanceField
+        Distances, (V,) float64 in mesh units, with the nearest source of each vertex, paths and
+        isolines.
+
     Raises
     ------
-    InvalidPoint, InvalidArgument
-        A source that is not on the mesh, or inside a barrier; a limit out of its domain.
+    InvalidPoint
+        A source or a target is not on the mesh, or lies inside a barrier.
+    InvalidArgument
+        Another argument is out of its domain.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         The sweep was stopped; the mesh is as good as before.
 
     Notes
     -----
     O(F^1.5 log F) in practice and O(F² log F) at worst. Memory: about a third of the mesh's own
-    arrays, since windows are given back as soon as they are propagated, unless they are kept.
+    arrays. Windows are released as soon as they are propagated, unless they are retained.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+    >>> field = gc.exact_distance(mesh, 0)
+    >>> field.distances.round(3).tolist()
+    [0.0, 1.0, 1.0, 1.414]
+    >>> gc.exact_distance(mesh, [0, gc.Source(3, start_distance=0.25)]).nearest_source.tolist()
+    [0, 0, 0, 1]
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     bounds = exact_bounds(as_limit(max_distance))
-    mesh, control = _among(mesh, barriers, control)
+    mesh, control = _with_barriers(mesh, barriers, control)
     return _solve(mesh, sources, targets, bounds, EXACT, retain, control)
 
 
@@ -114,7 +131,7 @@ def approximate_distance(
         As in `exact_distance`.
     relative_error
         Share of the exact distance by which a distance may fall short: above 0 and below 1. None
-        for no such bound, if there is an absolute one.
+        for no such bound, where there is an absolute one.
     absolute_error
         The same in mesh units. Where both are given, both hold.
     max_distance, targets, barriers
@@ -128,6 +145,11 @@ def approximate_distance(
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
+    Returns
+    -------
+    DistanceField
+        Distances, (V,) float64 in mesh units, and the error that they keep to.
+
     Raises
     ------
     NotConverged
@@ -138,12 +160,21 @@ def approximate_distance(
     Notes
     -----
     O(F log F) in practice. docs/accuracy.md tells what is guaranteed, and why.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> field = gc.approximate_distance(mesh, 0, relative_error=0.01)
+    >>> field.error_bound
+    ErrorBound(type='relative', value=0.01, kind='guaranteed')
+    >>> bool(0.99 * 2**0.5 <= field.distances[3] <= 2**0.5)
+    True
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     relative, absolute = _as_errors(relative_error, absolute_error)
     limit = as_limit(max_distance)
     bounds = merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
-    mesh, control = _among(mesh, barriers, control)
+    mesh, control = _with_barriers(mesh, barriers, control)
     if math.isfinite(relative):
         promise = ErrorBound("relative", relative, "guaranteed")
     else:
@@ -173,16 +204,21 @@ def shortest_path(
     mesh
         The surface.
     source, target
-        Vertex indices, or `SurfacePoint` of vertices.
+        Vertex indices or `SurfacePoint`.
     waypoints
         Points that the path passes in order; it is shortest from each to the next.
     max_distance
-        A path longer than this (mesh units), past all waypoints, is not looked for: the search ends
-        once it is certain that there is no other.
+        Largest length of the path past all waypoints, mesh units; None for no limit. The search
+        ends once it is certain that no path is as short.
     explain
-        Also return what each step of the search did, in `GeodesicPath.steps`.
+        Also record the steps of the search, in `GeodesicPath.steps`.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
+
+    Returns
+    -------
+    GeodesicPath
+        Its points, (K, 3) float64, and its length, mesh units.
 
     Raises
     ------
@@ -195,6 +231,17 @@ def shortest_path(
     -----
     In practice O(region), a thin strip around the path and a larger one for its bounds; allocating
     the state is O(V + F), about two thirds of the mesh's own arrays.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> path = gc.shortest_path(mesh, 1, 2)  # across the edge between the triangles
+    >>> path.points.tolist()
+    [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0]]
+    >>> round(path.length, 6)
+    1.414214
+    >>> gc.shortest_path(mesh, 0, 3, waypoints=[1]).length
+    2.0
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     limit = as_limit(max_distance)
@@ -203,22 +250,33 @@ def shortest_path(
 
 
 class Solver:
-    """Solvers of one mesh that keep between calls what they can share.
+    """Solvers of one mesh that reuse memory and landmarks from call to call.
 
     Paths need scratch memory, about two thirds of the mesh's own arrays, and get faster with
-    landmarks, which are added while paths are asked for (64 bytes a vertex); matrices and nearest
-    candidates need a third. Not for use by several threads at once.
+    landmarks, which are added as searches go on (64 bytes a vertex). Matrices and nearest
+    candidates need a third. One thread at a time may use a solver.
+
+    Parameters
+    ----------
+    mesh
+        The surface of all calls, also found as ``solver.mesh``.
+
+    Examples
+    --------
+    >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+    >>> [round(solver.shortest_path(0, target).length, 3) for target in (1, 2, 3)]
+    [1.0, 1.0, 1.414]
     """
 
     def __init__(self, mesh: TriangleMesh) -> None:
         self.mesh = mesh
         self._search: PathSearch | None = None
-        self._sweeper: TargetSweep | None = None
+        self._sweep: TargetSweep | None = None
 
     @property
     def nbytes(self) -> int:
-        """Memory kept, bytes, the mesh not counted."""
-        return sum(kept.nbytes for kept in (self._search, self._sweeper) if kept is not None)
+        """Memory held between calls, bytes, without the mesh."""
+        return sum(part.nbytes for part in (self._search, self._sweep) if part is not None)
 
     def exact_distance(
         self,
@@ -233,7 +291,31 @@ class Solver:
         deadline_s: float | None = None,
         memory_limit: int | None = None,
     ) -> DistanceField:
-        """Do as `exact_distance` does, on this mesh."""
+        """Return exact distances from the nearest source to every vertex, as `exact_distance` does.
+
+        Parameters
+        ----------
+        sources, max_distance, targets, barriers, retain
+            As in the function `exact_distance`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        DistanceField
+            Distances, (V,) float64, mesh units.
+
+        Raises
+        ------
+        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in the function.
+
+        Examples
+        --------
+        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver.exact_distance([0, 3]).distances.tolist()
+        [0.0, 1.0, 1.0, 0.0]
+        """
         return exact_distance(
             self.mesh,
             sources,
@@ -262,7 +344,32 @@ class Solver:
         deadline_s: float | None = None,
         memory_limit: int | None = None,
     ) -> DistanceField:
-        """Do as `approximate_distance` does, on this mesh."""
+        """Return distances within an error, never too long, as `approximate_distance` does.
+
+        Parameters
+        ----------
+        sources, relative_error, absolute_error, max_distance, targets, barriers, retain
+            As in the function `approximate_distance`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        DistanceField
+            Distances, (V,) float64, mesh units, and the error that they keep to.
+
+        Raises
+        ------
+        NotConverged, InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded,
+        MemoryLimitExceeded
+            As in the function.
+
+        Examples
+        --------
+        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver.approximate_distance(0, None, absolute_error=0.1).error_bound
+        ErrorBound(type='absolute', value=0.1, kind='guaranteed')
+        """
         return approximate_distance(
             self.mesh,
             sources,
@@ -291,11 +398,38 @@ class Solver:
         deadline_s: float | None = None,
         memory_limit: int | None = None,
     ) -> GeodesicPath:
-        """Do as `shortest_path` does, on this mesh; in time that does not depend on its size."""
+        """Return an exact shortest path between two points, as `shortest_path` does.
+
+        The time of a call does not depend on the size of the mesh: memory is reused, and landmarks
+        narrow the search.
+
+        Parameters
+        ----------
+        source, target, waypoints, max_distance, explain
+            As in the function `shortest_path`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        GeodesicPath
+            Its points, (K, 3) float64, and its length, mesh units.
+
+        Raises
+        ------
+        NoPath, InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in the function.
+
+        Examples
+        --------
+        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver.shortest_path(1, 2).faces.tolist()
+        [0, 1]
+        """
         control = Control(progress, cancel, deadline_s, memory_limit)
         limit = as_limit(max_distance)
         stops = _as_stops(self.mesh, source, target, waypoints)
-        search = self._kept_search()
+        search = self._shared_search()
         path = _shortest_through(search, stops, limit, control, explain=explain)
         search.add_landmark_if_due(stops[0], replace(control, progress=None))
         return path
@@ -313,11 +447,37 @@ class Solver:
         deadline_s: float | None = None,
         memory_limit: int | None = None,
     ) -> Floats | csr_array:
-        """Do as `distance_matrix` does, on this mesh; keeps the memory of one of the threads."""
+        """Return the exact distances from each source to each target, as `distance_matrix` does.
+
+        The memory of one of the threads is reused by the next call.
+
+        Parameters
+        ----------
+        sources, targets, max_distance, layout, threads
+            As in the function `distance_matrix`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        numpy.ndarray or scipy.sparse.csr_array
+            Distances, float64, mesh units: (N, M), or (N,) for pairs.
+
+        Raises
+        ------
+        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in the function.
+
+        Examples
+        --------
+        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver.distance_matrix([0, 1], [2, 3]).round(3).tolist()
+        [[1.0, 1.414], [1.414, 1.0]]
+        """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        keep = self._kept_sweeper, self._kept_search
+        shared = self._shared_sweep, self._shared_search
         return find_matrix(
-            self.mesh, *keep, sources, targets, max_distance, layout, threads, control
+            self.mesh, *shared, sources, targets, max_distance, layout, threads, control
         )
 
     def nearest(
@@ -332,21 +492,47 @@ class Solver:
         deadline_s: float | None = None,
         memory_limit: int | None = None,
     ) -> Nearest:
-        """Do as `nearest` does, on this mesh; in time that does not depend on its size."""
+        """Return the ``k`` geodesically nearest of some candidates, as `nearest` does.
+
+        The time of a call does not depend on the size of the mesh.
+
+        Parameters
+        ----------
+        source, candidates, k, max_distance
+            As in the function `nearest`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        Nearest
+            Indices into the candidates, (n,) int32, and distances, (n,) float64, nearest first.
+
+        Raises
+        ------
+        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in the function.
+
+        Examples
+        --------
+        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver.nearest(0, [3, 2], k=2).indices.tolist()
+        [1, 0]
+        """
         control = Control(progress, cancel, deadline_s, memory_limit)
         return find_nearest(
-            self.mesh, self._kept_sweeper, source, candidates, k, max_distance, control
+            self.mesh, self._shared_sweep, source, candidates, k, max_distance, control
         )
 
-    def _kept_search(self) -> PathSearch:
+    def _shared_search(self) -> PathSearch:
         if self._search is None:
             self._search = PathSearch(self.mesh)
         return self._search
 
-    def _kept_sweeper(self) -> TargetSweep:
-        if self._sweeper is None:
-            self._sweeper = TargetSweep(self.mesh)
-        return self._sweeper
+    def _shared_sweep(self) -> TargetSweep:
+        if self._sweep is None:
+            self._sweep = TargetSweep(self.mesh)
+        return self._sweep
 
 
 def _shortest_through(
@@ -357,7 +543,7 @@ def _shortest_through(
     *,
     explain: bool,
 ) -> GeodesicPath:
-    """Search for leg after leg, each no longer than what those before and after it leave."""
+    """Search for leg after leg, each no longer than the others leave of the limit."""
     legs: list[GeodesicPath] = []
     positions = np.array([search.mesh.position(stop) for stop in stops])
     left = limit * (1.0 + AT_LIMIT)
@@ -381,10 +567,14 @@ def _shortest_through(
 
 
 def warm_up() -> None:
-    """Compile what distances and paths need, or load it from the cache on disk (0.1 s).
+    """Compile the kernels of distances and paths, or load them from the cache on disk (0.1 s).
 
-    Some tens of seconds, once on a machine. Curves, isolines and matrices add theirs when they are
-    first asked for.
+    Compiling takes some tens of seconds, once on a machine. Curves, isolines and matrices compile
+    theirs at their first call.
+
+    Examples
+    --------
+    >>> gc.warm_up()
     """
     corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
     mesh = TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
@@ -404,14 +594,13 @@ def kernel_digest() -> str:
 
     Examples
     --------
-    >>> import geodesic_core as gc
     >>> gc.kernel_digest() == gc.kernel_digest()
     True
     """
     return sources_digest()
 
 
-def _among(
+def _with_barriers(
     mesh: TriangleMesh, barriers: Iterable[int], control: Control
 ) -> tuple[TriangleMesh, Control]:
     """Return the mesh with its barriers, and the control of a call that holds what that takes."""
@@ -432,17 +621,17 @@ def _solve(
     retain: Retain,
     control: Control,
 ) -> DistanceField:
-    """Check the arguments, sweep, and make the result with what it is to retain."""
+    """Check the arguments, sweep, and return the field with what it is to retain."""
     check_choice("retain", retain, get_args(Retain))
     paths, windows = retain != "distances", retain == "windows"
-    starts, places = as_sources(mesh, sources)
+    starts, polylines = as_sources(mesh, sources)
     ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
     distances = np.array([start.start_distance for start in starts])
-    sweep = RepeatableSweep.between(mesh, places, distances, ends, bounds)
+    sweep = RepeatableSweep.between(mesh, polylines, distances, ends, bounds)
     wave = sweep.run(control, paths=paths, windows=sweep.all_faces if windows else None)
-    found = sweep.found(wave, paths=paths, windows=windows)
+    result = sweep.result_of(wave, paths=paths, windows=windows)
     stats = stats_of(mesh, wave, time.perf_counter() - control.began)
-    return field_of(starts, places, ends, sweep, promise, found, stats)
+    return field_of(starts, polylines, ends, sweep, promise, result, stats)
 
 
 def _as_stops(

@@ -1,4 +1,4 @@
-"""What arguments must be."""
+"""Validation of arguments."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -11,12 +11,12 @@ from geodesic_core.errors import InvalidArgument
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value is a real number, and not a truth value."""
+    """Tell whether a value is a real number, and not a truth value."""
     return isinstance(value, int | float | np.number) and not isinstance(value, bool)
 
 
 def is_index(value: Any) -> bool:
-    """Whether a value is an integer, and not a truth value."""
+    """Tell whether a value is an integer, and not a truth value."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
@@ -62,7 +62,7 @@ def as_barriers(barriers: Any, face_count: int) -> Longs:
     if isinstance(barriers, np.ndarray) and barriers.dtype.kind in "iu" and barriers.ndim == 1:
         faces = barriers
     else:
-        faces = np.array([None, *barriers], dtype=object)[1:]  # so that rows stay what they are
+        faces = np.array([None, *barriers], dtype=object)[1:]  # rows stay rows
         for i, face in enumerate(faces):
             if not is_index(face):
                 raise InvalidArgument(

@@ -1,4 +1,4 @@
-"""What the solvers give back."""
+"""Distance fields: the results of the solvers."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -47,39 +47,73 @@ from geodesic_core.tolerances import FOOT, LEVEL, PATH_LENGTH
 
 @dataclass(frozen=True)
 class DistanceField:
-    """Geodesic distances from the sources to all vertices."""
+    """Geodesic distances from the sources to all vertices, and what can be found from them.
+
+    The solvers make it. Paths, points inside faces, gradients and isolines come from retained data,
+    or from a second sweep where those were not retained.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> field = gc.exact_distance(mesh, 0)
+
+    >>> field.distances.round(3).tolist()
+    [0.0, 1.0, 1.0, 1.414]
+    >>> field.path_to(3).points.tolist()
+    [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
+    """
 
     mesh: TriangleMesh
-    """With its barriers, if there are any"""
+    """The surface, with the barriers of the call"""
     sources: tuple[Source, ...]
     max_distance: float
-    """Mesh units; infinite where no limit was given."""
+    """Limit of the sweep, mesh units; infinite where none was given."""
     distances: Floats
     """(V,) float64, mesh units; infinite where unreachable or beyond ``max_distance``."""
     nearest_source: Ints
     """(V,) int32 index into ``sources``; -1 where unreachable; ties to the lowest."""
     error_bound: ErrorBound
     stats: SweepStats
-    _places: tuple[Polyline, ...]
-    """The sources' points, canonical"""
+    _polylines: tuple[Polyline, ...]
+    """Canonical points of each source"""
     _targets: tuple[SurfacePoint, ...]
-    """Those that the sweep was told of, canonical"""
+    """Targets of the sweep, canonical"""
     _sweep: RepeatableSweep
-    """Where the values come from"""
-    _found: SweepResult
+    _result: SweepResult
 
     @classmethod
     def from_arrays(cls, mesh: TriangleMesh, arrays: Mapping[str, NDArray[Any]]) -> "DistanceField":
         """Return the field on ``mesh`` whose `arrays` these are; trusted, not checked.
 
-        What it answers is the same to the bit; its sources are spelled canonically.
+        Its answers are the same to the bit; its sources are spelled canonically.
+
+        Parameters
+        ----------
+        mesh
+            The surface that the field was found on.
+        arrays
+            The arrays of `arrays`, by name; they may be memory-mapped.
+
+        Returns
+        -------
+        DistanceField
+            The same field.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> field = gc.exact_distance(mesh, 0)
+
+        >>> again = gc.DistanceField.from_arrays(mesh, field.arrays())
+        >>> again.path_to(3).length == field.path_to(3).length
+        True
         """
-        places = polylines_from_arrays("source", arrays)
+        polylines = polylines_from_arrays("source", arrays)
         targets = tuple(point for (point,) in polylines_from_arrays("target", arrays))
         starts = arrays["start_distances"]
         sources = tuple(
             Source(line[0] if len(line) == 1 else Curve(line), start)
-            for line, start in zip(places, starts.tolist(), strict=True)
+            for line, start in zip(polylines, starts.tolist(), strict=True)
         )
         limit, *errors = arrays["limits"].tolist()
         bounds = merging_bounds(limit, *errors) if errors else exact_bounds(limit)
@@ -88,63 +122,74 @@ class DistanceField:
         seconds = float(arrays["seconds"])
         return field_of(
             sources,
-            places,
+            polylines,
             targets,
-            RepeatableSweep.between(mesh, places, starts, targets, bounds),
+            RepeatableSweep.between(mesh, polylines, starts, targets, bounds),
             ErrorBound(of_type, float(arrays["promised"]), kind),
             SweepResult.from_arrays(arrays),
             SweepStats.of(mesh, created, kept, peak, peak_bytes, seconds),
         )
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return what was asked for, and what was found, by name: what a store keeps.
+        """Return the question and the result as arrays, for a store.
 
-        All but the mesh, and what was searched for later.
+        Returns
+        -------
+        dict of str to numpy.ndarray
+            All but the mesh, and but what later calls have found.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> field = gc.exact_distance(mesh, 0)
+
+        >>> field.arrays()["distance"].round(3).tolist()  # in the order of the topology
+        [0.0, 1.0, 1.0, 1.414]
         """
         bounds, stats, promise = self._sweep.bounds, self.stats, self.error_bound
         errors = [bounds.relative_error, bounds.absolute_error] if bounds.merging else []
         counts = stats.windows_created, stats.windows_kept, stats.windows_peak, stats.peak_bytes
         return {
-            **polylines_to_arrays("source", self._places),
+            **polylines_to_arrays("source", self._polylines),
             **polylines_to_arrays("target", [(target,) for target in self._targets]),
             "start_distances": self._sweep.start_distances,
             "limits": np.array([bounds.max_distance, *errors]),
             "promise": np.array([promise.type, promise.kind]),
             "promised": np.array(promise.value),
-            **self._found.arrays(),
+            **self._result.arrays(),
             "counts": np.array(counts, np.int64),
             "seconds": np.array(stats.seconds),
         }
 
     @property
     def nbytes(self) -> int:
-        """Memory kept, bytes, the mesh not counted; it grows by what is found only when asked."""
-        found, ways = self._found, self._ways
-        kept: list[Any] = [found.distance, self.distances, self.nearest_source]
-        kept += self._winners.found or ()
-        for windows in (found.windows, ways.found[1] if ways and ways.found else None):
-            kept += windows or ()
-        return sum(array.nbytes for array in kept)
+        """Memory held, bytes, without the mesh; it grows by what later calls find."""
+        result, later = self._result, self._winners_and_windows
+        arrays: list[Any] = [result.distance, self.distances, self.nearest_source]
+        arrays += self._winners.value or ()
+        for windows in (result.windows, later.value[1] if later and later.value else None):
+            arrays += windows or ()
+        return sum(array.nbytes for array in arrays)
 
     @cached_property
     def _node_of(self) -> Mapping[SurfacePoint, int]:
-        """The nodes of the targets."""
+        """Nodes of the targets."""
         return dict(zip(self._targets, self._sweep.nodes.targets.tolist(), strict=True))
 
     @cached_property
     def _winners(self) -> Lazy[Winners]:
-        """For backtracing; the sweep may not have kept what that needs."""
-        return Lazy(self._sweep.find_winners, self._found.winners)
+        """Data of paths to vertices and targets, swept for again if not retained."""
+        return Lazy(self._sweep.find_winners, self._result.winners)
 
     @cached_property
-    def _ways(self) -> Lazy[tuple[Winners, FaceWindows]] | None:
-        """By which windows any point is found exactly; None where it is searched from."""
-        sweep, bounds, found = self._sweep, self._sweep.bounds, self._found
-        if found.winners is not None and found.windows is not None and not bounds.merging:
-            return Lazy(sweep.find_ways, (found.winners, found.windows))
+    def _winners_and_windows(self) -> Lazy[tuple[Winners, FaceWindows]] | None:
+        """Data by which any point is found exactly; None where a search back from it finds it."""
+        sweep, bounds, result = self._sweep, self._sweep.bounds, self._result
+        if result.winners is not None and result.windows is not None and not bounds.merging:
+            return Lazy(sweep.find_winners_and_windows, (result.winners, result.windows))
         if bounds.parallel:  # a sweep back from a point ends at points, not on curves
             exact = with_parallel_windows(exact_bounds(bounds.max_distance), bounds.first_segment)
-            return Lazy(replace(sweep, bounds=exact).find_ways)
+            return Lazy(replace(sweep, bounds=exact).find_winners_and_windows)
         return None
 
     def distance_at(
@@ -156,30 +201,49 @@ class DistanceField:
         deadline_s: float | None = None,
         memory_limit: int | None = None,
     ) -> float:
-        """Return the distance of any point of the surface, mesh units; infinite as in `distances`.
+        """Return the distance of any point of the surface.
 
-        At a vertex or a target of the sweep it is what the sweep found, O(1). Elsewhere it is
-        exact, also where the field is approximate: by the windows of an exact field that kept them,
+        At a vertex or a target of the sweep it is the sweep's value, O(1). Elsewhere it is exact,
+        also where the field is approximate: from the windows of an exact field that retains them,
         O(windows of the face); else by an exact sweep from the point to the nearest source, in a
         thin strip that the field's own values leave. Where a source is a curve, the first such
-        point runs the sweep again, exactly, and keeps its windows. Sweeps are watched as those of
-        the solvers are: see `Control`.
+        point runs the sweep again, exactly, and retains its windows.
+
+        Parameters
+        ----------
+        point
+            A vertex index or a `SurfacePoint`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        float
+            Mesh units; infinite where unreachable or beyond ``max_distance``.
 
         Raises
         ------
         InvalidPoint
             It is not a point of the mesh.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As said in `Control`; the field is as good as before.
+            As in `Control`; the field is as good as before.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> field = gc.exact_distance(mesh, 0)
+
+        >>> round(field.distance_at(gc.SurfacePoint.face(0, (0.5, 0.25, 0.25))), 6)
+        0.559017
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        place = self.mesh.point(point)
-        node = self._node(place)
+        location = self.mesh.point(point)
+        node = self._node(location)
         if node is not None:
-            return float(self._found.distance[node])
-        if self._ways is None:
-            return self._nearest_to(place, control).distance
-        return self._arrival_at(place, *self._ways.get(control)).distance
+            return float(self._result.distance[node])
+        if self._winners_and_windows is None:
+            return self._nearest_to(location, control).distance
+        return self._arrival_at(location, *self._winners_and_windows.get(control)).distance
 
     def nearest_source_at(
         self,
@@ -190,25 +254,44 @@ class DistanceField:
         deadline_s: float | None = None,
         memory_limit: int | None = None,
     ) -> int:
-        """Return the index of the source nearest to any point of the surface; -1 for none.
+        """Return the source nearest to any point of the surface.
 
-        Found as `distance_at` finds the distance, and watched as that.
+        It is found as `distance_at` finds the distance.
+
+        Parameters
+        ----------
+        point
+            A vertex index or a `SurfacePoint`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        int
+            Index into ``sources``; -1 where the point is unreachable. Ties go to the lowest.
 
         Raises
         ------
         InvalidPoint
             It is not a point of the mesh.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As said in `Control`; the field is as good as before.
+            As in `Control`; the field is as good as before.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> field = gc.exact_distance(mesh, [0, 3])
+        >>> field.nearest_source_at(gc.SurfacePoint.edge(0, 1, 0.75))  # near 3
+        1
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        place = self.mesh.point(point)
-        node = self._node(place)
+        location = self.mesh.point(point)
+        node = self._node(location)
         if node is not None:
-            return int(self._found.nearest[node])
-        if self._ways is None:
-            return self._nearest_to(place, control).source
-        return self._arrival_at(place, *self._ways.get(control)).source
+            return int(self._result.nearest[node])
+        if self._winners_and_windows is None:
+            return self._nearest_to(location, control).source
+        return self._arrival_at(location, *self._winners_and_windows.get(control)).source
 
     def path_to(
         self,
@@ -223,9 +306,20 @@ class DistanceField:
 
         Of an exact field its length is the point's distance less the start distance of its source;
         of an approximate one at most the promised error more. O(faces crossed) to a vertex or a
-        target of the sweep. Where an approximate field was not told to keep what paths need, the
-        first of those runs the sweep again. To other points as `distance_at` finds their distances,
-        and watched as that.
+        target of the sweep; a field that does not retain paths runs the sweep again for the first
+        of those. To other points as `distance_at` finds their distances.
+
+        Parameters
+        ----------
+        target
+            A vertex index or a `SurfacePoint`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        GeodesicPath
+            From the source to the target.
 
         Raises
         ------
@@ -234,48 +328,80 @@ class DistanceField:
         NoPath
             It is not connected to a source, or lies beyond ``max_distance``.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As said in `Control`; the field is as good as before.
+            As in `Control`; the field is as good as before.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> field = gc.exact_distance(mesh, 0)
+
+        >>> field.path_to(2).points.tolist()
+        [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        place = self.mesh.point(target, "target")
-        node = self._node(place)
+        location = self.mesh.point(target, "target")
+        node = self._node(location)
         if node is not None:
-            if math.isinf(self._found.distance[node]):
-                raise self._no_path(place)
-            return self._traced(place, self._winners.get(control), self._sweep.nodes, node)
-        if self._ways is None:
-            path = self._nearest_to(place, control).path
+            if math.isinf(self._result.distance[node]):
+                raise self._no_path(location)
+            return self._traced(location, self._winners.get(control), self._sweep.nodes, node)
+        if self._winners_and_windows is None:
+            path = self._nearest_to(location, control).path
             if path is None:
-                raise self._no_path(place)
+                raise self._no_path(location)
             return path
-        winners, windows = self._ways.get(control)
-        arrival = self._arrival_at(place, winners, windows)
+        winners, windows = self._winners_and_windows.get(control)
+        arrival = self._arrival_at(location, winners, windows)
         if arrival.source < 0:
-            raise self._no_path(place)
+            raise self._no_path(location)
         return self._traced(
-            place, *with_target(self.mesh, winners, self._sweep.nodes, place, arrival)
+            location, *with_target(self.mesh, winners, self._sweep.nodes, location, arrival)
         )
 
     @cached_property
     def gradient(self) -> Floats:
         """Unit vectors (V, 3), float64: where distance grows fastest, tangent to the surface.
 
-        At each vertex the direction against that in which the shortest path to its nearest source
-        sets out; of one of them where several are as short. NaN at sources, and where `distances`
-        is infinite. O(V); of an approximate field that did not keep what paths need, after another
-        sweep, which nobody watches: unless `path_to` has found a path before.
+        At each vertex the direction opposite to the first step of the shortest path to its nearest
+        source; of one of them where several are as short. NaN at sources, and where `distances` is
+        infinite. O(V). A field that does not retain paths first runs the sweep again, without
+        control, unless `path_to` has found a path before.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> field = gc.exact_distance(mesh, 0)
+
+        >>> field.gradient.round(3).tolist()[1:]
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.707, 0.707, 0.0]]
         """
         return gradient_at_vertices(self.mesh, self._winners.get(Control()), self._sweep.nodes)
 
     def levels(self, count: int) -> Floats:
-        """Return levels for `isolines`: evenly spaced between 0 and the largest finite distance.
+        """Return levels for `isolines`, evenly spaced between 0 and the largest finite distance.
 
-        The two themselves are left out.
+        Parameters
+        ----------
+        count
+            Number of levels, 1 or more.
+
+        Returns
+        -------
+        numpy.ndarray
+            (count,) float64, mesh units, ascending; 0 and the largest distance are left out.
 
         Raises
         ------
         InvalidArgument
-            The count is not an integer, 1 or more; or no vertex is reached but sources.
+            The count is not an integer, 1 or more; or no vertex but the sources is reached.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> field = gc.exact_distance(mesh, 0)
+
+        >>> field.levels(3).round(3).tolist()
+        [0.354, 0.707, 1.061]
         """
         return spaced_levels(self.distances, count)
 
@@ -291,35 +417,50 @@ class DistanceField:
     ) -> list[list[Isoline]]:
         """Return for each level, in their order, the lines of points at that distance.
 
-        They are where the surface within that distance ends: closed, or open where they end at the
-        boundary or at an edge of more than two faces. In each face they consist of circular arcs,
-        and of straight lines beside curves; their ends, and what crosses edges, are exact, and
-        between them arcs become chords. A vertex at
-        the level itself counts as within. Levels beyond all distances, or beyond ``max_distance``,
-        have no lines. Of an approximate field they are those of its own distances, which the same
-        error bounds.
+        They bound the part of the surface within that distance: closed, or open where they end at
+        the boundary or at an edge of more than two faces. In each face they consist of circular
+        arcs, and of straight lines beside curves; their ends and crossings of edges are exact, and
+        between them arcs become chords. A vertex at the level itself counts as within. Levels
+        beyond all distances, or beyond ``max_distance``, have no lines. Of an approximate field
+        they are those of its own distances, which the same error bounds.
 
         Parameters
         ----------
         levels
             Distances above 0, mesh units; `levels` spaces some evenly.
         chord_error
-            How far chords may stray from their arcs, mesh units; by default a thousandth of the
+            Largest distance of a chord from its arc, mesh units; by default a thousandth of the
             mean edge length, at least a billionth of the bounding box's diagonal.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        list of list of Isoline
+            The lines of each level.
 
         Raises
         ------
         InvalidArgument
             A level or the chord error is out of its domain.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As said in `Control`; the field is as good as before.
+            As in `Control`; the field is as good as before.
 
         Notes
         -----
-        Where the sweep did not keep its windows, each call runs it again: of an exact field for
-        the windows of those faces only that the levels may pass. That takes less memory by far than
-        to keep all, and mostly less time. O(windows), and for each level O(n² log n) for n windows
-        in each face that it passes.
+        Where windows are not retained, each call runs the sweep again: of an exact field for the
+        windows of those faces only that the levels may pass. That takes far less memory than
+        retaining all, and mostly less time. O(windows), and for each level O(n² log n) for n
+        windows in each face that it passes.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> field = gc.exact_distance(mesh, 0)
+
+        >>> near, far = field.isolines([0.5, 1.2])
+        >>> len(near), near[0].closed, abs(near[0].length - 0.25 * np.pi) < 0.01
+        (1, False, True)
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
         return list(
@@ -336,7 +477,33 @@ class DistanceField:
         deadline_s: float | None = None,
         memory_limit: int | None = None,
     ) -> Iterator[list[Isoline]]:
-        """Yield what `isolines` returns, level by level: each is drawn when it is asked for."""
+        """Yield the lines of `isolines` level by level, each drawn when the iterator reaches it.
+
+        Parameters
+        ----------
+        levels, chord_error
+            As in `isolines`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Yields
+        ------
+        list of Isoline
+            The lines of the next level.
+
+        Raises
+        ------
+        InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in `isolines`.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> field = gc.exact_distance(mesh, 0)
+
+        >>> [len(lines) for lines in field.each_isoline([0.5, 1.2, 9.0])]
+        [1, 1, 0]
+        """
         control = Control(progress, cancel, deadline_s, memory_limit)
         return self._isolines(
             as_levels(levels), resolve_chord_error(self.mesh, chord_error), control
@@ -351,13 +518,13 @@ class DistanceField:
         if not within:
             yield from ([] for _ in levels)
             return
-        windows = self._found.windows
+        windows = self._result.windows
         if windows is None:
             windows = self._windows_at(within, control.for_part(0, 2))
             control = control.for_part(1, 2)
         parts = 1 + len(levels)
         drawing = Drawing(
-            self.mesh, windows, self._found.distance, self._sweep.nodes, control.for_part(0, parts)
+            self.mesh, windows, self._result.distance, self._sweep.nodes, control.for_part(0, parts)
         )
         for i, level in enumerate(levels):
             part = control.for_part(1 + i, parts)
@@ -370,13 +537,13 @@ class DistanceField:
         """Return the windows of all faces that some levels may pass."""
         if self._sweep.bounds.merging:
             return self._sweep.find_windows(self._sweep.all_faces, control)
-        faces = crossed_faces(self.mesh, self._found.distance, self.max_distance, levels)
+        faces = crossed_faces(self.mesh, self._result.distance, self.max_distance, levels)
         return self._sweep.find_windows(faces, control)
 
     def _traced(
-        self, place: SurfacePoint, winners: Winners, nodes: Nodes, node: int
+        self, target: SurfacePoint, winners: Winners, nodes: Nodes, node: int
     ) -> GeodesicPath:
-        """Return the path to a node, which must have the length that the field says."""
+        """Return the path to a node, whose length must be the distance in the field."""
         distance = float(winners.distance[node])
         path = traced_path(self.mesh, winners, nodes, node, EXACT)
         start = self.sources[winners.nearest[node]].start_distance
@@ -386,7 +553,7 @@ class DistanceField:
         most = PATH_LENGTH * distance + rounding
         if excess < -most or (exact and excess > most):
             raise InternalError(
-                f"the path to {place} has length {path.length}, but the field says "
+                f"the path to {target} has length {path.length}, but the field says "
                 f"{distance - start}; please report this mesh"
             )
         if exact:
@@ -394,59 +561,62 @@ class DistanceField:
         share = max(excess, 0.0) / distance if distance > rounding else 0.0
         return replace(path, error_bound=ErrorBound("relative", share, "guaranteed"))
 
-    def _node(self, place: SurfacePoint) -> int | None:
-        if place.vertex_index is not None:
-            return int(self.mesh.topology.inner_vertex[place.vertex_index])
-        return self._node_of.get(place)
+    def _node(self, location: SurfacePoint) -> int | None:
+        if location.vertex_index is not None:
+            return int(self.mesh.topology.inner_vertex[location.vertex_index])
+        return self._node_of.get(location)
 
-    def _arrival_at(self, place: SurfacePoint, winners: Winners, windows: FaceWindows) -> Arrival:
-        """Return how windows reach a point."""
+    def _arrival_at(
+        self, location: SurfacePoint, winners: Winners, windows: FaceWindows
+    ) -> Arrival:
+        """Return the arrival of windows at a point."""
         nodes = self._sweep.nodes
-        return arrival_at(self.mesh, winners, windows, nodes, place, self.max_distance)
+        return arrival_at(self.mesh, winners, windows, nodes, location, self.max_distance)
 
-    def _nearest_to(self, place: SurfacePoint, control: Control) -> NearestSource:
-        sweep, starts = self._sweep, [line[0] for line in self._places]
+    def _nearest_to(self, location: SurfacePoint, control: Control) -> NearestSource:
+        sweep, starts = self._sweep, [line[0] for line in self._polylines]
         return find_nearest_source(
             self.mesh,
             starts,
             sweep.start_distances,
-            self._found.distance,
+            self._result.distance,
             sweep.bounds,
-            place,
+            location,
             control,
         )
 
-    def _no_path(self, place: SurfacePoint) -> NoPath:
-        if component_of(self.mesh, place) in {component_of(self.mesh, p) for p, *_ in self._places}:
+    def _no_path(self, target: SurfacePoint) -> NoPath:
+        sources = [line[0] for line in self._polylines]
+        if component_of(self.mesh, target) in {component_of(self.mesh, p) for p in sources}:
             return NoPath(
-                f"{place} is farther than max_distance = {self.max_distance:g} from every source",
+                f"{target} is farther than max_distance = {self.max_distance:g} from every source",
                 "beyond_max_distance",
             )
-        message = f"{place} is in another connected component than every source"
-        return disconnected(self.mesh, message, place, *(line[0] for line in self._places))
+        message = f"{target} is in another connected component than every source"
+        return disconnected(self.mesh, message, target, *sources)
 
 
 def field_of(
     sources: tuple[Source, ...],
-    places: tuple[Polyline, ...],
+    polylines: tuple[Polyline, ...],
     targets: tuple[SurfacePoint, ...],
     sweep: RepeatableSweep,
     promise: ErrorBound,
-    found: SweepResult,
+    result: SweepResult,
     stats: SweepStats,
 ) -> DistanceField:
-    """Return the field of a sweep that has found what it was asked for."""
+    """Return the field of a sweep and its result."""
     inner = sweep.mesh.topology.inner_vertex
     return DistanceField(
         mesh=sweep.mesh,
         sources=sources,
         max_distance=sweep.bounds.max_distance,
-        distances=found.distance[inner],
-        nearest_source=found.nearest[inner],
+        distances=result.distance[inner],
+        nearest_source=result.nearest[inner],
         error_bound=promise,
         stats=stats,
-        _places=places,
+        _polylines=polylines,
         _targets=targets,
         _sweep=sweep,
-        _found=found,
+        _result=result,
     )

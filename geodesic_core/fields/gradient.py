@@ -1,4 +1,4 @@
-"""In which direction distance grows fastest, at the vertices."""
+"""Gradients at the vertices: the directions in which distance grows fastest."""
 
 import numpy as np
 
@@ -21,15 +21,15 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
     topology = mesh.topology
     gradient = np.full(mesh.vertices.shape, np.nan)
     via = winners.winner_ints[: len(gradient), ENTRY_EDGE]
-    is_strip = _is_strip(winners)
+    is_parallel = _is_parallel(winners)
     reached = np.flatnonzero((via >= 0) & np.isfinite(winners.distance[: len(gradient)]))
-    reached = reached[~_lies_on_curve(mesh, winners, is_strip)[reached]]
+    reached = reached[~_lies_on_curve(mesh, winners, is_parallel)[reached]]
     via = via[reached]
     geometry, positions = topology.geometry[via], topology.positions
     tail, head, apex = (positions[topology.links[via, k]] for k in (TAIL, HEAD, APEX))
     reach = geometry[:, LENGTH_LEFT]
     away = np.column_stack([geometry[:, COS_LEFT] * reach, geometry[:, SIN_LEFT] * reach])
-    away[is_strip[reached]] = 0.0  # a direction is all that there is of a strip's
+    away[is_parallel[reached]] = 0.0  # a parallel window has a direction only
     away -= winners.winner[reached]
     along = _unit(head - tail)
     across = apex - tail
@@ -43,18 +43,18 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
     return gradient[topology.inner_vertex]
 
 
-def _is_strip(winners: Winners) -> Flags:
-    """Tell which nodes are reached from a piece of a curve."""
+def _is_parallel(winners: Winners) -> Flags:
+    """Tell which nodes are reached from a segment of a curve."""
     if len(winners.piece_ints) == 0:
         return np.zeros(len(winners.distance), np.bool_)
-    is_strip: Flags = winners.winner_ints[:, PREDECESSOR] >= winners.piece_ints[0, NODE]
-    return is_strip
+    is_parallel: Flags = winners.winner_ints[:, PREDECESSOR] >= winners.piece_ints[0, NODE]
+    return is_parallel
 
 
-def _lies_on_curve(mesh: TriangleMesh, winners: Winners, is_strip: Flags) -> Flags:
-    """Tell which nodes lie on the piece that reaches them, as vertices of faces of no area may."""
-    lies = np.zeros_like(is_strip)
-    nodes = np.flatnonzero(is_strip & np.isfinite(winners.distance))
+def _lies_on_curve(mesh: TriangleMesh, winners: Winners, is_parallel: Flags) -> Flags:
+    """Tell which nodes lie on the segment that reaches them, as corners of flat faces may."""
+    lies = np.zeros_like(is_parallel)
+    nodes = np.flatnonzero(is_parallel & np.isfinite(winners.distance))
     pieces = winners.winner_ints[nodes, PREDECESSOR]
     away = winners.distance[nodes] - winners.distance[pieces]
     lies[nodes] = away <= FOOT * mesh.diagonal

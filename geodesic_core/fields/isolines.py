@@ -1,4 +1,4 @@
-"""Lines of equal distance on the surface."""
+"""Isolines: lines of equal distance on the surface."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from geodesic_core.tolerances import LEVEL, PIECE
 from geodesic_core.validation import is_index, is_number
 
 CHORD_SHARE = 1e-3
-"""Share of the mean edge length that chords may stray from their arcs if nothing else is said."""
+"""Share of the mean edge length that chords may stray from their arcs by default."""
 
 FINEST_CHORD = 1e-9
 """Share of the bounding box's diagonal below which no chord error is taken: what it takes in points
@@ -32,18 +32,30 @@ grows with the inverse of its root."""
 
 @dataclass(frozen=True, slots=True)
 class Isoline:
-    """A polyline of points at one distance; between two points it lies in one face."""
+    """A polyline of points at one distance; between two points it lies in one face.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> (line,) = gc.exact_distance(mesh, 0).isolines([0.5])[0]  # a quarter of a circle
+    >>> line.closed
+    False
+    >>> np.unique(np.linalg.norm(line.points, axis=1).round(9)).tolist()
+    [0.5]
+    >>> abs(line.length - 0.25 * np.pi) < 0.01
+    True
+    """
 
     points: Floats
     """(K, 3) float64, mesh units"""
     closed: bool
-    """Whether a last piece leads from the last point back to the first, which is not repeated."""
+    """Whether the last point is joined to the first, which is not repeated."""
     faces: Ints
-    """(K,) of a closed line, (K - 1,) of an open one: the face in which each piece lies"""
+    """(K,) int32 of a closed line, (K - 1,) of an open one: the face behind each point."""
 
     @property
     def length(self) -> float:
-        """Mesh units."""
+        """Sum of the distances between neighbouring points, mesh units."""
         return length_of(np.vstack([self.points, self.points[:1]]) if self.closed else self.points)
 
 
@@ -70,7 +82,6 @@ def spaced_levels(distances: Floats, count: int) -> Floats:
     Examples
     --------
     >>> import numpy as np
-    >>> import geodesic_core as gc
     >>> gc.spaced_levels(np.array([0.0, 1.0, 4.0, np.inf]), 3).tolist()
     [1.0, 2.0, 3.0]
     """
@@ -122,7 +133,6 @@ def resolve_chord_error(mesh: TriangleMesh, chord_error: float | None = None) ->
 
     Examples
     --------
-    >>> import geodesic_core as gc
     >>> mesh = gc.TriangleMesh([[0, 0, 0], [3, 0, 0], [0, 4, 0]], [[0, 1, 2]])
     >>> gc.resolve_chord_error(mesh)
     0.004
@@ -142,10 +152,10 @@ def resolve_chord_error(mesh: TriangleMesh, chord_error: float | None = None) ->
 def crossed_faces(
     mesh: TriangleMesh, distances: Floats, max_distance: float, levels: Sequence[float]
 ) -> Flags:
-    """Tell which inner faces (F,) some levels may pass, by the exact distances of the vertices.
+    """Return the inner faces that some levels may pass, flags (F,), by the exact vertex distances.
 
-    Within a face no distance differs from that of a corner by more than the way there. Of vertices
-    beyond ``max_distance`` it is known that they are as far as that. O(F log n) for n levels.
+    Within a face no distance differs from that of a corner by more than the way there. A vertex
+    beyond ``max_distance`` is at least as far as that. O(F log n) for n levels.
     """
     topology = mesh.topology
     corners = distances[topology.links[:, TAIL]]
@@ -159,12 +169,12 @@ def crossed_faces(
 
 
 class Drawing:
-    """Draws the lines of a finished sweep, level by level."""
+    """Lines of a finished sweep, drawn level by level."""
 
     def __init__(
         self,
         mesh: TriangleMesh,
-        kept: FaceWindows,
+        windows: FaceWindows,
         distances: Floats,
         nodes: Nodes,
         control: Control,
@@ -177,18 +187,18 @@ class Drawing:
         site_rows = np.argsort(sites.ints[: nodes.first_target, FACE], kind="stable")
         piece_rows = np.argsort(sites.segment_ints[:, FACE], kind="stable")
         field = Field(
-            kept=kept,
+            kept=windows,
             distance=distances,
             site_ints=sites.ints[site_rows],
             site_weights=sites.weights[site_rows],
             piece_ints=sites.segment_ints[piece_rows],
             piece_ends=sites.segment_ends[piece_rows],
-            first_piece=nodes.first_piece,
+            first_piece=nodes.first_segment,
         )
         count = len(mesh.topology.links) // 3
         least, most = np.full(count, np.inf), np.full(count, np.inf)
         self._mesh, self._field, self._least, self._most = mesh, field, least, most
-        self._nbytes = sum(array.nbytes for array in (*kept, least, most))
+        self._nbytes = sum(array.nbytes for array in (*windows, least, most))
         control.check_memory(self._nbytes)
 
         def bound(first: int, last: int) -> int:
@@ -212,10 +222,10 @@ class Drawing:
         passed = np.flatnonzero((self._least <= level + slack) & (self._most >= level - slack))
         if len(passed) == 0:
             return []
-        place = np.full(len(self._least), -1, np.int32)
-        control = control.holding(self._nbytes + place.nbytes)
-        cuts = self._cut(passed.astype(np.int32), level, place, control.for_part(0, 2))
-        crossings = kernels.cross_edges(topology, distances, cuts, level, place)
+        rank = np.full(len(self._least), -1, np.int32)
+        control = control.holding(self._nbytes + rank.nbytes)
+        cuts = self._cut(passed.astype(np.int32), level, rank, control.for_part(0, 2))
+        crossings = kernels.cross_edges(topology, distances, cuts, level, rank)
         held = sum(array.nbytes for array in (*cuts, *crossings))
         control = control.holding(held).for_part(1, 2)
         parts: list[_Arrays] = []
@@ -236,19 +246,19 @@ class Drawing:
             self._mesh, *kernels.link_chains(topology.links, crossings, chains, PIECE * level)
         )
 
-    def _cut(self, passed: Ints, level: float, place: Ints, control: Control) -> Cuts:
-        """Cut the faces that a level may pass: by their bounds, and by what neighbours say.
+    def _cut(self, passed: Ints, level: float, rank: Ints, control: Control) -> Cuts:
+        """Cut the faces that a level may pass: by their bounds, then neighbours that cuts lead to.
 
-        ``place`` (F,) is -1 all over, and then tells where among the faces each one is.
+        ``rank`` (F,) is -1 all over; the call sets it to the row of each face among those cut.
         """
-        place[passed] = np.arange(len(passed))
+        rank[passed] = np.arange(len(passed))
         faces = passed[:, None]
         parts: list[_Arrays] = []
 
         def cut(first: int, last: int) -> int:
             nonlocal faces
             spans, spans_of, arcs, arcs_of, found = kernels.cut_faces(
-                self._mesh.topology, self._field, faces[first:last], len(faces), level, place
+                self._mesh.topology, self._field, faces[first:last], len(faces), level, rank
             )
             parts.append((spans, spans_of, arcs, arcs_of))
             faces = np.concatenate([faces, found])

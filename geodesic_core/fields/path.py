@@ -1,4 +1,4 @@
-"""Paths over the surface: what they are, and how they are made of what backtracing finds."""
+"""Paths over the surface, and how they are made from backtraced crossings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +19,17 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 @dataclass(frozen=True, slots=True)
 class ErrorBound:
-    """How far an answer may be from the exact one."""
+    """Bound of the difference between an answer and the exact one.
+
+    ``value`` is a share of the exact answer where ``type`` is ``"relative"``, else mesh units.
+    ``kind`` tells whether the bound is proved or estimated.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> gc.exact_distance(mesh, 0).error_bound
+    ErrorBound(type='relative', value=0.0, kind='guaranteed')
+    """
 
     type: Literal["relative", "absolute"]
     value: float
@@ -35,10 +45,17 @@ StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "
 
 @dataclass(frozen=True, slots=True)
 class SearchStep:
-    """What a step of the search between two points did (section 5, figure 10)."""
+    """Step of the search between two points (section 5, figure 10).
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> [step.name for step in gc.shortest_path(mesh, 0, 3, explain=True).steps]
+    ['dijkstra', 'shorten', 'approximate', 'backtrace', 'exact', 'path']
+    """
 
     leg: int
-    """From one stop to the next, counted from 0."""
+    """Number of the leg, from one stop to the next, counted from 0."""
     name: StepName
     seconds: float
     bound: float
@@ -57,17 +74,28 @@ class GeodesicPath:
     An exact field gives shortest paths. An approximate one gives paths whose length U is an upper
     bound of the exact distance, as the field's value D is a lower bound: ``error_bound`` holds
     (U - D) / D.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> path = gc.shortest_path(mesh, 1, 2)
+    >>> path.points.tolist()
+    [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0]]
+    >>> path.faces.tolist()
+    [0, 1]
+    >>> str(path.locations[1])
+    'the point (0.5, 0.0, 0.5) of face 0'
     """
 
     points: Floats
     """(K, 3) positions, mesh units."""
     faces: Ints
-    """(K - 1,) int32: the face that each piece crosses."""
+    """(K - 1,) int32: the face between each point and the next."""
     length: float
-    """Sum of the pieces, mesh units."""
+    """Sum of the distances between neighbouring points, mesh units."""
     error_bound: ErrorBound
     steps: tuple[SearchStep, ...] | None
-    """Of the search between two points, leg by leg, where they were asked for."""
+    """Steps of the search between two points, leg by leg; None unless they were to be explained."""
     _location_faces: Ints
     _location_weights: Floats
     _location_vertices: Longs
@@ -121,17 +149,17 @@ def traced_path(
         node = -1 - int(nodes[i])
         if node < len(mesh.vertices):
             continue
-        piece = nodes_of_sweep.piece(node)
-        if piece is None:
+        segment = nodes_of_sweep.segment(node)
+        if segment is None:
             point, points[i] = nodes_of_sweep.site(node)
         else:
-            point = foot_on(mesh, piece, points[1])
+            point = foot_on(mesh, segment, points[1])
             points[i] = mesh.position(point)
         faces[i], weights[i] = point.face_index, point.barycentric
         vertices[i] = -1 if point.vertex_index is None else point.vertex_index
-    kept = np.empty(count, np.uint8)
-    locations.leave_out_repeated(faces, weights, kept)
-    where = np.flatnonzero(kept)
+    distinct = np.empty(count, np.uint8)
+    locations.leave_out_repeated(faces, weights, distinct)
+    where = np.flatnonzero(distinct)
     points = points[where]
     return GeodesicPath(
         points=points,
@@ -146,9 +174,9 @@ def traced_path(
 
 
 def length_of(points: Floats) -> float:
-    """Length of a polyline, mesh units."""
-    pieces = points[1:] - points[:-1]
-    return float(np.sqrt((pieces * pieces).sum(axis=1)).sum())
+    """Return the length of a polyline, mesh units."""
+    steps = points[1:] - points[:-1]
+    return float(np.sqrt((steps * steps).sum(axis=1)).sum())
 
 
 def reversed_path(path: GeodesicPath) -> GeodesicPath:
@@ -164,7 +192,7 @@ def reversed_path(path: GeodesicPath) -> GeodesicPath:
 
 
 def joined(legs: Sequence[GeodesicPath]) -> GeodesicPath:
-    """Return exact paths, each from where the one before ends, as one."""
+    """Return exact paths, each from the end of the one before, as one path."""
 
     def chained(name: str) -> Any:  # the first point of a leg is the last of the one before
         arrays = [getattr(leg, name) for leg in legs]

@@ -30,7 +30,7 @@ from geodesic_core.tolerances import SEARCH_SLACK, TIE
 
 
 class Arrival(NamedTuple):
-    """How a point that is no vertex is reached."""
+    """Arrival of windows at a point that is no vertex."""
 
     distance: float
     """Mesh units; infinite where the point is not reached"""
@@ -42,17 +42,17 @@ class Arrival(NamedTuple):
 def arrival_at(
     mesh: TriangleMesh,
     winners: Winners,
-    kept: FaceWindows,
+    windows: FaceWindows,
     nodes: Nodes,
     point: SurfacePoint,
     max_distance: float,
 ) -> Arrival:
-    """Return how a canonical point is reached; O(windows of its faces)."""
-    ways = (
-        reach_point(mesh.topology, winners, kept, nodes.first_target, face, np.array(weights))
+    """Return the shortest arrival at a canonical point; O(windows of its faces)."""
+    reaches = (
+        reach_point(mesh.topology, winners, windows, nodes.first_target, face, np.array(weights))
         for face, weights in weights_by_face(mesh, point).items()
     )
-    best = min(ways, key=lambda way: way[0])
+    best = min(reaches, key=lambda reach: reach[0])
     reach = Reach(*best)
     if math.isinf(reach.distance) or reach.distance > max_distance:
         return Arrival(math.inf, -1, reach)
@@ -105,9 +105,10 @@ def find_nearest_source(
     point: SurfacePoint,
     control: Control,
 ) -> NearestSource:
-    """Return the nearest source of a field with values ``known``, found within ``bounds``.
+    """Return the nearest source of a field whose vertices have the distances ``known``.
 
-    ``known`` is by inner vertex, with more behind. O(faces in the strip), and O(V + F) for memory.
+    ``bounds`` are those of the field. ``known`` is by inner vertex; more values may follow. O(faces
+    in the strip), and O(V + F) for memory.
 
     Raises
     ------
@@ -121,7 +122,7 @@ def find_nearest_source(
     upper = min(upper, _within_face(mesh, sources, start_distances, point), bounds.max_distance)
     if math.isinf(upper):
         return NearestSource(-1, math.inf, None)
-    # Whatever is farther than the field was to look is as far as that, at least.
+    # A vertex beyond the limit of the field is at least as far as that.
     rest = np.minimum(least, bounds.max_distance)
     goal = pruning_toward(np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
     wave = state.new_wavefront(mesh.topology, nodes.sites, pruned=True)
@@ -139,7 +140,7 @@ def find_nearest_source(
 
 
 def _most(least: Floats, bounds: Bounds) -> Floats:
-    """Return the longest that distances may be of which the field has these values."""
+    """Return the largest distances that these values of a field allow."""
     if not bounds.merging:
         return least
     return np.minimum(least / (1.0 - bounds.relative_error), least + bounds.absolute_error)
@@ -148,6 +149,7 @@ def _most(least: Floats, bounds: Bounds) -> Floats:
 def _within_face(
     mesh: TriangleMesh, sources: Sequence[SurfacePoint], starts: Floats, point: SurfacePoint
 ) -> float:
+    """Return the length of the straight path to the nearest source in the face of a point."""
     position = mesh.position(point)
     return min(
         (

@@ -1,4 +1,4 @@
-"""A sweep from some sources over all of a mesh: run once, or again for what was not kept."""
+"""Repeatable sweeps: from some sources over all of a mesh, run again for what was not retained."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -27,7 +27,15 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class SweepStats:
-    """What a sweep did."""
+    """Counts, memory and time of a sweep.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.sphere(80))
+    >>> stats = gc.exact_distance(mesh, 0).stats
+    >>> stats.windows_created >= stats.windows_kept > 0
+    True
+    """
 
     windows_created: int
     windows_kept: int
@@ -45,30 +53,65 @@ class SweepStats:
     def of(
         cls, mesh: TriangleMesh, created: int, kept: int, peak: int, peak_bytes: int, seconds: float
     ) -> Self:
-        """Return the statistics of a sweep with these counts of windows."""
+        """Return the statistics of a sweep on ``mesh`` from its counts of windows.
+
+        Parameters
+        ----------
+        mesh
+            The surface, whose edges the counts are divided by.
+        created, kept, peak
+            Windows created, left after trimming, and alive at once.
+        peak_bytes
+            Memory of the state at its largest, bytes.
+        seconds
+            Time of the solve.
+
+        Returns
+        -------
+        SweepStats
+            The same, and the counts per edge.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # of five edges
+        >>> gc.SweepStats.of(mesh, 10, 5, 3, 1024, 0.1).windows_per_edge_created
+        2.0
+        """
         edges = mesh.edge_count
         return cls(created, kept, peak, created / edges, kept / edges, peak_bytes, seconds)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the statistics as what JSON can hold."""
+        """Return the statistics by name, as plain numbers.
+
+        Returns
+        -------
+        dict
+            What JSON can hold.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> gc.exact_distance(mesh, 0).stats.as_dict()["windows_peak"]
+        0
+        """
         return asdict(self)
 
 
 class SweepResult(NamedTuple):
-    """What a sweep over all of a mesh has found, as far as it is kept; N as in its `Winners`."""
+    """Findings of a sweep over all of a mesh, as far as retained; N as in its `Winners`."""
 
     distance: Floats
     """(N,) by node"""
     nearest: Ints
-    """(N,): the index of the nearest source, by node; -1 where unreached"""
+    """(N,) index of the nearest source, by node; -1 where unreached"""
     winners: Winners | None
-    """What paths need"""
+    """Data of paths"""
     windows: FaceWindows | None
-    """Those of all faces"""
+    """Windows of all faces"""
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "SweepResult":
-        """Return what these `arrays` hold."""
+        """Return the result that these `arrays` hold."""
         winners = windows = None
         if "winner" in arrays:
             winners = Winners(**{name: arrays[name] for name in Winners._fields})
@@ -86,7 +129,7 @@ class SweepResult(NamedTuple):
 
 @dataclass(frozen=True)
 class RepeatableSweep:
-    """A sweep that can be run any number of times: what it finds is the same to the bit."""
+    """A sweep that can be run any number of times, with the same result to the bit."""
 
     mesh: TriangleMesh
     nodes: Nodes
@@ -97,15 +140,15 @@ class RepeatableSweep:
     def between(
         cls,
         mesh: TriangleMesh,
-        places: Sequence[Polyline],
+        sources: Sequence[Polyline],
         start_distances: Floats,
         targets: Sequence[SurfacePoint],
         bounds: Bounds,
     ) -> "RepeatableSweep":
-        """Return the sweep from points and curves, which are canonical, that knows of targets."""
-        nodes = nodes_of(mesh, places, targets)
-        if nodes.pieces:
-            bounds = with_parallel_windows(bounds, nodes.first_piece)
+        """Return the sweep from canonical points and curves that also reaches some targets."""
+        nodes = nodes_of(mesh, sources, targets)
+        if nodes.segments:
+            bounds = with_parallel_windows(bounds, nodes.first_segment)
         return cls(mesh, nodes, start_distances, bounds)
 
     @property
@@ -116,7 +159,7 @@ class RepeatableSweep:
     def run(
         self, control: Control, *, paths: bool = False, windows: Flags | None = None
     ) -> Wavefront:
-        """Return the state after the sweep, with what paths need, and the windows of some faces.
+        """Return the state after the sweep, with the data of paths and the windows of some faces.
 
         Raises
         ------
@@ -139,8 +182,8 @@ class RepeatableSweep:
             control.progress(1.0)
         return wave
 
-    def found(self, wave: Wavefront, *, paths: bool, windows: bool) -> SweepResult:
-        """Return what a `run` has found, in memory of its own."""
+    def result_of(self, wave: Wavefront, *, paths: bool, windows: bool) -> SweepResult:
+        """Return the result of a `run`, in memory of its own."""
         winners = all_winners(wave)
         return SweepResult(
             wave.vertices.distance,
@@ -150,33 +193,33 @@ class RepeatableSweep:
         )
 
     def find_winners(self, control: Control) -> Winners:
-        """Run the sweep for what paths need."""
+        """Run the sweep for the data of paths."""
         return all_winners(self.run(control, paths=True))
 
     def find_windows(self, faces: Flags, control: Control) -> FaceWindows:
-        """Run the sweep for the windows of some inner faces (F,)."""
+        """Run the sweep for the windows of some inner faces, flags (F,)."""
         return face_windows.face_windows_of(self.run(control, windows=faces))
 
-    def find_ways(self, control: Control) -> tuple[Winners, FaceWindows]:
-        """Run the sweep for what paths need, and for all windows."""
+    def find_winners_and_windows(self, control: Control) -> tuple[Winners, FaceWindows]:
+        """Run the sweep for the data of paths and for all windows."""
         wave = self.run(control, paths=True, windows=self.all_faces)
         return all_winners(wave), face_windows.face_windows_of(wave)
 
 
 def all_winners(wave: Wavefront) -> Winners:
-    """Return what backtracing needs of a sweep over all of a mesh, in memory of its own."""
+    """Return the data of paths of a sweep over all of a mesh, in memory of its own."""
     found = winners_of(
         wave,
         continuous_dijkstra.nearest_sources(
             wave.vertices.distance, wave.vertices.winner_ints, wave.vertices.source_index
         ),
     )
-    # What was recorded of merges is kept, not the room for more.
+    # A copy holds the merges without the room for more.
     return found._replace(merges=found.merges.copy(), merge_ints=found.merge_ints.copy())
 
 
 def peak_bytes(wave: Wavefront) -> int:
-    """Return the memory of a sweep that has finished, and of the windows that it kept."""
+    """Return the memory of a sweep that has finished, and of the windows that it retained."""
     return state.bytes_of(wave) + (face_windows.bytes_of(wave) if len(wave.pool.retained) else 0)
 
 
@@ -187,25 +230,25 @@ def stats_of(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
 
 
 class Lazy(Generic[T]):
-    """A value that is there already, or is found at the first call that is not stopped."""
+    """A value that is there already, or is found by the first call that is not stopped."""
 
-    def __init__(self, find: Callable[[Control], T], found: T | None = None) -> None:
+    def __init__(self, find: Callable[[Control], T], value: T | None = None) -> None:
         self._find = find
-        self._found = found
+        self._value = value
 
     @property
-    def found(self) -> T | None:
-        """The value, if it is there."""
-        return self._found
+    def value(self) -> T | None:
+        """The value; None until it is found."""
+        return self._value
 
     def get(self, control: Control) -> T:
-        """Return the value.
+        """Return the value, found under ``control`` if it is not there.
 
         Raises
         ------
         GeodesicError
-            As finding it does; the next call looks for it anew.
+            As finding it does; the next call tries again.
         """
-        if self._found is None:
-            self._found = self._find(control)
-        return self._found
+        if self._value is None:
+            self._value = self._find(control)
+        return self._value

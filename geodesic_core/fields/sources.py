@@ -1,4 +1,4 @@
-"""From points and curves to the nodes of a sweep: vertices, sites, and the pieces of curves."""
+"""Sources, and the nodes of a sweep: vertices, sites, and the segments of curves."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -13,10 +13,10 @@ from geodesic_core.kernels.sweep.state import NODE, SEGMENT, SEGMENT_ENDS, SITE,
 from geodesic_core.mesh.canonical import half_edges_around
 from geodesic_core.mesh.curve import (
     Curve,
-    PieceInFace,
     Polyline,
-    pieces_of,
+    SegmentInFace,
     polyline_of,
+    segments_of,
     weights_by_face,
 )
 from geodesic_core.mesh.surface_point import UNPLACED, Point, SurfacePoint
@@ -26,55 +26,71 @@ from geodesic_core.validation import is_number
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A source, and the distance at which it starts (mesh units, 0 or more)."""
+    """A point or a curve, and the distance at which it starts.
+
+    Parameters
+    ----------
+    point
+        A vertex index, a `SurfacePoint` or a `Curve`.
+    start_distance
+        Mesh units, finite, 0 or more: what every distance from this source begins with.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> gc.exact_distance(mesh, gc.Source(0, start_distance=0.5)).distances.round(3).tolist()
+    [0.5, 1.5, 1.5, 1.914]
+    """
 
     point: Point | Curve
     start_distance: float = 0.0
 
 
 Sources = Point | Curve | Source | Sequence[Point | Curve | Source]
+"""Every way to write the sources of a field"""
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """The nodes of the sources of a sweep, and of what it is to reach."""
+    """Nodes of the sources and the targets of a sweep."""
 
     sources: Ints
-    """(N,): an inner vertex, or a number beyond the vertices, for each point and each piece of the
-    sources"""
-    origins: Ints
-    """(N,): which of the sources each belongs to"""
+    """(N,) nodes of the points and segments of the sources: an inner vertex, or a number beyond the
+    vertices"""
+    source_indices: Ints
+    """(N,) index of the source that each belongs to"""
     targets: Ints
-    """(M,): the same for each target"""
+    """(M,) node of each target"""
     sites: Sites
     first_target: int
-    """Row of the first target among those of the sites."""
+    """First row of a target among those of the sites"""
     points: tuple[SurfacePoint, ...]
-    """Those that became sites, in the order of their nodes."""
+    """Points that became sites, in the order of their nodes"""
     positions: Floats
     """(sites, 3), mesh units"""
-    pieces: tuple[PieceInFace, ...]
-    """The pieces of curves, in the order of their nodes, each in one of its faces."""
-    first_piece: int
-    """The node of the first"""
+    segments: tuple[SegmentInFace, ...]
+    """Segments of curves, in the order of their nodes, each in one of its faces"""
+    first_segment: int
+    """Node of the first segment"""
     components: tuple[int, ...]
-    """Those of the mesh with a source in them"""
+    """Connected components with a source"""
 
     @property
-    def has_sited_targets(self) -> bool:
-        """Whether a target is neither vertex nor piece."""
+    def has_site_targets(self) -> bool:
+        """Whether a target is neither vertex nor segment."""
         return len(self.sites.ints) > self.first_target
 
-    def piece(self, node: int) -> PieceInFace | None:
-        """Return the piece of a node; None if it is none."""
-        rank = node - self.first_piece
-        return self.pieces[rank] if 0 <= rank < len(self.pieces) else None
+    def segment(self, node: int) -> SegmentInFace | None:
+        """Return the segment of a node; None if it has none."""
+        rank = node - self.first_segment
+        return self.segments[rank] if 0 <= rank < len(self.segments) else None
 
     def site(self, node: int) -> tuple[SurfacePoint, Floats]:
-        """Return the point of a node that is neither vertex nor piece, and its position."""
-        # What is asked for after a sweep comes behind its pieces.
-        rank = node - self.first_piece
-        rank += self.sites.nodes - len(self.pieces) - (len(self.pieces) if rank >= 0 else 0)
+        """Return the point of a node that is neither vertex nor segment, and its position."""
+        # Points added after a sweep come behind its segments.
+        rank = node - self.first_segment
+        segments = len(self.segments)
+        rank += self.sites.nodes - segments - (segments if rank >= 0 else 0)
         return self.points[rank], self.positions[rank]
 
 
@@ -95,7 +111,7 @@ class Ends:
     """Of all sources and all targets"""
 
     def targets_connected_to(self, source: int) -> Ints:
-        """Return the targets in the component of a source."""
+        """Return the indices of the targets in the component of a source."""
         connected = self.target_components == self.source_components[source]
         return np.flatnonzero(connected).astype(np.int32)
 
@@ -112,7 +128,7 @@ class Ends:
         return replace(
             nodes,
             sources=start,
-            origins=np.zeros(1, np.int32),
+            source_indices=np.zeros(1, np.int32),
             targets=ends,
             sites=nodes.sites._replace(ints=ints[rows], weights=nodes.sites.weights[rows]),
             first_target=len(first),
@@ -141,7 +157,7 @@ def ends_of(
 def nodes_of(
     mesh: TriangleMesh, sources: Sequence[Polyline], targets: Sequence[SurfacePoint]
 ) -> Nodes:
-    """Return the nodes of sources, which are points or curves, and of canonical points."""
+    """Return the nodes of sources, each given by its canonical points, and of targets."""
     vertices = len(mesh.vertices)
     sited: list[SurfacePoint] = []
     rows: list[tuple[int, int, int]] = []
@@ -162,17 +178,19 @@ def nodes_of(
     ]
     first_target = len(rows)
     ends = [node_of(point) for point in targets]
-    pieces = [(i, piece) for i, line in enumerate(sources) for piece in pieces_of(mesh, line)]
-    first_piece = vertices + len(sited)
-    starts += [(first_piece + k, i) for k, (i, _) in enumerate(pieces)]
-    in_faces = [(first_piece + k, part) for k, (_, piece) in enumerate(pieces) for part in piece]
+    segments = [(i, parts) for i, line in enumerate(sources) for parts in segments_of(mesh, line)]
+    first_segment = vertices + len(sited)
+    starts += [(first_segment + k, i) for k, (i, _) in enumerate(segments)]
+    in_faces = [
+        (first_segment + k, part) for k, (_, parts) in enumerate(segments) for part in parts
+    ]
     faces = [face for _, face, _ in rows] + [part.face for _, part in in_faces]
     return Nodes(
         sources=np.array([node for node, _ in starts], np.int32),
-        origins=np.array([origin for _, origin in starts], np.int32),
+        source_indices=np.array([source for _, source in starts], np.int32),
         targets=np.array(ends, np.int32),
         sites=Sites(
-            nodes=len(sited) + len(pieces),
+            nodes=len(sited) + len(segments),
             ints=np.array(rows, np.int32).reshape(-1, SITE),
             weights=np.array(weights).reshape(-1, 3),
             windows=sum(_edge_faces(mesh, face) for face in faces),
@@ -186,40 +204,46 @@ def nodes_of(
         first_target=first_target,
         points=tuple(sited),
         positions=np.array([mesh.position(point) for point in sited]).reshape(-1, 3),
-        pieces=tuple(piece[0] for _, piece in pieces),
-        first_piece=first_piece,
+        segments=tuple(parts[0] for _, parts in segments),
+        first_segment=first_segment,
         components=tuple({component_of(mesh, line[0]) for line in sources}),
     )
 
 
 def _edge_faces(mesh: TriangleMesh, face: int) -> int:
-    """Return how many faces the three edges of an inner face have, each edge's counted."""
+    """Return the number of faces at the three edges of an inner face, summed over the edges."""
     links = mesh.topology.links
     return sum(len(list(half_edges_around(links, h))) for h in range(3 * face, 3 * face + 3))
 
 
 def as_sources(mesh: TriangleMesh, sources: Any) -> tuple[tuple[Source, ...], tuple[Polyline, ...]]:
-    """Return the sources, and their canonical points."""
+    """Return the sources as records, and the canonical points of each.
+
+    Raises
+    ------
+    InvalidPoint, InvalidArgument
+        There are none, one is not on the mesh, or a start distance is out of its domain.
+    """
     if isinstance(sources, str | bytes):
         raise InvalidPoint(f"the source is {sources!r}; it must be a vertex index or a Source")
     if isinstance(sources, Source | SurfacePoint | Curve) or not isinstance(sources, Iterable):
         sources = [sources]
-    found, places = [], []
+    checked, polylines = [], []
     for i, item in enumerate(sources):
         source = item if isinstance(item, Source) else Source(item)
         if isinstance(source.point, Curve):
-            places.append(polyline_of(mesh, source.point, f"source {i}"))
+            polylines.append(polyline_of(mesh, source.point, f"source {i}"))
         else:
-            places.append((mesh.point(source.point, f"source {i}"),))
+            polylines.append((mesh.point(source.point, f"source {i}"),))
         start = source.start_distance
         if not is_number(start) or not (math.isfinite(start) and start >= 0.0):
             raise InvalidArgument(
                 f"source {i} starts at {start!r}; it must be a finite number, 0 or more"
             )
-        found.append(source)
-    if not found:
+        checked.append(source)
+    if not checked:
         raise InvalidPoint("there are no sources: give at least one")
-    return tuple(found), tuple(places)
+    return tuple(checked), tuple(polylines)
 
 
 def as_points(
@@ -236,10 +260,10 @@ def as_points(
     """
     if isinstance(points, str | bytes) or not isinstance(points, Iterable):
         raise InvalidArgument(f"{name}s is {points!r}; it must be a sequence of points")
-    places = [mesh.point(point, f"{name} {i}") for i, point in enumerate(points)]
-    if not places:
+    canonical = [mesh.point(point, f"{name} {i}") for i, point in enumerate(points)]
+    if not canonical:
         raise InvalidArgument(f"there are no {name}s: give at least one")
-    return places
+    return canonical
 
 
 def component_of(mesh: TriangleMesh, point: SurfacePoint) -> int:
@@ -251,7 +275,7 @@ def component_of(mesh: TriangleMesh, point: SurfacePoint) -> int:
 
 
 def disconnected(mesh: TriangleMesh, message: str, *points: SurfacePoint) -> NoPath:
-    """Return the error of canonical points that are not connected, and why they may not be."""
+    """Return the error of canonical points that are not connected, with the likely reason."""
     lonely = [point for point in points if point.face_index == UNPLACED]
     blocked = len(mesh.barriers)
     if lonely:
@@ -262,7 +286,7 @@ def disconnected(mesh: TriangleMesh, message: str, *points: SurfacePoint) -> NoP
 
 
 def corners_of(mesh: TriangleMesh, point: SurfacePoint) -> tuple[Ints, Floats]:
-    """Return the inner vertices around a canonical point, or itself, and how far each is."""
+    """Return the inner vertices around a canonical point, or at it, and how far each is."""
     inner = mesh.topology.inner_vertex
     if point.vertex_index is not None:
         return inner[[point.vertex_index]], np.zeros(1)

@@ -1,4 +1,4 @@
-"""Running a sweep to its end: slice by slice, watched by its caller; codes become exceptions."""
+"""Sweeps run to their end, slice by slice, under the control of the caller."""
 
 import math
 import time
@@ -52,9 +52,9 @@ def sweep_nodes(
     """
     topology = mesh.topology
     continuous_dijkstra.start_sweep(
-        topology, wave, nodes.sources, nodes.origins, start_distances, bounds
+        topology, wave, nodes.sources, nodes.source_indices, start_distances, bounds
     )
-    if not nodes.has_sited_targets:
+    if not nodes.has_site_targets:
         return run_sweep(mesh, wave, bounds, control, share_done, limit_of)
     surface_points.watch_sites(topology, wave, bounds, nodes.first_target)
     wave = run_sweep(mesh, wave, bounds, control, share_done, limit_of)
@@ -145,7 +145,7 @@ def _not_converged(mesh: TriangleMesh, wave: Wavefront) -> NotConverged:
 
 
 def share_of_vertices(reachable: int, limit: float) -> Callable[[Wavefront], float]:
-    """Return what tells the share of a sweep: of its vertices, or of the distance to a limit."""
+    """Return the share done as a function of the state: of the vertices, or of a limit."""
 
     def share(wave: Wavefront) -> float:
         done = float(wave.counters[state.SETTLED_VERTICES]) / reachable

@@ -40,14 +40,13 @@ def load_mesh(
     *,
     max_faces: int | None = None,
 ) -> TriangleMesh:
-    """Read a mesh file: OBJ, OFF, PLY, STL or GLB.
+    r"""Read a mesh file: OBJ, OFF, PLY, STL or GLB.
 
-    Vertices keep the file's numbering and faces its order; polygons become triangles, in place, and
-    ``mesh.face_map`` leads from these to the polygon. What is no surface (lines, points, curves) is
-    left out, and ``mesh.warnings`` say so. The parts of a GLB scene are placed by its nodes and put
-    one after the other, in the order of its meshes. An STL file has no numbering: its equal corners
-    are always merged, in order of first appearance, and
-    ``mesh.vertex_map[3 * face + corner]`` is the vertex.
+    Vertices keep the file's numbering and faces its order. Polygons become triangles, in place, and
+    ``mesh.face_map`` leads from these to the polygon. Lines, points and curves are left out, and
+    ``mesh.warnings`` say so. The parts of a GLB scene are placed by its nodes and put one after the
+    other, in the order of its meshes. An STL file has no numbering: its equal corners are always
+    merged, in order of first appearance, and ``mesh.vertex_map[3 * face + corner]`` is the vertex.
 
     Parameters
     ----------
@@ -58,16 +57,31 @@ def load_mesh(
     merge
         ``"exact"`` merges vertices at equal positions, as `TriangleMesh` does.
     max_faces
-        More triangles than that are refused: by what the header declares, else by counting, and in
-        any case before they are looked into.
+        Largest number of triangles. More are refused by the count in the header, else by counting,
+        and in any case before they are parsed.
+
+    Returns
+    -------
+    TriangleMesh
+        Of (V, 3) float64 positions in the units of the file.
 
     Raises
     ------
     TooManyFaces
         There are more than ``max_faces``; an `InvalidMesh` as well.
     InvalidMesh
-        The file cannot be read, is no such file, is damaged, claims more than it holds, or holds a
-        mesh that `TriangleMesh` refuses.
+        The file cannot be read, is no such file, is damaged, declares more than it holds, or holds
+        a mesh that `TriangleMesh` refuses.
+
+    Notes
+    -----
+    O(V + F).
+
+    Examples
+    --------
+    >>> text = b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    >>> gc.load_mesh(text, "off")
+    TriangleMesh(3 vertices, 1 faces)
     """
     if isinstance(source, str | Path):
         kind = _known_kind(file_type or Path(source).suffix)
@@ -83,7 +97,7 @@ def load_mesh(
         raise
     except MemoryError:
         raise
-    except Exception as error:  # whatever parsing stumbles over
+    except Exception as error:  # any failure of a parser
         what = " ".join(str(error).split())[:200] or type(error).__name__
         raise InvalidMesh(f"the {kind.upper()} file is damaged: {what}") from error
     if len(read.sizes) == 0:

@@ -1,8 +1,8 @@
-"""One spelling for each point of the surface: the same weights, to the bit, however it was written.
+"""Canonical points: one spelling for each point of the surface, the same weights to the bit.
 
-A point is a vertex, lies on an edge or inside a face. Weights that are rounding are taken for zero,
-and places on an edge are told apart up to `EDGE_STEPS` only, so that 0.3 from one end and 0.7 from
-the other are one.
+A point is a vertex, lies on an edge or inside a face. Weights that are rounding become zero, and
+points on an edge are told apart up to `EDGE_STEPS` only, so that 0.3 from one end and 0.7 from the
+other are one.
 """
 
 import math
@@ -45,11 +45,11 @@ def in_face(
     None where it is in no face of the surface: the face is blocked, or an edge of no length has
     left of it an edge that no other face has.
     """
-    kept = [float(weight) if weight > WEIGHT else 0.0 for weight in weights]
-    total = math.fsum(kept)
+    cleaned = [float(weight) if weight > WEIGHT else 0.0 for weight in weights]
+    total = math.fsum(cleaned)
     if abs(total - 1.0) <= ROUNDING:
-        total = 1.0  # else a canonical point would change each time it is asked for
-    u, v, w = (weight / total for weight in kept)
+        total = 1.0  # else a canonical point would change each time it is made canonical
+    u, v, w = (weight / total for weight in cleaned)
     share: dict[int, float] = {}
     for node, part in zip(topology.inner_vertex[faces[face]].tolist(), (u, v, w), strict=True):
         if part > 0.0:
@@ -81,7 +81,8 @@ def _cross(a: Floats, b: Floats) -> Floats:
 def weights_of(point: Floats, corners: Floats, snap: float) -> list[float]:
     """Return the weights of a point of a face, zero where it is nearer than ``snap`` to an edge.
 
-    Each from the height above its edge: of a face of no area, from places along its longest edge.
+    Each from the height above its edge; of a face of no area, from positions along its longest
+    edge.
     """
     edges = corners[_NEXT] - corners  # from each corner to the next
     away = point - corners
@@ -98,7 +99,7 @@ def weights_of(point: Floats, corners: Floats, snap: float) -> list[float]:
         weights = np.zeros(3)
         weights[longest], weights[(longest + 1) % 3] = 1.0 - share, share
     for i in np.flatnonzero(np.linalg.norm(away, axis=1) <= snap):
-        weights = np.eye(3)[i]  # of two corners, that within reach takes all
+        weights = np.eye(3)[i]  # of two corners, the one within reach takes all
     return [max(float(weight), 0.0) for weight in weights]
 
 

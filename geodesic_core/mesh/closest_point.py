@@ -1,4 +1,4 @@
-"""The face nearest to a position: libigl's tree of boxes."""
+"""The face nearest to a position, by the tree of boxes of libigl."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from geodesic_core.arrays import Floats, Ints, Longs
 class NearestFace:
     """A search tree over the ``surface``, which is some of the faces of a mesh.
 
-    O(F log F) to build, O(log F) to ask in practice.
+    O(F log F) to build, O(log F) a call in practice.
     """
 
     def __init__(self, vertices: Floats, faces: Ints, surface: Longs) -> None:
@@ -21,6 +21,6 @@ class NearestFace:
         self._tree.init(*self._arrays)
 
     def __call__(self, position: Floats) -> tuple[int, Floats, float]:
-        """Return the nearest face, the point of it, and how far that is, mesh units."""
+        """Return the nearest face, the nearest point of it, and its distance, mesh units."""
         squared, faces, points = self._tree.squared_distance(*self._arrays, position[None])
         return int(self._surface[faces[0]]), points[0], float(np.sqrt(squared[0]))

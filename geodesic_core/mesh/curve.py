@@ -1,4 +1,4 @@
-"""Curves on the surface, as sources: polylines of which each piece lies in a face."""
+"""Curves on the surface: polylines each of whose segments lies in a face."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,22 +25,35 @@ _NO_VERTEX = -1
 class Curve:
     """A polyline on the surface; as a source, all of its points are one.
 
-    Each piece is straight, and lies in a face that both of its ends belong to. The `locations` of a
-    `GeodesicPath` make a curve, so that `shortest_path` through waypoints joins points that are
+    Each segment is straight, and lies in a face that both of its ends belong to. The `locations` of
+    a `GeodesicPath` make a curve, so that `shortest_path` through waypoints joins points that are
     farther apart. A closed curve ends where it begins.
+
+    Parameters
+    ----------
+    points
+        Vertex indices or `SurfacePoint`, at least one.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> side = gc.Curve([0, 1])  # the lower edge of the square
+    >>> gc.exact_distance(mesh, side).distances.tolist()
+    [0.0, 0.0, 1.0, 1.0]
     """
 
     points: Sequence[Point]
 
 
-class PieceInFace(NamedTuple):
-    """A piece of a curve in one of the faces that it lies in."""
+class SegmentInFace(NamedTuple):
+    """A segment of a curve in one of the faces that it lies in."""
 
     face: int
-    """Inner"""
+    """Inner face"""
     start: Weights
-    """Of its beginning, at the face's inner corners"""
+    """Weights of its beginning at the face's inner corners"""
     end: Weights
+    """Weights of its end there"""
 
 
 def polyline_of(mesh: TriangleMesh, curve: Curve, name: str) -> Polyline:
@@ -86,7 +99,6 @@ def share_a_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> 
 
     Examples
     --------
-    >>> import geodesic_core as gc
     >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     >>> mesh = gc.TriangleMesh(corners, [[0, 1, 2], [0, 2, 3]])
     >>> gc.share_a_face(mesh, mesh.point(0), mesh.point(2))
@@ -99,18 +111,18 @@ def share_a_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> 
     return bool(weights_by_face(mesh, start).keys() & weights_by_face(mesh, end))
 
 
-def pieces_of(mesh: TriangleMesh, polyline: Polyline) -> list[list[PieceInFace]]:
-    """Return the pieces of a polyline, each in all faces that hold it.
+def segments_of(mesh: TriangleMesh, polyline: Polyline) -> list[list[SegmentInFace]]:
+    """Return the segments of a polyline, each in all faces that hold it.
 
-    Pieces of no length are left out.
+    Segments of no length are left out.
     """
-    pieces = []
+    segments = []
     for start, end in pairwise(polyline):
         if not np.array_equal(mesh.position(start), mesh.position(end)):
             at_start, at_end = weights_by_face(mesh, start), weights_by_face(mesh, end)
             shared = [face for face in at_start if face in at_end]
-            pieces.append([PieceInFace(face, at_start[face], at_end[face]) for face in shared])
-    return pieces
+            segments.append([SegmentInFace(face, at_start[face], at_end[face]) for face in shared])
+    return segments
 
 
 def weights_by_face(mesh: TriangleMesh, point: SurfacePoint) -> dict[int, Weights]:
@@ -134,20 +146,20 @@ def weights_by_face(mesh: TriangleMesh, point: SurfacePoint) -> dict[int, Weight
     return {g // 3: weights_in(g // 3) for g in half_edges_around(topology.links, h)}
 
 
-def foot_on(mesh: TriangleMesh, piece: PieceInFace, position: Floats) -> SurfacePoint:
-    """Return the canonical point of a piece that is nearest to a position."""
-    inner = mesh.topology.links[3 * piece.face : 3 * piece.face + 3, TAIL]
+def foot_on(mesh: TriangleMesh, segment: SegmentInFace, position: Floats) -> SurfacePoint:
+    """Return the canonical point of a segment that is nearest to a position."""
+    inner = mesh.topology.links[3 * segment.face : 3 * segment.face + 3, TAIL]
     start, end = (
         (np.array(weights)[:, None] * mesh.topology.positions[inner]).sum(axis=0)
-        for weights in (piece.start, piece.end)
+        for weights in (segment.start, segment.end)
     )
     along = end - start
     t = min(max(float((position - start) @ along / (along @ along)), 0.0), 1.0)
     share = {
         v: (1.0 - t) * at_start + t * at_end
-        for v, at_start, at_end in zip(inner.tolist(), piece.start, piece.end, strict=True)
+        for v, at_start, at_end in zip(inner.tolist(), segment.start, segment.end, strict=True)
     }
-    face = int(mesh.topology.outer_face[piece.face])
+    face = int(mesh.topology.outer_face[segment.face])
     u, v, w = (share[v] for v in mesh.topology.inner_vertex[mesh.faces[face]].tolist())
     return mesh.point(SurfacePoint.face(face, (u, v, w)))
 

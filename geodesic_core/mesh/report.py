@@ -1,4 +1,4 @@
-"""What is found in a mesh: counts and defects with the ids at fault, and what to do about them."""
+"""Reports on meshes: counts and defects with the ids at fault, and their remedies."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -25,21 +25,50 @@ NAMED = 10
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """How many elements of a kind there are, and the ids of the first ten; an edge has two."""
+    """Number of elements of a kind, and the ids of the first ten; an edge has two ids.
+
+    Examples
+    --------
+    >>> gc.Sample(2, (4, 7)).ids
+    (4, 7)
+    """
 
     count: int
     ids: tuple[int | tuple[int, int], ...]
 
     @classmethod
     def of(cls, ids: NDArray[Any]) -> "Sample":
-        """Return the sample of an array of ids, or of rows of them."""
+        """Return the sample of an array of ids.
+
+        Parameters
+        ----------
+        ids
+            (N,) ids, or (N, 2) of edges; integers.
+
+        Returns
+        -------
+        Sample
+            The number N, and the first ten.
+
+        Examples
+        --------
+        >>> gc.Sample.of(np.arange(20)).count
+        20
+        """
         named = ids[:NAMED].tolist()
         return cls(len(ids), tuple(tuple(i) if isinstance(i, list) else i for i in named))
 
 
 @dataclass(frozen=True, slots=True)
 class MeshReport:
-    """What was found in a mesh: the counts a user checks before trusting an answer."""
+    """Counts and defects of a mesh, to check before trusting an answer.
+
+    Examples
+    --------
+    >>> report = gc.TriangleMesh(*gc.samples.sphere(80)).report
+    >>> report.components, report.boundary_loops, report.euler_characteristic
+    (1, 0, 2)
+    """
 
     vertices: int
     faces: int
@@ -69,7 +98,7 @@ class MeshReport:
     repeated_vertex_faces: Sample
     """Faces that repeat a vertex: they have a number, but are no part of the surface."""
     zero_length_edges: Sample
-    """Edges between different vertices at one position: their ends are one place."""
+    """Edges between different vertices at one position: their ends are one point of the surface."""
     collapsed_faces: Sample
     """Faces with such an edge: what is left of them is an edge of other faces, or a vertex."""
     duplicate_faces: Sample
@@ -87,14 +116,25 @@ class MeshReport:
     """Mesh units."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as what JSON can hold."""
+        """Return the report by name, in plain types.
+
+        Returns
+        -------
+        dict
+            What JSON can hold.
+
+        Examples
+        --------
+        >>> gc.TriangleMesh(*gc.samples.sphere(80)).report.as_dict()["isolated_vertices"]
+        {'count': 0, 'ids': ()}
+        """
         return asdict(self)
 
 
 def edges_of(faces: Ints) -> tuple[Ints, Ints, NDArray[np.bool_]]:
-    """Return the edges of some faces, lower vertex first; O(F log F).
+    """Return the edges of some faces, (E, 2), lower vertex first; O(F log F).
 
-    With each: how many faces it has, and whether it has two that run it the same way.
+    With each: the number of its faces, and whether it has two that run it the same way.
     """
     tails, heads = faces.reshape(-1), np.roll(faces, -1, axis=1).reshape(-1)
     ends = np.stack([np.minimum(tails, heads), np.maximum(tails, heads)], axis=1)
@@ -114,9 +154,9 @@ def report_of(
     inner = topology.inner_vertex
     lowest_joined = topology.outer_vertex[inner]
     is_used = (np.diff(topology.first_corner) > 0)[inner]
-    is_place = lowest_joined == np.arange(len(vertices))
-    used = np.flatnonzero(is_used & is_place)
-    flags = np.where(is_place, topology.flags[inner], 0)
+    is_lowest = lowest_joined == np.arange(len(vertices))
+    used = np.flatnonzero(is_used & is_lowest)
+    flags = np.where(is_lowest, topology.flags[inner], 0)
     flat = topology.geometry[::3, SIN_LEFT] == 0.0
     surface = np.sort(topology.outer_face)
     corners = lowest_joined[faces[surface]]
@@ -155,7 +195,7 @@ def report_of(
 
 
 def warnings_of(report: MeshReport) -> Iterator[str]:
-    """Yield what a user should know of a mesh, a sentence or two each, with the remedy."""
+    """Yield sentences on the defects of a mesh and their remedies, for its user."""
     if report.components > 1:
         yield (
             f"The mesh has {report.components} connected components, which begin at the vertices "

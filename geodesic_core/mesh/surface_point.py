@@ -1,4 +1,4 @@
-"""A point of the surface: on a vertex, on an edge or inside a face."""
+"""Points of the surface: at a vertex, on an edge or inside a face."""
 
 from dataclasses import dataclass
 
@@ -15,9 +15,24 @@ Weights = tuple[float, float, float]
 class SurfacePoint:
     """A point of the surface, by its barycentric coordinates in a face.
 
-    Points that a mesh hands out are canonical: the face is the lowest that contains the point,
+    Points from a mesh are canonical: the face is the lowest that contains the point,
     ``vertex_index`` is set exactly where the point is a vertex, and all spellings of a point on an
-    edge have become the same.
+    edge are the same.
+
+    Parameters
+    ----------
+    face_index
+        Face id; -1 for a vertex that was named without a mesh.
+    barycentric
+        Weights of the face's three corners; they sum to one.
+    vertex_index
+        The vertex at this point, if there is one.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh.position(gc.SurfacePoint(0, (0.5, 0.25, 0.25))).tolist()
+    [0.5, 0.25, 0.0]
     """
 
     face_index: int
@@ -36,10 +51,25 @@ class SurfacePoint:
     def vertex(cls, index: int) -> "SurfacePoint":
         """Return the point at a vertex.
 
+        Parameters
+        ----------
+        index
+            Vertex index.
+
+        Returns
+        -------
+        SurfacePoint
+            Not bound to a mesh; `TriangleMesh.point` makes it canonical.
+
         Raises
         ------
         InvalidPoint
             The index is not an integer.
+
+        Examples
+        --------
+        >>> str(gc.SurfacePoint.vertex(7))
+        'vertex 7'
         """
         if not is_index(index):
             raise InvalidPoint(f"the vertex is {index!r}; it must be an integer")
@@ -49,10 +79,29 @@ class SurfacePoint:
     def edge(cls, face: int, corner: int, t: float) -> "SurfacePoint":
         """Return the point at share ``t`` of the way from a corner of a face to its next corner.
 
+        Parameters
+        ----------
+        face
+            Face id.
+        corner
+            0, 1 or 2: the corner of the face at which the edge begins.
+        t
+            Share of the way, 0 to 1.
+
+        Returns
+        -------
+        SurfacePoint
+            Not bound to a mesh; `TriangleMesh.point` makes it canonical.
+
         Raises
         ------
         InvalidPoint
             The corner is not 0, 1 or 2.
+
+        Examples
+        --------
+        >>> gc.SurfacePoint.edge(12, corner=1, t=0.25).barycentric
+        (0.0, 0.75, 0.25)
         """
         match corner:
             case 0:
@@ -65,9 +114,27 @@ class SurfacePoint:
 
     @classmethod
     def face(cls, index: int, barycentric: Weights) -> "SurfacePoint":
-        """Return the point of a face with these weights of its corners."""
+        """Return the point of a face with these weights of its corners.
+
+        Parameters
+        ----------
+        index
+            Face id.
+        barycentric
+            Three weights, 0 or more, whose sum is 1.
+
+        Returns
+        -------
+        SurfacePoint
+            Not bound to a mesh; `TriangleMesh.point` checks it and makes it canonical.
+
+        Examples
+        --------
+        >>> str(gc.SurfacePoint.face(12, (0.2, 0.3, 0.5)))
+        'the point (0.2, 0.3, 0.5) of face 12'
+        """
         return cls(index, barycentric)
 
 
 Point = int | SurfacePoint
-"""How users write a point: a vertex by its index."""
+"""Either way to write a point: a vertex by its index."""

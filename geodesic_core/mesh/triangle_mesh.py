@@ -1,4 +1,4 @@
-"""The triangle mesh: validated, frozen, with its topology."""
+"""Triangle meshes: validated, frozen, with their topology."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
@@ -61,9 +61,15 @@ class TriangleMesh:
     topology's own, nearer in memory, shows nowhere. A face that repeats a vertex keeps its number,
     but is no part of the surface: it joins nothing, and no point lies in it. To block other faces
     as well, see `with_barriers`. An edge of no length, of a face of three different vertices, makes
-    its ends one place: their distance is 0. What is left of the face is an edge, whose points are
-    those of its other faces, or a point. Preparing costs O(V + F) time, and memory of about 365
-    bytes a face.
+    its ends one point of the surface: their distance is 0. What is left of the face is an edge,
+    whose points are those of its other faces, or a point. Preparing costs O(V + F) time, and memory
+    of about 365 bytes a face.
+
+    Examples
+    --------
+    >>> corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]]
+    >>> gc.TriangleMesh(corners, [[0, 1, 3], [0, 3, 2]])
+    TriangleMesh(4 vertices, 2 faces)
     """
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, merge: Merge = "none") -> None:
@@ -90,16 +96,28 @@ class TriangleMesh:
         corners
             (C,) vertex indices of all polygons, one polygon after the other.
         sizes
-            (P,) how many corners each polygon has, 1 or more.
+            (P,) number of corners of each polygon, 1 or more.
         merge
-            As `TriangleMesh` takes it.
+            As for `TriangleMesh`.
         notes
-            What `warnings` begin with.
+            Sentences that `warnings` begin with.
+
+        Returns
+        -------
+        TriangleMesh
+            Of one triangle or more for each polygon, in their order.
 
         Raises
         ------
         InvalidMesh
-            As `TriangleMesh` does.
+            As for `TriangleMesh`.
+
+        Examples
+        --------
+        >>> square = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+        >>> mesh = gc.TriangleMesh.from_polygons(square, corners=[0, 1, 2, 3], sizes=[4])
+        >>> mesh.faces.tolist(), mesh.face_map.tolist()
+        ([[0, 1, 2], [0, 2, 3]], [0, 0])
         """
         points = as_vertices(vertices)
         check_vertices(points)
@@ -155,7 +173,25 @@ class TriangleMesh:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "TriangleMesh":
-        """Return the mesh whose `arrays` these are; trusted, not checked; may be memory-mapped."""
+        """Return the mesh whose `arrays` these are; trusted, not checked.
+
+        Parameters
+        ----------
+        arrays
+            The arrays of `arrays`, by name; they may be memory-mapped.
+
+        Returns
+        -------
+        TriangleMesh
+            The same mesh, without preparing it again.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+
+        >>> gc.TriangleMesh.from_arrays(mesh.arrays())
+        TriangleMesh(4 vertices, 2 faces)
+        """
         mesh = cls.__new__(cls)
         mesh._hold(
             arrays["vertices"],
@@ -167,7 +203,21 @@ class TriangleMesh:
         return mesh
 
     def arrays(self) -> dict[str, NDArray[Any]]:
-        """Return all arrays by name, the prepared topology included: what a store keeps."""
+        """Return all arrays by name, the prepared topology included, for a store.
+
+        Returns
+        -------
+        dict of str to numpy.ndarray
+            Read-only; ``"vertices"`` (V, 3) float64, ``"faces"`` (F, 3) int32, maps where there are
+            any, and those of the topology.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+
+        >>> mesh.arrays()["faces"].tolist()
+        [[0, 1, 3], [0, 3, 2]]
+        """
         arrays: dict[str, NDArray[Any]] = {"vertices": self.vertices, "faces": self.faces}
         if self.vertex_map is not None:
             arrays["vertex_map"] = self.vertex_map
@@ -178,16 +228,21 @@ class TriangleMesh:
     def with_barriers(self, barriers: Iterable[int]) -> "TriangleMesh":
         """Return this mesh with some faces blocked: holes, at whose corners paths may bend.
 
-        Every question can be asked of it, and all vertices and faces keep their numbers. Paths run
-        along a blocked face where a free one is beside, and past it through a corner that free
-        faces share. No point lies in blocked faces alone; a vertex of these alone is as isolated
-        as one of no face: it reaches itself, and nothing else.
+        It answers every question, and all vertices and faces keep their numbers. Paths run along a
+        blocked face where a free one is beside, and past it through a corner that free faces share.
+        No point lies in blocked faces alone. A vertex of these alone is as isolated as one of no
+        face: it reaches itself, and nothing else.
 
         Parameters
         ----------
         barriers
-            Ids of triangles, in any order (those of polygons are found in `face_map`). What is
-            blocked already stays so.
+            Ids of triangles, in any order (those of polygons are found in `face_map`). Faces that
+            are blocked already stay so.
+
+        Returns
+        -------
+        TriangleMesh
+            Sharing vertices and faces with this one; this one if no face is added.
 
         Raises
         ------
@@ -196,19 +251,26 @@ class TriangleMesh:
 
         Notes
         -----
-        O(V + F): what `TriangleMesh` takes, but for checking. The two share vertices and faces.
-        Nothing is kept of it here: who asks again among the same barriers keeps the mesh.
+        O(V + F): the time of `TriangleMesh` without its checks. Nothing is cached here: to ask
+        again among the same barriers, hold on to the mesh.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+
+        >>> gc.exact_distance(mesh.with_barriers([0]), 0).distances.round(3).tolist()
+        [0.0, inf, 1.0, 1.414]
         """
         blocked = as_barriers(barriers, len(self.faces))
         added = np.setdiff1d(blocked[of_three_vertices(self.faces[blocked])], self.barriers)
         if len(added) == 0:
             return self
-        kept = np.setdiff1d(np.arange(len(self.faces)), np.union1d(self.barriers, added))
-        if (self.inner_face[kept] < 0).all():
+        free = np.setdiff1d(np.arange(len(self.faces)), np.union1d(self.barriers, added))
+        if (self.inner_face[free] < 0).all():
             raise InvalidArgument("the barriers block every face: there is no surface left")
         mesh = TriangleMesh.__new__(TriangleMesh)
         # A copy of the vertices: kernels that prepare are compiled for arrays that can be written.
-        topology = _prepare(np.array(self.vertices), self.faces, kept)
+        topology = _prepare(np.array(self.vertices), self.faces, free)
         mesh._hold(self.vertices, self.faces, self.vertex_map, self.face_map, topology, self._notes)
         return mesh
 
@@ -256,7 +318,12 @@ class TriangleMesh:
         position
             (3,) mesh units.
         max_distance
-            How far the surface may be, mesh units.
+            Largest distance of the surface, mesh units; None for no limit.
+
+        Returns
+        -------
+        SurfacePoint
+            Canonical.
 
         Raises
         ------
@@ -268,35 +335,61 @@ class TriangleMesh:
 
         Notes
         -----
-        What lies within 1e-12 of the bounding box from a vertex or an edge counts as on it. The
-        first call builds a search tree, O(F log F).
+        A point within 1e-12 of the bounding box from a vertex or an edge counts as on it. The first
+        call builds a search tree, O(F log F); each takes O(log F) in practice.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+
+        >>> str(mesh.locate([0.25, 0.5, 1.0]))
+        'the point (0.5, 0.25, 0.25) of face 1'
         """
         try:
-            place = np.asarray(position, dtype=np.float64)
+            wanted = np.asarray(position, dtype=np.float64)
         except (TypeError, ValueError):
-            place = np.empty(0)
-        if place.shape != (3,) or not (np.abs(place) <= LARGEST_COORDINATE).all():
+            wanted = np.empty(0)
+        if wanted.shape != (3,) or not (np.abs(wanted) <= LARGEST_COORDINATE).all():
             raise InvalidPoint(
                 f"the position is {position!r}; it must be three finite numbers, at most "
                 f"{LARGEST_COORDINATE:g} in size"
             )
         limit = as_limit(max_distance)
-        face, point, distance = self._nearest_face(place)
+        face, point, distance = self._nearest_face(wanted)
         if distance > limit:
             raise InvalidPoint(
-                f"the nearest point of the surface is {distance:g} away from {place.tolist()}, "
+                f"the nearest point of the surface is {distance:g} away from {wanted.tolist()}, "
                 f"which is more than max_distance = {limit:g}"
             )
         weights = canonical.weights_of(point, self.vertices[self.faces[face]], SNAP * self.diagonal)
         return self._point_in_face(face, weights, "position")
 
     def point(self, point: int | SurfacePoint, name: str = "point") -> SurfacePoint:
-        """Return a point in its one spelling: all that name the same come out equal, to the bit.
+        """Return a point in its canonical form, the same to the bit for all spellings of it.
+
+        Parameters
+        ----------
+        point
+            A vertex index or a `SurfacePoint`.
+        name
+            Name of the point in messages.
+
+        Returns
+        -------
+        SurfacePoint
+            Canonical.
 
         Raises
         ------
         InvalidPoint
-            It is not a point of this mesh; ``name`` is how the message calls it.
+            It is not a point of this mesh.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+
+        >>> mesh.point(gc.SurfacePoint.edge(1, 0, 1.0)) == mesh.point(3)  # the end of an edge
+        True
         """
         index: Any = point
         if isinstance(point, SurfacePoint):
@@ -336,10 +429,22 @@ class TriangleMesh:
         t
             Share of the way from the first to the second, 0 to 1.
 
+        Returns
+        -------
+        SurfacePoint
+            Canonical.
+
         Raises
         ------
         InvalidPoint
             The two are no vertices, no edge of the surface joins them, or ``t`` is not from 0 to 1.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+
+        >>> mesh.point_on_edge(0, 1, 0.25) == mesh.point_on_edge(1, 0, 0.75)
+        True
         """
         for vertex in (start, end):
             canonical.check_index(vertex, len(self.vertices), "vertex", "end of the edge")
@@ -353,12 +458,29 @@ class TriangleMesh:
         return point
 
     def position(self, point: int | SurfacePoint) -> Floats:
-        """Return the (3,) position of a point, mesh units; of a vertex exactly the mesh's own.
+        """Return the position of a point; of a vertex exactly the mesh's own.
+
+        Parameters
+        ----------
+        point
+            A vertex index or a `SurfacePoint`.
+
+        Returns
+        -------
+        numpy.ndarray
+            (3,) float64, mesh units.
 
         Raises
         ------
         InvalidPoint
             It is not a point of this mesh.
+
+        Examples
+        --------
+        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+
+        >>> mesh.position(mesh.point_on_edge(0, 1, 0.25)).tolist()
+        [0.25, 0.0, 0.0]
         """
         if isinstance(point, SurfacePoint) and point.vertex_index is None:
             point = self.point(point)
@@ -387,7 +509,7 @@ class TriangleMesh:
 
     @cached_property
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know of this mesh, a sentence each, with the remedy."""
+        """Sentences on the defects of this mesh and their remedies, for its user."""
         return (*self._notes, *warnings_of(self.report))
 
     def __repr__(self) -> str:
@@ -402,14 +524,14 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
     return frozen
 
 
-def _prepare(vertices: Floats, faces: Ints, kept: Longs) -> Topology:
-    """Return the topology of some of the faces."""
-    topology, outcome, bad = _built(vertices, faces, kept)
+def _prepare(vertices: Floats, faces: Ints, free: Longs) -> Topology:
+    """Return the topology of the faces that are not blocked."""
+    topology, outcome, bad = _built(vertices, faces, free)
     if outcome == build.TOO_SHORT:
-        joined = lowest_joined(len(vertices), edges_of_no_length(vertices, faces[kept]))
-        topology, outcome, bad = _built(vertices, joined[faces].astype(np.int32), kept)
+        joined = lowest_joined(len(vertices), edges_of_no_length(vertices, faces[free]))
+        topology, outcome, bad = _built(vertices, joined[faces].astype(np.int32), free)
         topology.inner_vertex[:] = topology.inner_vertex[joined]
-        # The numbers of those that joined others are left out.
+        # Renumbered without the components of vertices that joined others.
         topology.component[:] = np.unique(topology.component[joined], return_inverse=True)[1]
     if outcome == build.TOO_SHORT:
         face = int(topology.outer_face[bad])
@@ -422,14 +544,14 @@ def _prepare(vertices: Floats, faces: Ints, kept: Longs) -> Topology:
     return topology
 
 
-def _built(vertices: Floats, faces: Ints, kept: Longs) -> tuple[Topology, int, int]:
-    """Return the topology of those faces of three different vertices, and how building it went."""
-    surface = kept[of_three_vertices(faces[kept])]
+def _built(vertices: Floats, faces: Ints, free: Longs) -> tuple[Topology, int, int]:
+    """Return the topology of those faces that have three different vertices, and the outcome."""
+    surface = free[of_three_vertices(faces[free])]
     if len(surface) == 0:
         raise InvalidMesh(
             "each face repeats a vertex or has an edge of no length: there is no surface",
             kind="face",
-            elements=kept[:NAMED].tolist(),
+            elements=free[:NAMED].tolist(),
         )
     topology = build.empty_topology(len(vertices), len(surface))
     outcome, bad = build.build_topology(vertices, faces[surface], topology)

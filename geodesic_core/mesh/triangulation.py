@@ -1,4 +1,4 @@
-"""Polygons become triangles, in place, with a map back to the polygon that each came from.
+"""Triangulation of polygons, in place, with a map from triangles back to polygons.
 
 A polygon is a fan from its first or its second corner where all triangles of the fan point the same
 way; else manifold3d cuts it, as seen along its normal. So a flat polygon, convex or not, becomes
@@ -62,8 +62,8 @@ def _without_stutter(corners: Longs, sizes: Longs) -> tuple[Longs, Longs]:
     gone = (corners == before) & (sizes > 3)[owner]
     all_gone = np.bincount(owner[gone], minlength=len(sizes)) == sizes
     gone[last[all_gone]] = False  # a polygon of one vertex
-    kept = ~gone
-    return corners[kept], np.bincount(owner[kept], minlength=len(sizes))
+    stay = ~gone
+    return corners[stay], np.bincount(owner[stay], minlength=len(sizes))
 
 
 def _cut(vertices: Floats, rows: Longs) -> Longs:

@@ -1,4 +1,4 @@
-"""Distances between many points: sweeps from one side, in threads; few pairs by searches."""
+"""Matrices of distances: sweeps from one side, in threads; searches where pairs are few."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +30,7 @@ Measured: a sweep costs as much as 7 searches on a scan of 10⁵ faces, as 20 wh
 """
 
 _GROWTH = 2
-"""How much larger than at first the state of a sweep may become, where memory is scarce."""
+"""Growth of the state of a sweep that is allowed for where memory is scarce."""
 
 
 def distance_matrix(
@@ -55,16 +55,21 @@ def distance_matrix(
     sources, targets
         N and M vertex indices or `SurfacePoint`.
     max_distance
-        What is farther (mesh units) is not looked for, and counts as unreachable.
+        Limit of the sweeps, mesh units; None for no limit. Points beyond it count as unreachable.
     layout
         ``"dense"`` for an (N, M) array, infinite where unreachable; ``"sparse"`` for a
-        `scipy.sparse.csr_array` of the same shape that holds what can be reached, zeros too;
+        `scipy.sparse.csr_array` of the same shape that holds the finite distances, zeros too;
         ``"pairs"`` for an (N,) array of the distances from each source to the target of the same
-        index, of which there must be as many.
+        index, with as many targets as sources.
     threads
-        How many threads to use at most; None for one per core that the process may use.
+        Largest number of threads; None for one per core that the process may use.
     progress, cancel, deadline_s, memory_limit
         See `Control`; the result counts as memory. Callbacks are called in the caller's thread.
+
+    Returns
+    -------
+    numpy.ndarray or scipy.sparse.csr_array
+        Distances, float64, mesh units, in the shape of the layout.
 
     Raises
     ------
@@ -78,6 +83,17 @@ def distance_matrix(
     from points that are in many of them, and searched for as `shortest_path` does else, in one
     thread. Each thread needs a third of the mesh's own arrays, the searches two thirds. Results do
     not depend on the number of threads.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+
+    >>> gc.distance_matrix(mesh, [0, 1], [2, 3]).round(3).tolist()
+    [[1.0, 1.414], [1.414, 1.0]]
+    >>> gc.distance_matrix(mesh, [0, 1], [2, 3], layout="pairs").round(3).tolist()
+    [1.0, 1.0]
+    >>> gc.distance_matrix(mesh, [0, 1], [1, 2, 3], max_distance=1.0, layout="sparse").nnz
+    4
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     make = partial(TargetSweep, mesh), partial(PathSearch, mesh)
@@ -86,7 +102,7 @@ def distance_matrix(
 
 def find_matrix(
     mesh: TriangleMesh,
-    sweeper: Callable[[], TargetSweep],
+    target_sweep: Callable[[], TargetSweep],
     search: Callable[[], PathSearch],
     sources: Sequence[Point],
     targets: Sequence[Point],
@@ -95,7 +111,7 @@ def find_matrix(
     threads: int | None,
     control: Control,
 ) -> Floats | csr_array:
-    """Do as `distance_matrix` does, with a first sweeper and a search, each asked for if needed."""
+    """Do as `distance_matrix` does; the first `TargetSweep` and a `PathSearch` come from makers."""
     limit = as_limit(max_distance)
     check_choice("layout", layout, get_args(Layout))
     if threads is not None and not (is_index(threads) and threads >= 1):
@@ -103,14 +119,14 @@ def find_matrix(
     starts, stops = as_points(mesh, sources, "source"), as_points(mesh, targets, "target")
     cores = threads or available_cores()
     if layout == "pairs":
-        return _find_pairs(mesh, sweeper, search, starts, stops, limit, cores, control)
+        return _find_pairs(mesh, target_sweep, search, starts, stops, limit, cores, control)
     table: _Dense | _Sparse
     if layout == "dense":
         control.check_memory(8 * len(starts) * len(stops))
         table = _Dense(mesh, starts, stops)
     else:
         table = _Sparse(mesh, starts, stops)
-    _sweep_all(mesh, sweeper(), table, limit, cores, control)
+    _sweep_all(mesh, target_sweep(), table, limit, cores, control)
     if control.progress is not None:
         control.progress(1.0)
     return table.result()
@@ -118,7 +134,7 @@ def find_matrix(
 
 def _find_pairs(
     mesh: TriangleMesh,
-    sweeper: Callable[[], TargetSweep],
+    target_sweep: Callable[[], TargetSweep],
     search: Callable[[], PathSearch],
     sources: Sequence[SurfacePoint],
     targets: Sequence[SurfacePoint],
@@ -142,7 +158,7 @@ def _find_pairs(
         control = control.holding(finder.nbytes)
     if table.groups:
         rest = control.for_part(few, parts, len(table.groups))
-        _sweep_all(mesh, sweeper(), table, limit, cores, rest)
+        _sweep_all(mesh, target_sweep(), table, limit, cores, rest)
     if control.progress is not None:
         control.progress(1.0)
     return table.values
@@ -168,34 +184,34 @@ def _searched(
 
 def _sweep_all(
     mesh: TriangleMesh,
-    sweeper: TargetSweep,
+    target_sweep: TargetSweep,
     table: "_Dense | _Sparse | _Pairs",
     limit: float,
     cores: int,
     control: Control,
 ) -> None:
-    """Do all sweeps of a table, in as many threads as there are cores, sweeps and memory for."""
+    """Do all sweeps of a table, in as many threads as cores, sweeps and memory allow."""
     ends = table.ends
     count = min(cores, table.sweeps)
     if control.memory_limit is not None:
         room = control.memory_limit - control.bytes_beside - table.nbytes
-        count = max(1, min(count, room // (_GROWTH * sweeper.nbytes)))
-    sweepers = [sweeper, *(TargetSweep(mesh) for _ in range(count - 1))]
+        count = max(1, min(count, room // (_GROWTH * target_sweep.nbytes)))
+    target_sweeps = [target_sweep, *(TargetSweep(mesh) for _ in range(count - 1))]
 
-    def sweep(sweeper: TargetSweep, source: int, control: Control) -> None:
+    def sweep(target_sweep: TargetSweep, source: int, control: Control) -> None:
         targets = np.intersect1d(table.wanted(source), ends.targets_connected_to(source))
         if len(targets) == 0:
             return
-        # Those of other threads are as large as this one, about.
-        control = control.holding(table.nbytes + (count - 1) * sweeper.nbytes)
-        found = sweeper.distances(ends, source, targets, len(targets), limit, control)
+        # The states of other threads are about as large as this one.
+        control = control.holding(table.nbytes + (count - 1) * target_sweep.nbytes)
+        found = target_sweep.distances(ends, source, targets, len(targets), limit, control)
         table.put(source, targets, found)
 
-    share_out(table.sweeps, [partial(sweep, each) for each in sweepers], control)
+    share_out(table.sweeps, [partial(sweep, each) for each in target_sweeps], control)
 
 
 class _Grid:
-    """A matrix in the making: swept from the smaller side, and where both are one, half of it."""
+    """A matrix in the making, swept from the smaller side; half of it where both sides are one."""
 
     def __init__(
         self, mesh: TriangleMesh, sources: Sequence[SurfacePoint], targets: Sequence[SurfacePoint]
@@ -220,7 +236,7 @@ class _Dense(_Grid):
         self.nbytes = self._values.nbytes
 
     def put(self, source: int, targets: Ints, distances: Floats) -> None:
-        """Take what a sweep has found."""
+        """Store the distances of a sweep."""
         rows = self._values.T if self.flipped else self._values
         rows[source, targets] = distances
         if self.symmetric:
@@ -240,7 +256,7 @@ class _Sparse(_Grid):
         self.nbytes = 0
 
     def put(self, source: int, targets: Ints, distances: Floats) -> None:
-        """Take what a sweep has found."""
+        """Store the distances of a sweep."""
         near = np.isfinite(distances)
         self._found[source] = targets[near], distances[near]
         self.nbytes += 12 * int(np.count_nonzero(near))
@@ -285,12 +301,12 @@ class _Pairs:
         return self.groups[source]
 
     def put(self, _: int, targets: Ints, distances: Floats) -> None:
-        """Take what a sweep has found."""
+        """Store the distances of a sweep."""
         self.values[targets] = distances
 
 
 def _grouped(points: Sequence[SurfacePoint]) -> dict[SurfacePoint, list[int]]:
-    """Return the indices at which each point is."""
+    """Return the indices of each point."""
     groups: dict[SurfacePoint, list[int]] = {}
     for i, point in enumerate(points):
         groups.setdefault(point, []).append(i)

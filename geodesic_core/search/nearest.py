@@ -18,7 +18,15 @@ from geodesic_core.validation import as_limit, is_index
 
 @dataclass(frozen=True, slots=True)
 class Nearest:
-    """The nearest of some candidates, nearest first."""
+    """The nearest of some candidates, nearest first.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> near = gc.nearest(mesh, 0, [3, 2], k=2)
+    >>> near.indices.tolist(), near.distances.round(3).tolist()
+    ([1, 0], [1.0, 1.414])
+    """
 
     indices: Ints
     """(n,) int32, into the candidates; of equal distances the lower index goes first"""
@@ -40,7 +48,7 @@ def nearest(
 ) -> Nearest:
     """Return the ``k`` candidates that are geodesically nearest to a point, exactly.
 
-    For many questions on one mesh, a `Solver` is faster.
+    For many calls on one mesh, a `Solver` is faster.
 
     Parameters
     ----------
@@ -49,12 +57,17 @@ def nearest(
     source, candidates
         Vertex indices or `SurfacePoint`.
     k
-        How many to find: from 1 to the number of candidates. There are fewer in the answer where
-        fewer can be reached.
+        Number to find, from 1 to the number of candidates. Fewer are returned where fewer can be
+        reached.
     max_distance
-        Candidates farther than this (mesh units) are left out.
+        Limit, mesh units; None for no limit. Candidates beyond it are left out.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
+
+    Returns
+    -------
+    Nearest
+        Indices into the candidates, (n,) int32, and distances, (n,) float64, nearest first.
 
     Raises
     ------
@@ -65,6 +78,13 @@ def nearest(
     -----
     Distances that differ by rounding count as equal. The sweep goes no farther than the k-th
     nearest; allocating its state is O(V + F), which a `Solver` does once.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+
+    >>> gc.nearest(mesh, 0, [3, 2]).indices.tolist()
+    [1]
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     return find_nearest(
@@ -74,27 +94,27 @@ def nearest(
 
 def find_nearest(
     mesh: TriangleMesh,
-    sweeper: Callable[[], TargetSweep],
+    target_sweep: Callable[[], TargetSweep],
     source: Point,
     candidates: Sequence[Point],
     k: int,
     max_distance: float | None,
     control: Control,
 ) -> Nearest:
-    """Do as `nearest` does, with a sweeper that is asked for once the arguments are in order."""
+    """Do as `nearest` does, with a `TargetSweep` made once the arguments are in order."""
     limit = as_limit(max_distance)
     start = mesh.point(source, "source")
-    places = as_points(mesh, candidates, "candidate")
-    if not is_index(k) or not 1 <= k <= len(places):
+    points = as_points(mesh, candidates, "candidate")
+    if not is_index(k) or not 1 <= k <= len(points):
         raise InvalidArgument(
-            f"k is {k!r}; it must be an integer from 1 to the number of candidates, {len(places)}"
+            f"k is {k!r}; it must be an integer from 1 to the number of candidates, {len(points)}"
         )
-    ends = ends_of(mesh, [start], places)
+    ends = ends_of(mesh, [start], points)
     connected = ends.targets_connected_to(0)
     indices, distances = connected[:0], np.empty(0)
     if len(connected) > 0:
         count = min(int(k), len(connected))
-        found = sweeper().distances(ends, 0, connected, count, limit, control)
+        found = target_sweep().distances(ends, 0, connected, count, limit, control)
         order = _nearest_first(found)[:count]
         order = order[np.isfinite(found[order])]
         indices, distances = connected[order], found[order]
@@ -104,7 +124,7 @@ def find_nearest(
 
 
 def _nearest_first(distances: Floats) -> Longs:
-    """Return the order of distances, in which those that differ by rounding count as equal."""
+    """Return the order of distances, where those that differ by rounding count as equal."""
     order = np.argsort(distances, kind="stable")
     ascending = distances[order]
     rank = np.zeros(len(order), np.int64)

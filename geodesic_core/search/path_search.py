@@ -69,9 +69,10 @@ _AFTER_APPROXIMATE = 0.9
 
 
 class PathSearch:
-    """Searches for paths on one mesh, with memory that is kept between them.
+    """Searches for paths on one mesh, in reused memory.
 
-    A search resets what it touched, so that its cost does not depend on the size of the mesh.
+    A search resets the vertices that it touched, so that its cost does not depend on the size of
+    the mesh.
     """
 
     def __init__(self, mesh: TriangleMesh) -> None:
@@ -136,10 +137,10 @@ class PathSearch:
         return replace(path, steps=leg.log.steps)
 
     def add_landmark_if_due(self, beside: SurfacePoint, control: Control) -> None:
-        """Add a landmark in the component of a point, once searches touched as much as it will.
+        """Add a landmark in the component of a point, once searches touched as many vertices.
 
-        So landmarks never cost more than what was spent without them. What stops the call before
-        there is one is left for the next call to raise: it must not lose the path just found.
+        So landmarks never cost more than was spent without them. A stop of the call before the
+        landmark is done is left for the next call to raise: it must not lose the path just found.
         """
         count = self._landmarks.count
         due = self._touched >= (count + 1) * len(self.mesh.vertices)
@@ -240,7 +241,7 @@ class _End:
 
 
 class _Leg(NamedTuple):
-    """What a search is after, and who watches it."""
+    """Ends, limits and control of a search."""
 
     start: _End
     end: _End
@@ -259,7 +260,7 @@ class _Leg(NamedTuple):
     def bound(self, upper: float) -> float:
         """Return how far to look where a path of length ``upper`` is known.
 
-        Beyond the limit by more than slivers round: what is missed is farther than the limit.
+        Beyond the limit by more than slivers round: a path that is missed is longer than the limit.
         """
         return min(upper, self.limit * (1.0 + STRAIGHT))
 
@@ -283,7 +284,7 @@ class _Leg(NamedTuple):
 
 
 class _Log:
-    """Notes what each step did, where that is asked for."""
+    """Log of the steps of a search, where they are to be explained."""
 
     def __init__(self, search: PathSearch, explain: bool) -> None:
         self.steps: tuple[SearchStep, ...] | None = () if explain else None

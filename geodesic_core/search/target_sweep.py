@@ -1,4 +1,4 @@
-"""Exact distances from one point to some others: sweep after sweep in the same memory."""
+"""Sweeps from one point to some others, one after another in the same memory."""
 
 from collections.abc import Callable
 
@@ -22,15 +22,15 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import SEARCH_SLACK
 
 _RESET = 3
-"""How many times as much it costs to reset a vertex as to allocate it: 3 % of a whole sweep, which
-therefore leaves its memory behind."""
+"""Cost of resetting a vertex, in those of allocating it. Resetting all takes 3 % of a whole sweep,
+which therefore allocates anew."""
 
 
 class TargetSweep:
-    """Finds exact distances between points of one mesh; not for several threads at once.
+    """Exact distances between points of one mesh, by sweeps in reused memory; for one thread.
 
-    A short sweep resets what it touched, so that it does not depend on the size of the mesh; each
-    stops once it has found what was asked for.
+    A short sweep resets the vertices that it touched, so that its cost does not depend on the size
+    of the mesh. Each stops once it has found its targets.
     """
 
     def __init__(self, mesh: TriangleMesh) -> None:
@@ -49,8 +49,8 @@ class TargetSweep:
     ) -> Floats:
         """Return the exact distances of the nearest ``count`` targets from a source of ``ends``.
 
-        Those of other targets, which are farther, may be too large; those beyond ``limit`` are
-        infinite. To look for more targets than can be reached costs time only.
+        Distances of other targets, which are farther, may be too large; those beyond ``limit`` are
+        infinite. A ``count`` beyond the targets that can be reached costs time only.
 
         Raises
         ------
@@ -89,7 +89,7 @@ class TargetSweep:
 def _limit_of(
     nodes: Ints, corners: Ints, reaches: Floats, count: int
 ) -> Callable[[Wavefront], float]:
-    """Return what tells how far a sweep has to look for the nearest ``count`` of its targets.
+    """Return the limit of a sweep for its nearest ``count`` targets, as a function of its state.
 
     A distance known so far is that of a path: nothing beyond it can be nearer.
     """

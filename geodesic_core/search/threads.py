@@ -1,4 +1,4 @@
-"""The parts of a call done in threads: the kernels let go of the interpreter."""
+"""Threads that share the parts of a call; kernels release the interpreter."""
 
 import os
 import threading
@@ -10,16 +10,16 @@ from functools import partial
 from geodesic_core.control import SLICE_SECONDS, Control
 
 Worker = Callable[[int, Control], None]
-"""Does the part of a number."""
+"""Function that does the part of a given number"""
 
 
 def available_cores() -> int:
-    """Return the number of cores that this process may use, or has where nothing tells that."""
+    """Return the number of cores that this process may use, or else of the machine."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def share_out(parts: int, workers: Sequence[Worker], control: Control) -> None:
-    """Have workers, each in a thread of its own, do parts of a call, until all are done.
+    """Do the parts of a call with some workers, each in a thread of its own.
 
     The caller's callbacks are called in the caller's thread only.
 
@@ -28,7 +28,7 @@ def share_out(parts: int, workers: Sequence[Worker], control: Control) -> None:
     Cancelled, DeadlineExceeded
         As the control says.
     Exception
-        Whatever the first worker to fail raises.
+        The exception of the first worker to fail.
     """
     stop = threading.Event()
     shares = [0.0] * parts

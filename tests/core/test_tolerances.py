@@ -396,9 +396,9 @@ def test_path_length_is_the_most_that_a_path_may_differ_from_its_field(scale, si
     field = gc.exact_distance(gc.TriangleMesh(points * scale, faces), gc.Source(0, scale))
     last = field.mesh.topology.inner_vertex[-1]
     honest = float(field.distances[-1])
-    field._found.distance[last] = honest * (1 + 0.5 * sign * PATH_LENGTH)
+    field._result.distance[last] = honest * (1 + 0.5 * sign * PATH_LENGTH)
     assert field.path_to(len(points) - 1).length == pytest.approx(honest - scale, rel=1e-14)
-    field._found.distance[last] = honest * (1 + 2.0 * sign * PATH_LENGTH)
+    field._result.distance[last] = honest * (1 + 2.0 * sign * PATH_LENGTH)
     with pytest.raises(gc.errors.InternalError, match="the field says"):
         field.path_to(len(points) - 1)
 
@@ -409,9 +409,9 @@ def test_foot_is_all_that_a_path_from_a_curve_may_be_off(scale):
     mesh = gc.TriangleMesh(places, [[0, 2, 3], [3, 1, 2]])  # vertex 2 lies on the edge of 0 and 3
     field, node = gc.exact_distance(mesh, gc.Curve([3, 0])), mesh.topology.inner_vertex[2]
     assert field.path_to(2).length <= FOOT * mesh.diagonal
-    field._found.distance[node] = 0.5 * FOOT * mesh.diagonal
+    field._result.distance[node] = 0.5 * FOOT * mesh.diagonal
     field.path_to(2)
-    field._found.distance[node] = 2.0 * FOOT * mesh.diagonal
+    field._result.distance[node] = 2.0 * FOOT * mesh.diagonal
     with pytest.raises(gc.errors.InternalError, match="the field says"):
         field.path_to(2)
 
@@ -681,7 +681,7 @@ def test_slant_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope,
     wave = new_wavefront(mesh.topology, nodes.sites)
     bounds = with_parallel_windows(exact_bounds(math.inf), int(nodes.sources[-1]))
     continuous_dijkstra.start_sweep(
-        mesh.topology, wave, nodes.sources, nodes.origins, np.zeros(1), bounds
+        mesh.topology, wave, nodes.sources, nodes.source_indices, np.zeros(1), bounds
     )
     roots = wave.pool.windows[: wave.counters[FRESH]].view(np.int32)[:, ROOT]
     assert (roots == nodes.sources[-1]).sum() == strips
