@@ -1,4 +1,4 @@
-"""Arrays: what every module calls those it takes and gives, and how large rows lie in memory."""
+"""Array types, and rows that are aligned to cache lines."""
 
 from typing import Any, TypeAlias
 

@@ -104,7 +104,7 @@ def sphere(faces: int) -> Sample:
     _refuse_count(faces, fewest=20)
     n = max(1, round(sqrt(faces / 20)))
     corners, triangles = _icosahedron()
-    # Grid points of a face: row i, place j, so that the corners weigh n - i, i - j and j.
+    # Grid points of a face: row i, column j, so that the corners weigh n - i, i - j and j.
     i, j = np.tril_indices(n + 1)
     weights = np.stack([n - i, i - j, j], axis=1)
     at = i * (i + 1) // 2 + j
@@ -257,7 +257,7 @@ def obstacles(faces: int) -> Sample:
     spread = (1.0 - share) * away + share * inner[:, None]
     centres = np.stack([tile_x, tile_y], axis=1) * 2.0 + (1.0 - _TILES)
     flat = (centres[:, None, None] + spread).reshape(-1, 2)
-    # Tiles share the points on their borders, which are known by their place on a lattice.
+    # Tiles share the points on their borders, which are identified by their lattice point.
     keys = np.arange(len(flat)).reshape(spread.shape[:3]) + (_TILES * side + 1) ** 2
     keys[:, 0] = lattice[..., 1] * (_TILES * side + 1) + lattice[..., 0]
     _, first, ids = np.unique(keys, return_index=True, return_inverse=True)

@@ -29,7 +29,7 @@ from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
 from geodesic_core.validation import as_barriers, as_limit, check_choice, is_number
 
 Retain = Literal["distances", "paths", "windows"]
-"""How much a field holds in memory: each word includes the ones before it."""
+"""Contents of a field in memory: each word includes the ones before it."""
 
 
 def exact_distance(

@@ -55,8 +55,8 @@ def _lies_on_curve(mesh: TriangleMesh, winners: Winners, is_parallel: Flags) -> 
     """Tell which nodes lie on the segment that reaches them, as corners of flat faces may."""
     lies = np.zeros_like(is_parallel)
     nodes = np.flatnonzero(is_parallel & np.isfinite(winners.distance))
-    pieces = winners.winner_ints[nodes, PREDECESSOR]
-    away = winners.distance[nodes] - winners.distance[pieces]
+    segments = winners.winner_ints[nodes, PREDECESSOR]
+    away = winners.distance[nodes] - winners.distance[segments]
     lies[nodes] = away <= FOOT * mesh.diagonal
     return lies
 

@@ -49,7 +49,7 @@ class Isoline:
     points: Floats
     """(K, 3) float64, mesh units"""
     closed: bool
-    """Whether the last point is joined to the first, which is not repeated."""
+    """True where the last point is joined to the first, which is not repeated."""
     faces: Ints
     """(K,) int32 of a closed line, (K - 1,) of an open one: the face behind each point."""
 
@@ -257,11 +257,11 @@ class Drawing:
 
         def cut(first: int, last: int) -> int:
             nonlocal faces
-            spans, spans_of, arcs, arcs_of, found = kernels.cut_faces(
+            spans, spans_of, arcs, arcs_of, more = kernels.cut_faces(
                 self._mesh.topology, self._field, faces[first:last], len(faces), level, rank
             )
             parts.append((spans, spans_of, arcs, arcs_of))
-            faces = np.concatenate([faces, found])
+            faces = np.concatenate([faces, more])
             control.check_memory(faces.nbytes + _bytes_of(parts))
             return len(faces)
 

@@ -208,14 +208,14 @@ class RepeatableSweep:
 
 def all_winners(wave: Wavefront) -> Winners:
     """Return the data of paths of a sweep over all of a mesh, in memory of its own."""
-    found = winners_of(
+    winners = winners_of(
         wave,
         continuous_dijkstra.nearest_sources(
             wave.vertices.distance, wave.vertices.winner_ints, wave.vertices.source_index
         ),
     )
     # A copy holds the merges without the room for more.
-    return found._replace(merges=found.merges.copy(), merge_ints=found.merge_ints.copy())
+    return winners._replace(merges=winners.merges.copy(), merge_ints=winners.merge_ints.copy())
 
 
 def peak_bytes(wave: Wavefront) -> int:

@@ -77,7 +77,7 @@ class Nodes:
 
     @property
     def has_site_targets(self) -> bool:
-        """Whether a target is neither vertex nor segment."""
+        """True where a target is neither vertex nor segment."""
         return len(self.sites.ints) > self.first_target
 
     def segment(self, node: int) -> SegmentInFace | None:

@@ -1,1 +1,1 @@
-"""From the bytes of a mesh file to polygons: one module for each format."""
+"""Mesh files: their bytes become polygons, by one module for each format."""

@@ -35,7 +35,7 @@ def read_glb(data: bytes, max_faces: int | None) -> FileContents:
     # trimesh walks the nodes from the last to the first.
     nodes = reversed(scene.graph.nodes_geometry)
     placed = [(transform, name) for transform, name in map(scene.graph.get, nodes)]
-    placed.sort(key=lambda place: order[place[1]])
+    placed.sort(key=lambda part: order[part[1]])
     vertices, faces, count, left_out = [], [], 0, 0
     for transform, name in placed:
         part = scene.geometry[name]

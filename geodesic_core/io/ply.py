@@ -238,7 +238,7 @@ def _walk_lists(element: _Element, body: bytes, at: int, order: str) -> tuple[Lo
     corner_list = _corner_list_index(element) if element.name == "face" else -1
     counters = [struct.Struct(order + part.count_type) for part in element.properties]
     widths = [np.dtype(part.type).itemsize for part in element.properties]
-    found, sizes = [], []
+    chunks, sizes = [], []
     for _ in range(element.size):
         for i, (counter, width) in enumerate(zip(counters, widths, strict=True)):
             count = counter.unpack_from(body, at)[0] if counter.size else 1
@@ -248,9 +248,9 @@ def _walk_lists(element: _Element, body: bytes, at: int, order: str) -> tuple[Lo
                 )
             at += counter.size
             if i == corner_list:
-                found.append(body[at : at + count * width])
+                chunks.append(body[at : at + count * width])
                 sizes.append(count)
             at += count * width
     item = order + element.properties[corner_list].type
-    corners = np.frombuffer(b"".join(found), item).astype(np.int64)
+    corners = np.frombuffer(b"".join(chunks), item).astype(np.int64)
     return corners, np.array(sizes, dtype=np.int64), at

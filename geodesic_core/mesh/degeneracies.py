@@ -1,6 +1,6 @@
 """Degeneracies: equal rows, faces that repeat a vertex, and edges of no length.
 
-The vertices that an edge of no length joins are one place of the surface. Inside, the lowest stands
+The vertices that an edge of no length joins are one point of the surface. Inside, the lowest stands
 for all of them. A face with such an edge has no extent: an edge of its neighbours, or a point, is
 left of it.
 """

@@ -202,60 +202,60 @@ def warnings_of(report: MeshReport) -> Iterator[str]:
             f"{_list(report.component_vertices)}: vertices of other components than the source's "
             f"are unreachable."
         )
-    found = report.duplicate_vertices
-    if found.count:
+    sample = report.duplicate_vertices
+    if sample.count:
         yield (
-            f"{_vertices(found.count)} at the position of an earlier one but kept apart, so that "
-            f"no path leads from one to the other there; the first is vertex {found.ids[0]}. "
+            f"{_vertices(sample.count)} at the position of an earlier one but kept apart, so that "
+            f"no path leads from one to the other there; the first is vertex {sample.ids[0]}. "
             f"merge='exact' joins them."
         )
-    found = report.isolated_vertices
-    if found.count:
+    sample = report.isolated_vertices
+    if sample.count:
         yield (
-            f"{_vertices(found.count)} of no face and unreachable; the first is vertex "
-            f"{found.ids[0]}."
+            f"{_vertices(sample.count)} of no face and unreachable; the first is vertex "
+            f"{sample.ids[0]}."
         )
-    found = report.repeated_vertex_faces
-    if found.count:
+    sample = report.repeated_vertex_faces
+    if sample.count:
         yield (
-            f"{_faces(found.count)} made of fewer than three different vertices and no part of "
-            f"the surface; the first is face {found.ids[0]}."
+            f"{_faces(sample.count)} made of fewer than three different vertices and no part of "
+            f"the surface; the first is face {sample.ids[0]}."
         )
-    found = report.zero_length_edges
-    if found.count:
+    sample = report.zero_length_edges
+    if sample.count:
         yield (
-            f"{_edges(found.count)} of no length, both ends one place; the first joins the "
-            f"vertices {found.ids[0]}. {_faces(report.collapsed_faces.count)} thereby no more than "
-            f"an edge or a point; the first is face {report.collapsed_faces.ids[0]}."
+            f"{_edges(sample.count)} of no length, both ends one place; the first joins the "
+            f"vertices {sample.ids[0]}. {_faces(report.collapsed_faces.count)} thereby no more "
+            f"than an edge or a point; the first is face {report.collapsed_faces.ids[0]}."
         )
-    found = report.duplicate_faces
-    if found.count:
+    sample = report.duplicate_faces
+    if sample.count:
         yield (
-            f"{_faces(found.count)} made of the same vertices as an earlier one; the first is face "
-            f"{found.ids[0]}. Distances are the same without them."
+            f"{_faces(sample.count)} made of the same vertices as an earlier one; the first is "
+            f"face {sample.ids[0]}. Distances are the same without them."
         )
-    found = report.degenerate_faces
-    if found.count:
-        yield f"{_faces(found.count)} without area; the first is face {found.ids[0]}."
-    found = report.non_manifold_edges
-    if found.count:
+    sample = report.degenerate_faces
+    if sample.count:
+        yield f"{_faces(sample.count)} without area; the first is face {sample.ids[0]}."
+    sample = report.non_manifold_edges
+    if sample.count:
         yield (
-            f"{_edges(found.count)} shared by three faces or more; the first joins the vertices "
-            f"{found.ids[0]}. Paths may go on into any of the faces."
+            f"{_edges(sample.count)} shared by three faces or more; the first joins the vertices "
+            f"{sample.ids[0]}. Paths may go on into any of the faces."
         )
-    found = report.misoriented_edges
-    if found.count:
+    sample = report.misoriented_edges
+    if sample.count:
         yield (
-            f"{_edges(found.count)} run in the same direction by both faces, whose winding is "
-            f"inconsistent; the first joins the vertices {found.ids[0]}. Distances do not depend "
+            f"{_edges(sample.count)} run in the same direction by both faces, whose winding is "
+            f"inconsistent; the first joins the vertices {sample.ids[0]}. Distances do not depend "
             f"on it."
         )
-    found = report.bow_tie_vertices
-    if found.count:
+    sample = report.bow_tie_vertices
+    if sample.count:
         yield (
-            f"Several fans of faces meet at {found.count} "
-            f"{'vertex' if found.count == 1 else 'vertices'}; the first is vertex {found.ids[0]}. "
-            f"Paths may pass through."
+            f"Several fans of faces meet at {sample.count} "
+            f"{'vertex' if sample.count == 1 else 'vertices'}; the first is vertex "
+            f"{sample.ids[0]}. Paths may pass through."
         )
 
 

@@ -43,9 +43,9 @@ def triangulated(vertices: Floats, corners: Longs, sizes: Longs) -> tuple[Longs,
     for size in np.unique(sizes):
         those = np.flatnonzero(sizes == size)
         rows = corners[first_corner[those, None] + np.arange(size)]
-        places = first_face[those, None] + np.arange(max(size - 2, 1))
+        targets = first_face[those, None] + np.arange(max(size - 2, 1))
         # Two corners, or one, repeat their last.
-        faces[places] = (
+        faces[targets] = (
             _cut(vertices, rows) if size > 3 else rows[:, None, [0, min(size - 1, 1), -1]]
         )
     if (counts == 1).all():

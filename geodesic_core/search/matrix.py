@@ -204,8 +204,8 @@ def _sweep_all(
             return
         # The states of other threads are about as large as this one.
         control = control.holding(table.nbytes + (count - 1) * target_sweep.nbytes)
-        found = target_sweep.distances(ends, source, targets, len(targets), limit, control)
-        table.put(source, targets, found)
+        distances = target_sweep.distances(ends, source, targets, len(targets), limit, control)
+        table.put(source, targets, distances)
 
     share_out(table.sweeps, [partial(sweep, each) for each in target_sweeps], control)
 

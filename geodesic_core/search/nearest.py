@@ -1,4 +1,4 @@
-"""The geodesically nearest of some candidates."""
+"""Nearest candidates: those with the shortest geodesic distance to a point."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -114,10 +114,10 @@ def find_nearest(
     indices, distances = connected[:0], np.empty(0)
     if len(connected) > 0:
         count = min(int(k), len(connected))
-        found = target_sweep().distances(ends, 0, connected, count, limit, control)
-        order = _nearest_first(found)[:count]
-        order = order[np.isfinite(found[order])]
-        indices, distances = connected[order], found[order]
+        reached = target_sweep().distances(ends, 0, connected, count, limit, control)
+        order = _nearest_first(reached)[:count]
+        order = order[np.isfinite(reached[order])]
+        indices, distances = connected[order], reached[order]
     if control.progress is not None:
         control.progress(1.0)
     return Nearest(indices, distances)

@@ -7,8 +7,8 @@
 4. The exact sweep from the start, pruned by U and the lower bounds: a thin region.
 5. Its backtraced path, which is the answer.
 
-Where no more than a limit is asked for, it takes the place of U as soon as it is below: what is not
-reached then is farther.
+A limit of the length takes the place of U as soon as it is below: a target that is not reached then
+is farther.
 """
 
 import math
@@ -89,8 +89,8 @@ class PathSearch:
     @property
     def nbytes(self) -> int:
         """Memory held, bytes, the mesh not counted."""
-        kept = self._landmarks.distances.nbytes + self._nearest.nbytes
-        return kept + state.bytes_of(self._toward) + state.bytes_of(self._outward)
+        shared = self._landmarks.distances.nbytes + self._nearest.nbytes
+        return shared + state.bytes_of(self._toward) + state.bytes_of(self._outward)
 
     def find(
         self,
