@@ -124,10 +124,10 @@ def find_nearest_source(
         return NearestSource(-1, math.inf, None)
     # A vertex beyond the limit of the field is at least as far as that.
     rest = np.minimum(least, bounds.max_distance)
-    goal = pruning_toward(np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
+    pruning_bounds = pruning_toward(np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
     wave = state.new_wavefront(mesh.topology, nodes.sites, pruned=True)
     control.check_memory(state.bytes_of(wave))
-    backward = exact_bounds(math.inf, goal)
+    backward = exact_bounds(math.inf, pruning_bounds)
     wave = sweep_nodes(mesh, wave, nodes, np.zeros(1), backward, control, lambda _: 0.0)
     totals = wave.vertices.distance[nodes.targets] + start_distances
     distance = float(totals.min())

@@ -37,8 +37,10 @@ class Landmarks:
         """(V, LANDMARKS) by inner vertex, mesh units; the first ``count`` columns are set"""
         self._nearest = np.full(len(mesh.vertices), math.inf)
 
-    def goal(self, position: Floats, corners: Ints, reaches: Floats, limit: float) -> PruningBounds:
-        """Return the goal of paths through a point that lies ``reaches`` away from ``corners``."""
+    def pruning_through(
+        self, position: Floats, corners: Ints, reaches: Floats, limit: float
+    ) -> PruningBounds:
+        """Return the bounds of paths through a point, ``reaches`` away from its ``corners``."""
         least, most = np.zeros(LANDMARKS), np.zeros(LANDMARKS)
         if self.count > 0:
             known = self.distances[corners, : self.count].astype(np.float64)

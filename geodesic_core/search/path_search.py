@@ -126,10 +126,12 @@ class PathSearch:
         try:
             upper = self._search_edges(leg)
             start = leg.start
-            goal = self._landmarks.goal(start.position, start.corners, start.reaches, math.inf)
+            pruning_bounds = self._landmarks.pruning_through(
+                start.position, start.corners, start.reaches, math.inf
+            )
             if leg.slack < math.inf:
-                upper, goal = self._sweep_toward(leg, upper, goal)
-            path = self._sweep_outward(leg, upper, goal)
+                upper, pruning_bounds = self._sweep_toward(leg, upper, pruning_bounds)
+            path = self._sweep_outward(leg, upper, pruning_bounds)
         finally:
             self._forget()
         if path.length > leg.limit:
@@ -158,7 +160,7 @@ class PathSearch:
         first, last = leg.start.nearest_corner, leg.end.nearest_corner
         beside = float(leg.start.reaches.min() + leg.end.reaches.min())
         corner = topology.positions[first].copy(), np.array([first]), np.zeros(1)
-        bounds = exact_bounds(math.inf, self._landmarks.goal(*corner, math.inf))
+        bounds = exact_bounds(math.inf, self._landmarks.pruning_through(*corner, math.inf))
         edge_dijkstra.search_edges(topology, wave, bounds, last, first)
         self._touched += int(wave.counters[TOUCHED])
         upper = float(wave.vertices.distance[first])
@@ -175,11 +177,13 @@ class PathSearch:
         return upper
 
     def _sweep_toward(
-        self, leg: "_Leg", upper: float, goal: PruningBounds
+        self, leg: "_Leg", upper: float, pruning_bounds: PruningBounds
     ) -> tuple[float, PruningBounds]:
-        """Return a tighter upper bound, and the goal of the next sweep (steps 2 and 3)."""
+        """Return a tighter upper bound, and the bounds of the next sweep (steps 2 and 3)."""
         limit = leg.bound(upper) * (1.0 + leg.slack) + self._margin
-        bounds = merging_bounds(math.inf, GUIDE_ERROR, math.inf, goal._replace(limit=limit))
+        bounds = merging_bounds(
+            math.inf, GUIDE_ERROR, math.inf, pruning_bounds._replace(limit=limit)
+        )
         nodes = nodes_of(self.mesh, [(leg.end.point,)], [leg.start.point])
         self._toward = with_sites(self._toward, nodes.sites)
         wave = self._toward = self._run(self._toward, nodes, bounds, leg.control, _AFTER_EDGES)
@@ -192,11 +196,15 @@ class PathSearch:
         upper = min(upper, guide.length)
         leg.log.add("backtrace", upper)
         tighter = leg.bound(upper) * (1.0 + leg.slack)
-        return upper, goal._replace(limit=tighter, known=wave.vertices.distance, ceiling=limit)
+        return upper, pruning_bounds._replace(
+            limit=tighter, known=wave.vertices.distance, ceiling=limit
+        )
 
-    def _sweep_outward(self, leg: "_Leg", upper: float, goal: PruningBounds) -> GeodesicPath:
+    def _sweep_outward(
+        self, leg: "_Leg", upper: float, pruning_bounds: PruningBounds
+    ) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
-        bounds = exact_bounds(math.inf, goal)
+        bounds = exact_bounds(math.inf, pruning_bounds)
         nodes = nodes_of(self.mesh, [(leg.start.point,)], [leg.end.point])
         self._outward = with_sites(self._outward, nodes.sites)
         wave = self._outward = self._run(

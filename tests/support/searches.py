@@ -88,9 +88,9 @@ def goal_at_vertex(
     landmarks: Landmarks | None = None,
     **known: object,
 ) -> PruningBounds:
-    """The goal of paths through inner vertex v."""
+    """The bounds of paths through inner vertex v."""
     here = mesh.topology.positions[v].copy(), np.array([v]), np.zeros(1)
-    return (landmarks or Landmarks(mesh)).goal(*here, limit)._replace(**known)
+    return (landmarks or Landmarks(mesh)).pruning_through(*here, limit)._replace(**known)
 
 
 def edge_paths(mesh: gc.TriangleMesh, pairs) -> Iterator[tuple[int, int, np.ndarray, float]]:
