@@ -1,7 +1,10 @@
-"""What all tests share: how much to run, and on what."""
+"""The tiers of tests, and the kernels that they share; ``tests/__init__.py`` tells of both."""
 
 import os
+import random
+from collections import defaultdict
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -12,29 +15,54 @@ pytest_plugins = ["tests.support.service"]
 
 WITHOUT_JIT = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
+MARKER_OF_FOLDER = {"service": "service", "page": "page"}
+NOT_QUICK = ("service", "page", "slow")
+FULL_ONLY = ("full",)
+EXAMPLES = {"quick": 5, "slice": 15, "full": 2000, "interpreted": 3}
+"""Random examples of a property."""
+
+SLICE_WITHOUT_JIT = 3
+"""The most cases of a slice where kernels run as plain Python."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    group = parser.getgroup("tiers")
+    group.addoption("--quick", action="store_true", help="only tests without service and browser")
+    group.addoption("--full", action="store_true", help="long suites whole, not as seeded slices")
+
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.addinivalue_line("markers", "jit: too long for kernels in pure Python; skipped there")
-    settings.register_profile(
-        "slice",
-        derandomize=True,
-        max_examples=5 if WITHOUT_JIT else 15,
-        deadline=None,
-        database=None,
-    )
-    settings.register_profile(
-        "full", derandomize=True, max_examples=2000, deadline=None, database=None
-    )
-    settings.load_profile("slice" if "not full" in config.option.markexpr else "full")
+    for name, count in EXAMPLES.items():
+        settings.register_profile(
+            name, derandomize=True, max_examples=count, deadline=None, database=None
+        )
+    profile = "quick" if config.option.quick else "slice"
+    if WITHOUT_JIT:
+        profile = "interpreted"
+    settings.load_profile("full" if config.option.full else profile)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_configure_node(node) -> None:
+    """Tell a process of pytest-xdist whether all tests are to run, or only some."""
+    node.workerinput["runs_all"] = _runs_all(node.config)
+
+
+def _runs_all(config: pytest.Config) -> bool:
+    if hasattr(config, "workerinput"):
+        return bool(config.workerinput["runs_all"])
+    narrowed = config.option.keyword or config.option.markexpr
+    return not narrowed and config.args_source is not pytest.Config.ArgsSource.ARGS
 
 
 @pytest.fixture(scope="session", autouse=True)
-def compiled_kernels(worker_id: str) -> None:
-    """Compile all kernels, for minutes on a fresh checkout; then all processes load them.
+def compiled_kernels(request: pytest.FixtureRequest, worker_id: str) -> None:
+    """Compile all kernels before all tests, where they are not in the cache, for all processes.
 
     Every other process of pytest-xdist begins at the other end, so that two have one half each.
+    When only some are to run, each kernel is compiled when it is first called instead.
     """
-    if WITHOUT_JIT:
+    if WITHOUT_JIT or not _runs_all(request.config):
         return
     mesh = gc.TriangleMesh(*gc.samples.plane(8))
     vertex = int(mesh.faces[0, 0])
@@ -51,25 +79,44 @@ def compiled_kernels(worker_id: str) -> None:
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: "tests/page" not in item.nodeid)  # the longest files go first
-    if WITHOUT_JIT:
-        for item in items:
-            if item.get_closest_marker("jit"):
-                item.add_marker(pytest.mark.skip(reason="kernels run in pure Python"))
-    if "not full" in config.option.markexpr:
-        kept = _slice_of(items, 3 if WITHOUT_JIT else 4)
-        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
-        items[:] = [item for item in items if item in kept]
-
-
-def _slice_of(items: list[pytest.Item], most: int) -> set[pytest.Item]:
-    """Return of each test so many of its cases, evenly spread; and whatever only runs in full."""
-    cases: dict[str, list[pytest.Item]] = {}
+    root = Path(__file__).parent
     for item in items:
-        if not item.get_closest_marker("full"):
-            cases.setdefault(item.nodeid.partition("[")[0], []).append(item)
-    kept = {item for item in items if item.get_closest_marker("full")}
-    for each in cases.values():
-        count = min(most, len(each))
-        kept.update(each[i * len(each) // count] for i in range(count))
-    return kept
+        marker = MARKER_OF_FOLDER.get(item.path.relative_to(root).parts[0])
+        if marker:
+            item.add_marker(marker)
+        if WITHOUT_JIT and item.get_closest_marker("jit"):
+            item.add_marker(pytest.mark.skip(reason="kernels run in pure Python"))
+    items.sort(key=lambda item: item.get_closest_marker("page") is None)  # the longest go first
+    if not config.option.full:
+        _deselect(config, items, FULL_ONLY)
+        _deselect_beyond_slices(config, items)
+    if config.option.quick:
+        _deselect(config, items, NOT_QUICK)
+
+
+def _deselect(config: pytest.Config, items: list[pytest.Item], markers: tuple[str, ...]) -> None:
+    _keep(config, items, lambda item: not any(map(item.get_closest_marker, markers)))
+
+
+def _deselect_beyond_slices(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep a seeded sample of the cases of each test that is marked as ``slice``."""
+    cases: dict[str, list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("slice"):
+            cases[item.nodeid.partition("[")[0]].append(item)
+    beyond: set[pytest.Item] = set()
+    for name, each in cases.items():
+        (size,) = each[0].get_closest_marker("slice").args
+        if WITHOUT_JIT:
+            size = min(size, SLICE_WITHOUT_JIT)
+        chosen = random.Random(name).sample(range(len(each)), min(size, len(each)))
+        beyond.update(item for number, item in enumerate(each) if number not in chosen)
+    _keep(config, items, lambda item: item not in beyond)
+
+
+def _keep(
+    config: pytest.Config, items: list[pytest.Item], condition: Callable[[pytest.Item], bool]
+) -> None:
+    selected = [item for item in items if condition(item)]
+    config.hook.pytest_deselected(items=[item for item in items if not condition(item)])
+    items[:] = selected

@@ -2,20 +2,20 @@
 
 import os
 import shutil
-import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 import httpx2
 import pytest
+from filelock import FileLock
 from playwright.sync_api import Browser, Page, sync_playwright
 
-from app.http import page as built
 from tests.support.paths import ROOT
+from tests.support.processes import Server
 from tests.support.viewing import View
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -25,22 +25,37 @@ FLAGS = [
     "--disable-gpu-compositing",  # WebGL is drawn as the GPU would, the rest of the page is not
     "--no-sandbox",
 ]
-SERVE = "from app.cli import main; main()"
+
+
+@pytest.fixture(scope="session")
+def _built(tmp_path_factory: pytest.TempPathFactory, testrun_uid: str) -> None:
+    """The page, built by one of the processes where its sources have changed."""
+    shared = tmp_path_factory.getbasetemp().parent / f"page-{testrun_uid}.lock"
+    with FileLock(shared):
+        built = subprocess.run(
+            [sys.executable, "hatch_build.py"],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    if built.returncode:
+        miss(f"the page could not be built, scripts/page tells why: {built.stderr[-500:]}")
+
+
+def miss(what: str) -> NoReturn:
+    """Skip the test; continuous integration has everything, and fails instead."""
+    if os.environ.get("CI"):
+        pytest.fail(what)
+    pytest.skip(what)
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
+def browser(_built: None) -> Iterator[Browser]:
     """A browser of the module: its event loop would be in the way of other tests."""
     executable = next(filter(None, map(shutil.which, BROWSERS)), None)
-    missing = []
     if executable is None:
-        missing.append(f"no browser is found: {', '.join(BROWSERS)}")
-    if not built.is_built():
-        missing.append("the page is not built: scripts/page does that")
-    if missing:
-        if os.environ.get("CI"):
-            pytest.fail("; ".join(missing))
-        pytest.skip("; ".join(missing))
+        miss(f"install one of these browsers to run this: {', '.join(BROWSERS)}")
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=executable, args=FLAGS)
         yield browser
@@ -57,35 +72,11 @@ def service(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Itera
 @contextmanager
 def serving(store: Path, **settings: str) -> Iterator[str]:
     """Serve, and give the address."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
-    environment = {"GEODESIC_STORE": str(store), "GEODESIC_WORKERS": "1", **settings}
-    process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
-        [sys.executable, "-c", SERVE, "serve", "--port", str(port)],
-        env=os.environ | environment,
-        cwd=ROOT,
-    )
-    address = f"http://127.0.0.1:{port}"
+    server = Server(store, **settings)
     try:
-        _wait_until_ready(address, process)
-        yield address
+        yield server.url
     finally:
-        process.terminate()
-        process.wait(30)
-
-
-def _wait_until_ready(address: str, process: "subprocess.Popen[bytes]") -> None:
-    end = time.monotonic() + 300  # kernels may have to be compiled
-    while time.monotonic() < end:
-        assert process.poll() is None, "the service ended"
-        try:
-            if httpx2.get(f"{address}/readyz").status_code == 200:
-                return
-        except httpx2.TransportError:
-            pass
-        time.sleep(0.1)
-    raise AssertionError("the service did not become ready")
+        server.close()
 
 
 def sample(service: str, name: str, faces: int, **headers: str) -> str:
