@@ -5,9 +5,17 @@ import pytest
 
 import geodesic_core as gc
 from tests.support.approximation import ERRORS, ROUNDING, check_approximate_path, check_within
-from tests.support.paths import real_mesh
+from tests.support.meshes import named_mesh
 
-SLICE = ["turbine.ply", "buddha30k.ply", "fandisk10k.ply", "rockerarm20k.ply", "cow.obj"]
+MADE_HERE = ["rough_scan", "thin_cad"]
+SLICE = [
+    *MADE_HERE,
+    "turbine.ply",
+    "buddha30k.ply",
+    "fandisk10k.ply",
+    "rockerarm20k.ply",
+    "cow.obj",
+]
 REST = [
     *("dragon100k.ply", "horse97k.ply", "fandisk.obj", "armadillo86k.ply", "bunny.obj"),
     *("blade.ply", "spot.obj", "teapot.obj", "alligator.obj"),
@@ -20,7 +28,7 @@ CASES = [
 
 def fields(name, count, **options):
     """The exact field from each of some sources, and for each error the approximate one."""
-    mesh = gc.load_mesh(real_mesh(name))
+    mesh = named_mesh(name)
     used = np.unique(mesh.faces)
     for source in np.random.default_rng(len(used)).choice(used, count, replace=False).tolist():
         exact = gc.exact_distance(mesh, source)
@@ -55,10 +63,10 @@ def test_paths_are_at_most_longer_by_the_error(name, count):
 
 @pytest.mark.jit
 @pytest.mark.parametrize(
-    "name", [SLICE[0], *(pytest.param(name, marks=pytest.mark.full) for name in REST)]
+    "name", [*SLICE[:3], *(pytest.param(name, marks=pytest.mark.full) for name in REST)]
 )
 def test_absolute_errors_and_limits(name):
-    mesh = gc.load_mesh(real_mesh(name))
+    mesh = named_mesh(name)
     diagonal = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
     exact = gc.exact_distance(mesh, int(mesh.faces[0, 0])).distances
     for share in (1e-5, 1e-4, 1e-3):
@@ -78,6 +86,6 @@ def test_absolute_errors_and_limits(name):
 @pytest.mark.parametrize("error", [5e-5, 1e-4, 2e-4])
 def test_a_window_within_a_nearer_one_goes_on(error):
     """It was sent to one side only, and up to 15 vertices came out too far."""
-    mesh = gc.load_mesh(real_mesh("dragon100k.ply"))
+    mesh = named_mesh("dragon100k.ply")
     exact = gc.exact_distance(mesh, 15008).distances
     check_within(gc.approximate_distance(mesh, 15008, error).distances, exact, error)

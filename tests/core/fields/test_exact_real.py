@@ -5,12 +5,12 @@ import pytest
 
 import geodesic_core as gc
 from tests.support.certificates import check_path
-from tests.support.paths import real_mesh
+from tests.support.meshes import named_mesh
 
 EXACT = 1e-9
 
 # blade.ply is left out: pygeodesic is no oracle on slivers. cow.obj has bow-ties, where it fails.
-SLICE = ["fandisk10k.ply", "turbine.ply", "rockerarm20k.ply", "buddha30k.ply"]
+SLICE = ["rough_scan", "fandisk10k.ply", "turbine.ply", "rockerarm20k.ply", "buddha30k.ply"]
 REST = ["fandisk.obj", "armadillo86k.ply", "dragon100k.ply", "horse97k.ply", "bunny.obj"]
 CASES = [
     *(pytest.param(name, 0, id=name) for name in SLICE),
@@ -27,7 +27,7 @@ CASES = [
 @pytest.mark.parametrize(("name", "seed"), CASES)
 def test_agrees_with_pygeodesic_at_every_vertex(name, seed):
     peer = pytest.importorskip("pygeodesic.geodesic", reason="pygeodesic is not installed")
-    mesh = gc.load_mesh(real_mesh(name))
+    mesh = named_mesh(name)
     source = int(np.random.default_rng(seed).integers(len(mesh.vertices))) if seed else 0
     field = gc.exact_distance(mesh, source)
     theirs, _ = peer.PyGeodesicAlgorithmExact(mesh.vertices, mesh.faces).geodesicDistances([source])
@@ -44,10 +44,12 @@ def test_agrees_with_pygeodesic_at_every_vertex(name, seed):
 
 
 @pytest.mark.jit
-@pytest.mark.parametrize("name", ["fandisk10k.ply", "blade.ply", "turbine.ply", "cow.obj"])
+@pytest.mark.parametrize(
+    "name", ["rough_scan", "thin_cad", "fandisk10k.ply", "blade.ply", "turbine.ply", "cow.obj"]
+)
 def test_paths_certify_the_distances_of_real_meshes(name):
     """A path of the distance's length shows that the distance is not too short."""
-    mesh = gc.load_mesh(real_mesh(name))
+    mesh = named_mesh(name)
     field = gc.exact_distance(mesh, 0)
     targets = np.flatnonzero(np.isfinite(field.distances))
     for target in np.random.default_rng(1).choice(targets, 100, replace=False).tolist():
@@ -55,9 +57,9 @@ def test_paths_certify_the_distances_of_real_meshes(name):
 
 
 @pytest.mark.jit
-@pytest.mark.parametrize("name", ["blade.ply", "cow.obj", "turbine.ply"])
+@pytest.mark.parametrize("name", ["rough_scan", "thin_cad", "blade.ply", "cow.obj", "turbine.ply"])
 def test_distances_are_symmetric_on_real_meshes(name):
-    mesh = gc.load_mesh(real_mesh(name))
+    mesh = named_mesh(name)
     rng = np.random.default_rng(2)
     ends = rng.choice(np.flatnonzero(mesh.components == mesh.components[0]), 6, replace=False)
     table = np.array([gc.exact_distance(mesh, int(end)).distances[ends] for end in ends])

@@ -19,7 +19,7 @@ from tests.support.isoline_checks import (
     check_points,
     some_levels,
 )
-from tests.support.paths import real_mesh
+from tests.support.meshes import named_mesh
 
 FINE = 1e-6
 """Chord error of what is compared with a closed form."""
@@ -315,9 +315,12 @@ def test_chord_errors_that_are_none(chord_error):
 
 
 @pytest.mark.jit
-@pytest.mark.parametrize("name", ["cow.obj", "spot.obj", "alligator.obj", "fandisk10k.ply"])
+@pytest.mark.parametrize(
+    "name",
+    ["rough_scan", "thin_cad", "cow.obj", "spot.obj", "alligator.obj", "fandisk10k.ply"],
+)
 def test_real_meshes(name):
-    mesh = gc.load_mesh(real_mesh(name))
+    mesh = named_mesh(name)
     field = gc.exact_distance(mesh, 0, retain="windows")
     levels = field.levels(5)
     for level, lines in zip(levels, field.isolines(levels), strict=True):

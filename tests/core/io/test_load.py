@@ -21,7 +21,7 @@ from geodesic_core.io.load import load_mesh
 from geodesic_core.mesh.report import Sample
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.solvers import exact_distance
-from tests.support.paths import real_mesh
+from tests.support.meshes import real_mesh
 
 KINDS = ["obj", "off", "ply", "stl", "glb"]
 

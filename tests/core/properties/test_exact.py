@@ -1,4 +1,4 @@
-"""What holds of exact distances on any mesh (STYLE.md, rule 10), and what the oracle says."""
+"""What holds of exact distances on any mesh, and what the oracle says."""
 
 import numpy as np
 from hypothesis import given

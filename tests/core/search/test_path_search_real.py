@@ -5,10 +5,18 @@ import pytest
 
 import geodesic_core as gc
 from tests.support.certificates import LENGTH
-from tests.support.paths import real_mesh
+from tests.support.meshes import named_mesh
 from tests.support.searches import check_search, landmark_count
 
-SLICE = ["turbine.ply", "buddha30k.ply", "fandisk10k.ply", "rockerarm20k.ply", "cow.obj"]
+SLICE = [
+    "rough_scan",
+    "thin_cad",
+    "turbine.ply",
+    "buddha30k.ply",
+    "fandisk10k.ply",
+    "rockerarm20k.ply",
+    "cow.obj",
+]
 SMALL = ["blade.ply", "spot.obj", "teapot.obj", "alligator.obj", "fandisk.obj"]
 LARGE = ["dragon100k.ply", "horse97k.ply", "armadillo86k.ply", "bunny.obj"]
 CASES = [
@@ -35,7 +43,7 @@ def ends(mesh, sources, targets, seed=5):
 @pytest.mark.jit
 @pytest.mark.parametrize(("name", "sources", "targets"), CASES)
 def test_equals_the_full_sweep_both_ways(name, sources, targets):
-    solver = gc.Solver(gc.load_mesh(real_mesh(name)))
+    solver = gc.Solver(named_mesh(name))
     for source, chosen, distances in ends(solver.mesh, sources, targets):
         lengths = [solver.shortest_path(source, target).length for target in chosen]
         np.testing.assert_allclose(lengths, distances[chosen], rtol=LENGTH, atol=0)
@@ -48,7 +56,7 @@ def test_equals_the_full_sweep_both_ways(name, sources, targets):
 @pytest.mark.parametrize("name", SLICE + SMALL)
 def test_paths_lie_on_the_surface(name):
     """Of a solver that has been used, and of new ones."""
-    mesh = gc.load_mesh(real_mesh(name))
+    mesh = named_mesh(name)
     solver = gc.Solver(mesh)
     for source, chosen, distances in ends(mesh, 2, 10):
         for target in chosen:
