@@ -10,7 +10,8 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
-from tests.support.service import TWO_TRIANGLES, check_problem, serving, wait_until
+from tests.support.service import TWO_TRIANGLES, ServiceClient, check_problem, serving
+from tests.support.waiting import wait_until
 
 ALICE, BOB = "alice-0123456789", "bob/0123456789=="
 PAGE = "https://example.org"
@@ -29,9 +30,9 @@ def keyed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
         yield client
 
 
-def limited(store: Path, **settings: Any) -> TestClient:
+def limited(store: Path, **settings: Any) -> ServiceClient:
     """A service that can answer what needs no worker."""
-    return TestClient(create_app(Settings(store=store, workers=1, **settings)))
+    return ServiceClient(store, **settings)
 
 
 # Keys
@@ -218,9 +219,8 @@ def test_keys_have_rates_of_their_own_wherever_they_come_from(tmp_path: Path) ->
 
 def test_requests_at_the_same_time(tmp_path: Path) -> None:
     with limited(tmp_path, max_concurrent=1) as client, ThreadPoolExecutor(1) as pool:
-        engine = client.app.state.service.engine  # type: ignore[attr-defined]
         asked = pool.submit(client.post, "/v1/meshes", params={"sample": "plane", "faces": 8})
-        wait_until(lambda: len(engine._waiting) == 1)  # for the worker, which starts
+        wait_until(lambda: client.load.waiting == 1)  # for the worker, which starts
 
         response = client.get("/v1")
         problem = check_problem(response, 429, "rate_limited")

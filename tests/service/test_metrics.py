@@ -13,14 +13,22 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
-from tests.support.service import check_problem, distances, serving, upload_sample, wait_until
+from tests.support.processes import stopped
+from tests.support.service import (
+    ServiceClient,
+    check_problem,
+    distances,
+    serving,
+    upload_sample,
+)
+from tests.support.waiting import LONG_S, wait_until
 
 Values = dict[tuple[str, frozenset[tuple[str, str]]], float]
 
 
 @pytest.fixture(scope="module")
-def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
-    with serving(tmp_path_factory.mktemp("metrics"), queue_size=3) as client:
+def watched(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:
+    with serving(tmp_path_factory.mktemp("metrics"), queue_size=3, cancel_grace_s=LONG_S) as client:
         wait_until(lambda: value(scrape(client), "workers", state="idle") == 2)
         yield client
 
@@ -130,12 +138,15 @@ def submit(client: TestClient, mesh_id: str, vertex: int) -> str:
     return str(response.headers["location"])
 
 
-def test_jobs_queue_workers_and_cancellations(watched: TestClient) -> None:
-    slow = upload_sample(watched, "sphere", 400_000)
+def test_jobs_queue_workers_and_cancellations(watched: ServiceClient) -> None:
+    large = upload_sample(watched, "sphere", 80_000)
     before = scrape(watched)
-    first, second = submit(watched, slow, 7), submit(watched, slow, 8)
-    wait_until(lambda: watched.get(first).json()["status"] == "running")
-    during = scrape(watched)
+    with stopped(watched.workers()):
+        first, second = submit(watched, large, 7), submit(watched, large, 8)
+        wait_until(lambda: watched.get(first).json()["status"] == "running")
+        during = scrape(watched)
+        watched.delete(second)
+        watched.delete(first)
 
     assert value(during, "jobs", status="running") == value(during, "jobs", status="accepted") == 1
     assert value(during, "queue_length") == 1
@@ -144,8 +155,6 @@ def test_jobs_queue_workers_and_cancellations(watched: TestClient) -> None:
         1,
     )
 
-    watched.delete(second)
-    watched.delete(first)
     wait_until(lambda: value(scrape(watched), "workers", state="idle") == 2)
     after = scrape(watched)
     assert grown(before, after, "jobs", status="dismissed") == 2
@@ -157,12 +166,11 @@ def test_jobs_queue_workers_and_cancellations(watched: TestClient) -> None:
     assert grown(before, scrape(watched), "jobs", status="dismissed") == 0
 
 
-def test_workers_that_are_lost(watched: TestClient) -> None:
+def test_workers_that_are_lost(watched: ServiceClient) -> None:
     before = scrape(watched)
-    slots = watched.app.state.service.engine._slots
-    os.kill(slots[0]._process.pid, signal.SIGKILL)
+    os.kill(min(watched.workers()), signal.SIGKILL)
 
-    wait_until(lambda: value(scrape(watched), "workers", state="missing") == 1)
+    wait_until(lambda: grown(before, scrape(watched), "workers_lost_total") == 1)
     wait_until(lambda: value(scrape(watched), "workers", state="idle") == 2)
     assert grown(before, scrape(watched), "workers_lost_total") == 1
 

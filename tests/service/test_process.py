@@ -3,112 +3,50 @@
 import os
 import signal
 import socket
-import subprocess
-import sys
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
-import httpx2
 import pytest
 
-from tests.service.test_engine import SLOW_FACES
-from tests.support.paths import ROOT
-from tests.support.service import is_ready, processor_time, upload_sample, wait_until
+import geodesic_core as gc
+from tests.support.meshes import named_mesh
+from tests.support.processes import (
+    Server,
+    are_gone,
+    is_running,
+    parent_of,
+    processor_time,
+    stopped,
+    total_time,
+)
+from tests.support.service import SLOW_FACES, upload_sample
+from tests.support.waiting import LONG_S, wait_until
 
-SERVE = "from app.cli import main; main()"
+PATIENT = {"GEODESIC_DRAIN_S": str(10 * LONG_S), "GEODESIC_CANCEL_GRACE_S": str(10 * LONG_S)}
+"""What runs at the end, and what is to stop, has longer than any test waits."""
 
-
-class Server:
-    def __init__(self, store: Path) -> None:
-        with socket.socket() as probe:
-            probe.bind(("127.0.0.1", 0))
-            port = probe.getsockname()[1]
-        environment = os.environ | {"GEODESIC_STORE": str(store), "GEODESIC_WORKERS": "1"}
-        self.process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
-            [sys.executable, "-c", SERVE, "serve", "--port", str(port)],
-            env=environment,
-            cwd=ROOT,
-        )
-        self.address = ("127.0.0.1", port)
-        self.client = httpx2.Client(base_url=f"http://127.0.0.1:{port}", timeout=60)
-        wait_until(self.listens)
-        wait_until(lambda: is_ready(self.client))
-
-    def listens(self) -> bool:
-        try:
-            return bool(self.client.get("/livez").status_code == 200)
-        except httpx2.TransportError:
-            return False
-
-    def workers(self) -> set[int]:
-        """Ids of the worker processes: those that the process forks which this one keeps for it."""
-        found = set()
-        for entry in Path("/proc").iterdir():
-            if entry.name.isdigit():
-                try:
-                    is_worker = (entry / "cmdline").read_bytes().startswith(b"geodesic-worker")
-                    forker = parent_of(int(entry.name))
-                    if is_worker and parent_of(forker) == self.process.pid:
-                        found.add(int(entry.name))
-                except (FileNotFoundError, ProcessLookupError):
-                    continue
-        return found
-
-    def begin_slow_query(self, mesh_id: str) -> socket.socket:
-        body = b'{"sources": [{"vertex": 0}], "targets": [{"vertex": 1}]}'
-        head = (
-            f"POST /v1/meshes/{mesh_id}/distances HTTP/1.1\r\nHost: x\r\n"
-            f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
-        )
-        connection = socket.create_connection(self.address)
-        connection.sendall(head.encode() + body)
-        time.sleep(0.5)
-        return connection
-
-    def close(self) -> None:
-        self.client.close()
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.wait()
-
-
-def parent_of(pid: int) -> int:
-    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+ENDED_WELL = (0, -signal.SIGTERM)
 
 
 @pytest.fixture
 def server(tmp_path: Path) -> Iterator[Server]:
-    server = Server(tmp_path)
+    server = Server(tmp_path, **PATIENT)
     yield server
     server.close()
 
 
-def are_gone(pids: set[int]) -> bool:
-    return not any(is_running(pid) for pid in pids)
-
-
-def is_running(pid: int) -> bool:
-    try:
-        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-
-
 def test_workers_die_with_their_parent_however_busy(server: Server) -> None:
     mesh_id = upload_sample(server.client, "sphere", SLOW_FACES)
-    wait_until(lambda: len(server.workers()) == 2)
-    workers = server.workers()
+    workers = server.both_workers()
 
-    with server.begin_slow_query(mesh_id):
+    with server.begin_query(mesh_id):
         server.process.kill()
-        wait_until(lambda: are_gone(workers), seconds=2)
+        wait_until(lambda: are_gone(workers))
 
 
 def test_the_process_that_workers_are_forked_from_killed(server: Server) -> None:
     """Workers go on without it; one that is killed then is forked from another; none is left."""
-    wait_until(lambda: len(server.workers()) == 2)
-    workers = server.workers()
+    workers = server.both_workers()
     os.kill(parent_of(min(workers)), signal.SIGKILL)
 
     mesh_id = upload_sample(server.client, "plane", 200)
@@ -117,36 +55,27 @@ def test_the_process_that_workers_are_forked_from_killed(server: Server) -> None
     )
     assert too_long.status_code == 504, "work that can only be killed"
     wait_until(lambda: len(server.workers()) == 1)
-    (kept,) = (pid for pid in workers if is_running(pid))
+    (survivor,) = (pid for pid in workers if is_running(pid))
     assert server.client.get(f"/v1/meshes/{mesh_id}/path?from=v0&to=v9").status_code == 200
 
     server.process.send_signal(signal.SIGTERM)
-    server.process.wait(5)
-    wait_until(lambda: are_gone({kept}))
+    server.process.wait(LONG_S)
+    wait_until(lambda: are_gone({survivor}))
 
 
 def test_a_client_that_hangs_up_stops_its_query(server: Server) -> None:
     mesh_id = upload_sample(server.client, "sphere", SLOW_FACES)
-    wait_until(lambda: len(server.workers()) == 2)
-    workers = server.workers()
+    workers = server.both_workers()
+    before = total_time(workers)
 
-    def taken() -> int:
-        return sum(processor_time(pid).total() for pid in workers)
+    with server.begin_query(mesh_id):
+        wait_until(lambda: total_time(workers) - before > 20e6)  # it has begun
+        os.kill(busiest := max(workers, key=lambda pid: processor_time(pid)[10]), signal.SIGSTOP)
+    wait_until(lambda: "geodesic_cancellations_total 1.0" in server.metrics())
+    os.kill(busiest, signal.SIGCONT)
 
-    def metrics() -> list[str]:
-        return server.client.get("/metrics").text.splitlines()
-
-    before, other = taken(), {"sources": [{"vertex": 2}], "targets": [{"vertex": 1}]}
-    assert server.client.post(f"/v1/meshes/{mesh_id}/distances", json=other).status_code == 200
-    whole = taken() - before
-
-    server.begin_slow_query(mesh_id).close()
-    before = taken()
-
-    wait_until(lambda: "geodesic_cancellations_total 1.0" in metrics())
-    wait_until(lambda: 'geodesic_workers{state="idle"} 2.0' in metrics())
-    assert taken() - before < whole / 4
-    assert 'geodesic_solves_total{kind="distances"} 1.0' in metrics()
+    wait_until(lambda: 'geodesic_workers{state="idle"} 2.0' in server.metrics())
+    assert 'geodesic_solves_total{kind="distances"} 1.0' not in server.metrics()
     assert server.workers() == workers
 
 
@@ -166,43 +95,51 @@ def test_ends_in_good_order(server: Server) -> None:
 
     server.process.send_signal(signal.SIGTERM)
 
-    assert server.process.wait(5) in (0, -signal.SIGTERM)
+    assert server.process.wait(LONG_S) in ENDED_WELL
     assert are_gone(workers)
 
 
 def test_what_runs_when_the_service_is_to_stop_ends_well_and_all_else_is_refused(
     server: Server,
 ) -> None:
-    mesh_id = upload_sample(server.client, "sphere", SLOW_FACES)
-    with server.begin_slow_query(mesh_id) as running:
+    mesh_id = upload_sample(server.client, "plane", 200)
+    with stopped(server.both_workers()):
+        running = server.begin_query(mesh_id)
         server.process.send_signal(signal.SIGTERM)
-        answer = running.recv(20)
+        wait_until(lambda: not server.listens())
+        assert server.process.poll() is None
 
-    assert answer.startswith(b"HTTP/1.1 200")
-    assert server.process.wait(5) in (0, -signal.SIGTERM)
+    with running:
+        assert running.recv(20).startswith(b"HTTP/1.1 200")
+    assert server.process.wait(LONG_S) in ENDED_WELL
 
 
 ASYNC = {"Prefer": "respond-async"}
-SLOW_QUERY = {"sources": [{"vertex": 0}], "targets": [{"vertex": 1}]}
 
 
-def submit(server: Server, mesh_id: str) -> str:
-    asked = server.client.post(f"/v1/meshes/{mesh_id}/distances", json=SLOW_QUERY, headers=ASYNC)
+def submit(server: Server, mesh_id: str, source: int = 0) -> str:
+    query = {"sources": [{"vertex": source}], "targets": [{"vertex": 1}]}
+    asked = server.client.post(f"/v1/meshes/{mesh_id}/distances", json=query, headers=ASYNC)
     assert asked.status_code == 202
     return str(asked.headers["location"])
+
+
+def status_of(server: Server, job: str) -> str:
+    return str(server.client.get(job).json()["status"])
 
 
 def test_jobs_survive_a_restart(tmp_path: Path) -> None:
     """One that had finished has its answer still, one that ran says why it failed."""
     first = Server(tmp_path)
-    small = upload_sample(first.client, "plane", 200)
-    slow = upload_sample(first.client, "sphere", SLOW_FACES)
-    done, lost = submit(first, small), submit(first, slow)
-    wait_until(lambda: first.client.get(done).json()["status"] == "successful")
+    mesh_id = upload_sample(first.client, "plane", 200)
+    done = submit(first, mesh_id)
+    wait_until(lambda: status_of(first, done) == "successful")
     answer = first.client.get(f"{done}/results").json()
-    assert first.client.get(lost).json()["status"] == "running"
-    first.process.kill()
-    first.close()
+    with stopped(first.both_workers()):
+        lost = submit(first, mesh_id, 5)
+        wait_until(lambda: status_of(first, lost) == "running")
+        first.process.kill()
+        first.close()
 
     second = Server(tmp_path)
     try:
@@ -213,31 +150,36 @@ def test_jobs_survive_a_restart(tmp_path: Path) -> None:
         assert job["problem"]["hint"] == "send the query again"
         response = second.client.get(f"{lost}/results")
         assert (response.status_code, response.json()["code"]) == (503, "engine_unavailable")
-        again = submit(second, slow)
-        wait_until(lambda: second.client.get(again).json()["status"] == "successful")
+        again = submit(second, mesh_id, 5)
+        wait_until(lambda: status_of(second, again) == "successful")
     finally:
         second.close()
 
 
 def test_who_watches_a_job_does_not_keep_the_service_from_stopping(server: Server) -> None:
-    job = submit(server, upload_sample(server.client, "sphere", 4 * SLOW_FACES))
-    with server.client.stream("GET", f"{job}/events") as events:
-        lines = events.iter_lines()
-        next(lines)
-        server.process.send_signal(signal.SIGTERM)
+    mesh_id = upload_sample(server.client, "plane", 200)
+    with stopped(server.both_workers()):
+        job = submit(server, mesh_id)
+        with server.client.stream("GET", f"{job}/events") as events:
+            lines = events.iter_lines()
+            next(lines)
+            server.process.send_signal(signal.SIGTERM)
 
-        assert server.process.wait(5) in (0, -signal.SIGTERM)
-        assert not any('"status": "failed"' in line for line in lines), "it is still to be told"
+            assert server.process.wait(LONG_S) in ENDED_WELL
+            assert not any('"status": "failed"' in line for line in lines), "it is still to be told"
 
 
-def test_exact_distances_of_a_real_mesh(server: Server, horse: bytes) -> None:
-    report = server.client.post("/v1/meshes", params={"format": "ply"}, content=horse).json()
-    assert (report["vertices"], report["faces"]) == (48485, 96966)
+@pytest.mark.parametrize("name", ["rough_scan", "horse97k.ply"])
+def test_exact_distances_of_a_scan(server: Server, name: str) -> None:
+    mesh = named_mesh(name)
+    arrays = {"vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist()}
+    report = server.client.post("/v1/meshes", json=arrays).json()
+    assert (report["vertices"], report["faces"]) == (len(mesh.vertices), len(mesh.faces))
 
     query = {"sources": [{"vertex": 0}]}
     answer = server.client.post(f"/v1/meshes/{report['id']}/distances", json=query).json()
 
-    assert len(answer["distances"]) == 48485
+    assert answer["distances"] == gc.exact_distance(mesh, 0).distances.tolist()
     assert answer["unreachable"] == {"disconnected": 0, "beyond_max_distance": 0}
     path = server.client.get(f"/v1/meshes/{report['id']}/path?from=v0&to=v99").json()
     assert path["length"] == pytest.approx(answer["distances"][99], rel=1e-10)

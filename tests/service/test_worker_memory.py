@@ -5,14 +5,19 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
-from starlette.testclient import TestClient
 
 from app.engine import memory
 from app.settings import LEAST_WORKER_MEMORY
-from tests.support.service import TWO_TRIANGLES, check_problem, distances, serving, upload_sample
+from tests.support.service import (
+    TWO_TRIANGLES,
+    ServiceClient,
+    check_problem,
+    distances,
+    serving,
+    upload_sample,
+)
 
 PLY = b"""ply
 format binary_little_endian 1.0
@@ -70,20 +75,18 @@ def test_elsewhere_there_is_no_limit(monkeypatch: pytest.MonkeyPatch, tmp_path: 
 
 
 @pytest.fixture(scope="module")
-def tight(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+def tight(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:
     """A service whose worker has as little memory as there can be."""
     memory = {"worker_memory_bytes": LEAST_WORKER_MEMORY, "query_memory_bytes": LEAST_WORKER_MEMORY}
     with serving(tmp_path_factory.mktemp("tight"), **memory) as client:
+        client.wait_until_idle()
         yield client
 
 
-def pid_of_worker(client: Any) -> int:
-    _, slot = client.app.state.service.engine._slots
-    return int(slot._process.pid)
-
-
-def test_an_upload_that_takes_too_much_is_refused_and_the_worker_lives(tight: TestClient) -> None:
-    pid = pid_of_worker(tight)
+def test_an_upload_that_takes_too_much_is_refused_and_the_worker_lives(
+    tight: ServiceClient,
+) -> None:
+    workers = tight.workers()
     vertices = b"\0\0\0\1\0\0\0\1\0" * 5_000_000  # 45 MB, which become 360 as numbers
     data = PLY + vertices + b"\3\0\1\2"
 
@@ -94,11 +97,11 @@ def test_an_upload_that_takes_too_much_is_refused_and_the_worker_lives(tight: Te
         assert problem["setting"] == "GEODESIC_WORKER_MEMORY_BYTES"
 
     assert tight.post("/v1/meshes", json=TWO_TRIANGLES).status_code in (200, 201)
-    assert pid_of_worker(tight) == pid
+    assert tight.workers() == workers
 
 
-def test_json_that_takes_too_much_is_refused_and_the_worker_lives(tight: TestClient) -> None:
-    pid = pid_of_worker(tight)
+def test_json_that_takes_too_much_is_refused_and_the_worker_lives(tight: ServiceClient) -> None:
+    workers = tight.workers()
     vertices = b",".join([b"[0,0,0]"] * 2_000_000)
     response = tight.post(
         "/v1/meshes",
@@ -108,12 +111,12 @@ def test_json_that_takes_too_much_is_refused_and_the_worker_lives(tight: TestCli
 
     problem = check_problem(response, 422, "memory_limit")
     assert problem["setting"] == "GEODESIC_WORKER_MEMORY_BYTES"
-    assert pid_of_worker(tight) == pid
+    assert tight.workers() == workers
 
 
-def test_a_query_that_takes_too_much_is_refused_and_the_next_is_not(tight: TestClient) -> None:
+def test_a_query_that_takes_too_much_is_refused_and_the_next_is_not(tight: ServiceClient) -> None:
     mesh_id = upload_sample(tight, "knot", 150_000)
-    pid = pid_of_worker(tight)
+    workers = tight.workers()
 
     # For so many levels nearly all windows are kept: half a gigabyte.
     lines = {"sources": [{"vertex": 0}], "count": 500}
@@ -123,4 +126,4 @@ def test_a_query_that_takes_too_much_is_refused_and_the_next_is_not(tight: TestC
     assert problem["limit"] == LEAST_WORKER_MEMORY
     assert problem["setting"] == "GEODESIC_WORKER_MEMORY_BYTES"
     assert distances(tight, mesh_id, targets=[{"vertex": 1}]).status_code == 200
-    assert pid_of_worker(tight) == pid
+    assert tight.workers() == workers

@@ -1,9 +1,8 @@
-"""A running service: real worker processes, a real store."""
+"""A service in this process: real worker processes, a real store."""
 
-import time
-from collections import Counter
+import os
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
+from app.engine.interface import Engine, Load
 from app.main import create_app
 from app.queries import ExecutionContext, FieldCache
 from app.settings import Settings
@@ -22,7 +22,8 @@ from app.store.layout import owned
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
 from geodesic_core.fields import repeatable_sweep
-from tests.support.paths import real_mesh
+from tests.support.processes import workers_of
+from tests.support.waiting import wait_until
 
 NPY = {"Accept": "application/x-npy"}
 TWO_TRIANGLES = {
@@ -30,41 +31,46 @@ TWO_TRIANGLES = {
     "faces": [[0, 1, 2], [3, 4, 5]],
 }
 
-Serve = Callable[..., AbstractContextManager[TestClient]]
-
-
-def wait_until(condition: Callable[[], bool], seconds: float = 60.0) -> None:
-    """Wait for something that happens in another thread or process."""
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "it did not happen in time"
-        time.sleep(0.02)
-
-
-def processor_time(pid: int) -> Counter[int]:
-    """Return the nanoseconds that the threads of a process have had, by niceness."""
-    taken: Counter[int] = Counter()
-    for thread in Path(f"/proc/{pid}/task").iterdir():
-        niceness = int((thread / "stat").read_text().rpartition(")")[2].split()[16])
-        taken[niceness] += int((thread / "schedstat").read_text().split()[0])
-    return taken
+SLOW_FACES = 300_000
+"""Distances on a sphere of so many faces take seconds, or about one on a fast machine."""
 
 
 def is_ready(client: Any) -> bool:
     return bool(client.get("/readyz").status_code == 200)
 
 
+class ServiceClient(TestClient):
+    """A client of a service in this process, which can tell of its engine and of its workers."""
+
+    def __init__(self, store: Path, **settings: Any) -> None:
+        app = create_app(Settings(store=store, **{"workers": 1} | settings))
+        super().__init__(app, raise_server_exceptions=False)
+        self.engine: Engine = app.state.service.engine
+        self._others = workers_of(os.getpid())
+
+    @property
+    def load(self) -> Load:
+        return self.engine.load
+
+    def workers(self) -> set[int]:
+        """Return the ids of the worker processes, if no other service has begun since."""
+        return workers_of(os.getpid()) - self._others
+
+    def wait_until_idle(self) -> None:
+        """Wait until every worker is there and does nothing."""
+        wait_until(lambda: self.load.busy == self.load.missing == self.load.waiting == 0)
+
+
 @contextmanager
-def serving(store: Path, **settings: Any) -> Iterator[TestClient]:
+def serving(store: Path, **settings: Any) -> Iterator[ServiceClient]:
     """Run the service in this process, with workers of its own."""
-    app = create_app(Settings(store=store, **{"workers": 1} | settings))
-    with TestClient(app, raise_server_exceptions=False) as client:
+    with ServiceClient(store, **settings) as client:
         wait_until(lambda: is_ready(client))
         yield client
 
 
 @pytest.fixture(scope="session")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:
     """A service that many tests share; they leave it as they found it, but for meshes."""
     with serving(tmp_path_factory.mktemp("store")) as client:
         yield client
@@ -131,11 +137,6 @@ def mesh_of(client: TestClient, mesh_id: str) -> gc.TriangleMesh:
         BytesIO(client.get(f"/v1/meshes/{mesh_id}/arrays/{name}").content)
     )
     return gc.TriangleMesh(load("vertices"), load("faces"))
-
-
-@pytest.fixture
-def horse() -> bytes:
-    return real_mesh("horse97k.ply").read_bytes()
 
 
 def check_problem(response: Any, status: int, code: str) -> dict[str, Any]:

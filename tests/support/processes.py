@@ -1,0 +1,139 @@
+"""The service as a process of its own, and processes as the system shows them."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import httpx2
+
+from tests.support.paths import ROOT
+from tests.support.waiting import LONG_S, wait_until
+
+COMMAND_LINE = [sys.executable, "-c", "from app.cli import main; main()"]
+"""``geodesic`` of this checkout; arguments follow."""
+
+
+class Server:
+    """A service that listens, with one worker and the one for small work; settings are text."""
+
+    def __init__(self, store: Path, **settings: str) -> None:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        own = {"GEODESIC_STORE": str(store), "GEODESIC_WORKERS": "1", **settings}
+        self.process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
+            [*COMMAND_LINE, "serve", "--port", str(port)], env=os.environ | own, cwd=ROOT
+        )
+        self.address = ("127.0.0.1", port)
+        self.url = f"http://127.0.0.1:{port}"
+        self.client = httpx2.Client(base_url=self.url, timeout=LONG_S)
+        wait_until(self.is_ready)
+
+    def listens(self) -> bool:
+        return self._answers("/livez")
+
+    def is_ready(self) -> bool:
+        assert self.process.poll() is None, "the service ended"
+        return self._answers("/readyz")
+
+    def _answers(self, path: str) -> bool:
+        try:
+            return bool(self.client.get(path).status_code == 200)
+        except httpx2.TransportError:
+            return False
+
+    def metrics(self) -> list[str]:
+        return self.client.get("/metrics").text.splitlines()
+
+    def workers(self) -> set[int]:
+        return workers_of(self.process.pid)
+
+    def both_workers(self) -> set[int]:
+        wait_until(lambda: len(self.workers()) == 2)
+        return self.workers()
+
+    def begin_query(self, mesh_id: str) -> socket.socket:
+        """Ask for distances; wait until a worker has been given the query, not for the answer."""
+        body = b'{"sources": [{"vertex": 0}], "targets": [{"vertex": 1}]}'
+        head = (
+            f"POST /v1/meshes/{mesh_id}/distances HTTP/1.1\r\nHost: x\r\n"
+            f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
+        )
+        connection = socket.create_connection(self.address)
+        connection.sendall(head.encode() + body)
+        wait_until(lambda: 'geodesic_workers{state="busy"} 1.0' in self.metrics())
+        return connection
+
+    def close(self) -> None:
+        """Kill the process, where it has not ended by itself."""
+        self.client.close()
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+
+
+@contextmanager
+def stopped(pids: Iterable[int]) -> Iterator[None]:
+    """Have processes do nothing at all meanwhile; what they are given waits."""
+    pids = set(pids)
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in filter(is_running, pids):
+            os.kill(pid, signal.SIGCONT)
+
+
+def workers_of(service: int) -> set[int]:
+    """Return the ids of worker processes that the fork server of a process has forked."""
+    found = set()
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                is_worker = (entry / "cmdline").read_bytes().startswith(b"geodesic-worker")
+                if is_worker and parent_of(parent_of(int(entry.name))) == service:
+                    found.add(int(entry.name))
+            except (FileNotFoundError, ProcessLookupError):
+                continue
+    return found
+
+
+def parent_of(pid: int) -> int:
+    return int(_status(pid)[1])
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return _status(pid)[0] != "Z"
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def are_gone(pids: Iterable[int]) -> bool:
+    return not any(is_running(pid) for pid in pids)
+
+
+def _status(pid: int) -> list[str]:
+    """Return what ``/proc`` says after the name: the state, the parent, and so on."""
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+
+
+def processor_time(pid: int) -> Counter[int]:
+    """Return the nanoseconds that the threads of a process have had, by niceness."""
+    taken: Counter[int] = Counter()
+    for thread in Path(f"/proc/{pid}/task").iterdir():
+        niceness = int((thread / "stat").read_text().rpartition(")")[2].split()[16])
+        taken[niceness] += int((thread / "schedstat").read_text().split()[0])
+    return taken
+
+
+def total_time(pids: Iterable[int]) -> int:
+    """Return the nanoseconds that processes have had."""
+    return sum(processor_time(pid).total() for pid in pids)

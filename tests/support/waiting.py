@@ -1,0 +1,15 @@
+"""Waiting for a state: tests never ask how soon it comes, only that it does."""
+
+import time
+from collections.abc import Callable
+
+LONG_S = 300.0
+"""Longer than anything takes that does happen, on a machine however busy."""
+
+
+def wait_until(condition: Callable[[], object]) -> None:
+    """Wait for something that happens in another thread or process."""
+    end = time.monotonic() + LONG_S
+    while not condition():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.02)
