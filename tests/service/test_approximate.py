@@ -12,7 +12,7 @@ import geodesic_core as gc
 from app.queries import PathQuery, result_key
 from app.schemas.points import VertexPoint
 from app.schemas.requests import PathRequest
-from tests.support.service import NPY, check_problem, distances, mesh_of, upload_sample
+from tests.support.service import NPY, check_problem, distances, stored_mesh, upload_sample
 
 ROUNDING = 1e-9
 SOURCES = [{"vertex": 3}, {"vertex": 400, "start_distance": 0.25}]
@@ -38,7 +38,7 @@ def path(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> 
 
 
 def test_distances_are_the_library_s(client: TestClient, knot: str) -> None:
-    field = gc.approximate_distance(mesh_of(client, knot), 3, relative_error=0.01)
+    field = gc.approximate_distance(stored_mesh(client, knot), 3, relative_error=0.01)
 
     answer = approximate(client, knot, sources=[{"vertex": 3}], relative_error=0.01).json()
 
@@ -171,7 +171,7 @@ def test_keys_tell_methods_and_errors_apart() -> None:
 
 
 def test_paths_are_the_library_s(client: TestClient, knot: str) -> None:
-    mesh = mesh_of(client, knot)
+    mesh = stored_mesh(client, knot)
     field = gc.approximate_distance(mesh, 3, relative_error=0.05, retain="paths")
     expected = field.path_to(700)
 

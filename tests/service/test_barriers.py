@@ -12,7 +12,7 @@ from app.queries import DistancesQuery, MeshSize, result_key
 from app.schemas.requests import DistancesRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
-from tests.support.service import check_problem, distances, mesh_of, serving, upload_sample
+from tests.support.service import check_problem, distances, serving, stored_mesh, upload_sample
 
 WALL = list(range(100, 116))
 """Of the plane of 10 × 10 squares: the sixth column but for its last two rows."""
@@ -34,14 +34,14 @@ def ask(client: TestClient, mesh_id: str, operation: str, query: str = "", **bod
 
 @pytest.fixture(scope="module")
 def walled(client: TestClient, plane: str) -> gc.TriangleMesh:
-    return mesh_of(client, plane).with_barriers(WALL)
+    return stored_mesh(client, plane).with_barriers(WALL)
 
 
 def test_answers_are_those_of_the_blocked_mesh(
     client: TestClient, plane: str, walled: gc.TriangleMesh
 ) -> None:
     field = gc.exact_distance(walled, 0)
-    direct = gc.exact_distance(mesh_of(client, plane), 0).distances
+    direct = gc.exact_distance(stored_mesh(client, plane), 0).distances
     assert field.distances[10] > 1.9 > 1.1 > direct[10], "the wall is in the way"
 
     def found(operation: str, **body: Any) -> Any:
@@ -93,7 +93,7 @@ def test_spellings_of_barriers_are_one_query(
 
 
 def test_reasons_are_those_of_the_blocked_mesh(client: TestClient, plane: str) -> None:
-    parted = mesh_of(client, plane).with_barriers(WHOLE_WALL)
+    parted = stored_mesh(client, plane).with_barriers(WHOLE_WALL)
     missed = int(np.isinf(gc.exact_distance(parted, 0).distances).sum())
     assert missed == 5 * 11
 
@@ -125,7 +125,7 @@ def test_points_are_found_on_the_blocked_mesh(
 
 def test_points_inside_barriers_are_refused(client: TestClient, plane: str) -> None:
     inside = {"face": 110, "barycentric": [0.2, 0.3, 0.5]}
-    (_, u, v) = mesh_of(client, plane).faces[110].tolist()
+    (_, u, v) = stored_mesh(client, plane).faces[110].tolist()
     across = {"edge": [5, 17], "t": 0.5}
     near = {"position": [0.55, 0.05, 0], "max_distance": 1e-3}
 

@@ -8,7 +8,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from tests.support.service import check_problem, distances, mesh_of, serving, upload_sample
+from tests.support.service import check_problem, distances, serving, stored_mesh, upload_sample
 
 METHODS = ({}, {"method": "approximate", "relative_error": 0.05})
 DIAGONAL = [{"vertex": 12 * i} for i in range(4)]
@@ -23,7 +23,7 @@ def paths(client: TestClient, mesh_id: str, query: str = "", **body: Any) -> Any
 @pytest.mark.parametrize("method", METHODS, ids=["exact", "approximate"])
 def test_distances_are_the_library_s(client: TestClient, method: dict) -> None:
     knot = upload_sample(client, "knot", 3000)
-    mesh = mesh_of(client, knot)
+    mesh = stored_mesh(client, knot)
     curve = gc.shortest_path(mesh, 3, 700).locations
     asked = [{"face": at.face_index, "barycentric": list(at.barycentric)} for at in curve]
     sources = [gc.Source(gc.Curve(curve), 0.5), 1200]
@@ -61,7 +61,7 @@ def test_distances_from_a_line_in_the_plane(client: TestClient, plane: str) -> N
     """From all of the line, not of its points alone, however these are written."""
     bottom = [{"vertex": 0}, {"edge": [0, 1], "t": 0.5}, {"position": [0.1, 0, 0]}]
     bottom += [{"edge": [2, 1], "t": 0}, *({"vertex": i} for i in range(3, 11))]
-    heights = mesh_of(client, plane).vertices[:, 1]
+    heights = stored_mesh(client, plane).vertices[:, 1]
 
     answer = distances(client, plane, sources=[{"polyline": bottom}], include=["gradient"]).json()
 

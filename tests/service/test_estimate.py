@@ -24,7 +24,7 @@ from app.queries import (
 )
 from app.schemas.points import StrictModel
 from app.store.meshes import OpenMesh
-from tests.support.service import check_problem, granted, mesh_of, upload_sample
+from tests.support.service import check_problem, granted, stored_mesh, upload_sample
 
 MESHES = {"knot": 8000, "sphere": 5000, "plane": 10_000}
 _RNG = np.random.default_rng(8)
@@ -144,7 +144,7 @@ ALLOCATED = [name for name in STATEFUL if QUERIES[name][0] != "paths"]
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("name", ALLOCATED)
 def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mesh: str) -> None:
-    opened = OpenMesh(("", b""), gc.Solver(mesh_of(client, ids[mesh])), [])
+    opened = OpenMesh(("", b""), gc.Solver(stored_mesh(client, ids[mesh])), [])
     query = query_of(name)
     told = estimate(query, Representation(JSON), opened, lambda: False)
     tracemalloc.start()
@@ -164,7 +164,7 @@ def test_memory_that_suffices(
     """Three times the estimate does, a third does not."""
     for module in ("app.queries.matrix", "geodesic_core.search.matrix"):
         monkeypatch.setattr(f"{module}.available_cores", lambda: 1)
-    opened = OpenMesh(("", b""), gc.Solver(mesh_of(client, ids["sphere"])), [])
+    opened = OpenMesh(("", b""), gc.Solver(stored_mesh(client, ids["sphere"])), [])
     query = query_of(name)
     told = estimate(query, Representation(JSON), opened, lambda: False)
 

@@ -7,7 +7,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from tests.support.service import NPY, check_problem, distances, mesh_of, serving, upload_sample
+from tests.support.service import NPY, check_problem, distances, serving, stored_mesh, upload_sample
 
 
 def rows(gradient: list) -> np.ndarray:
@@ -17,7 +17,7 @@ def rows(gradient: list) -> np.ndarray:
 @pytest.mark.parametrize("method", [{}, {"method": "approximate", "relative_error": 0.05}])
 def test_it_is_the_library_s(client: TestClient, method: dict) -> None:
     knot = upload_sample(client, "knot", 3000)
-    mesh = mesh_of(client, knot)
+    mesh = stored_mesh(client, knot)
     if method:
         field = gc.approximate_distance(mesh, [3, 9], 0.05)
     else:
@@ -46,7 +46,7 @@ def test_there_is_none_where_nothing_is_reached(client: TestClient, apart: str) 
 
 def test_it_ends_at_barriers(client: TestClient, plane: str) -> None:
     wall = list(range(100, 120))
-    field = gc.exact_distance(mesh_of(client, plane), 0, barriers=wall)
+    field = gc.exact_distance(stored_mesh(client, plane), 0, barriers=wall)
 
     answer = distances(client, plane, barriers=wall, include=["gradient"]).json()
 

@@ -11,7 +11,7 @@ import geodesic_core as gc
 from app.queries import IsolinesQuery
 from app.store.meshes import OpenMesh
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep
-from tests.support.service import check_problem, granted, mesh_of, serving, upload_sample
+from tests.support.service import check_problem, granted, serving, stored_mesh, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 METHODS = ({}, {"method": "approximate", "relative_error": 0.05})
@@ -40,7 +40,7 @@ def check_lines(found: list[dict[str, Any]], expected: list[gc.Isoline]) -> None
 
 @pytest.mark.parametrize("method", METHODS, ids=["exact", "approximate"])
 def test_lines_are_the_library_s(client: TestClient, knot: str, method: dict) -> None:
-    mesh = mesh_of(client, knot)
+    mesh = stored_mesh(client, knot)
     sources = [gc.Source(gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), 0.25), gc.Source(700)]
     if method:
         field = gc.approximate_distance(mesh, sources, 0.05, retain="windows")
@@ -106,7 +106,7 @@ def test_lines_around_a_curve_are_straight_beside_it(client: TestClient, plane: 
 
 def test_lines_end_at_barriers(client: TestClient, plane: str) -> None:
     wall = list(range(100, 116))
-    field = gc.exact_distance(mesh_of(client, plane), 0, barriers=wall)
+    field = gc.exact_distance(stored_mesh(client, plane), 0, barriers=wall)
 
     (level,) = isolines(client, plane, levels=[1.5], barriers=wall).json()["isolines"]
 

@@ -11,7 +11,7 @@ import geodesic_core as gc
 from app.queries import LocateQuery
 from app.store.meshes import OpenMesh
 from geodesic_core.mesh.closest_point import NearestFace
-from tests.support.service import NPY, check_problem, granted, mesh_of, serving, upload_sample
+from tests.support.service import NPY, check_problem, granted, serving, stored_mesh, upload_sample
 
 
 def locate(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
@@ -24,7 +24,7 @@ def knot(client: TestClient) -> str:
 
 
 def test_points_are_the_library_s(client: TestClient, knot: str) -> None:
-    mesh = mesh_of(client, knot)
+    mesh = stored_mesh(client, knot)
     rng = np.random.default_rng(1)
     positions = [*rng.normal(size=(20, 3)), *(mesh.vertices[:5] * (1 + 1e-15))]
     positions.append(mesh.vertices[mesh.faces[7, :2]].mean(axis=0))
@@ -84,7 +84,7 @@ def test_a_vertex_of_no_face_is_not_on_the_surface(client: TestClient) -> None:
 
 
 def test_found_points_are_points_of_queries(client: TestClient, knot: str) -> None:
-    mesh = mesh_of(client, knot)
+    mesh = stored_mesh(client, knot)
     position = [1.0, 2.0, 0.5]
     found = locate(client, knot, points=[position]).json()["points"][0]
     point = {name: found[name] for name in ("face", "barycentric")}

@@ -7,7 +7,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from tests.support.service import check_problem, mesh_of, serving, upload_sample
+from tests.support.service import check_problem, serving, stored_mesh, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 TARGETS = [{"vertex": 700}, INSIDE, {"vertex": 3}, {"vertex": 700}, {"vertex": 1200}]
@@ -26,7 +26,7 @@ def paths(client: TestClient, mesh_id: str, query: str = "", **body: Any) -> Any
 
 @pytest.mark.parametrize("method", METHODS, ids=["exact", "approximate"])
 def test_paths_are_the_library_s(client: TestClient, knot: str, method: dict) -> None:
-    mesh = mesh_of(client, knot)
+    mesh = stored_mesh(client, knot)
     places = [700, gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), 3, 700, 1200]
     if method:
         field = gc.approximate_distance(mesh, 3, 0.05, targets=places, retain="paths")

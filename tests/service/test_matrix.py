@@ -11,7 +11,7 @@ from scipy.sparse import load_npz
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from tests.support.service import NPY, check_problem, mesh_of, serving, upload_sample
+from tests.support.service import NPY, check_problem, serving, stored_mesh, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 SOURCES = [{"vertex": 3}, INSIDE, {"vertex": 900}]
@@ -26,7 +26,7 @@ def knot(client: TestClient) -> str:
 
 @pytest.fixture(scope="module")
 def table(client: TestClient, knot: str) -> np.ndarray:
-    mesh = mesh_of(client, knot)
+    mesh = stored_mesh(client, knot)
     inside = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5))
     corner = int(mesh.faces[41, 2])
     return gc.distance_matrix(mesh, [3, inside, 900], [7, 3, 500, corner])

@@ -10,7 +10,7 @@ from app.cli.arguments import SampleName
 from app.schemas import meshes as schemas
 from app.settings import Settings
 from geodesic_core import samples
-from tests.support.service import check_problem, mesh_of, serving, upload_sample
+from tests.support.service import check_problem, serving, stored_mesh, upload_sample
 
 TETRAHEDRON = {
     "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -82,7 +82,7 @@ def test_samples(client: TestClient, name: str) -> None:
     mesh_id = upload_sample(client, name, 500)
 
     vertices, faces = samples.SAMPLES[name](500)
-    mesh = mesh_of(client, mesh_id)
+    mesh = stored_mesh(client, mesh_id)
     np.testing.assert_array_equal(mesh.vertices, vertices)
     np.testing.assert_array_equal(mesh.faces, faces)
 

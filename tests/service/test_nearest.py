@@ -6,7 +6,7 @@ import pytest
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from tests.support.service import check_problem, mesh_of, upload_sample
+from tests.support.service import check_problem, stored_mesh, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 CANDIDATES = [{"vertex": i} for i in range(0, 1500, 100)] + [INSIDE, {"vertex": 100}]
@@ -24,7 +24,7 @@ def nearest(client: TestClient, mesh_id: str, query: str = "", **body: Any) -> A
 
 @pytest.mark.parametrize("k", [1, 5, len(CANDIDATES)])
 def test_candidates_are_the_library_s(client: TestClient, knot: str, k: int) -> None:
-    mesh = mesh_of(client, knot)
+    mesh = stored_mesh(client, knot)
     places = [*range(0, 1500, 100), gc.SurfacePoint.face(40, (0.2, 0.3, 0.5)), 100]
     expected = gc.nearest(mesh, 3, places, k)
 

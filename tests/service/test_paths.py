@@ -13,13 +13,13 @@ from app.queries import PathQuery, result_key
 from app.schemas.answers import StepName
 from app.schemas.points import VertexPoint
 from app.schemas.requests import PathRequest
-from tests.support.service import NPY, check_problem, mesh_of, serving, upload_sample
+from tests.support.service import NPY, check_problem, serving, stored_mesh, upload_sample
 
 _ENDS = {"source": {"vertex": 0}, "target": {"vertex": 60}}
 
 
 def test_paths_are_the_library_s(client: TestClient, plane: str) -> None:
-    path = gc.shortest_path(mesh_of(client, plane), 0, 60)
+    path = gc.shortest_path(stored_mesh(client, plane), 0, 60)
 
     body = {"source": {"vertex": 0}, "target": {"vertex": 60}}
     answer = client.post(f"/v1/meshes/{plane}/path", json=body).json()
@@ -135,7 +135,7 @@ def test_refused_posts(
 
 
 def test_waypoints_are_passed_in_order(client: TestClient, plane: str) -> None:
-    path = gc.shortest_path(mesh_of(client, plane), 0, 60, [90, 5, 5])
+    path = gc.shortest_path(stored_mesh(client, plane), 0, 60, [90, 5, 5])
 
     body = _ENDS | {"waypoints": [{"vertex": 90}, {"vertex": 5}, {"vertex": 5}]}
     answer = client.post(f"/v1/meshes/{plane}/path", json=body).json()
@@ -199,7 +199,7 @@ def test_explained_paths_tell_their_steps(client: TestClient, plane: str, by: st
         "body": lambda: client.post(link, json=body | {"explain": True}),
         "parameter": lambda: client.post(f"{link}?explain=true", json=body),
     }[by]()
-    path = gc.shortest_path(mesh_of(client, plane), 0, 60, [90], explain=True)
+    path = gc.shortest_path(stored_mesh(client, plane), 0, 60, [90], explain=True)
 
     answer = response.json()
 
@@ -256,7 +256,7 @@ def test_no_path_beyond_a_largest_distance(client: TestClient, plane: str, metho
     """At the very limit it is there; beyond it there is none, with the reason."""
     link = f"/v1/meshes/{plane}/path"
     body = {"source": {"vertex": 0}, "target": {"vertex": 60}, "method": method}
-    length = gc.exact_distance(mesh_of(client, plane), 0).distances[60]
+    length = gc.exact_distance(stored_mesh(client, plane), 0).distances[60]
 
     for limit, status in ((length, "ok"), (0.999 * length, "no_path"), (0, "no_path")):
         posted = client.post(link, json=body | {"max_distance": limit}).json()

@@ -28,7 +28,7 @@ from app.schemas.requests import (
     PathsRequest,
 )
 from app.store.meshes import OpenMesh
-from tests.support.service import check_problem, distances, granted, mesh_of, upload_sample
+from tests.support.service import check_problem, distances, granted, stored_mesh, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 ENDS = {"source": {"vertex": 3}, "target": INSIDE}
@@ -43,7 +43,7 @@ def knot(client: TestClient) -> str:
 
 @pytest.fixture(scope="module")
 def mesh(client: TestClient, knot: str) -> gc.TriangleMesh:
-    return mesh_of(client, knot)
+    return stored_mesh(client, knot)
 
 
 def path(client: TestClient, mesh_id: str, **body: Any) -> Any:

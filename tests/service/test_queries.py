@@ -9,11 +9,11 @@ from starlette.testclient import TestClient
 import geodesic_core as gc
 from app.queries import DistancesQuery, result_key
 from app.schemas.requests import DistancesRequest
-from tests.support.service import NPY, check_problem, distances, mesh_of, serving, upload_sample
+from tests.support.service import NPY, check_problem, distances, serving, stored_mesh, upload_sample
 
 
 def test_distances_are_the_library_s(client: TestClient, plane: str) -> None:
-    field = gc.exact_distance(mesh_of(client, plane), gc.Source(5))
+    field = gc.exact_distance(stored_mesh(client, plane), gc.Source(5))
 
     response = distances(client, plane, sources=[{"vertex": 5}])
 
@@ -50,7 +50,7 @@ def test_binary_formats_hold_the_same(client: TestClient, plane: str) -> None:
 
 
 def test_targets_sources_and_starts(client: TestClient, plane: str) -> None:
-    mesh = mesh_of(client, plane)
+    mesh = stored_mesh(client, plane)
     field = gc.exact_distance(mesh, [gc.Source(0, 0.5), gc.Source(9, 0.0)])
 
     answer = distances(

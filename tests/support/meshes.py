@@ -18,6 +18,10 @@ from tests.support.paths import ROOT
 MESHES = Path(os.environ.get("MESHES", ROOT / "../shared/meshes"))
 
 
+def mesh_of(case: zoo.Case) -> gc.TriangleMesh:
+    return gc.TriangleMesh(case.vertices, case.faces)
+
+
 def real_mesh(name: str) -> Path:
     """The path of a real mesh; skips the test where it is absent."""
     path = MESHES / name

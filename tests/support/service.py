@@ -131,7 +131,7 @@ def granted(
     return ExecutionContext(cancel, lambda _: None, known, memory, 10**7, 10**7)
 
 
-def mesh_of(client: TestClient, mesh_id: str) -> gc.TriangleMesh:
+def stored_mesh(client: TestClient, mesh_id: str) -> gc.TriangleMesh:
     """Return what is stored under an id, as the library has it."""
     load = lambda name: np.load(  # noqa: E731
         BytesIO(client.get(f"/v1/meshes/{mesh_id}/arrays/{name}").content)

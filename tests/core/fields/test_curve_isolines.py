@@ -10,7 +10,6 @@ import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_curves import random_curve
 from tests.core.fields.test_isolines import FINE, check_all, total_length
-from tests.core.fields.test_points import mesh_of
 from tests.support import zoo
 from tests.support.isoline_checks import (
     check_ends,
@@ -20,6 +19,7 @@ from tests.support.isoline_checks import (
     line_points,
     some_levels,
 )
+from tests.support.meshes import mesh_of
 from tests.support.oracles import closed_forms
 
 

@@ -13,15 +13,12 @@ import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.certificates import LENGTH
+from tests.support.meshes import mesh_of
 from tests.support.oracles import closed_forms, visibility
 from tests.support.random_meshes import KINDS, thin_terrain
 
 EXACT = 1e-9
 """Relative error allowed against an oracle."""
-
-
-def mesh_of(case) -> gc.TriangleMesh:
-    return gc.TriangleMesh(case.vertices, case.faces)
 
 
 def random_curve(mesh: gc.TriangleMesh, rng, shake=0.5) -> gc.Curve | None:

@@ -5,13 +5,10 @@ import pytest
 
 import geodesic_core as gc
 from tests.support import expected, zoo
+from tests.support.meshes import mesh_of
 
 EXACT = 1e-9
 TIE = 1e-12
-
-
-def mesh_of(case):
-    return gc.TriangleMesh(case.vertices, case.faces)
 
 
 @zoo.each(zoo.SMALL)

@@ -9,7 +9,7 @@ import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.tolerances import CROSSING, LEVEL
 from tests.conftest import WITHOUT_JIT
-from tests.core.fields.test_points import mesh_of, random_points
+from tests.core.fields.test_points import random_points
 from tests.support import zoo
 from tests.support.isoline_checks import (
     check_crossings,
@@ -19,7 +19,7 @@ from tests.support.isoline_checks import (
     check_points,
     some_levels,
 )
-from tests.support.meshes import named_mesh
+from tests.support.meshes import mesh_of, named_mesh
 
 FINE = 1e-6
 """Chord error of what is compared with a closed form."""

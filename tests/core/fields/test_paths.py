@@ -7,10 +7,7 @@ import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.certificates import check_path
-
-
-def mesh_of(case):
-    return gc.TriangleMesh(case.vertices, case.faces)
+from tests.support.meshes import mesh_of
 
 
 def check_paths(case, sources, at_most=10**9):

@@ -10,6 +10,7 @@ import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.certificates import check_path
+from tests.support.meshes import mesh_of
 from tests.support.oracles import unfolding
 from tests.support.splitting import split_at
 
@@ -18,10 +19,6 @@ EXACT = 1e-9
 
 SAME = 1e-11
 """Relative difference allowed between two ways to one exact distance."""
-
-
-def mesh_of(case: zoo.Case) -> gc.TriangleMesh:
-    return gc.TriangleMesh(case.vertices, case.faces)
 
 
 def random_points(mesh: gc.TriangleMesh, count: int, seed: int = 0) -> list[gc.SurfacePoint]:

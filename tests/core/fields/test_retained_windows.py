@@ -9,9 +9,10 @@ import pytest
 import geodesic_core as gc
 from geodesic_core.errors import MemoryLimitExceeded, NoPath
 from tests.conftest import WITHOUT_JIT
-from tests.core.fields.test_points import SAME, mesh_of, random_points
+from tests.core.fields.test_points import SAME, random_points
 from tests.support import zoo
 from tests.support.certificates import check_path
+from tests.support.meshes import mesh_of
 
 
 def kept_field(mesh, sources, **options):

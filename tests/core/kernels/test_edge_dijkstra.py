@@ -14,12 +14,9 @@ from geodesic_core.kernels.sweep.state import PREDECESSOR, TOUCHED
 from geodesic_core.search.landmarks import Landmarks
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
+from tests.support.meshes import mesh_of
 from tests.support.oracles import graph
 from tests.support.searches import edge_paths, goal_at_vertex, random_pairs, spread
-
-
-def mesh_of(case):
-    return gc.TriangleMesh(case.vertices, case.faces)
 
 
 def all_pairs(case):

@@ -18,15 +18,12 @@ from geodesic_core.kernels.paths.funnel import (
 )
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
+from tests.support.meshes import mesh_of
 from tests.support.oracles import visibility
 from tests.support.searches import edge_paths, random_pairs
 
 ROUNDING = 1e-9
 """Relative: strips of slivers are unfolded face after face."""
-
-
-def mesh_of(case):
-    return gc.TriangleMesh(case.vertices, case.faces)
 
 
 def check_shortened(mesh, pairs):

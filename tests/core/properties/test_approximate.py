@@ -5,9 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import geodesic_core as gc
-from tests.core.properties.test_exact import mesh_of, seeds, vertex_of
+from tests.core.properties.test_exact import seeds, vertex_of
 from tests.support import zoo
 from tests.support.approximation import ERRORS, ROUNDING, check_approximate_path, check_within
+from tests.support.meshes import mesh_of
 from tests.support.oracles import graph, unfolding
 from tests.support.random_meshes import cases
 

@@ -6,8 +6,9 @@ import numpy as np
 from hypothesis import given
 
 import geodesic_core as gc
-from tests.core.properties.test_exact import mesh_of, seeds
+from tests.core.properties.test_exact import seeds
 from tests.support.certificates import check_path
+from tests.support.meshes import mesh_of
 from tests.support.oracles import unfolding
 from tests.support.random_meshes import cases
 

@@ -6,15 +6,12 @@ from hypothesis import strategies as st
 
 import geodesic_core as gc
 from tests.support.certificates import check_path
+from tests.support.meshes import mesh_of
 from tests.support.oracles import graph, unfolding
 from tests.support.random_meshes import cases
 
 EXACT = 1e-9
 seeds = st.integers(0, 2**31 - 1)
-
-
-def mesh_of(case):
-    return gc.TriangleMesh(case.vertices, case.faces)
 
 
 def solve(vertices, faces, source):

@@ -6,7 +6,8 @@ from hypothesis import given
 
 import geodesic_core as gc
 from tests.core.fields.test_points import random_points
-from tests.core.properties.test_exact import EXACT, mesh_of, seeds
+from tests.core.properties.test_exact import EXACT, seeds
+from tests.support.meshes import mesh_of
 from tests.support.oracles import unfolding
 from tests.support.random_meshes import KINDS, blocks, cases, moebius, pages, wound
 from tests.support.splitting import split_at

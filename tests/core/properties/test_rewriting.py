@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 import geodesic_core as gc
 from tests.core.properties.test_approximate import split_cases
-from tests.core.properties.test_exact import EXACT, mesh_of, seeds
+from tests.core.properties.test_exact import EXACT, seeds
 from tests.support.approximation import ERRORS, check_within
+from tests.support.meshes import mesh_of
 from tests.support.random_meshes import IRREGULAR_KINDS, KINDS, cases
 from tests.support.rewriting import REWRITINGS, Rewritten
 

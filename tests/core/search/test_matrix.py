@@ -11,8 +11,9 @@ from scipy.sparse import csr_array
 import geodesic_core as gc
 from geodesic_core.search import matrix, path_search, threads
 from tests.conftest import WITHOUT_JIT
-from tests.core.fields.test_points import EXACT, SAME, mesh_of, random_points
+from tests.core.fields.test_points import EXACT, SAME, random_points
 from tests.support import zoo
+from tests.support.meshes import mesh_of
 from tests.support.oracles import unfolding
 from tests.support.splitting import split_at
 
