@@ -2,6 +2,7 @@
 
 import os
 import random
+import sys
 from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
@@ -18,11 +19,12 @@ WITHOUT_JIT = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 MARKER_OF_FOLDER = {"service": "service", "page": "page"}
 NOT_QUICK = ("service", "page", "slow")
 FULL_ONLY = ("full",)
-EXAMPLES = {"quick": 5, "slice": 15, "full": 2000, "interpreted": 3}
-"""Random examples of a property."""
+EXAMPLES = {"quick": 4, "slice": 15, "full": 2000, "interpreted": 4}
+"""Random examples of a property, by tier; kernels as plain Python take a hundred times as long."""
 
-SLICE_WITHOUT_JIT = 3
-"""The most cases of a slice where kernels run as plain Python."""
+QUICK_SLICE = 2
+CASES_WITHOUT_JIT = 2
+"""Of any test, which is enough to reach every line."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -99,19 +101,25 @@ def _deselect(config: pytest.Config, items: list[pytest.Item], markers: tuple[st
 
 
 def _deselect_beyond_slices(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep a seeded sample of the cases of each test that is marked as ``slice``."""
+    """Keep a seeded sample of the cases of each test that has a slice."""
     cases: dict[str, list[pytest.Item]] = defaultdict(list)
     for item in items:
-        if item.get_closest_marker("slice"):
-            cases[item.nodeid.partition("[")[0]].append(item)
+        cases[item.nodeid.partition("[")[0]].append(item)
     beyond: set[pytest.Item] = set()
     for name, each in cases.items():
-        (size,) = each[0].get_closest_marker("slice").args
-        if WITHOUT_JIT:
-            size = min(size, SLICE_WITHOUT_JIT)
-        chosen = random.Random(name).sample(range(len(each)), min(size, len(each)))
+        size = min(len(each), _size_of_slice(config, each[0]))
+        chosen = random.Random(name).sample(range(len(each)), size)
         beyond.update(item for number, item in enumerate(each) if number not in chosen)
     _keep(config, items, lambda item: item not in beyond)
+
+
+def _size_of_slice(config: pytest.Config, item: pytest.Item) -> int:
+    if WITHOUT_JIT:
+        return CASES_WITHOUT_JIT
+    marker = item.get_closest_marker("slice")
+    if marker is None:
+        return sys.maxsize
+    return QUICK_SLICE if config.option.quick else int(marker.args[0])
 
 
 def _keep(

@@ -135,6 +135,7 @@ LARGE = Answer(
 )
 
 
+@pytest.mark.slice(4)
 @pytest.mark.parametrize(
     ("form", "most"),
     [
@@ -153,6 +154,7 @@ def test_large_answers_are_never_there_as_a_whole(form: Representation, most: fl
     assert peak < most
 
 
+@pytest.mark.slice(1)
 @pytest.mark.parametrize(
     "table",
     [

@@ -25,6 +25,7 @@ def check_paths(mesh, source, exact, error, at_most):
             check_approximate_path(field, target, exact[target], error)
 
 
+@pytest.mark.slice(10)
 @zoo.each(zoo.SMALL)
 def test_paths_on_small_meshes(case):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
@@ -32,6 +33,7 @@ def test_paths_on_small_meshes(case):
         check_paths(mesh, source, expected.matrix(case)[source], 1e-2, 30)
 
 
+@pytest.mark.slice(6)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_paths_on_larger_meshes_and_slivers(case):
@@ -40,6 +42,7 @@ def test_paths_on_larger_meshes_and_slivers(case):
     check_paths(mesh, source, case.distances(source), 1e-3, 60)
 
 
+@pytest.mark.slice(3)
 @zoo.each(MERGING)
 def test_paths_where_much_is_merged(case):
     mesh = gc.TriangleMesh(case.vertices, case.faces)

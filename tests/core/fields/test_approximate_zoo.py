@@ -12,6 +12,7 @@ MANY, FEW = (2, 1) if WITHOUT_JIT else (12, 4)
 """Sources a mesh."""
 
 
+@pytest.mark.slice(20)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_against_the_oracle(case):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
@@ -33,6 +34,7 @@ def test_small_meshes_from_every_vertex(case):
             check_within(gc.approximate_distance(mesh, source, error).distances, exact, error)
 
 
+@pytest.mark.slice(6)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_closed_forms(case):

@@ -23,6 +23,7 @@ def check_source(mesh, source, distances):
     np.testing.assert_array_equal(field.nearest_source, np.where(np.isfinite(distances), 0, -1))
 
 
+@pytest.mark.slice(12)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_from_every_vertex(case):
     mesh = gc.TriangleMesh(case.vertices, case.faces)

@@ -40,6 +40,7 @@ def check_all(mesh, sources, field, levels, *, crossings=True):
             check_crossings(mesh, sources, level, lines)
 
 
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_all_of_each_level_is_found(case):
@@ -49,6 +50,7 @@ def test_all_of_each_level_is_found(case):
         check_all(mesh, source, field, some_levels(field, 41, 2))
 
 
+@pytest.mark.slice(8)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_points_lie_at_the_level_on_slivers_too(case):
@@ -58,6 +60,7 @@ def test_points_lie_at_the_level_on_slivers_too(case):
         check_all(mesh, source, field, some_levels(field, 42, 2), crossings=False)
 
 
+@pytest.mark.slice(12)
 @zoo.each(zoo.SMALL)
 def test_levels_of_vertices(case):
     """A level passes through its vertex, or has all around it within."""
@@ -95,6 +98,7 @@ def test_lines_along_edges_are_one_and_whole(share, scale):
             check_pieces(mesh, line)
 
 
+@pytest.mark.slice(2)
 @LEVELS
 def test_lines_through_vertices_are_one_and_whole(share):
     """On a grid, circles through vertices, and along none of their edges."""
@@ -185,6 +189,7 @@ def test_circles_on_a_cube():
     np.testing.assert_allclose(lengths, [1.5 * math.pi * 0.3, 1.5 * math.pi], rtol=2e-5)
 
 
+@pytest.mark.slice(2)
 @pytest.mark.jit
 @zoo.each({name: zoo.SMALL[name] for name in ("hills", "annulus", "crumpled_torus", "box_1x2x3")})
 def test_several_sources_with_start_distances(case):
@@ -214,6 +219,7 @@ def test_max_distance_and_what_is_kept_change_no_line_within(case):
             assert sorted(line.closed for line in ours) == sorted(line.closed for line in theirs)
 
 
+@pytest.mark.slice(15)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_windows_kept_or_found_again_draw_the_same_lines(case):
@@ -223,6 +229,7 @@ def test_windows_kept_or_found_again_draw_the_same_lines(case):
         check_found_again(mesh, sources, seed=46)
 
 
+@pytest.mark.slice(12)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL)
 def test_approximate_lines_keep_to_the_error(case):

@@ -22,12 +22,14 @@ def check_paths(case, sources, at_most=10**9):
                 check_path(mesh, path, source, target, field.distances[target])
 
 
+@pytest.mark.slice(15)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_paths_to_every_vertex(case):
     last = int(case.faces.max())
     check_paths(case, [last] if WITHOUT_JIT else [0, last // 2, last])
 
 
+@pytest.mark.slice(6)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_paths_on_larger_meshes_and_slivers(case):

@@ -63,6 +63,7 @@ def domain(seed) -> tuple[np.ndarray, np.ndarray]:
     return zoo.drop_unused(points, zoo.without_cells(faces, columns, map(tuple, cells.tolist())))
 
 
+@pytest.mark.slice(3)
 @pytest.mark.parametrize("seed", range(2 if WITHOUT_JIT else 12))
 def test_planar_domains_with_polygonal_holes(seed):
     vertices, faces = domain(seed)

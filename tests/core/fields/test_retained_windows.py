@@ -19,6 +19,7 @@ def kept_field(mesh, sources, **options):
     return gc.exact_distance(mesh, sources, retain="windows", **options)
 
 
+@pytest.mark.slice(15)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_windows_find_what_a_sweep_to_the_point_finds(case):
     mesh = mesh_of(case)

@@ -25,6 +25,7 @@ def test_unfolding_solves_the_regular_solids(name):
         np.testing.assert_allclose(np.sort(row), closed_forms.REGULAR[name], rtol=1e-14)
 
 
+@pytest.mark.slice(3)
 @pytest.mark.parametrize("name", FLAT)
 def test_unfolding_and_visibility_agree_on_planar_domains(name):
     case = zoo.SMALL[name]
@@ -112,6 +113,7 @@ def test_unfolding_says_where_it_does_not_know():
         unfolding.distance_matrix(LINE, sheets)
 
 
+@pytest.mark.slice(12)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_unfolding_is_a_metric_between_its_bounds(case):
     matrix = unfolding.distance_matrix(case.vertices, case.faces)

@@ -47,6 +47,7 @@ def check_layouts(mesh, sources, targets, expected, rtol, **options):
         np.testing.assert_allclose(pairs, expected.reshape(-1)[some], rtol=rtol, atol=atol)
 
 
+@pytest.mark.slice(10)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL)
 def test_distances_are_those_of_the_oracle(case):

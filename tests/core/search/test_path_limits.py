@@ -15,6 +15,7 @@ NEAR = 1e-9
 """Relative distance from the limit at which the answer is no longer a matter of rounding."""
 
 
+@pytest.mark.slice(15)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_the_limit_divides_paths_as_the_full_sweep_does(case):
     """At the very limit a path is found; beyond it none."""

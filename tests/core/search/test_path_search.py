@@ -23,6 +23,7 @@ EXACT = 1e-9
 """Relative error allowed against an oracle, as of exact fields."""
 
 
+@pytest.mark.slice(10)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_between_vertices_everywhere(case):
     solver = solver_of(case)
@@ -31,6 +32,7 @@ def test_small_meshes_between_vertices_everywhere(case):
     assert landmark_count(solver) > 0, "else only searches without landmarks were tried"
 
 
+@pytest.mark.slice(12)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_against_unfolding(case):
     solver = solver_of(case)
@@ -42,6 +44,7 @@ def test_small_meshes_against_unfolding(case):
                 assert path.length == pytest.approx(distance, rel=EXACT, abs=0)
 
 
+@pytest.mark.slice(2)
 @pytest.mark.jit
 @pytest.mark.parametrize("name", ["annulus", "obstacles", "comb", "pinched_holes"])
 def test_among_holes_in_the_plane(name):
@@ -63,6 +66,7 @@ def check_known(case, sources, targets):
             assert path.length == pytest.approx(distances[target], rel=EXACT, abs=0)
 
 
+@pytest.mark.slice(6)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_closed_forms(case):
@@ -170,6 +174,7 @@ def test_between_the_corners_of_a_face(name):
         check_searches(solver, a, [b, c])
 
 
+@pytest.mark.slice(2)
 @pytest.mark.parametrize("name", ["crags_with_holes", "double_frame", "open_fan", "comb"])
 def test_between_the_rims(name):
     case = zoo.SMALL[name]
