@@ -11,7 +11,7 @@ import httpx2
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Route
+from playwright.sync_api import Route, expect
 
 from tests.support.paths import ROOT
 from tests.support.viewing import PLAIN, View, angle_at, length_of, query_of
@@ -88,16 +88,15 @@ def test_a_long_list_of_meshes_goes_on(view: View, sphere: str, knot: str) -> No
 
     view.page.route("**/v1/meshes?*", one_at_a_time)
     view.open()
-    listed = "[...document.getElementById('meshes').options].map(option => option.value)"
-    ids = view.page.evaluate(listed)[1:]
-    assert ids[1:] == ["more"]
-    while ids[-1] == "more":
-        with view.page.expect_response("**/v1/meshes?*"):
-            view.page.select_option("#meshes", "more")
-        view.page.wait_for_function(
-            f"{listed}.length != {len(ids) + 1} || !{listed}.includes('more')"
-        )
-        ids = view.page.evaluate(listed)[1:]
+    options = view.page.locator("#meshes option")
+
+    def listed() -> list[str]:
+        return [option.get_attribute("value") or "" for option in options.all()][1:]
+
+    assert listed()[1:] == ["more"]
+    while (ids := listed())[-1] == "more":
+        view.page.select_option("#meshes", "more")
+        expect(options.nth(len(ids))).not_to_have_attribute("value", "more")
 
     assert ids == sorted(set(ids))
     assert {sphere, knot} <= set(ids)

@@ -22,7 +22,6 @@ from app.main import create_app
 from app.settings import Settings
 from tests.support.processes import Server, stopped
 from tests.support.service import (
-    SLOW_FACES,
     TWO_TRIANGLES,
     ServiceClient,
     check_problem,
@@ -43,7 +42,7 @@ class Site:
         client.headers.update(ALICE)
         self.client, self.store = client, store
         self.small = upload_sample(client, "plane", 200)
-        self.slow = upload_sample(client, "sphere", SLOW_FACES)
+        self.slow = upload_sample(client, "sphere", 300_000)
         self._starts = count(1)
         self.patch = pytest.MonkeyPatch()
 

@@ -31,8 +31,8 @@ TWO_TRIANGLES = {
     "faces": [[0, 1, 2], [3, 4, 5]],
 }
 
-SLOW_FACES = 300_000
-"""Distances on a sphere of so many faces take seconds, or about one on a fast machine."""
+SLOW_FACES = 200_000
+"""Distances on a sphere of so many faces take long enough to be stopped under way."""
 
 
 def is_ready(client: Any) -> bool:

@@ -45,14 +45,13 @@ def test_progress_grows_from_zero_to_one(mesh, arguments):
 
 
 def test_progress_is_spread_over_the_sweep(mesh):
-    """A true fraction: no jump over most of the bar, measured against the clock."""
+    """A true fraction of the work, as the processor's time tells it: never far behind or ahead."""
     seen = []
-    start = time.perf_counter()
-    gc.exact_distance(mesh, 0, progress=lambda value: seen.append((time.perf_counter(), value)))
-    total = time.perf_counter() - start
-    steps = np.diff([0.0, *(value for _, value in seen)])
-    assert steps.max() < 0.8
-    assert total < 5
+    start = time.thread_time()
+    gc.exact_distance(mesh, 0, progress=lambda value: seen.append((time.thread_time(), value)))
+    times, shares = np.transpose(seen)
+    done = (times - start) / (time.thread_time() - start)
+    assert np.abs(shares - done).max() < 0.35
 
 
 @pytest.mark.parametrize("vertex", ["far", "isolated"])
@@ -74,7 +73,7 @@ def test_cancel_is_asked_again_and_again(mesh, distances):
     asked = []
 
     def cancel():
-        asked.append(time.perf_counter())
+        asked.append(1)
         return len(asked) == 3
 
     with pytest.raises(gc.errors.Cancelled):
@@ -83,22 +82,24 @@ def test_cancel_is_asked_again_and_again(mesh, distances):
     check_usable(mesh, distances)
 
 
-def test_cancel_from_another_thread_stops_within_two_slices(mesh, distances):
-    stop, stopped_at = threading.Event(), []
+def test_cancel_from_another_thread_stops_at_the_next_question(mesh, distances):
+    is_under_way, stop, answers = threading.Event(), threading.Event(), []
 
     def cancel():
-        return stop.is_set()
+        is_under_way.set()
+        answers.append(stop.is_set())
+        return answers[-1]
 
     def press():
-        stopped_at.append(time.perf_counter())
+        is_under_way.wait()
         stop.set()
 
-    timer = threading.Timer(0.06, press)
-    timer.start()
+    thread = threading.Thread(target=press)
+    thread.start()
     with pytest.raises(gc.errors.Cancelled):
         repeat_sweeps(mesh, cancel)
-    assert time.perf_counter() - stopped_at[0] < 0.3
-    timer.join()
+    thread.join()
+    assert answers.index(True) == len(answers) - 1
     check_usable(mesh, distances)
 
 
@@ -108,12 +109,20 @@ def test_a_false_cancel_changes_nothing(mesh, distances):
     )
 
 
-@pytest.mark.parametrize("seconds", [1e-9, 0.05])
-def test_deadline(mesh, distances, seconds):
-    start = time.perf_counter()
+def test_a_deadline_that_is_over_at_once(mesh, distances):
     with pytest.raises(gc.errors.DeadlineExceeded):
-        gc.exact_distance(mesh, 0, deadline_s=seconds)
-    assert time.perf_counter() - start < seconds + 0.3
+        gc.exact_distance(mesh, 0, deadline_s=1e-9)
+    check_usable(mesh, distances)
+
+
+def test_a_deadline_that_passes_under_way(mesh, distances, monkeypatch):
+    seen, clock = [], time.perf_counter
+    monkeypatch.setattr(time, "perf_counter", lambda: clock() + (1e6 if len(seen) == 2 else 0.0))
+
+    with pytest.raises(gc.errors.DeadlineExceeded, match="within 100000 s"):
+        gc.exact_distance(mesh, 0, deadline_s=1e5, progress=seen.append)
+    assert len(seen) == 2
+    monkeypatch.undo()
     check_usable(mesh, distances)
 
 
@@ -160,24 +169,24 @@ def test_shortest_path_stops_too(mesh, arguments, error):
 
 
 def test_other_threads_run_while_a_sweep_does(mesh):
-    """The kernels let go of the interpreter."""
-    ticks, done = [], threading.Event()
+    """The kernels let go of the interpreter; else a thread had a turn or two between slices."""
+    ticks, slices, done = [], [], threading.Event()
 
     def tick():
         while not done.wait(0.001):
-            ticks.append(time.perf_counter())
+            ticks.append(1)
 
     thread = threading.Thread(target=tick)
     thread.start()
     try:
-        start = time.perf_counter()
-        for _ in range(3):
-            gc.exact_distance(mesh, 0)
-        seconds = time.perf_counter() - start
+        for _ in range(50):  # however rarely a busy machine wakes a thread
+            gc.exact_distance(mesh, 0, progress=slices.append)
+            if len(ticks) > 4 * len(slices):
+                break
     finally:
         done.set()
         thread.join()
-    assert len(ticks) > 20 * seconds
+    assert len(ticks) > 4 * len(slices)
 
 
 # Approximate sweeps -----------------------------------------------------------------------------

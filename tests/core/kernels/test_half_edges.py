@@ -255,10 +255,10 @@ def test_a_fan_of_many_faces_takes_linear_time():
         rim = np.stack([np.cos(turn), np.sin(turn), np.zeros(sides + 1)], axis=1)
         vertices = np.vstack([np.zeros(3), rim])
         faces = [(0, k, k + 1) for k in range(1, sides + 1)]
-        began = time.perf_counter()
+        began = time.thread_time()
         topology = gc.TriangleMesh(vertices, faces).topology
         assert np.diff(topology.first_corner).max() == sides
-        return time.perf_counter() - began
+        return time.thread_time() - began
 
     # A search in the bucket of the hub would take 100 times as long for 10 times the faces.
     assert min(seconds(200_000) for _ in range(2)) < 40 * min(seconds(20_000) for _ in range(3))

@@ -66,8 +66,7 @@ def test_bisector_is_where_bisection_finds_it(s0x, s0y, s1x, s1y, crossing):
         return distance_at(x, s1x, s1y, sigma1) - distance_at(x, s0x, s0y, 0.0)
 
     lo, hi = 0.0, 1.0
-    if (lead(lo) > 0) == (lead(hi) > 0):
-        return
+    assume((lead(lo) > 0) != (lead(hi) > 0))
     found = bisector(lo, hi, s0x, s0y, 0.0, s1x, s1y, sigma1)
     assert lo <= found <= hi
     # Where both sources lie on the edge's own line the root is double, and has half the digits.
