@@ -82,6 +82,7 @@ def test_every_setting_is_put_to_use_in_a_test() -> None:
 USED_BELOW = {"results_bytes"}
 
 
+@pytest.mark.service
 def test_results_bytes(tmp_path: Path) -> None:
     with serving(tmp_path, results_bytes=300_000) as client:
         mesh_id = upload_sample(client, "plane", 45_000)

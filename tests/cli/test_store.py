@@ -17,6 +17,8 @@ from app.store.results import ResultManifest
 from tests.support.commands import Run, error_line
 from tests.support.service import serving, upload_sample, wait_until
 
+pytestmark = pytest.mark.service  # a store is left by a service that has run
+
 KEYS = {"alice": "alice-alice-alice", "bob": "bob-bob-bob-bob-bob"}
 ALICE, BOB = ({"Authorization": f"Bearer {secret}"} for secret in KEYS.values())
 

@@ -1,12 +1,5 @@
-from typing import Any
-
-import pytest
-from pydantic import BaseModel
-from starlette.testclient import TestClient
-
 from app.cli.openapi import openapi_text
 from app.errors import PROBLEM_JSON
-from app.schemas import answers
 from tests.support.paths import ROOT
 
 COMMITTED = ROOT / "openapi" / "openapi.json"
@@ -73,40 +66,3 @@ def test_both_codes_of_a_status_are_named(client) -> None:
     responses = paths["/v1/meshes/{mesh_id}/distances"]["post"]["responses"]
 
     assert responses["413"]["description"] == "upload_too_large, result_too_large"
-
-
-ENDS = [{"vertex": 0}, {"vertex": 4}]
-ASKED = [
-    ("distances", {"sources": ENDS, "targets": ENDS, "include": ["nearest_source"]}),
-    ("distances", {"sources": ENDS, "include": ["gradient"], "barriers": [1]}),
-    ("distances", {"sources": [ENDS[1], {"polyline": [{"vertex": 0}, {"vertex": 1}]}]}),
-    ("isolines", {"sources": ENDS, "levels": [0.5, 9.0]}),
-    ("paths", {"source": {"polyline": [{"vertex": 0}, {"vertex": 1}]}, "targets": ENDS}),
-    ("path", {"source": ENDS[0], "target": ENDS[1]}),
-    ("path", {"source": ENDS[0], "target": {"vertex": 1}, "explain": True}),
-    ("paths", {"source": ENDS[0], "targets": [*ENDS, {"vertex": 1}]}),
-    *(
-        ("matrix", {"sources": ENDS, "targets": ENDS, "layout": layout})
-        for layout in ("dense", "sparse", "pairs")
-    ),
-    ("nearest", {"source": ENDS[0], "candidates": ENDS, "k": 2}),
-    ("locate", {"points": [[0, 0, 1]]}),
-]
-
-
-@pytest.mark.parametrize(("operation", "body"), ASKED)
-def test_answers_are_what_is_described(
-    client: TestClient, apart: str, operation: str, body: dict[str, Any]
-) -> None:
-    link = f"/v1/meshes/{apart}/{operation}"
-    path = client.get("/openapi.json").json()["paths"][f"/v1/meshes/{{mesh_id}}/{operation}"]
-    described = path["post"]["responses"]["200"]["content"]["application/json"]["schema"]
-    names = [each["$ref"].rpartition("/")[2] for each in described["anyOf"]]
-    assert names[1] == "Estimate"
-
-    for name, query in zip(names, ("", "?estimate=true"), strict=True):
-        answer = client.post(link + query, json=body).json()
-        model: type[BaseModel] = getattr(answers, name)
-        assert set(answer) <= set(model.model_fields)
-        read = model.model_validate(answer).model_dump(mode="json", exclude_unset=True)
-        assert read == answer

@@ -107,6 +107,7 @@ def test_without_limits_nothing_is_kept() -> None:
     assert not given._known
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_addresses_take_bounded_memory_and_no_thread() -> None:
     threads = threading.active_count()
     given = RateLimits(a_minute=1, at_once=1)

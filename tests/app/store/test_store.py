@@ -299,6 +299,7 @@ def test_uploads_at_the_same_time_do_not_exceed_the_bound(tmp_path: Path) -> Non
         assert files_in(tmp_path / "store" / "tmp") == set()
 
 
+@pytest.mark.service
 def test_over_http(tmp_path: Path) -> None:
     room = sum(sizes(tmp_path, 50, 72))
     store = tmp_path / "store"
@@ -332,6 +333,7 @@ def test_over_http(tmp_path: Path) -> None:
         assert total == sum(MeshStore(store).sizes().values()) <= room
 
 
+@pytest.mark.service
 def test_a_mesh_stays_while_a_query_waits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     room = sum(sizes(tmp_path, 50, 72))
     with (
@@ -451,6 +453,7 @@ def test_a_device_that_is_full() -> None:
     assert caught.value.errno == errno.ENOSPC
 
 
+@pytest.mark.service
 def test_killed_while_a_body_arrives_and_started_again(tmp_path: Path) -> None:
     first = Server(tmp_path)
     mesh_id = upload_sample(first.client, "plane", 50)
