@@ -91,6 +91,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         "max_sources": 2,
         "query_memory_bytes": 50_000_000,
         "cancel_grace_s": LONG_S,
+        "deadline_s": LONG_S,
     }
     with serving(store, **limits) as client:
         yield Site(client, store)
