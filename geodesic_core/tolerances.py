@@ -19,7 +19,7 @@ Closes the gap that rounding may leave between its windows and those that pass b
 """
 
 FLAT = 1e-14
-"""Share of an edge's length that a pseudosource is kept off the edge, at least.
+"""Share of an edge's length by which a pseudosource lies off the edge, at least.
 
 On the line itself it would send no rays into the face beyond. Directions are off by this much.
 """
@@ -28,7 +28,7 @@ SHARP = 1e-2
 """Radians of the total angle below which an inner vertex is a tip that windows wind about for long.
 
 A window whose rays meet the tip goes around it until it has turned by π: π / SHARP times here. At
-such a tip what passed an edge is kept, which ends that after a turn or two.
+such a tip crossings of edges are recorded, which ends that after a turn or two.
 """
 
 NO_AREA = 1e-8
@@ -57,6 +57,18 @@ DOUBLE_ROOT = 1e-4
 
 A root loses as many digits as its distance from the other has; at this distance it has twelve left.
 """
+
+DIVERGING = 1e-12
+"""Difference of the slopes of two rays up to which they count as parallel: rounding.
+
+Between rays that diverge by less, no merged window leaves a shadow that a path could run into.
+"""
+
+FALSE_POSITION_STEPS = 100
+"""Steps of false position after which the bisector is taken as it is; it needs less than ten."""
+
+HALF_ULP = 2.0**-53
+"""Relative rounding of one operation, at which false position ends."""
 
 GAP = 1e-12
 """Share of an edge's length up to which a gap between two windows is rounding and is closed.
@@ -150,6 +162,12 @@ LANDMARK_ERROR = 1e-3
 Exact ones would cost up to ten times as much, and bound by a thousandth better.
 """
 
+SINGLE_PRECISION = 1e-6
+"""Relative error of a number that was rounded to single precision: 6e-8, with room to spare.
+
+Distances from landmarks are stored so.
+"""
+
 SEARCH_SLACK = 1e-10
 """Relative amount by which a search between two points looks beyond its upper bound.
 
@@ -196,9 +214,9 @@ looked for. The surface of a flat polygon is the same either way.
 """
 
 SLANT = 1e-9
-"""Sine of the angle to an edge from which on the rays of a curve's piece are sent across it.
+"""Sine of the angle to an edge from which on the rays of a segment of a curve are sent across it.
 
-Of rays that are flatter, those that meet the edge leave the piece within so small a share of the
+Of rays that are flatter, those that meet the edge leave the segment within so small a share of the
 edge from its end that the rays of that end are as near: the square of this share is no number.
 """
 

@@ -225,7 +225,9 @@ def peak_bytes(wave: Wavefront) -> int:
 
 def stats_of(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
     """Return the statistics of a sweep that has finished."""
-    created, kept, peak = (int(wave.counters[i]) for i in (state.CREATED, state.KEPT, state.PEAK))
+    created, kept, peak = (
+        int(wave.counters[i]) for i in (state.CREATED, state.PROPAGATED, state.PEAK)
+    )
     return SweepStats.of(mesh, created, kept, peak, peak_bytes(wave), seconds)
 
 

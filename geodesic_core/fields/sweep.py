@@ -11,16 +11,10 @@ from geodesic_core.control import SLICE_SECONDS, Control
 from geodesic_core.errors import NotConverged
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
+from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep import continuous_dijkstra, state, surface_points
 from geodesic_core.kernels.sweep.bounds import Bounds
-from geodesic_core.kernels.sweep.propagation import (
-    MERGES_FULL,
-    POOL_FULL,
-    RETAINED_FULL,
-    RUNAWAY,
-    SCRATCH_FULL,
-)
 from geodesic_core.kernels.sweep.state import Wavefront
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import RUNS
@@ -31,6 +25,15 @@ _FIRST_LIMITED_BUDGET = 10_000
 _LIMITED_GROWTH = 1.25
 """Of the slices of a sweep whose limit shrinks: each is a quarter of all before it, so that a sweep
 does not go on for longer than that once it has found enough."""
+
+
+_GROW: dict[Outcome, Callable[[Wavefront], Wavefront]] = {
+    Outcome.POOL_FULL: state.with_larger_pool,
+    Outcome.SCRATCH_FULL: state.with_larger_scratch,
+    Outcome.RETAINED_FULL: state.with_more_retained,
+    Outcome.MERGES_FULL: state.with_more_merges,
+}
+"""How a wavefront grows where a sweep ended for want of room."""
 
 
 def sweep_nodes(
@@ -84,35 +87,27 @@ def run_sweep(
         The windows of an edge came up too often.
     """
     budget = _FIRST_BUDGET if limit_of is None else _FIRST_LIMITED_BUDGET
-    left, shown, outcome = budget, 0.0, continuous_dijkstra.RUNNING
-    while outcome != continuous_dijkstra.FINISHED:
+    left, shown, outcome = budget, 0.0, Outcome.RUNNING
+    while outcome != Outcome.FINISHED:
         shown = max(shown, share_done(wave))
         control.checkpoint(shown)
         began = time.perf_counter()
         outcome = continuous_dijkstra.advance(mesh.topology, wave, bounds, left)
         took = time.perf_counter() - began
-        if outcome == POOL_FULL:
-            grown = state.with_larger_pool
-        elif outcome == SCRATCH_FULL:
-            grown = state.with_larger_scratch
-        elif outcome == RETAINED_FULL:
-            grown = state.with_more_retained
-        elif outcome == MERGES_FULL:
-            grown = state.with_more_merges
-        elif outcome == RUNAWAY:
+        if outcome == Outcome.RUNAWAY:
             raise _not_converged(mesh, wave)
-        else:
-            if outcome == continuous_dijkstra.RUNNING and limit_of is not None:
-                limit = min(bounds.max_distance, limit_of(wave))
-                bounds = bounds._replace(max_distance=limit)
-                budget = min(int(_LIMITED_GROWTH * budget), _FIRST_BUDGET)
-            elif outcome == continuous_dijkstra.RUNNING:
-                budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
-            left = budget
+        if outcome in _GROW:
+            left -= int(wave.counters[state.WORK])  # slices do not depend on the room there was
+            wave = _GROW[outcome](wave)
+            control.check_memory(state.bytes_of(wave))
             continue
-        left -= int(wave.counters[state.WORK])  # slices do not depend on the room there was
-        wave = grown(wave)
-        control.check_memory(state.bytes_of(wave))
+        if outcome == Outcome.RUNNING and limit_of is not None:
+            limit = min(bounds.max_distance, limit_of(wave))
+            bounds = bounds._replace(max_distance=limit)
+            budget = min(int(_LIMITED_GROWTH * budget), _FIRST_BUDGET)
+        elif outcome == Outcome.RUNNING:
+            budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
+        left = budget
     return wave
 
 

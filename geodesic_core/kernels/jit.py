@@ -1,4 +1,4 @@
-"""How kernels are compiled: one decorator, one cache, raw views of arrays.
+"""Compilation of kernels: one decorator, one cache, raw pointers to arrays.
 
 With ``NUMBA_DISABLE_JIT=1`` the same sources run as plain Python, so that coverage and numpy's
 bounds checks see them.
@@ -62,7 +62,7 @@ def kernel(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Compile a kernel that is pasted into its callers: what runs per window, or has one caller.
+    """Compile a kernel that is pasted into its callers: for code per window, or of one caller.
 
     LLVM leaves functions of ten arguments as calls by itself, which costs a quarter of the sweep.
     """
@@ -174,4 +174,4 @@ as_ints: Any = _interpreted_ints if _interpreted else _compiled_ints
 """The memory of a pointer to float64 as int32, two for each; free of cost."""
 
 prefetch: Any = _interpreted_prefetch if _interpreted else _compiled_prefetch
-"""Ask for the cache line at an index of a `pointer`, to be read soon; without effect otherwise."""
+"""Prefetch the cache line at an index of a `pointer`, to be read soon; without effect otherwise."""

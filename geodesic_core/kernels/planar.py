@@ -1,4 +1,4 @@
-r"""Plane geometry of one unfolded triangle: scalars in, scalars out.
+r"""Plane geometry of one unfolded triangle, in scalars.
 
 The frame of a half-edge has its tail at the origin, its head at (length, 0) and its face on y > 0.
 The unfolded source of a window lies at (sx, sy) with sy <= 0; if its weight sw is 0, at infinity in
@@ -13,12 +13,18 @@ that direction::
 """
 
 import math
+from typing import NamedTuple
 
 from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.tolerances import DOUBLE_ROOT
+from geodesic_core.tolerances import DOUBLE_ROOT, FALSE_POSITION_STEPS, HALF_ULP
 
-_ROUNDING = 2.0**-53
-_MOST_STEPS = 100  # of false position, which takes less than ten
+
+class Source(NamedTuple):
+    """An unfolded source at (x, y); with weight 0, at infinity in that direction."""
+
+    x: float
+    y: float
+    weight: float
 
 
 @inlined
@@ -45,30 +51,23 @@ def distance(x: float, sx: float, sy: float, sw: float = 1.0) -> float:
 
 
 @kernel
-def bracketed(
-    lo: float,
-    hi: float,
-    s0x: float,
-    s0y: float,
-    s1x: float,
-    s1y: float,
-    delta: float,
-    s0w: float = 1.0,
-    s1w: float = 1.0,
-) -> float:
-    """Find what `bisector` looks for by false position (Illinois), to within rounding."""
-    lead_lo = distance(lo, s1x, s1y, s1w) + delta - distance(lo, s0x, s0y, s0w)
-    lead_hi = distance(hi, s1x, s1y, s1w) + delta - distance(hi, s0x, s0y, s0w)
+def bracketed(lo: float, hi: float, s0: Source, s1: Source, delta: float) -> float:
+    """Find the point of `bisector` by false position (Illinois), to within rounding.
+
+    ``delta`` is σ1 - σ0.
+    """
+    lead_lo = distance(lo, s1.x, s1.y, s1.weight) + delta - distance(lo, s0.x, s0.y, s0.weight)
+    lead_hi = distance(hi, s1.x, s1.y, s1.weight) + delta - distance(hi, s0.x, s0.y, s0.weight)
     if lead_lo * lead_hi >= 0.0:  # no sign change: by rounding alone, at an end
         return lo if abs(lead_lo) <= abs(lead_hi) else hi
     x, moved = lo, 0
-    for _ in range(_MOST_STEPS):
+    for _ in range(FALSE_POSITION_STEPS):
         x = lo - lead_lo * ((hi - lo) / (lead_hi - lead_lo))
         if x <= lo or x >= hi:
             break
-        r0, r1 = distance(x, s0x, s0y, s0w), distance(x, s1x, s1y, s1w)
+        r0, r1 = distance(x, s0.x, s0.y, s0.weight), distance(x, s1.x, s1.y, s1.weight)
         lead = r1 + delta - r0
-        if abs(lead) <= _ROUNDING * (abs(r0) + abs(r1)):
+        if abs(lead) <= HALF_ULP * (abs(r0) + abs(r1)):
             break
         if (lead > 0.0) == (lead_lo > 0.0):
             lo, lead_lo = x, lead
@@ -120,7 +119,7 @@ def bisector(
     c = m2 * (x0 * x0 + s0y * s0y) - u * u
     t = b + math.copysign(math.sqrt(max(b * b - a * c, 0.0)), b)
     if abs(t) <= DOUBLE_ROOT * (m2 * abs(x0) + abs(u * v)):  # both roots at lo, in the rounding
-        return bracketed(lo, hi, s0x, s0y, s1x, s1y, delta)
+        return bracketed(lo, hi, Source(s0x, s0y, 1.0), Source(s1x, s1y, 1.0), delta)
     near = c / t if t != 0.0 else 0.0
     far = t / a if a != 0.0 else 0.0
     depth_near = root_depth(near, width, delta, u, v)
@@ -128,6 +127,6 @@ def bisector(
     if max(depth_near, depth_far) <= 0.0 or abs(near - far) <= DOUBLE_ROOT * width:
         # Weights that are nearly equal: both roots are the straight bisector's, with half of its
         # digits, and the signs of r0 and r1 are rounding.
-        return bracketed(lo, hi, s0x, s0y, s1x, s1y, delta)
+        return bracketed(lo, hi, Source(s0x, s0y, 1.0), Source(s1x, s1y, 1.0), delta)
     # Where rounding lets in a second root, at an end, it is the inner one that counts.
     return lo + (near if depth_near >= depth_far else far)

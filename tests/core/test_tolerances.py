@@ -32,14 +32,16 @@ from geodesic_core.kernels.mesh.half_edges import (
 )
 from geodesic_core.kernels.paths.backtracing import Winners, is_on_path
 from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, shortened_part
-from geodesic_core.kernels.planar import bisector
+from geodesic_core.kernels.planar import Source, bisector, bracketed, distance
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
 from geodesic_core.kernels.sweep.merging import accuracy, directionality, merged
-from geodesic_core.kernels.sweep.propagation import reach_apex, trim_list
 from geodesic_core.kernels.sweep.pruning import least_to_start
+from geodesic_core.kernels.sweep.reach import reach_apex
 from geodesic_core.kernels.sweep.relaxation import precedence
 from geodesic_core.kernels.sweep.state import FIRST, FRESH, LAST, NO_SITES, SIZE, new_wavefront
+from geodesic_core.kernels.sweep.trim_list import trim_list
+from geodesic_core.kernels.sweep.trimming import leaves_gap
 from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.sweep.window_lists import put_window
 from geodesic_core.mesh.triangulation import triangulated
@@ -47,12 +49,15 @@ from geodesic_core.search.landmarks import Landmarks
 from geodesic_core.tolerances import (
     AT_LIMIT,
     BEND,
+    DIVERGING,
     DOUBLE_ROOT,
     EDGE_STEPS,
+    FALSE_POSITION_STEPS,
     FLAT,
     FOOT,
     GAP,
     GRAZING,
+    HALF_ULP,
     LANDMARK_ERROR,
     LARGEST_COORDINATE,
     LOCAL_SHARE,
@@ -69,6 +74,7 @@ from geodesic_core.tolerances import (
     SECTOR_MARGIN,
     SHARP,
     SHORTEST_EDGE,
+    SINGLE_PRECISION,
     SLACK,
     SLANT,
     SNAP,
@@ -84,7 +90,7 @@ from tests.support.certificates import check_path
 from tests.support.invariants import windows_of
 from tests.support.oracles import closed_forms
 from tests.support.searches import goal_at_vertex, spread
-from tests.support.stepping import started, steps, topology_of, view_of_arrays
+from tests.support.stepping import started, steps, topology_of, view_of_arrays, window
 
 SCALES = pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 
@@ -260,6 +266,38 @@ def test_double_root_leaves_the_bisector_its_digits(delta):
     assert abs(x - straight) <= 2 * delta + 1e-16 / DOUBLE_ROOT
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_half_ulp_and_false_position_steps_are_enough_for_any_bisector(seed):
+    """Of a parallel window, too: the lead that is left is a few roundings of the distances."""
+    x0, y0, x1, y1, angle, crossing = np.random.default_rng(seed).uniform(0.05, 1.0, 6)
+    for s0 in (Source(x0, -y0, 1.0), Source(math.cos(angle), -math.sin(angle), 0.0)):
+        s1 = Source(-x1, -y1, 1.0)
+        delta = distance(crossing, *s0) - distance(crossing, *s1)
+        ends = [distance(x, *s1) + delta - distance(x, *s0) for x in (0.0, 1.0)]
+        if ends[0] * ends[1] < 0.0:
+            x = bracketed(0.0, 1.0, s0, s1, delta)
+            r0, r1 = distance(x, *s0), distance(x, *s1)
+            assert abs(r1 + delta - r0) <= 8 * HALF_ULP * (abs(r0) + abs(r1) + abs(delta))
+
+
+def test_false_position_steps_are_more_than_bisection_would_need():
+    assert math.log2(1.0 / HALF_ULP) < FALSE_POSITION_STEPS
+
+
+@pytest.mark.parametrize(("share", "is_gap"), [(0.5, False), (2.0, True)])
+@SCALES
+def test_diverging_is_the_least_angle_between_rays_that_leave_a_gap(share, is_gap, scale):
+    left = (0.0, 0.5, 0.5 + share * DIVERGING, -1.0, 0.0, 1.0)
+    right = (0.5, 1.0, 0.5, -1.0, 0.0, 1.0)
+    both = (window(*(scale * x for x in values)) for values in (left, right))
+    assert leaves_gap(*both) == is_gap
+
+
+def test_single_precision_is_more_than_rounding_to_it():
+    numbers = np.random.default_rng(0).uniform(1.0, 2.0, 10_000)
+    assert (abs(numbers.astype(np.float32) - numbers) < 0.1 * SINGLE_PRECISION * numbers).all()
+
+
 def flat_view(scale):
     """A flat mesh: its view, its wavefront, and an inner half-edge of length ``scale``."""
     points, faces = zoo.grid(3, 3)
@@ -271,7 +309,7 @@ def flat_view(scale):
 
 
 def put_list(view, wave, h, windows, root):
-    slots = [put_window(view, *window, root, 0.0, -1) for window in windows]
+    slots = [put_window(view, window(*values, root=root)) for values in windows]
     wave.pool.lists[h, [SIZE, FIRST, LAST]] = len(slots), slots[0], slots[-1]
     for slot, after in zip(slots, [*slots[1:], -1], strict=True):
         wave.pool.windows.view(np.int32)[slot, NEXT] = after
@@ -460,8 +498,9 @@ def test_lower_bound_is_all_that_a_merged_window_rises_by(s0x, s0y, s1x, s1y, jo
     gap = math.hypot(s0x - b, s0y) - math.hypot(s1x - b, s1y)
     sigma0, sigma1 = max(-gap, 0.0), max(gap, 0.0)
     first, second = (0.0, b, s0x, s0y, sigma0), (b, 1.0, s1x, s1y, sigma1)
-    can, sx, sy, sigma, xi = merged(merging_view(0.5), *first, 0.0, *second, 0.0)
+    can, whole = merged(merging_view(0.5), window(*first), window(*second))
     assume(can)
+    sx, sy, sigma, xi = whole.sx, whole.sy, whole.sigma, whole.xi
     assert sy < 0
     assert sigma >= 0
     for b0, b1, x, y, weight in (first, second):

@@ -31,10 +31,10 @@ from geodesic_core.kernels.sweep.state import (
     FREE_SIZE,
     FRESH,
     IN_RING,
-    KEPT,
     LAST,
     MARKS,
     PREDECESSOR,
+    PROPAGATED,
     SETTLED,
     SETTLED_VERTICES,
     SIZE,
@@ -300,7 +300,7 @@ class Watch:
         self.due = int(ring[0]) if len(ring) else -1
         if self.due >= 0:
             self.before = windows_of(wave, [self.due])
-        self.kept = wave.counters[KEPT]
+        self.kept = wave.counters[PROPAGATED]
         windows = windows_of(wave)
         places = self.exact.shares * self.topology.geometry[windows.half_edge, LENGTH][:, None]
         np.minimum.at(self.seen, windows.half_edge, windows.least(places))
@@ -308,7 +308,7 @@ class Watch:
     def step(self, wave) -> None:
         """Check what a step has done; it was a list where one was due, else a vertex."""
         if self.due >= 0:
-            count = int(wave.counters[KEPT] - self.kept)
+            count = int(wave.counters[PROPAGATED] - self.kept)
             check_survivors(self.topology, wave, self.due, self.before, count, self.limit)
         self._look(wave)
 

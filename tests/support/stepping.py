@@ -7,9 +7,9 @@ import numpy as np
 
 import geodesic_core as gc
 from geodesic_core.kernels.mesh.half_edges import Topology
+from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.sweep import continuous_dijkstra
 from geodesic_core.kernels.sweep.bounds import exact_bounds
-from geodesic_core.kernels.sweep.propagation import POOL_FULL, SCRATCH_FULL
 from geodesic_core.kernels.sweep.state import (
     View,
     Wavefront,
@@ -18,6 +18,7 @@ from geodesic_core.kernels.sweep.state import (
     with_larger_pool,
     with_larger_scratch,
 )
+from geodesic_core.kernels.sweep.window import Window
 from tests.support import zoo
 
 WHOLE = 1 << 60
@@ -38,17 +39,17 @@ def started(topology, sources, starts=None, limit=math.inf) -> Wavefront:
     return wave
 
 
-def steps(topology, wave, limit=math.inf, budget=1) -> Iterator[tuple[int, Wavefront]]:
+def steps(topology, wave, limit=math.inf, budget=1) -> Iterator[tuple[Outcome, Wavefront]]:
     """Run to the end; after each slice the outcome and the wavefront, which growing replaces.
 
     With a budget of 1 a slice is one list or one vertex.
     """
-    outcome = continuous_dijkstra.RUNNING
-    while outcome != continuous_dijkstra.FINISHED:
+    outcome = Outcome.RUNNING
+    while outcome != Outcome.FINISHED:
         outcome = continuous_dijkstra.advance(topology, wave, exact_bounds(limit), budget)
-        if outcome == POOL_FULL:
+        if outcome == Outcome.POOL_FULL:
             wave = with_larger_pool(wave)
-        elif outcome == SCRATCH_FULL:
+        elif outcome == Outcome.SCRATCH_FULL:
             wave = with_larger_scratch(wave)
         yield outcome, wave
 
@@ -63,6 +64,11 @@ def view_of_arrays(topology, wave, bounds=exact_bounds(math.inf)) -> View:  # no
     """The View that kernels see, of flat arrays in place of pointers: so that tests can hold it."""
     sizes = getattr(sizes_of, "py_func", sizes_of)(topology, wave, bounds)
     return _flat(View(mesh=topology, **wave._asdict(), bounds=bounds, sizes=sizes))
+
+
+def window(b0, b1, sx, sy, sigma, xi=0.0, root=0) -> Window:
+    """A window whose rays are not parallel."""
+    return Window(b0, b1, sx, sy, sigma, 1.0, root, xi, -1 - root)
 
 
 def with_pool(wave: Wavefront, **arrays) -> Wavefront:

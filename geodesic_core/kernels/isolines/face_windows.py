@@ -19,7 +19,7 @@ from geodesic_core.kernels.sweep.relaxation import precedence
 from geodesic_core.kernels.sweep.segments import distance_to_segment, is_segment
 from geodesic_core.kernels.sweep.state import FACE, NODE, RETAINED_ROWS, Wavefront
 from geodesic_core.kernels.sweep.surface_points import way_through
-from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY, WIDTH
+from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY, WIDTH, Window
 from geodesic_core.tolerances import GAP
 
 
@@ -95,7 +95,8 @@ def reach_point(
         for i in range(kept.first[h], kept.first[h + 1]):
             w = kept.windows[i]
             sw = 0.0 if is_segment(winners.piece_ints, ints[i, ROOT]) else 1.0
-            there = way_through(x, y, w[B0], w[B1], w[SX], w[SY], sw, w[SIGMA], gap)
+            window = Window(w[B0], w[B1], w[SX], w[SY], w[SIGMA], sw, ints[i, ROOT], 0.0, -1)
+            there = way_through(window, x, y, gap)
             source = nearest[ints[i, ROOT]]
             if precedence(there, source, best, best_source):
                 best, best_source, via, root = min(best, there), source, h, ints[i, ROOT]

@@ -33,7 +33,8 @@ from geodesic_core.kernels.mesh.half_edges import (
     half_edge_in_face,
     next_around,
 )
-from geodesic_core.kernels.sweep.window import B0, B1, ROOT, SIGMA, SX, SY, distance_at
+from geodesic_core.kernels.planar import distance
+from geodesic_core.kernels.sweep.window import B0, B1, ROOT, SIGMA, SX, SY
 from geodesic_core.tolerances import CROSSING, LEVEL, PIECE
 
 
@@ -114,7 +115,7 @@ def bound_faces(
                     x, sw = w[B1] if w[SX] > 0.0 else w[B0], 0.0
                 else:
                     x, sw = min(max(w[SX], w[B0]), w[B1]), 1.0
-                least[face] = min(least[face], distance_at(x, w[SX], w[SY], w[SIGMA], sw))
+                least[face] = min(least[face], distance(x, w[SX], w[SY], sw) + w[SIGMA])
             corner = field.distance[topology.links[h, TAIL]]
             farthest = max(geometry[h, LENGTH], geometry[h, LENGTH_LEFT])
             least[face], most[face] = min(least[face], corner), min(most[face], corner + farthest)

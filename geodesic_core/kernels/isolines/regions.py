@@ -25,7 +25,7 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL, half_edge_in_face, point_in_frame
 from geodesic_core.kernels.sweep.state import FACE, NODE, SEGMENT_END
-from geodesic_core.kernels.sweep.window import B0, B1, ROOT, SIGMA, SX, SY, reaches
+from geodesic_core.kernels.sweep.window import B0, B1, ROOT, SIGMA, SX, SY, Window, reaches
 from geodesic_core.tolerances import GAP, LEVEL
 
 # Columns of a front, with which a region begins
@@ -123,7 +123,8 @@ def regions_of_face(topology: Any, field: Any, face: int, level: float) -> Float
             w = kept.windows[i]
             sx, sy, sigma = w[SX], w[SY], w[SIGMA]
             sw = 0.0 if ints[i, ROOT] >= field.first_piece else 1.0
-            if not reaches(w[B0], w[B1], sx, sy, sigma, reach, sw):
+            window = Window(w[B0], w[B1], sx, sy, sigma, sw, ints[i, ROOT], 0.0, -1)
+            if not reaches(window, reach):
                 continue
             region = regions[count]
             count += 1

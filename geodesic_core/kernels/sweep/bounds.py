@@ -1,11 +1,12 @@
-"""The bounds of a sweep: how far it looks, what merging may cost, where a path may pass (5)."""
+"""The bounds of a sweep: its limit, the errors granted to merging, and pruning (section 5)."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from geodesic_core.arrays import Floats, Singles
+from geodesic_core.kernels.jit import inlined
 
 LANDMARKS = 16  # of a mesh, at most: a cache line of distances per vertex
 
@@ -91,3 +92,17 @@ def merging_bounds(
 def with_parallel_windows(bounds: Bounds, first_segment: int) -> Bounds:
     """Return the bounds of the same sweep from curves whose segments are the nodes from there."""
     return bounds._replace(parallel=(1,), first_segment=first_segment)
+
+
+@inlined
+def merging(wave: Any) -> bool:
+    """Whether the sweep merges windows; known when it is compiled."""
+    return len(wave.bounds.merging) > 0
+
+
+@inlined
+def source_weight(wave: Any, root: int) -> float:
+    """SW of a window with this root: 0 for a parallel one, which comes from a segment, else 1."""
+    if len(wave.bounds.parallel) > 0 and root >= wave.bounds.first_segment:
+        return 0.0
+    return 1.0

@@ -20,7 +20,9 @@ from geodesic_core.kernels.mesh.half_edges import (
     following,
     previous,
 )
-from geodesic_core.kernels.sweep.propagation import POOL_FULL, PROPAGATED, propagate_list
+from geodesic_core.kernels.outcome import Outcome
+from geodesic_core.kernels.sweep.bounds import merging
+from geodesic_core.kernels.sweep.propagation import propagate_list
 from geodesic_core.kernels.sweep.pruning import touch
 from geodesic_core.kernels.sweep.pseudosources import emit_pseudosource, is_pseudosource
 from geodesic_core.kernels.sweep.queues import (
@@ -48,15 +50,12 @@ from geodesic_core.kernels.sweep.state import (
     SIZE,
     WINNER,
     WORK,
-    merging,
     view_of,
 )
 from geodesic_core.kernels.sweep.surface_points import emit_site
 from geodesic_core.kernels.sweep.window_lists import faces_beyond, free_windows, queue_list
 
-# Outcomes of a slice; those of `propagate` are the others
-FINISHED = 3
-RUNNING = 4
+WORK_OF_VERTEX = 30  # units, as in `propagation`
 
 
 @kernel
@@ -64,21 +63,22 @@ def start_sweep(
     topology: Any,
     wavefront: Any,
     sources: Ints,
-    origins: Ints,
+    source_indices: Ints,
     start_distances: Floats,
     bounds: Any,
 ) -> None:
-    """Reach the nodes of the sources; sites and pieces among them emit their windows.
+    """Reach the nodes of the sources; sites and segments among them emit their windows.
 
-    ``origins`` are the sources that the nodes belong to, of which each has a start distance.
+    ``source_indices`` (N,) are the sources that the nodes ``sources`` (N,) belong to, of which each
+    has a start distance, mesh units. Modifies the wavefront.
     """
     wave = view_of(topology, wavefront, bounds)
     vertices, sites = wave.vertices, wave.sites
     for i in range(len(sources)):
-        v, start = sources[i], start_distances[origins[i]]
+        v, start = sources[i], start_distances[source_indices[i]]
         if start >= vertices.distance[v]:
             continue
-        vertices.source_index[v] = origins[i]
+        vertices.source_index[v] = source_indices[i]
         if v < wave.sizes.vertices:
             if merging(wave):
                 bound_vertex(wave, v, start)
@@ -98,8 +98,12 @@ def start_sweep(
 
 
 @kernel
-def advance(topology: Any, wavefront: Any, bounds: Any, budget: int) -> int:
-    """Run the sweep for a slice of about ``budget`` units of 10 ns; return its outcome.
+def advance(topology: Any, wavefront: Any, bounds: Any, budget: int) -> Outcome:
+    """Run the sweep for a slice of about ``budget`` units of 10 ns; return its outcome (3.4).
+
+    Lists in the ring come first; then, again and again, the nearest vertex is settled and the ring
+    drained. A slice that ends for want of room has changed nothing since its last whole step.
+    Modifies the wavefront.
 
     Windows wholly beyond ``max_distance`` are dropped. Vertices beyond it are reached and settled
     all the same, for a list waits for an end of its edge, and windows between two far ends may be
@@ -108,31 +112,34 @@ def advance(topology: Any, wavefront: Any, bounds: Any, budget: int) -> int:
     wave = view_of(topology, wavefront, bounds)
     wave.counters[WORK] = 0
     outcome = drain(wave, budget)
-    while outcome == FINISHED and wave.counters[HEAP_SIZE] > 0:
+    while outcome == Outcome.FINISHED and wave.counters[HEAP_SIZE] > 0:
         if wave.counters[WORK] >= budget:
-            return RUNNING
+            return Outcome.RUNNING
         outcome = settle_nearest(wave)
-        if outcome == FINISHED:
+        if outcome == Outcome.FINISHED:
             outcome = drain(wave, budget)
     return outcome
 
 
 @kernel
-def settle_nearest(wave: Any) -> int:
-    """Take the nearest vertex: emit its windows, wake the lists around it."""
+def settle_nearest(wave: Any) -> Outcome:
+    """Settle the nearest vertex: emit its windows, queue the lists around it.
+
+    Modifies the vertex, its neighbours and their lists.
+    """
     mesh, queues, vertices = wave.mesh, wave.queues, wave.vertices
     v = queues.heap[0]
     emits = is_pseudosource(wave, v)
     first, last = mesh.first_corner[v], mesh.first_corner[v + 1]
     if emits and room_to_emit(wave, v) > free_windows(wave):
-        return POOL_FULL
+        return Outcome.POOL_FULL
     pop_nearest(wave)
     if wave.counters[HEAP_SIZE] > 0:
-        ask_ahead(wave, queues.heap[0])
+        prefetch_around(wave, queues.heap[0])
     if vertices.status[v] != SETTLED:
         vertices.status[v] = SETTLED
         wave.counters[SETTLED_VERTICES] += 1
-    wave.counters[WORK] += 30
+    wave.counters[WORK] += WORK_OF_VERTEX
     if emits:
         emit_pseudosource(wave, v)
     for c in range(first, last):
@@ -151,12 +158,12 @@ def settle_nearest(wave: Any) -> int:
                 queue_list(wave, across)
         elif across == IRREGULAR:
             queue_lists_beyond(wave, following(h))
-    return FINISHED
+    return Outcome.FINISHED
 
 
 @kernel
 def room_to_emit(wave: Any, v: int) -> int:
-    """How many windows v may emit, at most."""
+    """Return how many windows v may emit, at most."""
     mesh = wave.mesh
     first, last = mesh.first_corner[v], mesh.first_corner[v + 1]
     room = 6 * (last - first)
@@ -170,7 +177,7 @@ def room_to_emit(wave: Any, v: int) -> int:
 
 @kernel
 def queue_lists_beyond(wave: Any, g: int) -> None:
-    """Queue the lists beyond the irregular edge of g whose far vertex is in front, or done."""
+    """Queue the lists beyond the irregular edge of g whose far vertex is in front, or settled."""
     mesh = wave.mesh
     h = mesh.links[ROW * g + AROUND] >> 1
     while h != g:
@@ -180,8 +187,8 @@ def queue_lists_beyond(wave: Any, g: int) -> None:
 
 
 @inlined
-def ask_ahead(wave: Any, v: int) -> None:
-    """Ask for the rows around the vertex that will probably be next: 3 to 6 % of a sweep."""
+def prefetch_around(wave: Any, v: int) -> None:
+    """Prefetch the rows around the vertex that will probably be next: saves 3 to 6 % of a sweep."""
     mesh = wave.mesh
     for c in range(mesh.first_corner[v], mesh.first_corner[v + 1]):
         h = mesh.corners[c]
@@ -192,7 +199,7 @@ def ask_ahead(wave: Any, v: int) -> None:
 
 @kernel
 def mark_front(wave: Any, v: int) -> None:
-    """Mark a neighbour of a vertex that is done."""
+    """Mark v as a neighbour of a settled vertex. Modifies its status."""
     vertices = wave.vertices
     if vertices.status[v] == FAR:
         if vertices.distance[v] == math.inf:
@@ -201,25 +208,26 @@ def mark_front(wave: Any, v: int) -> None:
 
 
 @kernel
-def drain(wave: Any, budget: int) -> int:
-    """Propagate the lists in the ring, and what they wake, until it is empty."""
+def drain(wave: Any, budget: int) -> Outcome:
+    """Propagate the lists in the ring, and those that they queue, until it is empty."""
     while wave.counters[RING_SIZE] > 0:
         if wave.counters[WORK] >= budget:
-            return RUNNING
+            return Outcome.RUNNING
         h = wave.queues.ring[wave.counters[RING_HEAD]]
         outcome = propagate_list(wave, h)
-        if outcome != PROPAGATED:
+        if outcome != Outcome.FINISHED:
             return outcome
         ring_pop(wave)
         wave.pool.lists[LIST * h + MARKS] &= ~IN_RING
-    return FINISHED
+    return Outcome.FINISHED
 
 
 @kernel
-def nearest_sources(distance: Floats, winner_ints: Ints, origin: Ints) -> Ints:
-    """Return for each vertex at a finite distance the index of its pseudosource's source.
+def nearest_sources(distance: Floats, winner_ints: Ints, source_index: Ints) -> Ints:
+    """Return for each node at a finite distance the index of its source; for others -1.
 
-    Asked at the end: a pseudosource may have changed its own source after it emitted.
+    Follow pseudosources to the source at the end of the sweep, since one may have changed its own
+    source after it emitted. O(N).
     """
     result = np.full(len(distance), -1, np.int32)
     for start in range(len(distance)):
@@ -228,7 +236,7 @@ def nearest_sources(distance: Floats, winner_ints: Ints, origin: Ints) -> Ints:
         v = start
         while result[v] < 0 and winner_ints[v, ENTRY_EDGE] >= 0:
             v = winner_ints[v, PREDECESSOR]
-        found = result[v] if result[v] >= 0 else origin[v]
+        found = result[v] if result[v] >= 0 else source_index[v]
         v = start
         while result[v] < 0:
             result[v] = found

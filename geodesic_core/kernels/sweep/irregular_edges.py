@@ -1,164 +1,115 @@
-"""What went over an irregular edge, which a window that comes there later must be nearer than.
+"""The crossing history of irregular edges, against which windows that come later are trimmed.
 
 Elsewhere the windows of a list are forgotten once they are propagated: one that comes too late to
 be trimmed against them goes on in vain until a filter finds it. Over an irregular edge it would go
 into several faces and from each of them back again: windows that wind about a sharp tip, from sheet
-to sheet, would double at every edge. So here what passes is kept, whichever face it came from, and
-a newcomer passes only where it is nearer than all of it and than the paths along the edge.
+to sheet, would double at every edge. So here each window that crosses is recorded, from whichever
+face it came. A later one crosses only where it is nearer than all of them and than the paths along
+the edge.
 
-Elsewhere no shortest path goes with it, into any face. Let p, which passed before, be as near at x.
-Into the faces beyond, p goes as well; into the face that it came from leads a straighter way than
-over x; and what bends at an end of the edge that end emits, for it emits all around.
+Elsewhere no shortest path goes with it, into any face. Let p, an earlier one, be as near at x. Into
+the faces beyond, p goes as well; into the face that it came from leads a straighter way than over
+x; and what bends at an end of the edge that end emits, for it emits all around.
 
-What passed is kept in the frame that runs from the lower vertex of the edge to the higher.
+A recorded window is in the frame that runs from the lower vertex of the edge to the higher.
 """
 
 from typing import Any
 
 from geodesic_core.kernels.jit import as_ints, kernel
 from geodesic_core.kernels.mesh.half_edges import AROUND, HEAD, LENGTH, ROW, TAIL
-from geodesic_core.kernels.sweep.state import merging, source_weight
+from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.trimming import trim, wins_throughout, without
 from geodesic_core.kernels.sweep.window import (
-    B0,
-    B1,
     INTS,
     NEXT,
-    ROOT,
-    SIGMA,
-    SX,
-    SY,
-    WIDTH,
-    XI,
+    Window,
+    at_sigma,
+    between,
     distance_at,
+    emitted_window,
+    load_window,
+    reversed_window,
+    store_window,
 )
 from geodesic_core.tolerances import GAP, SLACK
 
 
 @kernel
-def trim_against_crossings(wave: Any, g: int, slot: int) -> bool:
+def trim_against_crossings(wave: Any, g: int, window: Window) -> tuple[bool, Window]:
     """Trim a window that is to go over the irregular edge of g to where it is nearest so far.
 
-    Return whether anything is left. O(windows that passed), mostly.
+    Return whether anything is left, and it. O(windows in the crossing history), mostly.
     """
-    mesh, pool, vertices = wave.mesh, wave.pool, wave.vertices
-    w, length = WIDTH * slot, mesh.geometry[ROW * g + LENGTH]
+    mesh, vertices, pool = wave.mesh, wave.vertices, wave.pool
+    length = mesh.geometry[ROW * g + LENGTH]
     tail, head = mesh.links[ROW * g + TAIL], mesh.links[ROW * g + HEAD]
-    name, flip = lowest_half_edge(wave, g), tail < head
     from_tail, from_head = vertices.distance[tail], vertices.distance[head]
-    if merging(wave):  # only what is surely too long may go
+    if merging(wave):  # drop only windows that are surely too long
         from_tail, from_head = vertices.upper[tail], vertices.upper[head]
-    before = 2.0 * length
-    b0, b1 = pool.windows[w + B0], pool.windows[w + B1]
-    while b1 > b0 and b1 - b0 < before - GAP * length:  # what one cannot end, another may
-        before = b1 - b0
-        cut_by(wave, slot, 0.0, length, 0.0, 0.0, from_head, head)
-        cut_by(wave, slot, 0.0, length, length, 0.0, from_tail, tail)
+    at_head = emitted_window(wave, 0.0, length, 0.0, 0.0, from_head, head, 0.0)
+    at_tail = emitted_window(wave, 0.0, length, length, 0.0, from_tail, tail, 0.0)
+    name = lowest_half_edge(wave, g)
+    width, before = window.b1 - window.b0, 2.0 * length
+    while width > 0.0 and width < before - GAP * length:  # an end that one cannot cut, another may
+        before = width
+        window = cut_by(wave, cut_by(wave, window, at_head), at_tail)
         other = pool.crossings[name]
         while other >= 0:
-            p = WIDTH * other
-            p0, p1, px = (
-                pool.windows[p + B0],
-                pool.windows[p + B1],
-                pool.windows[p + SX],
-            )
-            py, sigma = pool.windows[p + SY], pool.windows[p + SIGMA]
-            root = as_ints(pool.windows)[INTS * other + ROOT]
-            if flip:
-                p0, p1 = length - p1, length - p0
-                px, sigma = mirrored(px, source_weight(wave, root), sigma, length)
+            earlier = load_window(wave, pool.windows, other)
+            if tail < head:
+                earlier = reversed_window(earlier, length)
             if merging(wave):
-                sigma += pool.windows[p + XI]
-            cut_by(wave, slot, p0, p1, px, py, sigma, root)
+                earlier = at_sigma(earlier, earlier.sigma + earlier.xi)
+            window = cut_by(wave, window, earlier)
             other = as_ints(pool.windows)[INTS * other + NEXT]
-        c0, c1 = pool.windows[w + B0], pool.windows[w + B1]
-        if c1 - c0 < b1 - b0 and c1 - c0 <= GAP * length:
-            return False
-        b0, b1 = c0, c1
-    return True
+        width = window.b1 - window.b0
+        if width < before and width <= GAP * length:
+            return False, window
+    return True, window
 
 
 @kernel
-def record_crossing(wave: Any, g: int, slot: int) -> None:
-    """Keep a window that went over the irregular edge of g."""
+def record_crossing(wave: Any, g: int, slot: int, window: Window) -> None:
+    """Put a window, which takes the slot, in the crossing history of the irregular edge of g."""
     mesh, pool = wave.mesh, wave.pool
     name = lowest_half_edge(wave, g)
     if mesh.links[ROW * g + TAIL] < mesh.links[ROW * g + HEAD]:
-        mirror(wave, slot, mesh.geometry[ROW * g + LENGTH])
+        window = reversed_window(window, mesh.geometry[ROW * g + LENGTH])
+    store_window(wave, pool.windows, slot, window)
     as_ints(pool.windows)[INTS * slot + NEXT] = pool.crossings[name]
     pool.crossings[name] = slot
 
 
 @kernel
-def mirror(wave: Any, slot: int, length: float) -> None:
-    """Turn a window into the frame that runs along its edge the other way."""
-    pool = wave.pool
-    w = WIDTH * slot
-    b0, b1 = pool.windows[w + B0], pool.windows[w + B1]
-    pool.windows[w + B0], pool.windows[w + B1] = length - b1, length - b0
-    sw = source_weight(wave, as_ints(pool.windows)[INTS * slot + ROOT])
-    sx, sigma = mirrored(pool.windows[w + SX], sw, pool.windows[w + SIGMA], length)
-    pool.windows[w + SX], pool.windows[w + SIGMA] = sx, sigma
+def cut_by(wave: Any, window: Window, earlier: Window) -> Window:
+    """Return the part of a window that wins against an earlier one: ties as between sources."""
+    source_index = wave.vertices.source_index
+    slack = -SLACK if source_index[window.root] < source_index[earlier.root] else SLACK
+    lo, hi = max(earlier.b0, window.b0), min(earlier.b1, window.b1)
+    if lo < hi and is_no_nearer(lo, hi, window, earlier, slack):
+        b0, b1 = without(window.b0, window.b1, lo, hi)
+        return between(window, b0, b1)
+    lead = slack * distance_at(window, window.b0)
+    return trim(at_sigma(earlier, earlier.sigma - lead), window, 0.0, 0.0)[1]
 
 
 @kernel
-def mirrored(sx: float, sw: float, sigma: float, length: float) -> tuple[float, float]:
-    """Return sx and σ of a pseudosource in the frame that runs along the edge the other way."""
-    return length * sw - sx, sigma if sw == 1.0 else sigma - sx * length
-
-
-@kernel
-def cut_by(
-    wave: Any, slot: int, p0: float, p1: float, px: float, py: float, p_sigma: float, root: int
-) -> None:
-    """Leave of a window what it wins against p, which came before: ties as between sources."""
-    pool, vertices = wave.pool, wave.vertices
-    w = WIDTH * slot
-    b0, b1 = pool.windows[w + B0], pool.windows[w + B1]
-    sx, sy, sigma = (
-        pool.windows[w + SX],
-        pool.windows[w + SY],
-        pool.windows[w + SIGMA],
-    )
-    own_root = as_ints(pool.windows)[INTS * slot + ROOT]
-    pw, sw = source_weight(wave, root), source_weight(wave, own_root)
-    slack = -SLACK if vertices.source_index[own_root] < vertices.source_index[root] else SLACK
-    lo, hi = max(p0, b0), min(p1, b1)
-    if lo < hi and is_no_nearer(lo, hi, sx, sy, sigma, sw, px, py, p_sigma, pw, slack):
-        b0, b1 = without(b0, b1, lo, hi)
-    else:
-        p_sigma -= slack * distance_at(b0, sx, sy, sigma, sw)
-        p0, p1, b0, b1 = trim(p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, 0.0, 0.0, pw, sw)
-    pool.windows[w + B0], pool.windows[w + B1] = b0, b1
-
-
-@kernel
-def is_no_nearer(
-    lo: float,
-    hi: float,
-    sx: float,
-    sy: float,
-    sigma: float,
-    sw: float,
-    px: float,
-    py: float,
-    p_sigma: float,
-    pw: float,
-    slack: float,
-) -> bool:
-    """Whether a window is nowhere in [lo, hi] nearer than p, by a share of its own distance there.
+def is_no_nearer(lo: float, hi: float, window: Window, earlier: Window, slack: float) -> bool:
+    """Whether a window is nowhere in [lo, hi] nearer than another, by a share of its own distance.
 
     By what rounding adds from turn to turn, a window that lies along the edge seems nearer at its
     far end than before; seen from the near end, where the source may be, that is not little.
     """
-    x = 0.5 * (lo + hi)
-    if pw * sw == 1.0 and py != sy:  # where the lead is stationary: see `wins_throughout`
-        x = min(max((px * sy - sx * py) / (sy - py), lo), hi)
+    x, straight = 0.5 * (lo + hi), earlier.weight * window.weight == 1.0
+    if straight and earlier.sy != window.sy:  # where the lead is stationary: `wins_throughout`
+        x = (earlier.sx * window.sy - window.sx * earlier.sy) / (window.sy - earlier.sy)
+        x = min(max(x, lo), hi)
     for place in (lo, x, hi):
-        own = distance_at(place, sx, sy, sigma, sw)
-        if distance_at(place, px, py, p_sigma, pw) > own + slack * own:
+        own = distance_at(window, place)
+        if distance_at(earlier, place) > own + slack * own:
             return False
-    return pw * sw == 1.0 or wins_throughout(lo, hi, px, py, p_sigma, sx, sy, sigma, pw, sw)
+    return straight or wins_throughout(lo, hi, earlier, window)
 
 
 @kernel

@@ -17,8 +17,8 @@ is chosen there.
 import math
 from typing import Any
 
-from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.sweep.window import distance_at
+from geodesic_core.kernels.jit import inlined
+from geodesic_core.kernels.sweep.window import Window, distance_at
 from geodesic_core.tolerances import GRAZING, LOCAL_SHARE, LOWER_BOUND
 
 
@@ -57,18 +57,16 @@ def continuity(width: float, r0: float, r1: float) -> float:
 
 
 @inlined
-def shortfall(
-    lo: float, hi: float, nx: float, ny: float, n_sigma: float, sx: float, sy: float, sigma: float
-) -> float:
-    """D - D' where it is stationary in (lo, hi), for a window (s, σ) and the merged one (n, σ').
+def shortfall(window: Window, whole: Window) -> float:
+    """D - D' where it is stationary within a window, for the merged one (s', σ'); else 0.
 
-    There is one such point: where s, s' and the point are collinear. Without it, 0.
+    There is at most one such point: where s, s' and the point are collinear.
     """
-    if sy == ny:
+    if window.sy == whole.sy:
         return 0.0
-    x = (nx * sy - sx * ny) / (sy - ny)
-    if lo < x < hi:
-        return distance_at(x, sx, sy, sigma) - distance_at(x, nx, ny, n_sigma)
+    x = (whole.sx * window.sy - window.sx * whole.sy) / (window.sy - whole.sy)
+    if window.b0 < x < window.b1:
+        return distance_at(window, x) - distance_at(whole, x)
     return 0.0
 
 
@@ -82,61 +80,72 @@ def accuracy(wave: Any, xi: float, local: float, nearest: float) -> bool:
     return xi <= allowed and local <= LOCAL_SHARE * allowed
 
 
-@kernel
-def merged(
-    wave: Any,
-    b0: float,
-    b1: float,
-    s0x: float,
-    s0y: float,
-    sigma0: float,
-    xi0: float,
-    c0: float,
-    c1: float,
-    s1x: float,
-    s1y: float,
-    sigma1: float,
-    xi1: float,
-) -> tuple[bool, float, float, float, float]:
-    """Merge the windows [b0, b1] and [c0, c1]; return (whether it can be, s'x, s'y, σ', ξ')."""
-    refused = (False, 0.0, 0.0, 0.0, 0.0)
-    r0 = math.sqrt((s0x - b0) * (s0x - b0) + s0y * s0y)
-    r1 = math.sqrt((s1x - c1) * (s1x - c1) + s1y * s1y)
-    width, d0, d1 = c1 - b0, r0 + sigma0, r1 + sigma1
-    if not accuracy(wave, max(xi0, xi1), 0.0, min(d0, d1)):
-        return refused
-    # Half of all pairs fail here already, before the conic costs anything.
-    meets = min(distance_at(b1, s0x, s0y, sigma0), distance_at(c0, s1x, s1y, sigma1))
-    chord = d0 + (d1 - d0) * (b1 - b0) / width  # nowhere below the merged window
-    if not accuracy(wave, meets - chord, meets - chord, min(d0, d1)):
-        return refused
+@inlined
+def pseudosource_between(w0: Window, w1: Window) -> tuple[bool, float, float, float]:
+    """Find s' and σ' with which w0 and w1 can be one: continuity, visibility, directionality (4.2).
+
+    Return whether there is one, s'x, s'y and σ'.
+    """
+    b0, c1 = w0.b0, w1.b1
+    r0 = math.sqrt((w0.sx - b0) * (w0.sx - b0) + w0.sy * w0.sy)
+    r1 = math.sqrt((w1.sx - c1) * (w1.sx - c1) + w1.sy * w1.sy)
+    width, d0, d1 = c1 - b0, r0 + w0.sigma, r1 + w1.sigma
     difference = d0 - d1
     spare = (width - difference) * (width + difference)
     if spare <= 0.0 or r0 <= 0.0 or r1 <= 0.0:
-        return refused
-    reach0 = visibility((s0x - b0) / r0, width, difference, spare)
-    reach1 = visibility((c1 - s1x) / r1, width, -difference, spare)
+        return False, 0.0, 0.0, 0.0
+    reach0 = visibility((w0.sx - b0) / r0, width, difference, spare)
+    reach1 = visibility((c1 - w1.sx) / r1, width, -difference, spare)
     sigma = least_sigma(d0, d1, reach0, reach1)
     r0, r1 = d0 - sigma, d1 - sigma
     if r0 <= 0.0 or r1 <= 0.0:
-        return refused
+        return False, 0.0, 0.0, 0.0
     along = continuity(width, r0, r1)
     height = directionality(along, r0)
     if height < 0.0:
-        return refused
-    sx, sy = b0 + along, -math.sqrt(height)
+        return False, 0.0, 0.0, 0.0
+    return True, b0 + along, -math.sqrt(height), sigma
+
+
+@inlined
+def may_merge(wave: Any, w0: Window, w1: Window, nearest: float) -> bool:
+    """Whether two windows may be accurate enough as one, for ``nearest`` as in `accuracy`.
+
+    Half of all pairs fail here already, before the conic costs anything.
+    """
+    if not accuracy(wave, max(w0.xi, w1.xi), 0.0, nearest):
+        return False
+    d0, d1 = distance_at(w0, w0.b0), distance_at(w1, w1.b1)
+    meets = min(distance_at(w0, w0.b1), distance_at(w1, w1.b0))
+    chord = d0 + (d1 - d0) * (w0.b1 - w0.b0) / (w1.b1 - w0.b0)  # nowhere below the merged window
+    return accuracy(wave, meets - chord, meets - chord, nearest)
+
+
+@inlined
+def merged(wave: Any, w0: Window, w1: Window) -> tuple[bool, Window]:
+    """Merge w0 and w1, which meet or overlap; return whether they can be, and the merged window.
+
+    Its root and reference are those of w0.
+    """
+    ends = min(distance_at(w0, w0.b0), distance_at(w1, w1.b1))
+    if not may_merge(wave, w0, w1, ends):
+        return False, w0
+    exists, sx, sy, sigma = pseudosource_between(w0, w1)
+    if not exists:
+        return False, w0
+    whole = Window(w0.b0, w1.b1, sx, sy, sigma, 1.0, w0.root, 0.0, w0.reference)
     # The distances at the ends are kept; where the windows meet, and at the stationary points,
     # they are not.
-    meets0 = distance_at(b1, s0x, s0y, sigma0) - distance_at(b1, sx, sy, sigma)
-    meets1 = distance_at(c0, s1x, s1y, sigma1) - distance_at(c0, sx, sy, sigma)
-    if min(meets0, meets1) < -LOWER_BOUND * min(d0, d1):
-        return refused
-    nearest = distance_at(min(max(sx, b0), c1), sx, sy, sigma)
-    if not accuracy(wave, max(xi0 + meets0, xi1 + meets1), max(meets0, meets1), nearest):
-        return refused
-    most0 = max(meets0, shortfall(b0, b1, sx, sy, sigma, s0x, s0y, sigma0))
-    most1 = max(meets1, shortfall(c0, c1, sx, sy, sigma, s1x, s1y, sigma1))
-    xi = max(xi0 + most0, xi1 + most1)
+    meets0 = distance_at(w0, w0.b1) - distance_at(whole, w0.b1)
+    meets1 = distance_at(w1, w1.b0) - distance_at(whole, w1.b0)
+    if min(meets0, meets1) < -LOWER_BOUND * ends:
+        return False, w0
+    nearest = distance_at(whole, min(max(sx, w0.b0), w1.b1))
+    if not accuracy(wave, max(w0.xi + meets0, w1.xi + meets1), max(meets0, meets1), nearest):
+        return False, w0
+    most0 = max(meets0, shortfall(w0, whole))
+    most1 = max(meets1, shortfall(w1, whole))
+    xi = max(w0.xi + most0, w1.xi + most1)
     if not accuracy(wave, xi, max(most0, most1), nearest):
-        return refused
-    return True, sx, sy, sigma, xi
+        return False, w0
+    return True, Window(w0.b0, w1.b1, sx, sy, sigma, 1.0, w0.root, xi, w0.reference)

@@ -1,8 +1,8 @@
-"""Push the windows of one half-edge across its face (section 3.2), merged where that is asked."""
+"""The windows of one half-edge propagated across its face (section 3.2)."""
 
 from typing import Any
 
-from geodesic_core.kernels.jit import as_ints, kernel, prefetch
+from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
@@ -12,48 +12,100 @@ from geodesic_core.kernels.mesh.half_edges import (
     ROW,
     SIN_LEFT,
 )
+from geodesic_core.kernels.outcome import Outcome
+from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.reach import reach_apex
 from geodesic_core.kernels.sweep.spread import room_to_spread, spread
 from geodesic_core.kernels.sweep.state import (
     FREE_SIZE,
     FRESH,
-    KEPT,
     LIST,
     MARKS,
     MERGES,
     PEAK,
+    PROPAGATED,
     RETAINED,
     RETAINED_ROWS,
     SITE_SHIFT,
     SIZE,
     WORK,
-    merging,
 )
 from geodesic_core.kernels.sweep.surface_points import reach_sites
 from geodesic_core.kernels.sweep.trim_list import trim_list
-from geodesic_core.kernels.sweep.window import (
-    INTS,
-    NEXT,
-    WIDTH,
-)
+from geodesic_core.kernels.sweep.window import INTS, NEXT, WIDTH
 from geodesic_core.kernels.sweep.window_lists import (
     free_windows,
     release_list,
 )
 from geodesic_core.tolerances import RUNS
 
-# Outcomes of propagating a list
-PROPAGATED = 0
-POOL_FULL = 1
-SCRATCH_FULL = 2
-MERGES_FULL = 5
-RUNAWAY = 6  # a list came up again and again
-RETAINED_FULL = 7
+# Units of work, of about 10 ns
+WORK_OF_LIST = 20
+WORK_OF_WINDOW = 4
+
+
+@kernel
+def propagate_list(wave: Any, h: int) -> Outcome:
+    """Propagate the windows of h across its face: trim, reach the apex, spread (section 3.2).
+
+    Return an outcome; unless it is FINISHED nothing has changed, and the caller may call again.
+    Modifies the lists of the face, its apex and its sites.
+    """
+    mesh, counters = wave.mesh, wave.counters
+    size = wave.pool.lists[LIST * h + SIZE]
+    marks = wave.pool.lists[LIST * h + MARKS]
+    prefetch(wave.pool.lists, LIST * mesh.links[ROW * h + OUT_LEFT])
+    prefetch(wave.pool.lists, LIST * mesh.links[ROW * h + OUT_RIGHT])
+    prefetch(wave.vertices.distance, mesh.links[ROW * h + APEX])
+    outcome = room_to_propagate(wave, h, size)
+    if outcome != Outcome.FINISHED:
+        return outcome
+    if merging(wave):
+        if wave.pool.runs[h] >= RUNS:
+            return Outcome.RUNAWAY
+        wave.pool.runs[h] += 1
+    count = trim_list(wave, h)
+    release_list(wave, h)
+    if marks & RETAINED:
+        retain_windows(wave, h, count)
+    counters[PROPAGATED] += count
+    counters[WORK] += WORK_OF_WINDOW * size + WORK_OF_LIST
+    if count > 0:
+        row = ROW * h
+        ax = mesh.geometry[row + COS_LEFT] * mesh.geometry[row + LENGTH_LEFT]
+        ay = mesh.geometry[row + SIN_LEFT] * mesh.geometry[row + LENGTH_LEFT]
+        nearest, crossing, least = reach_apex(wave, h, count, ax, ay)
+        if marks >> SITE_SHIFT:
+            reach_sites(wave, h, count)
+        spread(wave, h, count, nearest, crossing, least)
+        counters[PEAK] = max(counters[PEAK], counters[FRESH] - counters[FREE_SIZE])
+    return Outcome.FINISHED
+
+
+@inlined
+def room_to_propagate(wave: Any, h: int, size: int) -> Outcome:
+    """Return FINISHED if there is room to propagate ``size`` windows of h, else what is full."""
+    if room_to_spread(wave, h, size) > free_windows(wave):
+        return Outcome.POOL_FULL
+    if size > wave.sizes.scratch:
+        return Outcome.SCRATCH_FULL
+    # Looked up per list, while the sweep runs: free, where a compiled switch would double the
+    # kernels.
+    is_retained = wave.pool.lists[LIST * h + MARKS] & RETAINED
+    if is_retained and wave.counters[RETAINED_ROWS] + size > wave.sizes.retained:
+        return Outcome.RETAINED_FULL
+    is_recorded = merging(wave) and wave.sizes.merges > 0
+    if is_recorded and wave.counters[MERGES] + size > wave.sizes.merges:
+        return Outcome.MERGES_FULL
+    return Outcome.FINISHED
 
 
 @kernel
 def retain_windows(wave: Any, h: int, count: int) -> None:
-    """Keep the windows of scratch, which are those that cross the face of h."""
+    """Retain the windows of scratch, which are those that cross the face of h.
+
+    Modifies the retained windows.
+    """
     pool = wave.pool
     first = wave.counters[RETAINED_ROWS]
     for i in range(WIDTH * count):
@@ -61,44 +113,3 @@ def retain_windows(wave: Any, h: int, count: int) -> None:
     for i in range(first, first + count):
         as_ints(pool.retained)[INTS * i + NEXT] = h
     wave.counters[RETAINED_ROWS] = first + count
-
-
-@kernel
-def propagate_list(wave: Any, h: int) -> int:
-    """Propagate the windows of h across its face (section 3.2)."""
-    mesh, pool = wave.mesh, wave.pool
-    size = pool.lists[LIST * h + SIZE]
-    prefetch(pool.lists, LIST * mesh.links[ROW * h + OUT_LEFT])
-    prefetch(pool.lists, LIST * mesh.links[ROW * h + OUT_RIGHT])
-    prefetch(wave.vertices.distance, mesh.links[ROW * h + APEX])
-    if room_to_spread(wave, h, size) > free_windows(wave):
-        return POOL_FULL
-    if size > wave.sizes.scratch:
-        return SCRATCH_FULL
-    # Asked per list, while the sweep runs: free, where a compiled switch would double the kernels.
-    keeps = pool.lists[LIST * h + MARKS] & RETAINED
-    if keeps and wave.counters[RETAINED_ROWS] + size > wave.sizes.retained:
-        return RETAINED_FULL
-    if merging(wave):
-        if wave.sizes.merges > 0 and wave.counters[MERGES] + size > wave.sizes.merges:
-            return MERGES_FULL
-        if pool.runs[h] >= RUNS:
-            return RUNAWAY
-        pool.runs[h] += 1
-    count = trim_list(wave, h)
-    release_list(wave, h)
-    if keeps:
-        retain_windows(wave, h, count)
-    wave.counters[KEPT] += count
-    wave.counters[WORK] += 4 * size + 20
-    if count > 0:
-        row = ROW * h
-        ax = mesh.geometry[row + COS_LEFT] * mesh.geometry[row + LENGTH_LEFT]
-        ay = mesh.geometry[row + SIN_LEFT] * mesh.geometry[row + LENGTH_LEFT]
-        nearest, crossing, least = reach_apex(wave, h, count, ax, ay)
-        if pool.lists[LIST * h + MARKS] >> SITE_SHIFT:
-            reach_sites(wave, h, count)
-        spread(wave, h, count, nearest, crossing, least)
-        alive = wave.counters[FRESH] - wave.counters[FREE_SIZE]
-        wave.counters[PEAK] = max(wave.counters[PEAK], alive)
-    return PROPAGATED

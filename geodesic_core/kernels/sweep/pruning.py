@@ -1,10 +1,10 @@
-"""The pruned search: which part of the surface a path may pass, and what a search has touched (5).
+"""Pruning of a search between two points: lower bounds, and resetting of touched state (5).
 
 A point p may be on a path from the start, of length U at most, only where L(p) + D(p) <= U for its
 distance D from where the sweep began and a lower bound L of the rest. L is known at vertices;
-elsewhere on an edge it is what the nearer ends leave. Windows are dropped by it where the filter of
-Xin and Wang drops them, in `propagate.collect`: at both ends of a list, where the bound's slope
-gathers all that it finds.
+elsewhere on an edge it follows from the nearer end. Windows are dropped by it where the filter of
+Xin and Wang drops them, in `trim_list`: at both ends of a list, where the bound's slope gathers
+all that it finds.
 """
 
 import math
@@ -13,7 +13,7 @@ from typing import Any
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL
-from geodesic_core.kernels.sweep.bounds import LANDMARKS
+from geodesic_core.kernels.sweep.bounds import LANDMARKS, merging
 from geodesic_core.kernels.sweep.state import (
     COUNTERS,
     ENTRY_EDGE,
@@ -35,19 +35,21 @@ from geodesic_core.kernels.sweep.state import (
     TOUCHED,
     WINNER,
     is_pruned,
-    merging,
     view_of,
 )
-from geodesic_core.tolerances import LANDMARK_ERROR
+from geodesic_core.tolerances import LANDMARK_ERROR, SINGLE_PRECISION
 
 # Stored distances from landmarks are lower bounds, rounded to single precision.
-LEAST = 1.0 - 1e-6
-MOST = (1.0 + 1e-6) / (1.0 - LANDMARK_ERROR)
+LEAST = 1.0 - SINGLE_PRECISION
+MOST = (1.0 + SINGLE_PRECISION) / (1.0 - LANDMARK_ERROR)
 
 
 @kernel
 def touch(wave: Any, v: int) -> None:
-    """Note that v is no longer as it was at first, and bound the rest of a path from it."""
+    """Note that v is no longer in its first state, and bound the rest of a path from it.
+
+    Modifies the list of touched vertices and the heuristic.
+    """
     vertices = wave.vertices
     vertices.touched[wave.counters[TOUCHED]] = v
     wave.counters[TOUCHED] += 1
@@ -57,9 +59,9 @@ def touch(wave: Any, v: int) -> None:
 
 @kernel
 def lower_bound_to_target(wave: Any, v: int) -> float:
-    """Lower bound of the distance from v to where a path is to end.
+    """Lower bound of the distance from v to the end of a path.
 
-    What an earlier sweep from there knows of v counts up to its ceiling. Had it pruned the path to
+    The value of an earlier sweep from there counts up to its ceiling. Had it pruned the path to
     v at a point q, then D(q) + L(q) would exceed the ceiling, and so D(v) + L'(v), where L' is a
     bound that no L exceeds by more than the way from v to it: the steepest.
     """
@@ -104,7 +106,7 @@ def least_to_start(wave: Any, v: int, straight: float) -> float:
 
 @kernel
 def steepest_to_start(wave: Any, v: int, straight: float) -> float:
-    """Return what `least_to_start`, at any point q, exceeds by the distance of v and q at most."""
+    """Bound of `least_to_start` at any point q, less the distance of v and q."""
     steepest = straight
     for i in range(wave.bounds.pruning.landmark_count):
         if wave.bounds.pruning.least[i] == math.inf:
@@ -130,7 +132,10 @@ def may_pass(wave: Any, v: int) -> bool:
 
 @kernel
 def forget(topology: Any, wavefront: Any, bounds: Any) -> None:
-    """Set the wavefront back to how it was at first, in time proportional to what was touched."""
+    """Reset the wavefront to its first state, in time proportional to the vertices touched.
+
+    Modifies the wavefront.
+    """
     wave = view_of(topology, wavefront, bounds)
     mesh, pool, vertices, sites = wave.mesh, wave.pool, wave.vertices, wave.sites
     for i in range(wave.counters[TOUCHED]):
@@ -173,7 +178,10 @@ def forget(topology: Any, wavefront: Any, bounds: Any) -> None:
 
 @kernel
 def mark_visited(topology: Any, distance: Floats, touched: Ints, visited: Flags) -> None:
-    """Mark the faces, in the caller's numbering, all of whose corners have been reached."""
+    """Mark the faces, in the caller's numbering, all of whose corners are reached.
+
+    Modifies ``visited`` (F,).
+    """
     for v in touched:
         for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
             face = topology.corners[c] // 3

@@ -1,4 +1,4 @@
-"""Windows that a vertex emits, as a source or because shortest paths bend there (section 3.2)."""
+"""Pseudosources: windows that a vertex emits, as a source or where shortest paths bend (3.2)."""
 
 import math
 from typing import Any
@@ -23,6 +23,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     following,
     previous,
 )
+from geodesic_core.kernels.sweep.bounds import merging, source_weight
 from geodesic_core.kernels.sweep.pruning import may_pass
 from geodesic_core.kernels.sweep.relaxation import (
     bound_vertex,
@@ -41,9 +42,8 @@ from geodesic_core.kernels.sweep.state import (
     SENT_FROM,
     SENT_TO,
     WINNER,
-    merging,
-    source_weight,
 )
+from geodesic_core.kernels.sweep.window import emitted_window
 from geodesic_core.kernels.sweep.window_lists import (
     insert_sorted,
     put_window,
@@ -65,9 +65,10 @@ def is_pseudosource(wave: Any, v: int) -> bool:
 def emit_pseudosource(wave: Any, v: int) -> None:
     """Emit windows from v: all around a source, else into the shadow behind v.
 
-    At a saddle the shadow is what no straight path through a neighbourhood of v reaches: directions
-    that make an angle of π or more with the incoming one on both sides. At a boundary either side
-    will do. Where several fans meet, or faces are pinched, v emits all around.
+    At a saddle no straight path through a neighbourhood of v reaches the shadow: the directions
+    that make an angle of π or more with the incoming one on both sides. At a boundary one side is
+    enough. Where several fans meet, or faces are pinched, v emits all around. Modifies the lists
+    across the faces at v, and its neighbours.
     """
     mesh, vertices = wave.mesh, wave.vertices
     total = mesh.total_angle[v]
@@ -89,7 +90,10 @@ def emit_pseudosource(wave: Any, v: int) -> None:
 
 @kernel
 def emit_shadows(wave: Any, v: int) -> None:
-    """Emit into the shadows of all directions that v is lit from, but for those emitted before."""
+    """Emit into the shadows of all directions that v is lit from, but for those emitted before.
+
+    Modifies the light of v.
+    """
     mesh, vertices = wave.mesh, wave.vertices
     row, total = LIGHT * v, mesh.total_angle[v]
     lo, hi = vertices.light[row + LIT_FROM], vertices.light[row + LIT_TO]
@@ -194,7 +198,7 @@ def relax_edge(wave: Any, v: int, u: int, reach: float, via: int, place: float) 
 def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) -> None:
     """Emit the window of v that crosses the face of h, its corner at v, between two angles.
 
-    The angles are measured from h; what lies outside of the corner is cut off.
+    The angles are measured from h; the part outside of the corner is cut off.
     """
     mesh, vertices = wave.mesh, wave.vertices
     if hi <= 0.0 or lo >= widest or hi <= lo:
@@ -218,7 +222,7 @@ def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) 
     sigma, xi = vertices.distance[v], 0.0
     if merging(wave):
         xi = vertices.upper[v] - sigma
-    slot = put_window(wave, b0, b1, sx, sy, sigma, v, xi, -1 - v)
+    slot = put_window(wave, emitted_window(wave, b0, b1, sx, sy, sigma, v, xi))
     wave.counters[CREATED] += 1
     if across == IRREGULAR:
         send_across(wave, following(h), slot)

@@ -24,7 +24,7 @@ def precedes(key: float, v: int, other_key: float, u: int) -> bool:
 
 @kernel
 def push_or_raise(wave: Any, v: int, key: float) -> None:
-    """Put v into the heap, or move it up after its key has decreased."""
+    """Put v into the heap, or move it up after its key has decreased. Modifies the heap."""
     queues = wave.queues
     i = queues.heap_place[v]
     if i < 0:
@@ -44,7 +44,7 @@ def push_or_raise(wave: Any, v: int, key: float) -> None:
 
 @kernel
 def pop_nearest(wave: Any) -> int:
-    """Remove and return the nearest vertex; the heap must not be empty."""
+    """Remove and return the nearest vertex; the heap must not be empty. Modifies the heap."""
     queues = wave.queues
     nearest = queues.heap[0]
     queues.heap_place[nearest] = -1
@@ -79,7 +79,7 @@ def pop_nearest(wave: Any) -> int:
 
 @kernel
 def ring_push(wave: Any, h: int) -> None:
-    """Append half-edge h; the ring has room for every half-edge once."""
+    """Append half-edge h; the ring has room for every half-edge once. Modifies the ring."""
     i = wave.counters[RING_HEAD] + wave.counters[RING_SIZE]
     if i >= wave.sizes.ring:
         i -= wave.sizes.ring
@@ -89,7 +89,7 @@ def ring_push(wave: Any, h: int) -> None:
 
 @kernel
 def ring_pop(wave: Any) -> int:
-    """Remove and return the oldest half-edge; the ring must not be empty."""
+    """Remove and return the oldest half-edge; the ring must not be empty. Modifies the ring."""
     head = wave.counters[RING_HEAD]
     h = wave.queues.ring[head]
     head += 1

@@ -1,135 +1,114 @@
-"""Reach the apex of a face over the windows of one half-edge (section 3.2)."""
+"""The apex of a face, reached over the windows of one half-edge (section 3.2)."""
 
 import math
 from typing import Any
 
-from geodesic_core.kernels.jit import as_ints, inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import (
-    APEX,
-    LENGTH,
-    ROW,
-)
+from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import APEX, LENGTH, ROW
 from geodesic_core.kernels.planar import distance
+from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.relaxation import (
     bound_vertex,
     illuminate_vertex,
     precedence,
     relax_vertex,
 )
-from geodesic_core.kernels.sweep.state import (
-    merging,
-    source_weight,
-)
-from geodesic_core.kernels.sweep.window import (
-    B0,
-    B1,
-    INTS,
-    REFERENCE,
-    ROOT,
-    SIGMA,
-    SX,
-    SY,
-    WIDTH,
-    XI,
-    straight_distance,
-)
+from geodesic_core.kernels.sweep.window import Window, load_window, straight_distance
 from geodesic_core.tolerances import BEND, GAP
 
 
 @inlined
+def ray_to(window: Window, x: float, y: float) -> tuple[float, float]:
+    """Return where the ray to (x, y) crosses the half-edge, times its rise; and its rise, >= 0."""
+    return window.sx * y - x * window.sy, y * window.weight - window.sy
+
+
+@inlined
 def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int, float, float]:
-    """Find the window of scratch nearest to the apex; return its index, crossing and distance.
+    """Reach the apex, at (ax, ay), by the nearest window of scratch; return three values.
 
-    The distance is infinite if no window covers the apex: then none beats another for sure.
-
-    The crossing is where the window's shortest path to the apex passes the half-edge. Windows whose
-    rays cover the apex are asked first; only where none does, the two beside it, for a path that
-    bends at the window's end. (To ask them all costs a tenth of the sweep and finds nothing more.)
+    They are the window's index; its crossing, where its shortest path to the apex passes the
+    half-edge; and its distance, infinite if no window covers the apex: then none beats another for
+    sure. Windows whose rays cover the apex go first; only where none does, the two beside it, for a
+    path that bends at the window's end. (To try them all costs a tenth of the sweep and finds
+    nothing more.) Modifies the vertex, and queues it.
     """
-    mesh, pool = wave.mesh, wave.pool
-    best, best_origin, nearest, crossing = math.inf, 0, -1, 0.0
+    mesh, scratch = wave.mesh, wave.pool.scratch
+    best, best_source, nearest, crossing = math.inf, 0, -1, 0.0
     last_left, first_right = -1, -1  # beside the apex
     upper = math.inf
     gap = GAP * mesh.geometry[ROW * h + LENGTH]
     for i in range(count):
-        w = WIDTH * i
-        sx, sy = pool.scratch[w + SX], pool.scratch[w + SY]
-        sw = source_weight(wave, as_ints(pool.scratch)[INTS * i + ROOT])
-        rise = ay * sw - sy
-        x = sx * ay - ax * sy  # times rise: where the ray to the apex crosses
-        if x > (pool.scratch[w + B1] + gap) * rise:
+        window = load_window(wave, scratch, i)
+        x, rise = ray_to(window, ax, ay)
+        if x > (window.b1 + gap) * rise:
             last_left = i
-        elif x < (pool.scratch[w + B0] - gap) * rise:
+        elif x < (window.b0 - gap) * rise:
             if first_right < 0:
                 first_right = i
         else:
-            d = straight_distance(ax, ay, sx, sy, sw, pool.scratch[w + SIGMA])
-            origin = wave.vertices.source_index[as_ints(pool.scratch)[INTS * i + ROOT]]
+            d, source = straight_distance(window, ax, ay), wave.vertices.source_index[window.root]
             if merging(wave):
-                upper = min(upper, d + pool.scratch[w + XI])
-            if precedence(d, origin, best, best_origin):
-                best, best_origin, nearest = d, origin, i
-                crossing = x / rise if rise > 0.0 else sx
-    surcharge = 1.0
-    if nearest < 0:
-        surcharge += BEND
-        if last_left >= 0:
-            best, crossing = bent_distance(wave, last_left, ax, ay)
-            nearest = last_left
-        if first_right >= 0:
-            d, b = bent_distance(wave, first_right, ax, ay)
-            if d < best:
-                best, nearest, crossing = d, first_right, b
-    w, v, reference = WIDTH * nearest, mesh.links[ROW * h + APEX], -1
+                upper = min(upper, d + window.xi)
+            if precedence(d, source, best, best_source):
+                best, best_source, nearest = d, source, i
+                crossing = x / rise if rise > 0.0 else window.sx
+    is_covered = nearest >= 0
+    if not is_covered:
+        nearest, best, crossing = nearest_bent(wave, last_left, first_right, ax, ay)
+    window, v = load_window(wave, scratch, nearest), mesh.links[ROW * h + APEX]
     if merging(wave):
-        reference = as_ints(pool.scratch)[INTS * nearest + REFERENCE]
-        bound_vertex(wave, v, min(upper, best + pool.scratch[w + XI]))
+        bound_vertex(wave, v, min(upper, best + window.xi))
         if mesh.flags[v]:
             illuminate_apex(wave, h, count, nearest, ax, ay, best)
-    relax_vertex(
-        wave,
-        v,
-        best * surcharge,
-        h,
-        pool.scratch[w + SX],
-        pool.scratch[w + SY],
-        as_ints(pool.scratch)[INTS * nearest + ROOT],
-        reference,
-    )
-    covered = surcharge == 1.0
-    return nearest, crossing, best if covered else math.inf
+    surcharge = 1.0 if is_covered else 1.0 + BEND
+    relax_vertex(wave, v, best * surcharge, h, window.sx, window.sy, window.root, window.reference)
+    return nearest, crossing, best if is_covered else math.inf
+
+
+@inlined
+def nearest_bent(
+    wave: Any, last_left: int, first_right: int, ax: float, ay: float
+) -> tuple[int, float, float]:
+    """Return the nearer of two windows beside the apex, its distance bent at its end, and that end.
+
+    Either may be missing (-1), not both.
+    """
+    nearest, best, crossing = last_left, math.inf, 0.0
+    if last_left >= 0:
+        window = load_window(wave, wave.pool.scratch, last_left)
+        best, crossing = bent_distance(window, ax, ay)
+    if first_right >= 0:
+        window = load_window(wave, wave.pool.scratch, first_right)
+        d, b = bent_distance(window, ax, ay)
+        if d < best:
+            nearest, best, crossing = first_right, d, b
+    return nearest, best, crossing
 
 
 @kernel
 def illuminate_apex(
     wave: Any, h: int, count: int, nearest: int, ax: float, ay: float, best: float
 ) -> None:
-    """Note from where the windows of scratch light the apex: a saddle, or on the boundary."""
-    mesh, pool = wave.mesh, wave.pool
-    v, gap = mesh.links[ROW * h + APEX], GAP * mesh.geometry[ROW * h + LENGTH]
+    """Note from where the windows of scratch light the apex: a saddle, or on the boundary.
+
+    Modifies the light of the vertex, and may queue it.
+    """
+    v, gap = wave.mesh.links[ROW * h + APEX], GAP * wave.mesh.geometry[ROW * h + LENGTH]
     for i in range(count):
-        w = WIDTH * i
-        sx, sy = pool.scratch[w + SX], pool.scratch[w + SY]
-        sw = source_weight(wave, as_ints(pool.scratch)[INTS * i + ROOT])
-        rise = ay * sw - sy
-        x = sx * ay - ax * sy
-        covers = (pool.scratch[w + B0] - gap) * rise <= x <= (pool.scratch[w + B1] + gap) * rise
-        if covers:
-            d = straight_distance(ax, ay, sx, sy, sw, pool.scratch[w + SIGMA])
-            illuminate_vertex(wave, v, d, h, sx, sy, sw)
-        elif i == nearest:
-            illuminate_vertex(wave, v, best, h, sx, sy, sw)
+        window = load_window(wave, wave.pool.scratch, i)
+        x, rise = ray_to(window, ax, ay)
+        covers = (window.b0 - gap) * rise <= x <= (window.b1 + gap) * rise
+        if covers or i == nearest:
+            d = straight_distance(window, ax, ay) if covers else best
+            illuminate_vertex(wave, v, d, h, window.sx, window.sy, window.weight)
 
 
 @kernel
-def bent_distance(wave: Any, i: int, ax: float, ay: float) -> tuple[float, float]:
+def bent_distance(window: Window, ax: float, ay: float) -> tuple[float, float]:
     """Distance to the apex through the end of a window that does not cover it, and that end."""
-    pool = wave.pool
-    w, sw = WIDTH * i, source_weight(wave, as_ints(pool.scratch)[INTS * i + ROOT])
-    sx, sy = pool.scratch[w + SX], pool.scratch[w + SY]
-    b = pool.scratch[w + B0]
-    if b * (ay * sw - sy) <= sx * ay - ax * sy:
-        b = pool.scratch[w + B1]
-    there = distance(b, sx, sy, sw)
+    x, rise = ray_to(window, ax, ay)
+    b = window.b1 if window.b0 * rise <= x else window.b0
+    there = distance(b, window.sx, window.sy, window.weight)
     onward = math.sqrt((ax - b) * (ax - b) + ay * ay)
-    return there + onward + pool.scratch[w + SIGMA], b
+    return there + onward + window.sigma, b

@@ -1,4 +1,4 @@
-"""How vertices are reached: the least distance, and in a merging sweep what bounds it."""
+"""Relaxation of vertices: least distances, and in a merging sweep their bounds and their light."""
 
 import math
 from typing import Any
@@ -14,6 +14,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     ROW,
     SIN_LEFT,
 )
+from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.pruning import touch
 from geodesic_core.kernels.sweep.queues import push_or_raise
 from geodesic_core.kernels.sweep.state import (
@@ -25,17 +26,16 @@ from geodesic_core.kernels.sweep.state import (
     PREDECESSOR,
     SETTLED,
     WINNER,
-    merging,
 )
 from geodesic_core.tolerances import SLACK, TIE
 
 
 @inlined
-def precedence(distance: float, origin: int, known: float, known_origin: int) -> bool:
+def precedence(distance: float, source: int, known: float, known_source: int) -> bool:
     """Whether a distance from one source goes before that from another: ties to the lower."""
-    if origin == known_origin or known == math.inf or abs(distance - known) > TIE * known:
+    if source == known_source or known == math.inf or abs(distance - known) > TIE * known:
         return distance < known
-    return origin < known_origin
+    return source < known_source
 
 
 @kernel
@@ -44,7 +44,7 @@ def relax_vertex(
 ) -> None:
     """Offer v a distance and the window that gives it; queue v if it is the least so far.
 
-    Of equal distances that of the lower source wins.
+    Of equal distances that of the lower source wins. Modifies the vertex and the heap.
     """
     vertices = wave.vertices
     known = vertices.distance[v]
@@ -66,7 +66,7 @@ def relax_vertex(
 
 @kernel
 def bound_vertex(wave: Any, v: int, upper: float) -> None:
-    """Note an upper bound of the exact distance of v."""
+    """Note an upper bound of the exact distance of v. Modifies the bound and the light of v."""
     vertices = wave.vertices
     if upper < vertices.upper[v]:
         if (

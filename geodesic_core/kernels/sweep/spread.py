@@ -1,6 +1,6 @@
-"""Send the windows of one half-edge on to the two other edges of its face (section 3.2)."""
+"""The windows of one half-edge sent on to the two other edges of its face (section 3.2)."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from geodesic_core.kernels.jit import as_ints, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
@@ -23,29 +23,10 @@ from geodesic_core.kernels.mesh.half_edges import (
     previous,
 )
 from geodesic_core.kernels.planar import hit_left
-from geodesic_core.kernels.sweep.reach import bent_distance
-from geodesic_core.kernels.sweep.state import (
-    CREATED,
-    FIRST,
-    LAST,
-    LIST,
-    SIZE,
-    merging,
-    source_weight,
-)
-from geodesic_core.kernels.sweep.window import (
-    B0,
-    B1,
-    INTS,
-    NEXT,
-    REFERENCE,
-    ROOT,
-    SIGMA,
-    SX,
-    SY,
-    WIDTH,
-    XI,
-)
+from geodesic_core.kernels.sweep.bounds import merging
+from geodesic_core.kernels.sweep.reach import bent_distance, ray_to
+from geodesic_core.kernels.sweep.state import CREATED, FIRST, LAST, LIST, SIZE
+from geodesic_core.kernels.sweep.window import INTS, NEXT, Window, at_sigma, load_window
 from geodesic_core.kernels.sweep.window_lists import (
     faces_beyond,
     put_window,
@@ -55,143 +36,200 @@ from geodesic_core.kernels.sweep.window_lists import (
 from geodesic_core.tolerances import OVERLAP
 
 
+class Side(NamedTuple):
+    """One of the two other edges of a face, as seen from the end of the half-edge it starts at."""
+
+    out: int
+    """The half-edge across it, or NO_FACE, or IRREGULAR"""
+    length: float
+    cosine: float
+    """Of the angle between it and the half-edge"""
+    sine: float
+    start: float
+    """Place of that end on the half-edge: 0 on the left, its length on the right"""
+    is_right: bool
+
+
+class Chain(NamedTuple):
+    """New windows in their order along an edge, linked one to the next."""
+
+    first: int
+    last: int
+    size: int
+
+
+NO_CHAIN = Chain(-1, -1, 0)
+
+
 @inlined
 def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: float) -> None:
     """Send the windows of scratch on to the two other edges of the face.
 
     Shortest paths do not cross: what lies left of the path to the apex goes left, what lies right
-    of it goes right, and only the window nearest to the apex goes both ways.
+    of it goes right, and only the window nearest to the apex goes both ways. ``nearest`` to
+    ``least`` are as `reach_apex` returns them. Modifies the two lists, and queues them.
     """
-    mesh, pool = wave.mesh, wave.pool
-    row = ROW * h
-    length = mesh.geometry[row + LENGTH]
-    cos_left, sin_left = mesh.geometry[row + COS_LEFT], mesh.geometry[row + SIN_LEFT]
-    cos_right, sin_right = mesh.geometry[row + COS_RIGHT], mesh.geometry[row + SIN_RIGHT]
-    length_left = mesh.geometry[row + LENGTH_LEFT]
-    length_right = mesh.geometry[row + LENGTH_RIGHT]
-    ax, ay = cos_left * length_left, sin_left * length_left
-    left, right = mesh.links[row + OUT_LEFT], mesh.links[row + OUT_RIGHT]
-    tail, head, apex = (
-        mesh.links[row + TAIL],
-        mesh.links[row + HEAD],
-        mesh.links[row + APEX],
-    )
-    overlap = OVERLAP * length
-    left_first, left_last, left_size = -1, -1, 0
-    right_first, right_last, right_size = -1, -1, 0
+    left, right = left_of(wave, h), right_of(wave, h)
+    ax, ay = left.cosine * left.length, left.sine * left.length
+    overlap = OVERLAP * right.start
+    best = load_window(wave, wave.pool.scratch, nearest)
+    to_left, to_right = NO_CHAIN, NO_CHAIN
     for i in range(count):
-        w = WIDTH * i
-        b0, b1 = pool.scratch[w + B0], pool.scratch[w + B1]
-        sx, sy, sigma = (
-            pool.scratch[w + SX],
-            pool.scratch[w + SY],
-            pool.scratch[w + SIGMA],
-        )
-        xi, reference = 0.0, -1
-        if merging(wave):
-            xi, reference = (
-                pool.scratch[w + XI],
-                as_ints(pool.scratch)[INTS * i + REFERENCE],
-            )
-        sw = source_weight(wave, as_ints(pool.scratch)[INTS * i + ROOT])
-        rise, x = ay * sw - sy, sx * ay - ax * sy
-        goes_left = x > b0 * rise
-        goes_right = x < b1 * rise
-        ends_at_apex = goes_left and goes_right
-        if i != nearest:
-            if ends_at_apex:
-                # Two windows that meet on the ray to the apex both cover it: each keeps its side.
-                # Where one lies within the other, the other may have both.
-                goes_right = x >= (crossing - overlap) * rise
-                goes_left = x <= (crossing + overlap) * rise
-                if not goes_right and b1 > crossing:
-                    goes_right = not is_beaten(wave, i, nearest, crossing, b1)
-                if not goes_left and b0 < crossing:
-                    goes_left = not is_beaten(wave, i, nearest, crossing, b0)
-            elif goes_left:
-                if b0 >= crossing and bent_distance(wave, i, ax, ay)[0] >= least:
-                    continue
-            elif b1 <= crossing and bent_distance(wave, i, ax, ay)[0] >= least:
+        window = load_window(wave, wave.pool.scratch, i)
+        x, rise = ray_to(window, ax, ay)
+        goes_left, goes_right = x > window.b0 * rise, x < window.b1 * rise
+        covers = goes_left and goes_right
+        if i != nearest and covers:
+            # Two windows that meet on the ray to the apex both cover it: each keeps its side.
+            # Where one lies within the other, the other may have both.
+            goes_right = x >= (crossing - overlap) * rise
+            goes_left = x <= (crossing + overlap) * rise
+            if not goes_right and window.b1 > crossing:
+                goes_right = not is_beaten(wave, window, best, crossing, window.b1)
+            if not goes_left and window.b0 < crossing:
+                goes_left = not is_beaten(wave, window, best, crossing, window.b0)
+        elif i != nearest:
+            is_beyond = window.b0 >= crossing if goes_left else window.b1 <= crossing
+            if is_beyond and bent_distance(window, ax, ay)[0] >= least:
                 continue
-        if goes_left and left != NO_FACE:
-            s_left = sy * cos_left - sx * sin_left
-            u0 = hit_left(b0, sy, s_left, sin_left, length_left, sw)
-            u1 = length_left
-            if not ends_at_apex:
-                u1 = hit_left(b1, sy, s_left, sin_left, length_left, sw)
-            if u1 > u0:
-                along = sx * cos_left + sy * sin_left
-                root = as_ints(pool.scratch)[INTS * i + ROOT]
-                slot = put_window(wave, u0, u1, along, s_left, sigma, root, xi, reference)
-                if left_last >= 0:
-                    as_ints(pool.windows)[INTS * left_last + NEXT] = slot
-                else:
-                    left_first = slot
-                left_last = slot
-                left_size += 1
-        if goes_right and right != NO_FACE:
-            s_right = (sx - length * sw) * sin_right + sy * cos_right
-            u0 = hit_left(length - b1, sy, s_right, sin_right, length_right, sw)
-            u1 = length_right
-            if not ends_at_apex:
-                u1 = hit_left(length - b0, sy, s_right, sin_right, length_right, sw)
-            if u1 > u0:
-                along = length_right * sw + (sx - length * sw) * cos_right - sy * sin_right
-                root = as_ints(pool.scratch)[INTS * i + ROOT]
-                if sw == 0.0:  # the frame begins at the apex
-                    sigma -= sx * ax + sy * ay
-                u0, u1 = length_right - u1, length_right - u0
-                slot = put_window(wave, u0, u1, along, s_right, sigma, root, xi, reference)
-                if right_last >= 0:
-                    as_ints(pool.windows)[INTS * right_last + NEXT] = slot
-                else:
-                    right_first = slot
-                right_last = slot
-                right_size += 1
-    wave.counters[CREATED] += left_size + right_size
-    if left == IRREGULAR:
-        send_chain(wave, previous(h), left_first, left_size)
-    elif left_size > 0:  # they come in at the tail: before what is there
-        r = LIST * left
-        if pool.lists[r + SIZE] > 0:
-            as_ints(pool.windows)[INTS * left_last + NEXT] = pool.lists[r + FIRST]
+        if goes_left:
+            to_left = send_over_edge(wave, to_left, left, window, covers)
+        if goes_right:
+            to_right = send_over_edge(wave, to_right, right, seen_from(window, ax, ay), covers)
+    wave.counters[CREATED] += to_left.size + to_right.size
+    deliver_left(wave, h, to_left)
+    deliver_right(wave, h, to_right)
+
+
+@inlined
+def left_of(wave: Any, h: int) -> Side:
+    """Return the edge from the tail of h to its apex."""
+    geometry, row = wave.mesh.geometry, ROW * h
+    return Side(
+        wave.mesh.links[row + OUT_LEFT],
+        geometry[row + LENGTH_LEFT],
+        geometry[row + COS_LEFT],
+        geometry[row + SIN_LEFT],
+        0.0,
+        False,
+    )
+
+
+@inlined
+def right_of(wave: Any, h: int) -> Side:
+    """Return the edge from the head of h to its apex."""
+    geometry, row = wave.mesh.geometry, ROW * h
+    return Side(
+        wave.mesh.links[row + OUT_RIGHT],
+        geometry[row + LENGTH_RIGHT],
+        geometry[row + COS_RIGHT],
+        geometry[row + SIN_RIGHT],
+        geometry[row + LENGTH],
+        True,
+    )
+
+
+@inlined
+def seen_from(window: Window, x: float, y: float) -> Window:
+    """Return the window with σ as a frame that begins at (x, y) has it: another if parallel."""
+    if window.weight == 0.0:
+        return at_sigma(window, window.sigma - (window.sx * x + window.sy * y))
+    return window
+
+
+@inlined
+def send_over_edge(wave: Any, chain: Chain, side: Side, window: Window, covers: bool) -> Chain:
+    """Send what a window lights of an edge over it; return the chain, which it may lengthen.
+
+    The right edge is seen in the mirror, from where the half-edge ends. ``covers`` says that the
+    window lights the apex. Modifies the pool.
+    """
+    if side.out == NO_FACE:
+        return chain
+    near, far, offset = window.b0, window.b1, window.sx
+    if side.is_right:
+        near, far = side.start - window.b1, side.start - window.b0
+        offset = side.start * window.weight - window.sx
+    sy, weight = window.sy, window.weight
+    depth = sy * side.cosine - offset * side.sine
+    u0, u1 = hit_left(near, sy, depth, side.sine, side.length, weight), side.length
+    if not covers:
+        u1 = hit_left(far, sy, depth, side.sine, side.length, weight)
+    if u1 <= u0:
+        return chain
+    along = offset * side.cosine + sy * side.sine
+    if side.is_right:  # from the apex on; in this order, which fixes how it rounds
+        along = side.length * weight - offset * side.cosine - sy * side.sine
+        u0, u1 = side.length - u1, side.length - u0
+    slot = put_window(
+        wave,
+        Window(
+            u0, u1, along, depth, window.sigma, weight, window.root, window.xi, window.reference
+        ),
+    )
+    if chain.size == 0:
+        return Chain(slot, slot, 1)
+    as_ints(wave.pool.windows)[INTS * chain.last + NEXT] = slot
+    return Chain(chain.first, slot, chain.size + 1)
+
+
+@inlined
+def deliver_left(wave: Any, h: int, chain: Chain) -> None:
+    """Put a chain before the list across the left edge, for it comes in at the tail; queue that.
+
+    Modifies the list.
+    """
+    links, lists = wave.mesh.links, wave.pool.lists
+    out = links[ROW * h + OUT_LEFT]
+    if out == IRREGULAR:
+        send_chain(wave, previous(h), chain)
+    elif chain.size > 0:
+        row = LIST * out
+        if lists[row + SIZE] > 0:
+            as_ints(wave.pool.windows)[INTS * chain.last + NEXT] = lists[row + FIRST]
         else:
-            pool.lists[r + LAST] = left_last
-        pool.lists[r + FIRST] = left_first
-        pool.lists[r + SIZE] += left_size
-        queue_if_due(wave, left, tail, apex)
-    if right == IRREGULAR:
-        send_chain(wave, following(h), right_first, right_size)
-    elif right_size > 0:  # they come in at the head: after what is there
-        r = LIST * right
-        if pool.lists[r + SIZE] > 0:
-            as_ints(pool.windows)[INTS * pool.lists[r + LAST] + NEXT] = right_first
+            lists[row + LAST] = chain.last
+        lists[row + FIRST] = chain.first
+        lists[row + SIZE] += chain.size
+        queue_if_due(wave, out, links[ROW * h + TAIL], links[ROW * h + APEX])
+
+
+@inlined
+def deliver_right(wave: Any, h: int, chain: Chain) -> None:
+    """Put a chain after the list across the right edge, for it comes in at the head; queue that.
+
+    Modifies the list.
+    """
+    links, lists = wave.mesh.links, wave.pool.lists
+    out = links[ROW * h + OUT_RIGHT]
+    if out == IRREGULAR:
+        send_chain(wave, following(h), chain)
+    elif chain.size > 0:
+        row = LIST * out
+        if lists[row + SIZE] > 0:
+            as_ints(wave.pool.windows)[INTS * lists[row + LAST] + NEXT] = chain.first
         else:
-            pool.lists[r + FIRST] = right_first
-        pool.lists[r + LAST] = right_last
-        pool.lists[r + SIZE] += right_size
-        queue_if_due(wave, right, apex, head)
+            lists[row + FIRST] = chain.first
+        lists[row + LAST] = chain.last
+        lists[row + SIZE] += chain.size
+        queue_if_due(wave, out, links[ROW * h + APEX], links[ROW * h + HEAD])
 
 
 @kernel
-def is_beaten(wave: Any, i: int, nearest: int, crossing: float, b: float) -> bool:
-    """Whether window i of scratch is nowhere nearest between the nearest path to the apex and b.
+def is_beaten(wave: Any, window: Window, best: Window, crossing: float, b: float) -> bool:
+    """Whether a window is nowhere nearest between the nearest path to the apex and b.
 
-    That path crosses the edge at ``crossing``; window i covers it, and all up to b. Back from the
-    edge both run through the same faces, until the path meets the ray of window i to b, or begins
-    between its rays. Where they meet the ray is no nearer, or else window i would be nearest to the
-    apex, too. Beyond an edge of several faces, though, they may have come by different ones.
+    That path, of the window ``best``, crosses the edge at ``crossing``; ``window`` covers it, and
+    all up to b. Back from the edge both run through the same faces, until the path meets the ray of
+    ``window`` to b, or begins between its rays. Where they meet the ray is no nearer, or else
+    ``window`` would be nearest to the apex, too. Beyond an edge of several faces, though, they may
+    have come by different ones.
     """
-    pool = wave.pool
-    w, n = WIDTH * i, WIDTH * nearest
-    is_strip = (
-        source_weight(wave, as_ints(pool.scratch)[INTS * i + ROOT]) == 0.0
-        or source_weight(wave, as_ints(pool.scratch)[INTS * nearest + ROOT]) == 0.0
-    )
-    if merging(wave) or wave.sizes.crossings > 0 or is_strip:
+    is_irregular, is_parallel = wave.sizes.crossings > 0, window.weight * best.weight == 0.0
+    if merging(wave) or is_irregular or is_parallel:
         return False
-    dx, dy = pool.scratch[w + SX] - b, pool.scratch[w + SY]
-    nx, ny = pool.scratch[n + SX] - crossing, pool.scratch[n + SY]
+    dx, dy = window.sx - b, window.sy
+    nx, ny = best.sx - crossing, best.sy
     ray, path = (crossing - b) * ny, (crossing - b) * dy
     slant = dx * ny - dy * nx  # they meet at these shares of it
     if slant < 0.0:
@@ -200,9 +238,10 @@ def is_beaten(wave: Any, i: int, nearest: int, crossing: float, b: float) -> boo
 
 
 @kernel
-def send_chain(wave: Any, g: int, slot: int, size: int) -> None:
-    """Move windows, linked one to the next, over the irregular edge of g."""
-    for _ in range(size):
+def send_chain(wave: Any, g: int, chain: Chain) -> None:
+    """Move the windows of a chain over the irregular edge of g."""
+    slot = chain.first
+    for _ in range(chain.size):
         after = as_ints(wave.pool.windows)[INTS * slot + NEXT]
         send_across(wave, g, slot)
         slot = after
@@ -210,11 +249,11 @@ def send_chain(wave: Any, g: int, slot: int, size: int) -> None:
 
 @kernel
 def room_to_spread(wave: Any, h: int, size: int) -> int:
-    """How many windows may be made of ``size`` that cross the face of h, at most."""
-    mesh = wave.mesh
+    """Return how many windows may be made of ``size`` that cross the face of h, at most."""
+    links = wave.mesh.links
     room = 2 * size
-    if mesh.links[ROW * h + OUT_LEFT] == IRREGULAR:
+    if links[ROW * h + OUT_LEFT] == IRREGULAR:
         room += size * faces_beyond(wave, previous(h))
-    if mesh.links[ROW * h + OUT_RIGHT] == IRREGULAR:
+    if links[ROW * h + OUT_RIGHT] == IRREGULAR:
         room += size * faces_beyond(wave, following(h))
     return room

@@ -5,8 +5,8 @@ is called from Python takes the mesh, the wavefront and the bounds and makes the
 groups, with pointers in place of arrays. So each field is defined once, in its group.
 
 Lists of windows: every half-edge has a singly linked list of the windows that wait to cross its
-face, ordered along the edge. Rows come from a pool with a last-in-first-out free list, which keeps
-the rows in use within a cache's reach.
+face, ordered along the edge. Rows come from a pool with a last-in-first-out free list, so that
+the rows in use stay within a cache's reach.
 """
 
 from collections.abc import Iterable
@@ -50,7 +50,7 @@ WINNER = 2
 
 # Status of a vertex
 FAR = 0
-FRONT = 1  # shares a face with a vertex that is done
+FRONT = 1  # shares a face with a settled vertex
 SETTLED = 2  # has left the heap
 
 # Columns of Vertices.light, a row per vertex: angles in its unfolded fan
@@ -67,7 +67,7 @@ LEFT = 1  # SX, SY, SIGMA of the first window
 RIGHT = 4  # of the second
 MERGE = 7
 MERGED_ON = 0  # half-edge
-LEFT_REFERENCE = 1  # what was merged into the first window before; see `window`
+LEFT_REFERENCE = 1  # reference of the first window before; see `window`
 RIGHT_REFERENCE = 2
 MERGE_INTS = 3
 
@@ -77,7 +77,7 @@ FREE_SIZE = 4
 FRESH = 5  # rows of the pool from here on were never used
 SETTLED_VERTICES = 6
 CREATED = 7  # windows, in all
-KEPT = 8  # windows that survived trimming and were propagated
+PROPAGATED = 8  # windows that survived trimming
 PEAK = 9  # windows alive at once, at most
 WORK = 10  # done in this slice, about 10 ns each
 MERGES = 11  # recorded for backtracing
@@ -253,23 +253,9 @@ def view_of(topology: Any, wavefront: Any, bounds: Any) -> Any:
 
 
 @inlined
-def merging(wave: Any) -> bool:
-    """Whether the sweep merges windows; known when it is compiled."""
-    return len(wave.bounds.merging) > 0
-
-
-@inlined
 def is_pruned(wave: Any) -> bool:
     """Whether the sweep looks for paths of limited length only (section 5)."""
     return bool(wave.sizes.heuristic > 0)
-
-
-@inlined
-def source_weight(wave: Any, root: int) -> float:
-    """SW of a window with this root: 0 for a parallel one, which comes from a segment, else 1."""
-    if len(wave.bounds.parallel) > 0 and root >= wave.bounds.first_segment:
-        return 0.0
-    return 1.0
 
 
 def new_wavefront(

@@ -1,4 +1,4 @@
-"""Sites: points of a sweep that are no vertices, where it begins or which it is to reach.
+"""Sites: points of a sweep that are no vertices, as its sources or its targets.
 
 A site has a node of its own, numbered after the vertices, and a row for each face that it belongs
 to: one inside a face, one for each face of an edge. It emits windows over the edges of its faces,
@@ -9,7 +9,7 @@ windows that cross its face. No vertex is inserted, so that there are no slivers
 import math
 from typing import Any
 
-from geodesic_core.kernels.jit import as_ints, kernel
+from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
@@ -22,6 +22,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     TAIL,
     weights_in_frame,
 )
+from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.relaxation import (
     bound_vertex,
     illuminate_vertex,
@@ -41,30 +42,25 @@ from geodesic_core.kernels.sweep.state import (
     SITE,
     SITE_SHIFT,
     WINNER,
-    merging,
-    source_weight,
     view_of,
 )
 from geodesic_core.kernels.sweep.window import (
-    B0,
-    B1,
-    INTS,
-    REFERENCE,
-    ROOT,
-    SIGMA,
-    SX,
-    SY,
-    WIDTH,
+    Window,
     distance_at,
+    emitted_window,
+    load_window,
     straight_distance,
 )
-from geodesic_core.kernels.sweep.window_lists import put_window, send_out
+from geodesic_core.kernels.sweep.window_lists import send_out
 from geodesic_core.tolerances import BEND, FLAT, GAP
 
 
 @kernel
 def emit_site(wave: Any, k: int) -> None:
-    """Send windows from the site of row k over all edges of its face, and reach the corners."""
+    """Send windows from the site of row k over all edges of its face, and reach the corners.
+
+    Modifies lists and vertices.
+    """
     mesh, sites = wave.mesh, wave.sites
     node, face = sites.ints[SITE * k + NODE], sites.ints[SITE * k + FACE]
     sigma = wave.vertices.distance[node]
@@ -76,8 +72,8 @@ def emit_site(wave: Any, k: int) -> None:
         is_off_edge = sites.weights[3 * k + (h + 2) % 3] > 0.0
         if mesh.links[row + OPPOSITE] != NO_FACE and is_off_edge:
             sy = min(-y, -FLAT * length)
-            slot = put_window(wave, 0.0, length, length - x, sy, sigma, node, 0.0, -1 - node)
-            send_out(wave, h, slot)
+            window = emitted_window(wave, 0.0, length, length - x, sy, sigma, node, 0.0)
+            send_out(wave, h, window)
         ax = mesh.geometry[row + COS_LEFT] * mesh.geometry[row + LENGTH_LEFT]
         ay = mesh.geometry[row + SIN_LEFT] * mesh.geometry[row + LENGTH_LEFT]
         distance = sigma + math.hypot(ax - x, ay - y)
@@ -91,7 +87,10 @@ def emit_site(wave: Any, k: int) -> None:
 
 @kernel
 def watch_sites(topology: Any, wavefront: Any, bounds: Any, first: int) -> None:
-    """Have the sites of the rows from ``first`` on reached by whatever crosses their faces."""
+    """Have the sites from row ``first`` on reached by the windows that cross their faces.
+
+    Modifies the marks of the faces' lists.
+    """
     wave = view_of(topology, wavefront, bounds)
     pool, sites = wave.pool, wave.sites
     for k in range(first, wave.sizes.sites):
@@ -114,51 +113,29 @@ def reach_sites(wave: Any, h: int, count: int) -> None:
 
 @kernel
 def reach_site(wave: Any, h: int, count: int, k: int) -> None:
-    """Offer the site of row k the nearest of the windows of scratch.
+    """Offer the site of row k the nearest of the windows of scratch. Modifies its node.
 
-    Unlike an apex it asks them all: it has no neighbours that would make up for a gap.
+    Unlike an apex it tries them all: it has no neighbours that would make up for a gap.
     """
-    mesh, pool, sites = wave.mesh, wave.pool, wave.sites
+    mesh, sites = wave.mesh, wave.sites
     node = sites.ints[SITE * k + NODE]
     x, y = weights_in_frame(mesh.geometry, sites.weights, 3 * k, h)
     gap = GAP * mesh.geometry[ROW * h + LENGTH]
     for i in range(count):
-        w = WIDTH * i
-        sx, sy = pool.scratch[w + SX], pool.scratch[w + SY]
-        b0, b1 = pool.scratch[w + B0], pool.scratch[w + B1]
-        root = as_ints(pool.scratch)[INTS * i + ROOT]
-        sw, sigma = source_weight(wave, root), pool.scratch[w + SIGMA]
-        relax_site(
-            wave,
-            node,
-            way_through(x, y, b0, b1, sx, sy, sw, sigma, gap),
-            h,
-            sx,
-            sy,
-            root,
-            as_ints(pool.scratch)[INTS * i + REFERENCE] if merging(wave) else -1,
-        )
+        window = load_window(wave, wave.pool.scratch, i)
+        there = way_through(window, x, y, gap)
+        relax_site(wave, node, there, h, window.sx, window.sy, window.root, window.reference)
 
 
 @kernel
-def way_through(
-    x: float,
-    y: float,
-    b0: float,
-    b1: float,
-    sx: float,
-    sy: float,
-    sw: float,
-    sigma: float,
-    gap: float,
-) -> float:
+def way_through(window: Window, x: float, y: float, gap: float) -> float:
     """Distance through a window of a point of the face; the way is bent at its end if it must."""
-    rise = y * sw - sy
-    crossing = (sx * y - x * sy) / rise if rise > 0.0 else x
-    if b0 - gap <= crossing <= b1 + gap:
-        return straight_distance(x, y, sx, sy, sw, sigma)
-    crossing = min(max(crossing, b0), b1)
-    there = distance_at(crossing, sx, sy, sigma, sw)
+    rise = y * window.weight - window.sy
+    crossing = (window.sx * y - x * window.sy) / rise if rise > 0.0 else x
+    if window.b0 - gap <= crossing <= window.b1 + gap:
+        return straight_distance(window, x, y)
+    crossing = min(max(crossing, window.b0), window.b1)
+    there = distance_at(window, crossing)
     return (there + math.hypot(x - crossing, y)) * (1.0 + BEND)
 
 
@@ -166,7 +143,10 @@ def way_through(
 def relax_site(
     wave: Any, node: int, distance: float, via: int, sx: float, sy: float, root: int, reference: int
 ) -> None:
-    """Offer a site a distance and what gives it; of equal ones that of the lower source wins."""
+    """Offer a site a distance and the window that gives it; ties go to the lower source.
+
+    Modifies its node.
+    """
     vertices = wave.vertices
     known = vertices.distance[node]
     if not precedence(distance, vertices.source_index[root], known, vertices.source_index[node]):
@@ -184,7 +164,8 @@ def relax_site(
 def reach_sites_inside(topology: Any, wavefront: Any, bounds: Any, first: int) -> None:
     """Offer the sites from row ``first`` on the paths that cross no edge, after the sweep.
 
-    They come from the corners of their faces, or from sources and pieces in the same face.
+    They come from the corners of their faces, or from sources and segments in the same face.
+    Modifies the nodes of the sites.
     """
     wave = view_of(topology, wavefront, bounds)
     mesh, vertices, sites = wave.mesh, wave.vertices, wave.sites

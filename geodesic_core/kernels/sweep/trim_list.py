@@ -1,15 +1,11 @@
-"""Trim the windows of one half-edge against each other, and merge them (sections 3.3, 3.4, 4.1)."""
+"""The list of one half-edge trimmed, filtered and, in a merging sweep, merged (3.3, 3.4, 4.1)."""
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from geodesic_core.kernels.jit import as_ints, inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import (
-    HEAD,
-    LENGTH,
-    ROW,
-    TAIL,
-)
+from geodesic_core.kernels.mesh.half_edges import HEAD, LENGTH, ROW, TAIL
+from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.merging import merged
 from geodesic_core.kernels.sweep.state import (
     FIRST,
@@ -25,8 +21,6 @@ from geodesic_core.kernels.sweep.state import (
     SIZE,
     SPLIT,
     is_pruned,
-    merging,
-    source_weight,
 )
 from geodesic_core.kernels.sweep.trimming import leaves_gap, trim
 from geodesic_core.kernels.sweep.window import (
@@ -34,159 +28,166 @@ from geodesic_core.kernels.sweep.window import (
     B1,
     INTS,
     NEXT,
-    REFERENCE,
-    ROOT,
-    SIGMA,
-    SX,
-    SY,
+    NO_WINDOW,
     WIDTH,
-    XI,
+    Window,
+    between,
+    is_within,
+    load_window,
     reaches,
-    within,
+    store_window,
 )
 from geodesic_core.tolerances import GAP, LOOSE_OVERLAP, OVERLAP, SLACK
+
+
+class EdgeLimits(NamedTuple):
+    """The measures by which the windows of one half-edge are trimmed; mesh units."""
+
+    from_tail: float
+    """A window whose distance at x exceeds this + x is farther than the path over the tail"""
+    from_head: float
+    """The same for the head, and this - x"""
+    gap: float
+    """Gaps up to this are closed"""
+    overlap: float
+    """Overlaps up to this are left alone"""
+    uneven_overlap: float
+    """The same between windows of different σ"""
+
+
+@inlined
+def limits_of(wave: Any, h: int) -> EdgeLimits:
+    """Return the measures for the half-edge h.
+
+    The filters of Xin and Wang (2009) drop windows that a path along the edge beats, or that no
+    path of allowed length may pass.
+    """
+    mesh, vertices = wave.mesh, wave.vertices
+    length = mesh.geometry[ROW * h + LENGTH]
+    tail, head = mesh.links[ROW * h + TAIL], mesh.links[ROW * h + HEAD]
+    if merging(wave):  # drop only windows that are surely too long
+        from_tail, from_head = vertices.upper[tail], vertices.upper[head]
+    else:
+        from_tail, from_head = vertices.distance[tail], vertices.distance[head]
+    from_tail, from_head = from_tail * (1.0 + SLACK), from_head * (1.0 + SLACK)
+    if is_pruned(wave):
+        limit = wave.bounds.pruning.limit
+        from_tail = min(from_tail, limit - vertices.heuristic[tail])
+        from_head = min(from_head, limit - vertices.heuristic[head])
+    # Merging makes few windows of many: there, none is too many to be trimmed.
+    uneven_overlap = OVERLAP if merging(wave) else LOOSE_OVERLAP
+    return EdgeLimits(
+        from_tail, from_head + length, GAP * length, OVERLAP * length, uneven_overlap * length
+    )
 
 
 @inlined
 def trim_list(wave: Any, h: int) -> int:
     """Copy the list of h to scratch, trimmed against each other; return how many are left.
 
-    The filters of Xin and Wang (2009) take away what a path along the edge beats, or what no path
-    of allowed length may pass: only at both ends of the list, where nearly all of it lies.
+    Filters apply at both ends of the list only, where nearly all that they find lies. Modifies
+    scratch, and the record of merges.
     """
-    mesh, pool, vertices = wave.mesh, wave.pool, wave.vertices
-    row = ROW * h
-    length = mesh.geometry[row + LENGTH]
-    tail, head = mesh.links[row + TAIL], mesh.links[row + HEAD]
-    if merging(wave):  # only what is surely too long may go
-        from_tail, from_head = vertices.upper[tail], vertices.upper[head]
-    else:
-        from_tail, from_head = vertices.distance[tail], vertices.distance[head]
-    from_tail, from_head = from_tail * (1.0 + SLACK), from_head * (1.0 + SLACK)
-    if is_pruned(wave):
-        from_tail = min(from_tail, wave.bounds.pruning.limit - vertices.heuristic[tail])
-        from_head = min(from_head, wave.bounds.pruning.limit - vertices.heuristic[head])
-    from_head += length
-    gap, overlap = GAP * length, OVERLAP * length
-    # Merging makes few windows of many: there, none is too many to be trimmed.
-    uneven_overlap = overlap if merging(wave) else LOOSE_OVERLAP * length
-    limited = wave.bounds.max_distance < math.inf
-    count = 0
-    # The window last kept, also in scratch
-    p0, p1, px, py, pw, p_sigma = 0.0, 0.0, 0.0, 0.0, 1.0, 0.0
-    xi, p_xi = 0.0, 0.0
+    pool, max_distance = wave.pool, wave.bounds.max_distance
+    limits, limited = limits_of(wave, h), max_distance < math.inf
+    last, count = NO_WINDOW, 0  # the window last stored in scratch, and how many are there
     slot = pool.lists[LIST * h + FIRST]
     for _ in range(pool.lists[LIST * h + SIZE]):
-        w = WIDTH * slot
-        b0, b1 = pool.windows[w + B0], pool.windows[w + B1]
-        sx, sy, sigma = (
-            pool.windows[w + SX],
-            pool.windows[w + SY],
-            pool.windows[w + SIGMA],
-        )
-        root = as_ints(pool.windows)[INTS * slot + ROOT]
-        sw, reference = source_weight(wave, root), -1
-        if merging(wave):
-            xi, reference = (
-                pool.windows[w + XI],
-                as_ints(pool.windows)[INTS * slot + REFERENCE],
-            )
+        new = load_window(wave, pool.windows, slot)
         slot = as_ints(pool.windows)[INTS * slot + NEXT]
-        if limited and not reaches(b0, b1, sx, sy, sigma, wave.bounds.max_distance, sw):
+        if limited and not reaches(new, max_distance):
             continue
-        while count > 0 and p1 >= b0:
-            old_p0, old_p1, old_b0, old_b1 = p0, p1, b0, b1
-            p0, p1, b0, b1 = trim(
-                p0, p1, px, py, p_sigma, b0, b1, sx, sy, sigma, overlap, uneven_overlap, pw, sw
-            )
-            if merging(wave) and leaves_gap(
-                p0, p1, px, py, p_sigma + p_xi, b0, b1, sx, sy, sigma + xi, p_sigma, sigma, pw, sw
-            ):
-                p0, p1, b0, b1 = old_p0, old_p1, old_b0, old_b1
-                break
-            p = WIDTH * (count - 1)
-            if p1 > p0:
-                pool.scratch[p + B0], pool.scratch[p + B1] = p0, p1
-                break
-            count -= 1
-            if count > 0:
-                p -= WIDTH
-                p0, p1 = pool.scratch[p + B0], pool.scratch[p + B1]
-                px, py = pool.scratch[p + SX], pool.scratch[p + SY]
-                p_sigma = pool.scratch[p + SIGMA]
-                pw = source_weight(wave, as_ints(pool.scratch)[INTS * (count - 1) + ROOT])
-                if merging(wave):
-                    p_xi = pool.scratch[p + XI]
-        if b1 <= b0:
+        last, new, count = trim_against_earlier(wave, limits, last, new, count)
+        if new.b1 <= new.b0:
             continue
-        if count == 0:
-            if not within(b1, sx, sy, sw, sigma, from_tail + b1):
+        if count == 0 and not is_within(new, new.b1, limits.from_tail + new.b1):
+            continue
+        if count > 0 and new.b0 > last.b1 and new.b0 - last.b1 <= limits.gap:
+            new = between(new, last.b1, new.b1)
+        if merging(wave) and count > 0:
+            is_merged, last = merge_into(wave, h, last, new)
+            if is_merged:
+                store_window(wave, pool.scratch, count - 1, last)
                 continue
-        elif b0 > p1 and b0 - p1 <= gap:
-            b0 = p1
-        if merging(wave) and count > 0 and p0 <= b0 <= p1 <= b1:
-            p_root = as_ints(pool.scratch)[INTS * (count - 1) + ROOT]
-            if vertices.source_index[p_root] == vertices.source_index[root] and pw * sw == 1.0:
-                can, nx, ny, n_sigma, n_xi = merged(
-                    wave, p0, p1, px, py, p_sigma, p_xi, b0, b1, sx, sy, sigma, xi
-                )
-                if can:
-                    record_merge(wave, h, count - 1, sx, sy, sigma, reference)
-                    p1, px, py, p_sigma, p_xi = b1, nx, ny, n_sigma, n_xi
-                    put_scratch(wave, count - 1, p0, p1, px, py, p_sigma)
-                    pool.scratch[WIDTH * (count - 1) + XI] = p_xi
-                    continue
-        p0, p1, px, py, pw, p_sigma = b0, b1, sx, sy, sw, sigma
-        put_scratch(wave, count, b0, b1, sx, sy, sigma)
-        as_ints(pool.scratch)[INTS * count + ROOT] = root
-        if merging(wave):
-            p_xi = xi
-            pool.scratch[WIDTH * count + XI] = xi
-            as_ints(pool.scratch)[INTS * count + REFERENCE] = reference
+        last = new
+        store_window(wave, pool.scratch, count, new)
         count += 1
+    return without_covered_tail(wave, limits.from_head, count)
+
+
+@inlined
+def trim_against_earlier(
+    wave: Any, limits: EdgeLimits, last: Window, new: Window, count: int
+) -> tuple[Window, Window, int]:
+    """Trim a window and those in scratch that overlap it, from the last one on.
+
+    Return the last one that is left, the new one, and the number left. Modifies scratch.
+    """
+    scratch = wave.pool.scratch
+    while count > 0 and last.b1 >= new.b0:
+        earlier, later = trim(last, new, limits.overlap, limits.uneven_overlap)
+        if merging(wave) and leaves_gap(earlier, later):
+            break
+        last, new = earlier, later
+        if last.b1 > last.b0:
+            w = WIDTH * (count - 1)
+            scratch[w + B0], scratch[w + B1] = last.b0, last.b1
+            break
+        count -= 1
+        if count > 0:
+            last = load_window(wave, scratch, count - 1)
+    return last, new, count
+
+
+@inlined
+def without_covered_tail(wave: Any, from_head: float, count: int) -> int:
+    """Return how many windows of scratch are left, less those at its end beyond ``from_head``."""
     while count > 0:
-        p = WIDTH * (count - 1)
-        b0, sx, sy = pool.scratch[p + B0], pool.scratch[p + SX], pool.scratch[p + SY]
-        sw = source_weight(wave, as_ints(pool.scratch)[INTS * (count - 1) + ROOT])
-        if within(b0, sx, sy, sw, pool.scratch[p + SIGMA], from_head - b0):
+        window = load_window(wave, wave.pool.scratch, count - 1)
+        if is_within(window, window.b0, from_head - window.b0):
             break
         count -= 1
     return count
 
 
 @inlined
-def put_scratch(
-    wave: Any, i: int, b0: float, b1: float, sx: float, sy: float, sigma: float
-) -> None:
-    """Write a window to scratch."""
-    pool = wave.pool
-    w = WIDTH * i
-    pool.scratch[w + B0], pool.scratch[w + B1] = b0, b1
-    pool.scratch[w + SX], pool.scratch[w + SY] = sx, sy
-    pool.scratch[w + SIGMA] = sigma
+def merge_into(wave: Any, h: int, last: Window, new: Window) -> tuple[bool, Window]:
+    """Merge the window ``new`` into the last one of h, if both are of one source and it is allowed.
+
+    Return whether they are merged, and what the last one is then. Modifies the record of merges.
+    """
+    source_index = wave.vertices.source_index
+    if not last.b0 <= new.b0 <= last.b1 <= new.b1:
+        return False, last
+    if source_index[last.root] != source_index[new.root] or last.weight * new.weight != 1.0:
+        return False, last
+    is_merged, whole = merged(wave, last, new)
+    if not is_merged:
+        return False, last
+    reference = record_merge(wave, h, last, new)
+    return True, Window(
+        whole.b0, whole.b1, whole.sx, whole.sy, whole.sigma, 1.0, whole.root, whole.xi, reference
+    )
 
 
 @kernel
-def record_merge(
-    wave: Any, h: int, i: int, sx: float, sy: float, sigma: float, reference: int
-) -> None:
-    """Note that a window is merged into that at i of scratch, if paths are wanted (4.3)."""
+def record_merge(wave: Any, h: int, last: Window, new: Window) -> int:
+    """Record that ``new`` is merged into ``last``, if paths are wanted (4.3); return the reference.
+
+    Modifies the record of merges.
+    """
     pool = wave.pool
     if wave.sizes.merges == 0:
-        return
+        return last.reference
     record = wave.counters[MERGES]
     wave.counters[MERGES] = record + 1
-    m, w = MERGE * record, WIDTH * i
-    pool.merges[m + SPLIT] = pool.scratch[w + B1]
-    pool.merges[m + LEFT], pool.merges[m + LEFT + 1] = (
-        pool.scratch[w + SX],
-        pool.scratch[w + SY],
-    )
-    pool.merges[m + LEFT + 2] = pool.scratch[w + SIGMA]
-    pool.merges[m + RIGHT], pool.merges[m + RIGHT + 1] = sx, sy
-    pool.merges[m + RIGHT + 2] = sigma
-    m = MERGE_INTS * record
-    pool.merge_ints[m + MERGED_ON] = h
-    pool.merge_ints[m + LEFT_REFERENCE] = as_ints(pool.scratch)[INTS * i + REFERENCE]
-    pool.merge_ints[m + RIGHT_REFERENCE] = reference
-    as_ints(pool.scratch)[INTS * i + REFERENCE] = record
+    m, i = MERGE * record, MERGE_INTS * record
+    pool.merges[m + SPLIT] = last.b1
+    pool.merges[m + LEFT], pool.merges[m + LEFT + 1] = last.sx, last.sy
+    pool.merges[m + LEFT + 2] = last.sigma
+    pool.merges[m + RIGHT], pool.merges[m + RIGHT + 1] = new.sx, new.sy
+    pool.merges[m + RIGHT + 2] = new.sigma
+    pool.merge_ints[i + MERGED_ON] = h
+    pool.merge_ints[i + LEFT_REFERENCE] = last.reference
+    pool.merge_ints[i + RIGHT_REFERENCE] = new.reference
+    return record

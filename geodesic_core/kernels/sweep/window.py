@@ -1,87 +1,204 @@
 """The window: a stretch of an edge to which one pseudosource sends straight rays (section 3.1).
 
-A window is a row of eight float64 in a pool, addressed by its slot. It lies on a half-edge and is
-about to cross that half-edge's face; its rays come from y < 0 in the half-edge's frame.
+A window lies on a half-edge and is about to cross that half-edge's face; its rays come from y < 0
+in the half-edge's frame.
 
-=========  ==========================  =======================================================
-column     paper                       meaning, unit
-=========  ==========================  =======================================================
-B0, B1     b0, b1                      ends on the half-edge, mesh units from its tail
-SX, SY     d0, d1 and τ, in one        the unfolded pseudosource s in the half-edge's frame
-           (of a strip: see below)
-SIGMA      σ                           distance from s back to the source, mesh units
-XI         ξ                           how much the window may fall short of the exact distance
-=========  ==========================  =======================================================
+=============  =======================  =========================================================
+field          paper                    meaning, unit
+=============  =======================  =========================================================
+b0, b1         b0, b1                   ends on the half-edge, mesh units from its tail
+sx, sy         d0, d1 and τ, in one     the unfolded pseudosource s in the half-edge's frame
+               (if parallel: see below)
+sigma          σ                        distance from s back to the source, mesh units
+weight                                  1; 0 where the rays are parallel
+root                                    node of the pseudosource; of a merged window, of one of
+                                        those that it replaces; of a parallel one, its segment
+xi             ξ                        how much it may fall short of the exact distance
+reference      reference list (4.3)     what was merged into it: a merge's index, or -1 - root
+=============  =======================  =========================================================
 
 The unfolded position replaces the two distances d0, d1, whose every use would cost a square root,
-and its side of the edge replaces the direction τ.
+and its side of the edge replaces the direction τ. The last two fields have a meaning in a merging
+sweep only.
 
-A *strip* is a window whose rays are parallel: they leave a straight piece of a curve at right
-angles. Its pseudosource lies at infinity: in homogeneous coordinates (SX, SY, SW), with SW = 0 and
-(SX, SY) the unit vector against the rays; all others have SW = 1. Its distance function is linear:
-D(x, y) = SIGMA - SX x - SY y, where SIGMA belongs to the frame's origin and may be negative. SW is
-not stored, since ROOT tells it (`wavefront.source_weight`).
+A window is *parallel* where its rays leave a straight segment of a curve at right angles. Its
+pseudosource lies at infinity: in homogeneous coordinates (sx, sy, weight), with weight 0 and
+(sx, sy) the unit vector against the rays. Its distance function is linear:
+D(x, y) = sigma - sx x - sy y, where sigma belongs to the frame's origin and may be negative.
 
-The rest of a row holds int32:
-
-REFERENCE  what was merged into the window (4.3): a merge's index, or -1 - ROOT where nothing was
-NEXT       slot of the next window of the same list (or of the next free slot), -1 at the end
-ROOT       node of the pseudosource; of a merged window, of one of those that it replaces; of a
-           strip, the piece that it comes from
-
-XI and REFERENCE have a meaning in a merging sweep only.
+In memory a window is a row of eight float64, half a dozen of them in use and the rest int32, in a
+pool where its number is its *slot*; kernels read and write whole windows, as values. The weight is
+not stored, since the root tells it.
 """
 
 import math
+from typing import Any, NamedTuple
 
-from geodesic_core.kernels.jit import inlined
+import numpy as np
 
+from geodesic_core.kernels.jit import as_ints, inlined
+from geodesic_core.kernels.planar import distance
+from geodesic_core.kernels.sweep.bounds import merging, source_weight
+
+# Columns of a row, float64
 B0 = 0
 B1 = 1
 SX = 2
 SY = 3
 SIGMA = 4
 XI = 5
+WIDTH = 8  # columns in all
 
-WIDTH = 8  # float64 columns of a row
-REFERENCE = 12  # int32 columns of a row
-NEXT = 14
+# Columns of a row, int32
+REFERENCE = 12
+NEXT = 14  # slot of the next window of the same list (or of the next free slot), -1 at the end
 ROOT = 15
-INTS = 16
+INTS = 16  # columns in all
+
+
+class Window(NamedTuple):
+    """A window as a value."""
+
+    b0: float
+    b1: float
+    sx: float
+    sy: float
+    sigma: float
+    weight: float
+    root: int
+    xi: float
+    reference: int
+
+
+NO_WINDOW = Window(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0, 0.0, -1)
+"""An empty window."""
 
 
 @inlined
-def distance_at(x: float, sx: float, sy: float, sigma: float, sw: float = 1.0) -> float:
-    """Distance function D of a window at (x, 0)."""
-    if sw == 0.0:
-        return sigma - sx * x
-    return math.sqrt((x - sx) * (x - sx) + sy * sy) + sigma
+def load_window(wave: Any, rows: Any, i: int) -> Window:
+    """Return the window of row i of the pool, or of scratch."""
+    w, ints = WIDTH * i, as_ints(rows)
+    root: Any = np.int64(ints[INTS * i + ROOT])  # one type, so that kernels are compiled once
+    xi, reference = 0.0, -1
+    if merging(wave):
+        xi, reference = rows[w + XI], ints[INTS * i + REFERENCE]
+    return Window(
+        rows[w + B0],
+        rows[w + B1],
+        rows[w + SX],
+        rows[w + SY],
+        rows[w + SIGMA],
+        source_weight(wave, root),
+        root,
+        xi,
+        reference,
+    )
 
 
 @inlined
-def reaches(
-    b0: float, b1: float, sx: float, sy: float, sigma: float, limit: float, sw: float = 1.0
-) -> bool:
+def store_window(wave: Any, rows: Any, i: int, window: Window) -> None:
+    """Write a window to row i. Modifies ``rows``."""
+    w, ints = WIDTH * i, as_ints(rows)
+    rows[w + B0], rows[w + B1] = window.b0, window.b1
+    rows[w + SX], rows[w + SY] = window.sx, window.sy
+    rows[w + SIGMA] = window.sigma
+    ints[INTS * i + ROOT] = window.root
+    if merging(wave):
+        rows[w + XI] = window.xi
+        ints[INTS * i + REFERENCE] = window.reference
+
+
+@inlined
+def emitted_window(
+    wave: Any, b0: float, b1: float, sx: float, sy: float, sigma: float, root: int, xi: float
+) -> Window:
+    """Return a window as the pseudosource ``root`` emits it, with nothing merged into it."""
+    node: Any = np.int64(root)
+    return Window(b0, b1, sx, sy, sigma, source_weight(wave, node), node, xi, -1 - node)
+
+
+@inlined
+def between(window: Window, b0: float, b1: float) -> Window:
+    """Return the window with other ends."""
+    return Window(
+        b0,
+        b1,
+        window.sx,
+        window.sy,
+        window.sigma,
+        window.weight,
+        window.root,
+        window.xi,
+        window.reference,
+    )
+
+
+@inlined
+def at_sigma(window: Window, sigma: float) -> Window:
+    """Return the window with another σ."""
+    return Window(
+        window.b0,
+        window.b1,
+        window.sx,
+        window.sy,
+        sigma,
+        window.weight,
+        window.root,
+        window.xi,
+        window.reference,
+    )
+
+
+@inlined
+def reversed_window(window: Window, length: float) -> Window:
+    """Return the window in the frame that runs along its edge, of this length, the other way."""
+    sigma = window.sigma
+    if window.weight != 1.0:  # it belongs to the origin, which is at the other end
+        sigma -= window.sx * length
+    return Window(
+        length - window.b1,
+        length - window.b0,
+        length * window.weight - window.sx,
+        window.sy,
+        sigma,
+        window.weight,
+        window.root,
+        window.xi,
+        window.reference,
+    )
+
+
+@inlined
+def distance_at(window: Window, x: float) -> float:
+    """Distance function D at (x, 0)."""
+    return distance(x, window.sx, window.sy, window.weight) + window.sigma
+
+
+@inlined
+def straight_distance(window: Window, x: float, y: float) -> float:
+    """Distance function D at a point of the face that the window is about to cross."""
+    sx, sy = window.sx, window.sy
+    if window.weight == 0.0:
+        return window.sigma - sx * x - sy * y
+    return math.sqrt((x - sx) * (x - sx) + (y - sy) * (y - sy)) + window.sigma
+
+
+@inlined
+def reaches(window: Window, limit: float) -> bool:
     """Whether the least distance over the window is within ``limit``."""
-    if sw == 0.0:
-        return sigma - max(sx * b0, sx * b1) <= limit
+    b0, b1, sx, sy = window.b0, window.b1, window.sx, window.sy
+    if window.weight == 0.0:
+        return window.sigma - max(sx * b0, sx * b1) <= limit
     x = min(max(sx, b0), b1) - sx
-    room = limit - sigma
+    room = limit - window.sigma
     return room >= 0.0 and x * x + sy * sy <= room * room
 
 
 @inlined
-def within(x: float, sx: float, sy: float, sw: float, sigma: float, limit: float) -> bool:
+def is_within(window: Window, x: float, limit: float) -> bool:
     """Whether the distance at (x, 0) is within ``limit``."""
-    if sw == 0.0:
-        return sigma - sx * x <= limit
-    room = limit - sigma
+    sx, sy = window.sx, window.sy
+    if window.weight == 0.0:
+        return window.sigma - sx * x <= limit
+    room = limit - window.sigma
     return room > 0.0 and room * room >= (sx - x) * (sx - x) + sy * sy
-
-
-@inlined
-def straight_distance(x: float, y: float, sx: float, sy: float, sw: float, sigma: float) -> float:
-    """Distance function at a point of the face that the window is about to cross."""
-    if sw == 0.0:
-        return sigma - sx * x - sy * y
-    return math.sqrt((x - sx) * (x - sx) + (y - sy) * (y - sy)) + sigma

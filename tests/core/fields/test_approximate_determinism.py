@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.fields import sweep
+from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
@@ -85,7 +87,7 @@ def test_growing_changes_nothing(name, monkeypatch):
 
     allocate, more_merges = state.new_wavefront, state.with_more_merges
     monkeypatch.setattr(state, "new_wavefront", cramped)
-    monkeypatch.setattr(state, "with_more_merges", counted)
+    monkeypatch.setitem(sweep._GROW, Outcome.MERGES_FULL, counted)
     assert answer(mesh, 7) == whole
     assert len(grown) > 5
     assert grown == [2**step for step in range(len(grown))]

@@ -22,7 +22,7 @@ from geodesic_core.kernels.sweep.state import new_wavefront
 from geodesic_core.kernels.sweep.trimming import leaves_gap
 from geodesic_core.tolerances import LOCAL_SHARE
 from tests.support import zoo
-from tests.support.stepping import topology_of, view_of_arrays
+from tests.support.stepping import topology_of, view_of_arrays, window
 
 ROUNDING = 1e-9
 """Of lengths of about 1: a few roundings, on a conic that may be close to a line."""
@@ -149,7 +149,7 @@ def test_shortfall_is_the_most_between_the_ends(nx, ny, sx, sy, sigma, hi):
     assume(abs(ny - sy) > 1e-3)
     x = np.linspace(0, hi, 2001)
     falls = distance(x, sx, sy, sigma) - distance(x, nx, ny, 0.1)
-    found = shortfall(0.0, hi, nx, ny, 0.1, sx, sy, sigma)
+    found = shortfall(window(0.0, hi, sx, sy, sigma), window(0.0, 1.0, nx, ny, 0.1))
     most, least = falls[1:-1].max(), falls[1:-1].min()
     ends = max(falls[0], falls[-1])
     if most > ends + 1e-6:
@@ -173,7 +173,9 @@ def test_accuracy_is_both_errors_and_the_local_share_of_them(relative, absolute,
 
 
 def merge(pair, error, xi0=0.0, xi1=0.0):
-    return merged(granted(error), *pair[0], xi0, *pair[1], xi1)
+    can, whole = merged(granted(error), window(*pair[0], xi0), window(*pair[1], xi1))
+    assert not can or (whole.b0, whole.b1) == (pair[0][0], pair[1][1])
+    return can, whole.sx, whole.sy, whole.sigma, whole.xi
 
 
 @given(neighbours(), st.sampled_from([ANYTHING, 0.5, 1e-2]), st.floats(0, 1e-3), st.floats(0, 1e-3))
@@ -183,13 +185,13 @@ def test_what_is_merged_keeps_every_promise(pair, error, xi0, xi1):
     first, second = pair
     assert sy < 0
     assert sigma >= 0
-    for end, window in ((0.0, first), (1.0, second)):
+    for end, old in ((0.0, first), (1.0, second)):
         # Where the conic is close to a line, half of the digits of s' are lost, not of distances.
-        assert distance(end, sx, sy, sigma) == pytest.approx(distance(end, *window[2:]), rel=1e-9)
+        assert distance(end, sx, sy, sigma) == pytest.approx(distance(end, *old[2:]), rel=1e-9)
     fall = 0.0
-    for window, known in ((first, xi0), (second, xi1)):
-        x = np.linspace(*window[:2], 401)
-        falls = distance(x, *window[2:]) - distance(x, sx, sy, sigma)
+    for old, known in ((first, xi0), (second, xi1)):
+        x = np.linspace(*old[:2], 401)
+        falls = distance(x, *old[2:]) - distance(x, sx, sy, sigma)
         assert falls.min() >= -ROUNDING
         assert (falls + known <= xi + ROUNDING).all()
         fall = max(fall, falls.max())
@@ -227,8 +229,8 @@ def test_where_merging_is_refused_no_pseudosource_would_do(pair):
         if s is None or s[1] > -1e-3 or widens(s, first, second) < 1e-6:
             continue
         above = max(
-            distance(x, *s, sigma) - distance(x, *window[2:])
-            for x, window in ((first[1], first), (second[0], second))
+            distance(x, *s, sigma) - distance(x, *old[2:])
+            for x, old in ((first[1], first), (second[0], second))
         )
         assert above > -step
         return
@@ -248,11 +250,9 @@ def test_two_halves_of_a_window_make_it_whole_again(sx, sy, sigma, split):
 @given(neighbours(), st.sampled_from([1e-9, 1e9]))
 def test_merging_scales(pair, scale):
     can, *found = merge(pair, 0.5)
-    scaled = merged(
-        granted(0.5), *(scale * x for x in pair[0]), 0.0, *(scale * x for x in pair[1]), 0.0
-    )
-    if can and scaled[0]:
-        assert scaled[1:4] == pytest.approx(
+    can_scaled, *scaled = merge([[scale * x for x in ends] for ends in pair], 0.5)
+    if can and can_scaled:
+        assert scaled[:3] == pytest.approx(
             [scale * x for x in found[:3]], rel=1e-5, abs=1e-9 * scale
         )
 
@@ -296,12 +296,8 @@ def test_a_gap_is_a_wedge_that_either_window_may_be_nearest_to(pair, late, xi0, 
     assume(abs(lean) > 1e-6)
     assume(abs(at_p - at_c - xi1) > 1e-9 and abs(at_c - at_p - xi0) > 1e-9)
     wanted = diverge(p, c) and _either_may_be_nearest(at_p, xi0, at_c, xi1)
-    arguments = (
-        (*c[:4], c[4] + xi1, *p[:4], p[4] + xi0, c[4], p[4])
-        if swapped
-        else (*p[:4], p[4] + xi0, *c[:4], c[4] + xi1, p[4], c[4])
-    )
-    assert leaves_gap(*arguments) == wanted
+    windows = window(*p, xi0), window(*c, xi1)
+    assert leaves_gap(*(windows[::-1] if swapped else windows)) == wanted
 
 
 def _either_may_be_nearest(at_p, xi_p, at_c, xi_c) -> bool:
@@ -319,5 +315,6 @@ def _either_may_be_nearest(at_p, xi_p, at_c, xi_c) -> bool:
     ],
 )
 def test_there_is_no_gap_where_windows_do_not_meet(p, c):
-    assert not leaves_gap(*p, 1.0, *c, 1.0, 0.0, 0.0)
-    assert leaves_gap(0.0, 0.5, *p[2:], 1.0, 0.5, 1.0, *c[2:], 1.0, 0.0, 0.0)
+    assert not leaves_gap(window(*p, 0.0, xi=1.0), window(*c, 0.0, xi=1.0))
+    first, second = (0.0, 0.5, *p[2:], 0.0), (0.5, 1.0, *c[2:], 0.0)
+    assert leaves_gap(window(*first, xi=1.0), window(*second, xi=1.0))

@@ -8,7 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from geodesic_core.kernels.planar import bisector, hit_left
-from geodesic_core.kernels.sweep.window import distance_at, reaches
+from geodesic_core.kernels.sweep.window import reaches
+from tests.support.stepping import window
 
 shares = st.floats(0, 1)
 positions = st.floats(-3, 3)
@@ -63,7 +64,7 @@ def test_bisector_is_where_bisection_finds_it(s0x, s0y, s1x, s1y, crossing):
     sigma1 = math.hypot(crossing - s0x, s0y) - math.hypot(crossing - s1x, s1y)
 
     def lead(x):
-        return distance_at(x, s1x, s1y, sigma1) - distance_at(x, s0x, s0y, 0.0)
+        return math.hypot(x - s1x, s1y) + sigma1 - math.hypot(x - s0x, s0y)
 
     lo, hi = 0.0, 1.0
     assume((lead(lo) > 0) != (lead(hi) > 0))
@@ -83,7 +84,8 @@ def test_bisector_tells_the_branches_of_the_hyperbola_apart(swapped):
     if swapped:
         s0, s1 = s1, s0
     found = bisector(0.0, 1.0, *s0, *s1)
-    assert distance_at(found, *s1) == pytest.approx(distance_at(found, *s0), rel=1e-12)
+    at_s0, at_s1 = (math.hypot(found - x, y) + sigma for x, y, sigma in (s0, s1))
+    assert at_s1 == pytest.approx(at_s0, rel=1e-12)
 
 
 @pytest.mark.parametrize("weight", [0.0, 1e-16, 1e-14, 1e-12, 1e-10, 1e-8])
@@ -108,4 +110,4 @@ def test_reaches_is_about_the_least_distance(u, v, sx, sy, sigma, limit):
     b0, b1 = min(u, v), max(u, v)
     nearest = math.hypot(min(max(sx, b0), b1) - sx, sy) + sigma
     assume(abs(nearest - limit) > 1e-9)
-    assert reaches(b0, b1, sx, sy, sigma, limit) == (nearest < limit)
+    assert reaches(window(b0, b1, sx, sy, sigma), limit) == (nearest < limit)

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from geodesic_core.kernels.sweep import continuous_dijkstra
-from geodesic_core.kernels.sweep.propagation import POOL_FULL, SCRATCH_FULL
+from geodesic_core.kernels.outcome import Outcome
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.invariants import Watch, exact_by_euclid, exact_by_unfolding
@@ -145,10 +144,10 @@ def test_growing_changes_nothing(name):
         outcomes.append(outcome)
         wave = grown
     assert set(outcomes) == {
-        continuous_dijkstra.RUNNING,
-        continuous_dijkstra.FINISHED,
-        POOL_FULL,
-        SCRATCH_FULL,
+        Outcome.RUNNING,
+        Outcome.FINISHED,
+        Outcome.POOL_FULL,
+        Outcome.SCRATCH_FULL,
     }
     assert state_of(wave) == state_of(whole)
     np.testing.assert_array_equal(wave.counters[:10], whole.counters[:10])

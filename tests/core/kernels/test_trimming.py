@@ -8,6 +8,7 @@ from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
 from geodesic_core.kernels.sweep.trimming import trim
+from tests.support.stepping import window
 
 ALONG_THE_LINE = 2e-7
 """Where both sources lie on the edge's own line the bisector has half the digits."""
@@ -26,9 +27,9 @@ def windows(draw):
     return b0, b1, draw(positions), draw(depths), draw(weights)
 
 
-def naive(x, window):
+def naive(x, values):
     """Distance by a window where it covers x, else infinity."""
-    b0, b1, sx, sy, sigma = window
+    b0, b1, sx, sy, sigma = values
     return np.where((b0 <= x) & (x <= b1), np.hypot(x - sx, sy) + sigma, math.inf)
 
 
@@ -37,12 +38,13 @@ LEAST = 1e-14
 
 
 def trimmed(p, c):
-    p0, p1, c0, c1 = trim(*p, *c, LEAST, LEAST)
-    return (p0, p1, *p[2:]), (c0, c1, *c[2:])
+    left = trim(window(*p), window(*c), LEAST, LEAST)
+    assert [each[2:] for each in left] == [window(*p)[2:], window(*c)[2:]]
+    return tuple(each[:5] for each in left)
 
 
-def is_empty(window) -> bool:
-    return window[1] <= window[0]
+def is_empty(values) -> bool:
+    return values[1] <= values[0]
 
 
 @given(windows(), windows())
@@ -55,12 +57,12 @@ def test_nothing_nearest_is_lost(p, c):
     for before, after in ((p, p_left), (c, c_left)):
         assert before[0] <= after[0]
         assert after[1] <= before[1]
-    kept = [window for window in (p_left, c_left) if not is_empty(window)]
+    kept = [values for values in (p_left, c_left) if not is_empty(values)]
     places = np.concatenate([SAMPLES, [p[0], p[1], c[0], c[1]]])
     wanted = np.minimum(naive(places, p), naive(places, c))
     if p[0] == p[1] or c[0] == c[1]:
         return  # without width there is nothing to keep
-    found = np.min([naive(places, window) for window in kept], axis=0)
+    found = np.min([naive(places, values) for values in kept], axis=0)
     asked = np.isfinite(wanted)
     assert (found[asked] <= wanted[asked] * (1 + 1e-12) + ALONG_THE_LINE).all()
 
