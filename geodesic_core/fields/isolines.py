@@ -187,13 +187,13 @@ class Drawing:
         site_rows = np.argsort(sites.ints[: nodes.first_target, FACE], kind="stable")
         piece_rows = np.argsort(sites.segment_ints[:, FACE], kind="stable")
         field = Field(
-            kept=windows,
+            face_windows=windows,
             distance=distances,
             site_ints=sites.ints[site_rows],
             site_weights=sites.weights[site_rows],
-            piece_ints=sites.segment_ints[piece_rows],
-            piece_ends=sites.segment_ends[piece_rows],
-            first_piece=nodes.first_segment,
+            segment_ints=sites.segment_ints[piece_rows],
+            segment_ends=sites.segment_ends[piece_rows],
+            first_segment=nodes.first_segment,
         )
         count = len(mesh.topology.links) // 3
         least, most = np.full(count, np.inf), np.full(count, np.inf)
@@ -206,7 +206,7 @@ class Drawing:
             return count
 
         in_slices(count, bound, control)
-        for inside in (field.site_ints, field.piece_ints):
+        for inside in (field.site_ints, field.segment_ints):
             np.minimum.at(least, inside[:, FACE], distances[inside[:, NODE]])
 
     def lines(self, level: float, chord_error: float, control: Control) -> list[Isoline]:
@@ -232,7 +232,7 @@ class Drawing:
 
         def chain(first: int, last: int) -> int:
             parts.append(
-                kernels.chain_pieces(
+                kernels.chain_arcs(
                     topology, distances, cuts, crossings, level, chord_error, first, last
                 )
             )

@@ -12,6 +12,7 @@ from geodesic_core.errors import InternalError
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.paths import backtracing, locations
 from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.kernels.paths.locations import Locations
 from geodesic_core.mesh.curve import foot_on
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -142,9 +143,8 @@ def traced_path(
     faces, vertices = np.empty(count, np.int32), np.empty(count, np.int64)
     weights, points = np.empty((count, 3)), np.empty((count, 3))
     nodes, parameters = nodes[::-1].copy(), parameters[::-1].copy()
-    locations.place_nodes(
-        mesh.topology, mesh.faces, nodes, parameters, faces, weights, vertices, points
-    )
+    located = Locations(faces, weights, vertices, points)
+    locations.locate_nodes(mesh.topology, mesh.faces, nodes, parameters, located)
     for i in (count - 1, 0):
         node = -1 - int(nodes[i])
         if node < len(mesh.vertices):
@@ -157,9 +157,9 @@ def traced_path(
             points[i] = mesh.position(point)
         faces[i], weights[i] = point.face_index, point.barycentric
         vertices[i] = -1 if point.vertex_index is None else point.vertex_index
-    distinct = np.empty(count, np.uint8)
-    locations.leave_out_repeated(faces, weights, distinct)
-    where = np.flatnonzero(distinct)
+    is_new = np.empty(count, np.uint8)
+    locations.flag_new(faces, weights, is_new)
+    where = np.flatnonzero(is_new)
     points = points[where]
     return GeodesicPath(
         points=points,

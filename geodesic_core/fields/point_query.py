@@ -56,7 +56,7 @@ def arrival_at(
     reach = Reach(*best)
     if math.isinf(reach.distance) or reach.distance > max_distance:
         return Arrival(math.inf, -1, reach)
-    return Arrival(reach.distance, int(winners.nearest[reach.root]), reach)
+    return Arrival(reach.distance, int(winners.nearest[reach.predecessor]), reach)
 
 
 def with_target(
@@ -72,7 +72,7 @@ def with_target(
             distance=np.append(winners.distance, arrival.distance),
             winner=np.vstack([winners.winner, [reach.sx, reach.sy]]),
             winner_ints=np.vstack(
-                [winners.winner_ints, np.array([reach.via, reach.root], np.int32)]
+                [winners.winner_ints, np.array([reach.entry_edge, reach.predecessor], np.int32)]
             ),
             site_ints=np.vstack([winners.site_ints, rows]),
             site_weights=np.vstack([winners.site_weights, list(faces.values())]),

@@ -16,7 +16,14 @@ from geodesic_core.fields.sources import nodes_of
 from geodesic_core.fields.sweep import run_sweep
 from geodesic_core.kernels.isolines.arcs import outer_arcs
 from geodesic_core.kernels.isolines.lines import united
-from geodesic_core.kernels.isolines.regions import CX, CY, RADIUS, REGION
+from geodesic_core.kernels.isolines.regions import (
+    CX,
+    CY,
+    RADIUS,
+    REGION,
+    put_segment_bands,
+    span_on_line,
+)
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
@@ -30,8 +37,9 @@ from geodesic_core.kernels.mesh.half_edges import (
     SIN_LEFT,
     TAIL,
 )
+from geodesic_core.kernels.paths import funnel
 from geodesic_core.kernels.paths.backtracing import Winners, is_on_path
-from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, shortened_part
+from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, pull_taut, shortened_part
 from geodesic_core.kernels.planar import Source, bisector, bracketed, distance
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
@@ -47,7 +55,9 @@ from geodesic_core.kernels.sweep.window_lists import put_window
 from geodesic_core.mesh.triangulation import triangulated
 from geodesic_core.search.landmarks import Landmarks
 from geodesic_core.tolerances import (
+    ASTAR_WEIGHT,
     AT_LIMIT,
+    BEHIND,
     BEND,
     DIVERGING,
     DOUBLE_ROOT,
@@ -55,6 +65,7 @@ from geodesic_core.tolerances import (
     FALSE_POSITION_STEPS,
     FLAT,
     FOOT,
+    FORKS,
     GAP,
     GRAZING,
     HALF_ULP,
@@ -66,6 +77,7 @@ from geodesic_core.tolerances import (
     NO_AREA,
     ON_PATH,
     OVERLAP,
+    PASSES,
     PATH_LENGTH,
     RUNS,
     SADDLE_EXCESS,
@@ -80,16 +92,18 @@ from geodesic_core.tolerances import (
     SNAP,
     STRAIGHT,
     TIE,
+    TRIES,
     WEIGHT,
     WEIGHT_ERROR,
     WIDEST_ERROR,
 )
+from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.approximation import MERGING
 from tests.support.certificates import check_path
 from tests.support.invariants import windows_of
-from tests.support.oracles import closed_forms
-from tests.support.searches import goal_at_vertex, spread
+from tests.support.oracles import closed_forms, graph
+from tests.support.searches import edge_paths, goal_at_vertex, random_pairs, spread
 from tests.support.stepping import started, steps, topology_of, view_of_arrays, window
 
 SCALES = pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
@@ -658,6 +672,72 @@ def test_same_place_tells_the_face_that_a_path_came_from(name, scale):
             path = field.path_to(target)
             check_path(mesh, path, source, target, field.distances[target])
             assert path.length == pytest.approx(field.distances[target], rel=SAME_PLACE, abs=0)
+
+
+def test_behind_ends_beyond_the_segment_and_before_the_other_front():
+    far, bands = 0.25, np.zeros((2, REGION))
+    put_segment_bands(bands, 0.0, 0.0, 1.0, 0.0, far)
+    assert 1 < BEHIND < 2
+    for band, side in zip(bands, (1, -1), strict=True):
+        for y, is_inside in ((-far, 1), (0, 1), ((BEHIND - 1) * far, 0), (far, -1)):
+            point = 0.5, side * y, 1.0, 0.0
+            lo, hi = span_on_line(band, 0.0, *point, -0.1, 0.1)
+            assert lo <= hi if is_inside >= 0 else lo > hi
+
+
+@pytest.mark.parametrize("name", ["crags_with_holes", "crumpled_torus"])
+def test_astar_weight_is_all_that_a_path_along_edges_is_longer_by(name):
+    case = zoo.SMALL[name]
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    for start, end, _, length in edge_paths(mesh, random_pairs(mesh, 10)):
+        shortest = graph.edge_distances(case.vertices, case.faces, start)[end]
+        assert shortest * (1 - 1e-12) <= length <= ASTAR_WEIGHT * shortest * (1 + 1e-12)
+
+
+@pytest.mark.skipif(not WITHOUT_JIT, reason="compiled kernels cannot be watched")
+def test_passes_are_far_more_than_a_strip_takes(monkeypatch):
+    passes = []
+
+    def counted(*arguments):
+        passes.append(1)
+        return pull_taut(*arguments)
+
+    monkeypatch.setattr(funnel, "pull_taut", counted)
+    case = zoo.KNOWN["caps"]
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    for _, _, path, _ in edge_paths(mesh, random_pairs(mesh, 10)):
+        passes.clear()
+        funnel.shortened(mesh.topology, path)
+        assert len(passes) < PASSES / 4
+
+
+def strip_with_fins(count) -> gc.TriangleMesh:
+    """A strip of squares, with a third face on each edge between two of them."""
+    points, faces = zoo.grid(count, 1)
+    x = np.arange(1.0, count)
+    tips = np.stack([x, np.full_like(x, 0.5), np.ones_like(x)], axis=1)
+    fins = [(i, len(points) + i - 1, count + 1 + i) for i in range(1, count)]
+    return gc.TriangleMesh(np.vstack([points, tips]), [*np.asarray(faces).tolist(), *fins])
+
+
+def test_forks_are_enough_for_a_line_over_that_many_seams():
+    mesh = strip_with_fins(FORKS)
+    for source in (0, FORKS + 1):
+        field = gc.exact_distance(mesh, source)
+        target = 2 * FORKS + 1 if source == 0 else FORKS
+        assert field.distances[target] == pytest.approx(math.hypot(FORKS, 1), rel=1e-12)
+        check_path(mesh, field.path_to(target), source, target, field.distances[target])
+
+
+def test_tries_end_a_line_that_leads_nowhere():
+    """Its distance is claimed to be 0, so that each face is too far: all are tried in vain."""
+    count = TRIES // 4
+    mesh, target = strip_with_fins(count), 2 * count + 1
+    field = gc.exact_distance(mesh, 0)
+    winners, v = field._winners.get(Control()), int(mesh.topology.inner_vertex[target])
+    winners.distance[v] = 0.0
+    with pytest.raises(gc.errors.InternalError, match="left the surface"):
+        field.path_to(target)
 
 
 @pytest.fixture

@@ -1,16 +1,16 @@
-r"""One level in one face: the edge of all that is nearer, in closed form.
+r"""Arcs of one level in one face: the outline of the region within the level, in closed form.
 
-What is no farther than a level is the union of all that reaches it (`regions`), cut to the face.
-Its edge consists of arcs of their fronts: of each what lies in the face, between its sides, and in
-none of the others::
+The points within a level form the union of the regions that reach them (`regions`), cut to the
+face. Its outline consists of arcs of their fronts. An arc counts where it lies in the face, between
+the sides of its own region, and in no other region::
 
               .---.
-             / \ / \        Two discs of rays from below: of each circle that part counts
-            /  |X|  \       which the other does not reach.
+             / \ / \        Two discs of rays from below: of each circle the part counts
+            /  |X|  \       that the other disc does not hold.
            |  / | \  |
 
-Arcs are intervals of *places*: of a circle angles, counter-clockwise, and of a line distances from
-where it begins; so that the nearer side is on their left.
+An arc is an interval of *parameters* of its front. Those of a circle are angles, counter-clockwise;
+those of a line are distances from its first point. So the nearer side is on the arc's left.
 """
 
 import math
@@ -36,22 +36,29 @@ from geodesic_core.kernels.isolines.regions import (
     span_in_half_plane,
     span_on_line,
 )
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import LENGTH, half_edge_in_face
 from geodesic_core.tolerances import LEVEL
 
 # Columns of an arc, after those of its front
-FROM = FRONT  # places
-TO = FRONT + 1
+START = FRONT  # parameter at which the arc starts
+END = FRONT + 1
 ARC = FRONT + 2
 
 TURN = 2.0 * math.pi
-_INTERVALS = 16  # that a circle, a face and a region can have in common, at most
+
+INTERVALS = 16
+"""Intervals that a circle, a face and a region have in common, at most.
+
+A convex cut adds at most one interval: three edges of the face, three sides and a front make eight.
+"""
+
+ROWS = 64  # rows that arrays have at first; they grow
 
 
 @kernel
 def with_room(rows: Any, needed: int) -> Any:
-    """Return the rows in an array that has room for so many."""
+    """Return ``rows``, in a larger array if it has fewer than ``needed`` rows."""
     if needed <= len(rows):
         return rows
     larger = np.empty((max(2 * len(rows), needed), rows.shape[1]), rows.dtype)
@@ -62,28 +69,28 @@ def with_room(rows: Any, needed: int) -> Any:
 
 
 @kernel
-def point_on(front: Floats, place: float) -> tuple[float, float]:
-    """Point of a front."""
+def point_on(front: Floats, parameter: float) -> tuple[float, float]:
+    """Point of a front at a parameter."""
     x, y = front[CX], front[CY]
     if is_line(front):
-        return x + place * front[EX], y + place * front[EY]
-    return x + front[RADIUS] * math.cos(place), y + front[RADIUS] * math.sin(place)
+        return x + parameter * front[EX], y + parameter * front[EY]
+    return x + front[RADIUS] * math.cos(parameter), y + front[RADIUS] * math.sin(parameter)
 
 
-@kernel
-def pace(front: Floats) -> float:
-    """Length of a front per unit of its places."""
+@inlined
+def speed(front: Floats) -> float:
+    """Length of a front per unit of its parameter."""
     return 1.0 if is_line(front) else front[RADIUS]
 
 
 @kernel
 def clip(intervals: Floats, count: int, start: float, width: float) -> int:
-    """Cut intervals of angles to an arc; return how many are left."""
-    cut, left = np.empty((_INTERVALS, 2)), 0
+    """Cut the first ``count`` intervals of angles to an arc, in place; return how many are left."""
+    cut, left = np.empty((INTERVALS, 2)), 0
     for i in range(count):
         lo, hi = intervals[i, 0], intervals[i, 1]
         turn = start + TURN * math.floor((lo - start) / TURN)
-        while turn < hi and left < _INTERVALS:
+        while turn < hi and left < INTERVALS:
             a, b = max(turn, lo), min(turn + width, hi)
             if b > a:
                 cut[left, 0], cut[left, 1] = a, b
@@ -98,7 +105,10 @@ def clip(intervals: Floats, count: int, start: float, width: float) -> int:
 def clip_to_half_plane(
     intervals: Floats, count: int, front: Floats, depth: float, nx: float, ny: float
 ) -> int:
-    """Cut intervals of a front to n·p >= 0, its (CX, CY) ``depth`` inside; n a unit, or zero."""
+    """Cut ``intervals`` of a front to the half-plane n·p >= 0; return how many are left.
+
+    Its (CX, CY) is ``depth`` inside; n is a unit vector, or zero where nothing is to be cut.
+    """
     if count == 0 or (nx == 0.0 and ny == 0.0):
         return count
     if is_line(front):
@@ -119,7 +129,7 @@ def clip_to_half_plane(
 def clip_to_disc(
     intervals: Floats, count: int, radius: float, dx: float, dy: float, other: float
 ) -> int:
-    """Cut intervals of a circle to a disc of radius ``other``, whose centre is at -(dx, dy)."""
+    """Cut ``intervals`` of a circle to a disc of radius ``other``, whose centre is at -(dx, dy)."""
     if count == 0 or other <= 0.0:
         return 0
     d = math.hypot(dx, dy)
@@ -134,7 +144,7 @@ def clip_to_disc(
 
 @kernel
 def clip_to_sides(intervals: Floats, count: int, front: Floats, region: Floats) -> int:
-    """Cut intervals of a front to the sides of a region."""
+    """Cut ``intervals`` of a front to the sides of a region; return how many are left."""
     dx, dy = front[CX] - region[CX], front[CY] - region[CY]
     for side in range(FRONT, end_of_sides(region), SIDE):
         nx, ny = region[side + NX], region[side + NY]
@@ -145,7 +155,10 @@ def clip_to_sides(intervals: Floats, count: int, front: Floats, region: Floats) 
 
 @kernel
 def clip_to_region(intervals: Floats, front: Floats, region: Floats, slack: float) -> int:
-    """Cut an interval of a front to a region, whose own front is moved outward by ``slack``."""
+    """Cut the first of ``intervals`` of a front to a region; return how many are left.
+
+    The region's own front is moved outward by ``slack``.
+    """
     if is_line(front):
         x, y, ex, ey = front[CX], front[CY], front[EX], front[EY]
         lo, hi = intervals[0, 0], intervals[0, 1]
@@ -164,11 +177,12 @@ def clip_to_region(intervals: Floats, front: Floats, region: Floats, slack: floa
 def arcs_within(topology: Any, face: int, regions: Floats, slack: float) -> tuple[Floats, Any]:
     """Return the arcs of the regions' fronts in the face and between their sides; whose each is.
 
-    Lines along an edge, within ``slack``, are in the faces beyond: rounding must not say.
+    A line along an edge, within ``slack``, would be in either face by rounding: it counts as in the
+    face that is farther.
     """
     geometry = topology.geometry
     arcs, owners, count = np.empty((len(regions), ARC)), np.empty((len(regions), 1), np.int32), 0
-    intervals = np.empty((_INTERVALS, 2))
+    intervals = np.empty((INTERVALS, 2))
     ax, ay, _, _ = half_edge_in_face(geometry, 3 * face + 2)
     middle_x, middle_y = (geometry[3 * face, LENGTH] + ax) / 3.0, ay / 3.0
     for i in range(len(regions)):
@@ -183,8 +197,8 @@ def arcs_within(topology: Any, face: int, regions: Floats, slack: float) -> tupl
             intervals[0, 1] = intervals[0, 0] + TURN
         for h in range(3 * face, 3 * face + 3):
             ox, oy, ux, uy = half_edge_in_face(geometry, h)
-            if runs_along(region, slack, ox, oy, ux, uy, geometry[h, LENGTH]):
-                if region[EX] * ux + region[EY] * uy > 0.0:  # what is nearer is in this face
+            if runs_along(region, slack, (ox, oy, ux, uy), geometry[h, LENGTH]):
+                if region[EX] * ux + region[EY] * uy > 0.0:  # the nearer side is in this face
                     left = 0
                 continue
             depth = ux * (y - oy) - uy * (x - ox)
@@ -198,31 +212,31 @@ def arcs_within(topology: Any, face: int, regions: Floats, slack: float) -> tupl
     return arcs[:count], owners[:count]
 
 
-@kernel
+@inlined
 def put_arc(arc: Floats, front: Floats, start: float, end: float) -> None:
-    """Make an arc of a front."""
+    """Make ``arc`` the arc of a front between two parameters."""
     for column in range(FRONT):
         arc[column] = front[column]
-    arc[FROM], arc[TO] = start, end
+    arc[START], arc[END] = start, end
 
 
 @kernel
 def chord_of(arc: Floats) -> tuple[float, float, float, float, float, float]:
-    """Return an arc's ends, how far it strays from their chord, and half its length."""
-    width, radius = arc[TO] - arc[FROM], arc[RADIUS]
-    x0, y0 = point_on(arc, arc[FROM])
-    x1, y1 = point_on(arc, arc[TO])
+    """Return an arc's ends, its sagitta (how far it strays from its chord), and half its length."""
+    width, radius = arc[END] - arc[START], arc[RADIUS]
+    x0, y0 = point_on(arc, arc[START])
+    x1, y1 = point_on(arc, arc[END])
     sagitta = 0.0
     if not is_line(arc):
         sagitta = 2.0 * radius
         if width < math.pi:
             sagitta = radius * (1.0 - math.cos(0.5 * width))
-    return x0, y0, x1, y1, sagitta, 0.5 * pace(arc) * width
+    return x0, y0, x1, y1, sagitta, 0.5 * speed(arc) * width
 
 
-@kernel
+@inlined
 def is_apart(chord: Any, region: Floats, slack: float) -> bool:
-    """Whether an arc surely is beyond a region: asked first, without arctangents.
+    """Whether an arc is surely outside a region: a cheap test without arctangents.
 
     An arc strays from its chord by no more than its sagitta.
     """
@@ -240,12 +254,12 @@ def is_apart(chord: Any, region: Floats, slack: float) -> bool:
     return nearest - half > region[RADIUS] + slack
 
 
-@kernel
+@inlined
 def yields_to(arc: Floats, owner: int, region: Floats, rank: int) -> bool:
-    """Whether an arc does not count where the front of another region coincides with it.
+    """Whether an arc gives way where the front of another region coincides with it.
 
-    Lines come before circles, which may touch them, then what is first. Of lines that face each
-    other neither counts: nothing is farther between them.
+    Lines take precedence over circles, which may touch them; then the first does. Of lines that
+    face each other neither counts: nothing is farther between them.
     """
     if is_line(arc) != is_line(region):
         return is_line(region)
@@ -254,45 +268,68 @@ def yields_to(arc: Floats, owner: int, region: Floats, rank: int) -> bool:
 
 @kernel
 def outer_arcs(topology: Any, face: int, regions: Floats, level: float, shortest: float) -> Floats:
-    """Return the edge of the union of the regions in the face: arcs that no other one reaches.
+    """Return the outline of the union of the regions in the face: arcs in no other region.
 
-    Where fronts coincide within `LEVEL`, one of them counts (`yields_to`): of it nothing is taken
-    that another does not reach by more, and from the others all that it reaches but for as much.
-    What is not longer than ``shortest`` is left out. O(n² log n) for n regions.
+    Where fronts coincide within `LEVEL`, one of them takes precedence (`yields_to`). It loses only
+    what another region holds by more than that, and the others lose all that it holds within that.
+    Arcs not longer than ``shortest`` are left out. O(n² log n) for n regions.
     """
     slack = LEVEL * level
     arcs, owners = arcs_within(topology, face, regions, slack)
     outer, count = np.empty((len(arcs) + 4, ARC)), 0
-    hidden, intervals = np.empty((64, 2)), np.empty((_INTERVALS, 2))
+    hidden, intervals = np.empty((ROWS, 2)), np.empty((INTERVALS, 2))
     for a in range(len(arcs)):
-        arc, owner, hidden_count = arcs[a], owners[a, 0], 0
-        lo, hi, chord = arc[FROM], arc[TO], chord_of(arc)
-        for j in range(len(regions)):
-            if j == owner:
-                continue
-            region = regions[j]
-            beyond = slack if yields_to(arc, owner, region, j) else -slack
-            if is_apart(chord, region, beyond):
-                continue
-            intervals[0, 0], intervals[0, 1] = lo, hi
-            left = clip_to_region(intervals, arc, region, beyond)
-            if left == 1 and intervals[0, 0] <= lo and intervals[0, 1] >= hi:
-                lo = hi  # all of it: what others hide does not matter
-                break
-            hidden = with_room(hidden, hidden_count + left)
-            for k in range(left):  # kept in order
-                place = hidden_count
-                while place > 0 and hidden[place - 1, 0] > intervals[k, 0]:
-                    hidden[place, 0], hidden[place, 1] = hidden[place - 1, 0], hidden[place - 1, 1]
-                    place -= 1
-                hidden[place, 0], hidden[place, 1] = intervals[k, 0], intervals[k, 1]
-                hidden_count += 1
+        arc = arcs[a]
+        hidden, hidden_count = hidden_intervals(
+            arc, owners[a, 0], regions, slack, intervals, hidden
+        )
+        if hidden_count < 0:
+            continue
         outer = with_room(outer, count + hidden_count + 1)
+        start = arc[START]
         for k in range(hidden_count + 1):
-            end = hidden[k, 0] if k < hidden_count else hi
-            if (end - lo) * pace(arc) > shortest:
-                put_arc(outer[count], arc, lo, end)
+            end = hidden[k, 0] if k < hidden_count else arc[END]
+            if (end - start) * speed(arc) > shortest:
+                put_arc(outer[count], arc, start, end)
                 count += 1
             if k < hidden_count:
-                lo = max(lo, hidden[k, 1])
+                start = max(start, hidden[k, 1])
     return outer[:count]
+
+
+@inlined
+def hidden_intervals(
+    arc: Floats, owner: int, regions: Floats, slack: float, intervals: Floats, hidden: Floats
+) -> tuple[Floats, int]:
+    """Return the intervals of an arc that other regions hold, sorted, and how many there are.
+
+    They are written to ``hidden``, or to a larger array; ``intervals`` is scratch memory. Their
+    number is -1 where one region holds all of the arc.
+    """
+    start, end, chord, count = arc[START], arc[END], chord_of(arc), 0
+    for j in range(len(regions)):
+        if j == owner:
+            continue
+        region = regions[j]
+        beyond = slack if yields_to(arc, owner, region, j) else -slack
+        if is_apart(chord, region, beyond):
+            continue
+        intervals[0, 0], intervals[0, 1] = start, end
+        left = clip_to_region(intervals, arc, region, beyond)
+        if left == 1 and intervals[0, 0] <= start and intervals[0, 1] >= end:
+            return hidden, -1
+        hidden = with_room(hidden, count + left)
+        for k in range(left):
+            insert_interval(hidden, count, intervals[k, 0], intervals[k, 1])
+            count += 1
+    return hidden, count
+
+
+@inlined
+def insert_interval(rows: Floats, count: int, start: float, end: float) -> None:
+    """Insert an interval into the first ``count`` of ``rows``, which are sorted by their starts."""
+    row = count
+    while row > 0 and rows[row - 1, 0] > start:
+        rows[row, 0], rows[row, 1] = rows[row - 1, 0], rows[row - 1, 1]
+        row -= 1
+    rows[row, 0], rows[row, 1] = start, end

@@ -1,10 +1,10 @@
-"""The windows that a sweep kept: found by half-edge, and asked for distances of points of a face.
+"""The windows that a sweep retained, sorted by half-edge; distances of points of a face by them.
 
-All that crosses a half-edge into its face was propagated from its list. So the least distance of a
-point of a face is that by a window of one of its three half-edges, from one of its corners, or from
-a source inside it, a point or a piece of a curve: paths that reach it over an edge, along one, and
-within. A list may have been propagated several times. What later ones improve is then kept as well:
-it costs time, no accuracy.
+All windows that cross a half-edge into its face were propagated from its list. So a point of a face
+is reached by a window of one of the three half-edges, from one of the corners, or from a source
+inside the face: a point or a segment of a curve. Its distance is the least of these. A list may
+have been propagated several times. Windows that a later run improves are then retained as well:
+they cost time, not accuracy.
 """
 
 import math
@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Longs, aligned_rows
-from geodesic_core.kernels.jit import kernel, pointer
+from geodesic_core.arrays import Floats, Ints, Longs, aligned_rows
+from geodesic_core.kernels.jit import inlined, kernel, pointer
 from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL, point_in_frame
 from geodesic_core.kernels.sweep.relaxation import precedence
 from geodesic_core.kernels.sweep.segments import distance_to_segment, is_segment
@@ -34,7 +34,7 @@ class FaceWindows(NamedTuple):
 
 @kernel
 def sort_by_half_edge(rows: Floats, first: Longs, windows: Floats) -> None:
-    """Sort kept rows stably by half-edge, and fill ``first``; O(K + F)."""
+    """Sort ``rows`` stably by half-edge into ``windows``, and fill ``first``; O(K + F)."""
     ints = rows.view(np.int32)
     first[:] = 0
     for i in range(len(rows)):
@@ -49,14 +49,14 @@ def sort_by_half_edge(rows: Floats, first: Longs, windows: Floats) -> None:
 
 
 def face_windows_of(wave: Wavefront) -> FaceWindows:
-    """Return the windows that a sweep kept, in memory of their own."""
+    """Return the windows that a sweep retained, in memory of their own."""
     rows = wave.pool.retained[: wave.counters[RETAINED_ROWS]]
-    kept = FaceWindows(
+    face_windows = FaceWindows(
         first=np.empty(len(wave.pool.lists) + 1, np.int64),
         windows=aligned_rows(len(rows), WIDTH, np.float64),
     )
-    sort_by_half_edge(rows, kept.first, kept.windows)
-    return kept
+    sort_by_half_edge(rows, face_windows.first, face_windows.windows)
+    return face_windows
 
 
 def bytes_of(wave: Wavefront) -> int:
@@ -64,63 +64,98 @@ def bytes_of(wave: Wavefront) -> int:
     return 8 * (len(wave.pool.lists) + 1 + WIDTH * int(wave.counters[RETAINED_ROWS]))
 
 
+@inlined
+def retained_window(row: Floats, root: int, weight: float) -> Window:
+    """Return the window of a row of `FaceWindows`, without what was merged into it."""
+    return Window(row[B0], row[B1], row[SX], row[SY], row[SIGMA], weight, root + 0, 0.0, -1)
+
+
 class Reach(NamedTuple):
-    """How a point of a face is reached: its distance, and from where in the frame of VIA."""
+    """A way to a point of a face."""
 
     distance: float
-    via: int
+    """Mesh units; infinite where the point is not reached"""
+    entry_edge: int
     """A half-edge of the face; -1 where the point is not reached"""
     sx: float
     sy: float
-    root: int
+    """The pseudosource in the frame of that half-edge"""
+    predecessor: int
     """Node of the pseudosource"""
 
 
 @kernel
 def reach_point(
-    topology: Any, winners: Any, kept: Any, first_target: int, face: int, weights: Floats
+    topology: Any, winners: Any, face_windows: Any, first_target: int, face: int, weights: Floats
 ) -> Reach:
     """Return the least way to the point of an inner face with these barycentric weights.
 
     ``first_target`` is the number of site rows of sources. Of equal distances that of the lower
     source wins. O(windows of the face).
     """
-    geometry, nearest = topology.geometry, winners.nearest
-    best, best_source, via, root = math.inf, -1, -1, -1
-    sx, sy = 0.0, 0.0
-    ints = kept.windows.view(np.int32)
+    best = Reach(math.inf, -1, 0.0, 0.0, -1)
     for h in range(3 * face, 3 * face + 3):
-        x, y = point_in_frame(geometry, h, weights)
-        gap = GAP * geometry[h, LENGTH]
-        for i in range(kept.first[h], kept.first[h + 1]):
-            w = kept.windows[i]
-            sw = 0.0 if is_segment(winners.piece_ints, ints[i, ROOT]) else 1.0
-            window = Window(w[B0], w[B1], w[SX], w[SY], w[SIGMA], sw, ints[i, ROOT], 0.0, -1)
-            there = way_through(window, x, y, gap)
-            source = nearest[ints[i, ROOT]]
-            if precedence(there, source, best, best_source):
-                best, best_source, via, root = min(best, there), source, h, ints[i, ROOT]
-                sx, sy = w[SX], w[SY]
+        x, y = point_in_frame(topology.geometry, h, weights)
+        best = reach_by_windows(topology, winners, face_windows, h, x, y, best)
         corner = topology.links[h, TAIL]
-        there = winners.distance[corner] + math.hypot(x, y)
-        if there < math.inf and precedence(there, nearest[corner], best, best_source):
-            best, best_source, via, root = min(best, there), nearest[corner], h, corner
-            sx, sy = 0.0, 0.0
-        for k in range(first_target if h == 3 * face else 0):
-            if winners.site_ints[k, FACE] == face:
-                node = winners.site_ints[k, NODE]
-                px, py = point_in_frame(geometry, h, winners.site_weights[k])
-                there = winners.distance[node] + math.hypot(x - px, y - py)
-                if precedence(there, nearest[node], best, best_source):
-                    best, best_source, via, root = min(best, there), nearest[node], h, node
-                    sx, sy = px, py
-        for k in range(len(winners.piece_ints) if h == 3 * face else 0):
-            if winners.piece_ints[k, FACE] == face:
-                node = winners.piece_ints[k, NODE]
-                ends = pointer(winners.piece_ends)
-                there = distance_to_segment(pointer(geometry), ends, k, h, x, y)
-                there += winners.distance[node]
-                if precedence(there, nearest[node], best, best_source):
-                    best, best_source, via, root = min(best, there), nearest[node], h, node
-                    sx, sy = 0.0, 0.0
-    return Reach(best, via, sx, sy, root)
+        distance = winners.distance[corner] + math.hypot(x, y)
+        if distance < math.inf:
+            best = nearer_way(winners.nearest, best, Reach(distance, h, 0.0, 0.0, corner + 0))
+        if h == 3 * face:
+            best = reach_by_sites(topology, winners, first_target, h, x, y, best)
+            best = reach_by_segments(topology, winners, h, x, y, best)
+    return best
+
+
+@inlined
+def nearer_way(nearest: Ints, best: Reach, other: Reach) -> Reach:
+    """Return that of two ways which takes precedence; ``nearest`` is that of `Winners`."""
+    best_source = nearest[best.predecessor] if best.predecessor >= 0 else -1
+    if not precedence(other.distance, nearest[other.predecessor], best.distance, best_source):
+        return best
+    distance = min(best.distance, other.distance)
+    return Reach(distance, other.entry_edge, other.sx, other.sy, other.predecessor)
+
+
+@inlined
+def reach_by_windows(
+    topology: Any, winners: Any, face_windows: Any, h: int, x: float, y: float, best: Reach
+) -> Reach:
+    """Return the best way to (x, y) in the frame of h: a known one, or by a window over h."""
+    windows, segment_ints, nearest = face_windows.windows, winners.piece_ints, winners.nearest
+    ints, gap = windows.view(np.int32), GAP * topology.geometry[h, LENGTH]
+    for i in range(face_windows.first[h], face_windows.first[h + 1]):
+        weight = 0.0 if is_segment(segment_ints, ints[i, ROOT]) else 1.0
+        window = retained_window(windows[i], ints[i, ROOT], weight)
+        distance = way_through(window, x, y, gap)
+        best = nearer_way(nearest, best, Reach(distance, h, window.sx, window.sy, window.root))
+    return best
+
+
+@inlined
+def reach_by_sites(
+    topology: Any, winners: Any, first_target: int, h: int, x: float, y: float, best: Reach
+) -> Reach:
+    """Return the best way to (x, y) in the frame of h: a known one, or from a point in the face."""
+    for k in range(first_target):
+        if winners.site_ints[k, FACE] == h // 3:
+            node = winners.site_ints[k, NODE] + 0
+            sx, sy = point_in_frame(topology.geometry, h, winners.site_weights[k])
+            distance = winners.distance[node] + math.hypot(x - sx, y - sy)
+            best = nearer_way(winners.nearest, best, Reach(distance, h, sx, sy, node))
+    return best
+
+
+@inlined
+def reach_by_segments(
+    topology: Any, winners: Any, h: int, x: float, y: float, best: Reach
+) -> Reach:
+    """Return the best way to (x, y) in the frame of h: a known one, or from a segment inside."""
+    geometry, ends = pointer(topology.geometry), pointer(winners.piece_ends)
+    for k in range(len(winners.piece_ints)):
+        if winners.piece_ints[k, FACE] == h // 3:
+            node = winners.piece_ints[k, NODE] + 0
+            distance = distance_to_segment(geometry, ends, k, h, x, y)
+            distance += winners.distance[node]
+            best = nearer_way(winners.nearest, best, Reach(distance, h, 0.0, 0.0, node))
+    return best

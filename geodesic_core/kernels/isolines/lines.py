@@ -1,10 +1,10 @@
 """Lines of equal distance: arcs in faces, joined to chains, joined across edges to lines.
 
-In every face that a level may pass, the arcs are cut out (`arcs`). Where the level crosses an edge
-is found once for all faces of that edge, from what each of them says that is nearer. So each face
-is entered as often as it is left, counter-clockwise around it by turns; and the ends of its arcs
-are joined, the nearest first, to each other and to these crossings. No piece can be left over,
-however the ends are rounded.
+Arcs are cut out in every face that a level may pass (`arcs`). The crossings of the level with an
+edge are found once for all faces of the edge, from the stretches that each of them holds to be
+nearer. So each face is entered as often as it is left, by turns around it counter-clockwise. The
+ends of its arcs are joined to each other and to these crossings, the nearest first. No arc can be
+left over, however the ends are rounded.
 """
 
 import math
@@ -13,7 +13,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs
-from geodesic_core.kernels.isolines.arcs import ARC, FROM, TO, outer_arcs, point_on, with_room
+from geodesic_core.kernels.isolines.arcs import (
+    ARC,
+    END,
+    ROWS,
+    START,
+    insert_interval,
+    outer_arcs,
+    point_on,
+    with_room,
+)
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.isolines.regions import (
     RADIUS,
@@ -22,7 +31,7 @@ from geodesic_core.kernels.isolines.regions import (
     runs_along,
     span_on_line,
 )
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     COS_LEFT,
     HEAD,
@@ -39,28 +48,28 @@ from geodesic_core.tolerances import CROSSING, LEVEL, PIECE
 
 
 class Field(NamedTuple):
-    """What a finished sweep knows of the distances in its faces."""
+    """The results of a sweep from which distances in faces follow."""
 
-    kept: FaceWindows
+    face_windows: FaceWindows
     distance: Floats
     """(N,) by node"""
     site_ints: Ints
     """Those of sources only, by face"""
     site_weights: Floats
-    piece_ints: Ints
+    segment_ints: Ints
     """By face"""
-    piece_ends: Floats
-    first_piece: int
-    """The least node of a piece"""
+    segment_ends: Floats
+    first_segment: int
+    """The least node of a segment"""
 
 
 class Cuts(NamedTuple):
-    """The faces that a level may pass, and what it does there."""
+    """The faces that a level may pass, with its arcs there and its spans on their edges."""
 
     faces: Ints
     """(n, 1)"""
     spans: Floats
-    """(S, 2): stretches of half-edges that are no farther than the level, as the face says"""
+    """(S, 2): stretches of half-edges within the level, by the regions of their face"""
     first_span: Ints
     """(3n + 1, 1): of each half-edge of the faces"""
     arcs: Floats
@@ -70,22 +79,22 @@ class Cuts(NamedTuple):
 
 
 class Crossings(NamedTuple):
-    """Where a level crosses the edges of the faces that it may pass."""
+    """The crossings of a level with the edges of the faces that it may pass."""
 
-    places: Floats
-    """(C, 1): distance from the tail of the first half-edge of the edge, ascending there"""
+    positions: Floats
+    """(C, 1): distance from the tail of the first half-edge of the edge, ascending on each edge"""
     half_edges: Ints
     """(C, 1): that half-edge"""
     first: Ints
-    """(3n, 1): of the edge of each half-edge of the faces"""
+    """(3n, 1): first crossing on the edge of each half-edge of the faces"""
     number: Ints
-    """(3n, 1): how many there are on that edge"""
+    """(3n, 1): number of crossings on that edge"""
     turned: Ints
-    """(3n, 1): whether the half-edge runs against that from which places are counted"""
+    """(3n, 1): whether the half-edge runs against the one from whose tail positions are measured"""
 
 
 class Chains(NamedTuple):
-    """What the level does in each face, from crossing to crossing."""
+    """The level in each face, from crossing to crossing."""
 
     points: Floats
     """(N, 3)"""
@@ -101,17 +110,18 @@ class Chains(NamedTuple):
 def bound_faces(
     topology: Any, field: Any, first: int, last: int, least: Floats, most: Floats
 ) -> None:
-    """Lower bounds (F,) of the distances in some faces in a row to what windows and corners say.
+    """Bound the distances in the faces from ``first`` up to ``last`` by windows and corners.
 
-    ``most`` (F,) to upper ones. Points and pieces inside are left to the caller. O(their windows).
+    Lowers ``least`` (F,) to lower bounds and ``most`` (F,) to upper bounds. Points and segments
+    inside are left to the caller. O(windows of the faces).
     """
-    geometry, kept = topology.geometry, field.kept
-    ints = kept.windows.view(np.int32)
+    geometry, face_windows = topology.geometry, field.face_windows
+    ints = face_windows.windows.view(np.int32)
     for face in range(first, last):
         for h in range(3 * face, 3 * face + 3):
-            for i in range(kept.first[h], kept.first[h + 1]):
-                w = kept.windows[i]
-                if ints[i, ROOT] >= field.first_piece:  # least at an end
+            for i in range(face_windows.first[h], face_windows.first[h + 1]):
+                w = face_windows.windows[i]
+                if ints[i, ROOT] >= field.first_segment:  # least at an end
                     x, sw = w[B1] if w[SX] > 0.0 else w[B0], 0.0
                 else:
                     x, sw = min(max(w[SX], w[B0]), w[B1]), 1.0
@@ -123,22 +133,22 @@ def bound_faces(
 
 @kernel
 def cut_faces(
-    topology: Any, field: Any, faces: Ints, known: int, level: float, place: Ints
+    topology: Any, field: Any, faces: Ints, known: int, level: float, row_of: Ints
 ) -> tuple[Floats, Ints, Floats, Ints, Ints]:
-    """Cut some (n, 1) of the faces that a level may pass.
+    """Cut some of the faces that a level may pass; ``faces`` (n, 1) are their numbers.
 
-    Returns their spans and arcs, each as `Cuts` has them, followed by how many there are of each
-    half-edge and of each face; then the faces that the level may pass as well, as these say.
-    ``place`` (F,) tells where among all faces each one is, -1 for none; ``known`` is how many there
-    are, and those that are found come after them.
+    Returns their spans and arcs, each as `Cuts` has them, followed by the number for each half-edge
+    and for each face. Last come neighbours that the level may pass as well, by these spans.
+    ``row_of`` (F,) is the row of each face among all that are to be cut, -1 for none. There are
+    ``known`` rows; those of the neighbours follow, and are written to ``row_of``.
     """
     links, geometry = topology.links, topology.geometry
     slack, shortest = LEVEL * level, PIECE * level
-    spans, span_count = np.empty((64, 2)), 0
-    arcs, arc_count = np.empty((64, ARC)), 0
+    spans, span_count = np.empty((ROWS, 2)), 0
+    arcs, arc_count = np.empty((ROWS, ARC)), 0
     spans_of = np.empty((3 * len(faces), 1), np.int32)
     arcs_of = np.empty((len(faces), 1), np.int32)
-    found, count = np.empty((64, 1), np.int32), 0
+    found, count = np.empty((ROWS, 1), np.int32), 0
     for k in range(len(faces)):
         f = faces[k, 0]
         regions = regions_of_face(topology, field, f, level)
@@ -150,38 +160,44 @@ def cut_faces(
             arc_count += 1
         arcs_of[k, 0] = len(outer)
         for h in range(3 * f, 3 * f + 3):
-            ox, oy, ux, uy = half_edge_in_face(geometry, h)
-            length, begin = geometry[h, LENGTH], span_count
-            spans = with_room(spans, span_count + len(regions))
-            for i in range(len(regions)):
-                along = runs_along(regions[i], slack, ox, oy, ux, uy, length)
-                beyond = slack if along else 0.0  # at the level counts as nearer
-                lo, hi = span_on_line(regions[i], beyond, ox, oy, ux, uy, 0.0, length)
-                if lo <= hi:
-                    spans[span_count, 0], spans[span_count, 1] = lo, hi
-                    span_count += 1
-            span_count = begin + united(spans[begin:span_count], CROSSING * length)
-            spans_of[3 * (k - f) + h, 0] = span_count - begin
-            whole = span_count == begin + 1 and spans[begin, 0] <= 0.0 and spans[begin, 1] >= length
-            g = -1 if whole or span_count == begin else next_around(links, h)
+            spans, begin = with_room(spans, span_count + len(regions)), span_count
+            size = cut_edge(geometry, h, regions, slack, spans[begin:])
+            spans_of[3 * (k - f) + h, 0] = size
+            span_count += size
+            is_whole = size == 1 and spans[begin, 0] <= 0.0
+            is_whole = is_whole and spans[begin, 1] >= geometry[h, LENGTH]
+            g = -1 if is_whole or size == 0 else next_around(links, h)
             while g >= 0 and g != h:
-                if place[g // 3] < 0:
+                if row_of[g // 3] < 0:
                     found = with_room(found, count + 1)
-                    found[count, 0], place[g // 3] = g // 3, known + count
+                    found[count, 0], row_of[g // 3] = g // 3, known + count
                     count += 1
                 g = next_around(links, g)
     return spans[:span_count], spans_of, arcs[:arc_count], arcs_of, found[:count]
 
 
+@inlined
+def cut_edge(geometry: Floats, h: int, regions: Floats, slack: float, spans: Floats) -> int:
+    """Write the spans of h that lie in regions of its face to ``spans``; return how many there are.
+
+    A line that runs along the edge, within ``slack``, holds it: at the level counts as nearer.
+    """
+    edge, length, count = half_edge_in_face(geometry, h), geometry[h, LENGTH], 0
+    ox, oy, ux, uy = edge
+    for i in range(len(regions)):
+        beyond = slack if runs_along(regions[i], slack, edge, length) else 0.0
+        lo, hi = span_on_line(regions[i], beyond, ox, oy, ux, uy, 0.0, length)
+        if lo <= hi:
+            spans[count, 0], spans[count, 1] = lo, hi
+            count += 1
+    return united(spans[:count], CROSSING * length)
+
+
 @kernel
 def united(spans: Floats, gap: float) -> int:
-    """Sort spans and unite those that leave no more than a gap; return how many are left."""
+    """Sort ``spans`` and unite those with a gap of at most ``gap``; return how many are left."""
     for i in range(1, len(spans)):
-        lo, hi, place = spans[i, 0], spans[i, 1], i
-        while place > 0 and spans[place - 1, 0] > lo:
-            spans[place, 0], spans[place, 1] = spans[place - 1, 0], spans[place - 1, 1]
-            place -= 1
-        spans[place, 0], spans[place, 1] = lo, hi
+        insert_interval(spans, i, spans[i, 0], spans[i, 1])
     count = 0
     for i in range(len(spans)):
         if count > 0 and spans[i, 0] <= spans[count - 1, 1] + gap:
@@ -193,81 +209,99 @@ def united(spans: Floats, gap: float) -> int:
 
 
 @kernel
-def cross_edges(topology: Any, distance: Floats, cuts: Any, level: float, place: Ints) -> Crossings:
-    """Find where a level crosses the edges of the faces that it may pass, each edge once.
+def cross_edges(
+    topology: Any, distance: Floats, cuts: Any, level: float, row_of: Ints
+) -> Crossings:
+    """Find the crossings of a level with the edges of the faces that it may pass, each edge once.
 
-    A vertex at the level, within `LEVEL`, counts as nearer, and no end of an edge is anything but
-    what its vertex is: so that what crosses the edges around a face does so in pairs.
+    A vertex at the level, within `LEVEL`, counts as nearer. An end of an edge is on the same side
+    as its vertex. So the crossings around a face come in pairs.
     """
-    reach = level * (1.0 + LEVEL)
-    links, geometry = topology.links, topology.geometry
-    count = 3 * len(cuts.faces)
-    places, half_edges, total = np.empty((64, 1)), np.empty((64, 1), np.int32), 0
+    links, geometry, reach = topology.links, topology.geometry, level * (1.0 + LEVEL)
+    count, total, spans = 3 * len(cuts.faces), 0, np.empty((ROWS, 2))
+    positions, half_edges = np.empty((ROWS, 1)), np.empty((ROWS, 1), np.int32)
     first, number = np.zeros((count, 1), np.int32), np.zeros((count, 1), np.int32)
     turned, known = np.zeros((count, 1), np.int32), np.zeros(count, np.uint8)
-    spans = np.empty((64, 2))
     for n in range(count):
         if known[n]:
             continue
-        h = 3 * cuts.faces[n // 3, 0] + n % 3
-        length, gap = geometry[h, LENGTH], CROSSING * geometry[h, LENGTH]
+        h, begin = 3 * cuts.faces[n // 3, 0] + n % 3, total
         tail_inside = distance[links[h, TAIL]] <= reach
         head_inside = distance[links[h, HEAD]] <= reach
-        size, begin, g = 0, total, h
-        if tail_inside:
-            spans[size, 0], spans[size, 1] = 0.0, 0.0
-            size += 1
-        if head_inside:
-            spans[size, 0], spans[size, 1] = length, length
-            size += 1
-        while True:
-            if place[g // 3] >= 0:
-                m = 3 * place[g // 3] + g % 3
-                against = links[g, TAIL] != links[h, TAIL]
-                known[m], first[m, 0], turned[m, 0] = 1, begin, against
-                spans = with_room(spans, size + cuts.first_span[m + 1, 0] - cuts.first_span[m, 0])
-                for i in range(cuts.first_span[m, 0], cuts.first_span[m + 1, 0]):
-                    lo, hi = cuts.spans[i, 0], cuts.spans[i, 1]
-                    if against:
-                        lo, hi = length - hi, length - lo
-                    spans[size, 0] = lo if tail_inside else max(lo, gap)
-                    spans[size, 1] = hi if head_inside else min(hi, length - gap)
-                    size += 1
-            g = next_around(links, g)
-            if g < 0 or g == h:
-                break
-        size = united(spans[:size], gap)
-        places = with_room(places, total + 2 * size)
+        spans, size = spans_on_edge(topology, cuts, row_of, h, tail_inside, head_inside, spans)
+        positions = with_room(positions, total + 2 * size)
         half_edges = with_room(half_edges, total + 2 * size)
         for i in range(size):
             lo, hi = spans[i, 0], spans[i, 1]
             from_tail = tail_inside and i == 0
             to_head = head_inside and i == size - 1
-            if from_tail or to_head or hi - lo > gap:
+            if from_tail or to_head or hi - lo > CROSSING * geometry[h, LENGTH]:
                 if not from_tail:
-                    places[total, 0], half_edges[total, 0] = lo, h
+                    positions[total, 0], half_edges[total, 0] = lo, h
                     total += 1
                 if not to_head:
-                    places[total, 0], half_edges[total, 0] = hi, h
+                    positions[total, 0], half_edges[total, 0] = hi, h
                     total += 1
         g = h
         while True:
-            if place[g // 3] >= 0:
-                number[3 * place[g // 3] + g % 3, 0] = total - begin
+            if row_of[g // 3] >= 0:
+                m = 3 * row_of[g // 3] + g % 3
+                known[m], first[m, 0], number[m, 0] = 1, begin, total - begin
+                turned[m, 0] = links[g, TAIL] != links[h, TAIL]
             g = next_around(links, g)
             if g < 0 or g == h:
                 break
-    return Crossings(places[:total], half_edges[:total], first, number, turned)
+    return Crossings(positions[:total], half_edges[:total], first, number, turned)
+
+
+@inlined
+def spans_on_edge(
+    topology: Any,
+    cuts: Any,
+    row_of: Ints,
+    h: int,
+    tail_inside: bool,
+    head_inside: bool,
+    spans: Floats,
+) -> tuple[Floats, int]:
+    """Return the united spans of all faces of the edge of h, and how many there are.
+
+    They are written to ``spans``, or to a larger array.
+    """
+    links, length, size, g = topology.links, topology.geometry[h, LENGTH], 0, h
+    gap = CROSSING * length
+    if tail_inside:
+        spans[size, 0], spans[size, 1] = 0.0, 0.0
+        size += 1
+    if head_inside:
+        spans[size, 0], spans[size, 1] = length, length
+        size += 1
+    while True:
+        if row_of[g // 3] >= 0:
+            m = 3 * row_of[g // 3] + g % 3
+            first, end = cuts.first_span[m, 0], cuts.first_span[m + 1, 0]
+            spans = with_room(spans, size + end - first)
+            for i in range(first, end):
+                lo, hi = cuts.spans[i, 0], cuts.spans[i, 1]
+                if links[g, TAIL] != links[h, TAIL]:
+                    lo, hi = length - hi, length - lo
+                spans[size, 0] = lo if tail_inside else max(lo, gap)
+                spans[size, 1] = hi if head_inside else min(hi, length - gap)
+                size += 1
+        g = next_around(links, g)
+        if g < 0 or g == h:
+            return spans, united(spans[:size], gap)
 
 
 @kernel
 def ends_of_face(
     topology: Any, distance: Floats, cuts: Any, crossings: Any, k: int, level: float
 ) -> tuple[Floats, Ints, Floats, Ints]:
-    """Return where pieces end and where they begin in the k-th face, and what each is.
+    """Return the points at which arcs end and start in the k-th face, and the number of each.
 
-    Numbers below zero are crossings, -1 - c; others are arcs. The line enters a face where the
-    boundary, counter-clockwise, comes to what is farther: there a piece ends, so to say.
+    Crossings are among them, with numbers -1 - c below zero. A line enters the face at a crossing
+    from which the boundary, counter-clockwise, is farther than the level. Such a crossing counts as
+    an end, and one at which the line leaves as a start.
     """
     face = cuts.faces[k, 0]
     arc0, arc1 = cuts.first_arc[k, 0], cuts.first_arc[k + 1, 0]
@@ -278,8 +312,8 @@ def ends_of_face(
     starts, start_ids, start_count = np.empty((room, 2)), np.empty(room, np.int32), 0
     for a in range(arc0, arc1):
         arc = cuts.arcs[a]
-        ends[end_count, 0], ends[end_count, 1] = point_on(arc, arc[TO])
-        starts[start_count, 0], starts[start_count, 1] = point_on(arc, arc[FROM])
+        ends[end_count, 0], ends[end_count, 1] = point_on(arc, arc[END])
+        starts[start_count, 0], starts[start_count, 1] = point_on(arc, arc[START])
         end_ids[end_count], start_ids[start_count] = a, a
         end_count, start_count = end_count + 1, start_count + 1
     for i in range(3):
@@ -288,10 +322,10 @@ def ends_of_face(
         inside = distance[topology.links[h, TAIL]] <= level * (1.0 + LEVEL)
         for j in range(crossings.number[n, 0]):
             c = crossings.first[n, 0] + j
-            x = crossings.places[c, 0]
+            x = crossings.positions[c, 0]
             if crossings.turned[n, 0]:
                 c = crossings.first[n, 0] + crossings.number[n, 0] - 1 - j
-                x = topology.geometry[h, LENGTH] - crossings.places[c, 0]
+                x = topology.geometry[h, LENGTH] - crossings.positions[c, 0]
             if inside:
                 ends[end_count, 0], ends[end_count, 1] = ox + x * ux, oy + x * uy
                 end_ids[end_count] = -1 - c
@@ -306,10 +340,10 @@ def ends_of_face(
 
 @kernel
 def join(ends: Floats, starts: Floats) -> Ints:
-    """Return for each end the start that it is joined to: the nearest pair first, then of the rest.
+    """Return for each end the start that it is joined to: the nearest pair first, and so on.
 
-    Pairs that are each other's nearest are joined at once; so are at least the nearest of each
-    round. Mostly one round of O(n²).
+    Each round joins all pairs that are each other's nearest, of which there is at least one. Mostly
+    one round of O(n²).
     """
     count = len(ends)
     joined, taken = np.full(count, -1, np.int32), np.full(count, -1, np.int32)
@@ -345,7 +379,7 @@ def step_of(radius: float, chord_error: float) -> float:
 def trace_arc(
     topology: Any, face: int, arc: Floats, error: float, points: Floats, count: int
 ) -> Any:
-    """Append an arc's points, both ends included; return the points and how many there are."""
+    """Append an arc's points to ``points``, both ends included; return them and their number."""
     links, geometry, positions = topology.links, topology.geometry, topology.positions
     h = 3 * face
     tail, head = positions[links[h, TAIL]], positions[links[h, HEAD]]
@@ -353,12 +387,12 @@ def trace_arc(
     length = geometry[h, LENGTH]
     ax = geometry[h, LENGTH_LEFT] * geometry[h, COS_LEFT]
     ay = geometry[h, LENGTH_LEFT] * geometry[h, SIN_LEFT]
-    width, chords = arc[TO] - arc[FROM], 1
+    width, chords = arc[END] - arc[START], 1
     if not is_line(arc):
         chords = max(math.ceil(width / step_of(arc[RADIUS], error)), 1)
     points = with_room(points, count + chords + 1)
     for i in range(chords + 1):
-        x, y = point_on(arc, arc[FROM] + width * (i / chords))
+        x, y = point_on(arc, arc[START] + width * (i / chords))
         up = min(max(y / ay, 0.0), 1.0) if ay > 0.0 else 0.0
         along = min(max((x - up * ax) / length, 0.0), 1.0 - up)
         for axis in range(3):
@@ -370,9 +404,9 @@ def trace_arc(
 
 @kernel
 def put_crossing(topology: Any, crossings: Any, c: int, points: Floats, count: int) -> Any:
-    """Append the point of a crossing: the same to the bit for all faces."""
+    """Append the point of a crossing to ``points``: the same to the bit for all faces."""
     links, positions, h = topology.links, topology.positions, crossings.half_edges[c, 0]
-    share = crossings.places[c, 0] / topology.geometry[h, LENGTH]
+    share = crossings.positions[c, 0] / topology.geometry[h, LENGTH]
     points = with_room(points, count + 1)
     for axis in range(3):
         start, end = positions[links[h, TAIL], axis], positions[links[h, HEAD], axis]
@@ -381,7 +415,7 @@ def put_crossing(topology: Any, crossings: Any, c: int, points: Floats, count: i
 
 
 @kernel
-def chain_pieces(
+def chain_arcs(
     topology: Any,
     distance: Floats,
     cuts: Any,
@@ -391,14 +425,14 @@ def chain_pieces(
     first: int,
     last: int,
 ) -> tuple[Floats, Longs, Ints, Ints]:
-    """Join the pieces of each of the cut faces from the first up to the last.
+    """Join the arcs of each of the cut faces from ``first`` up to ``last`` to chains.
 
-    Returns the chains, as `Chains` has them, with the number of points of each. O(n²) for n pieces
-    in a face.
+    Returns the chains, as `Chains` has them, but with the number of points of each. O(n²) for n
+    arcs in a face.
     """
-    points, count = np.empty((256, 3)), 0
-    points_of, ends = np.empty((64, 1), np.int64), np.empty((64, 2), np.int32)
-    faces, chains = np.empty((64, 1), np.int32), 0
+    points, count = np.empty((4 * ROWS, 3)), 0
+    points_of, ends = np.empty((ROWS, 1), np.int64), np.empty((ROWS, 2), np.int32)
+    faces, chains = np.empty((ROWS, 1), np.int32), 0
     for k in range(first, last):
         face = cuts.faces[k, 0]
         end_places, end_ids, start_places, start_ids = ends_of_face(
@@ -454,16 +488,49 @@ def faces_at(links: Ints, h: int) -> int:
 def link_chains(
     links: Ints, crossings: Any, chains: Any, shortest: float
 ) -> tuple[Floats, Ints, Longs, Flags]:
-    """Join chains across edges to lines: points, faces, the first point of each, what is closed.
+    """Join chains across edges to lines; return points, faces, first points and closed flags.
 
-    Across an edge of more than two faces lines end. The faces are those that follow each point; the
-    last of an open line has none, -1. Points nearer than ``shortest`` to the one before are left
-    out, and with them lines that are not longer.
+    The faces are those that follow each point; the last point of an open line has none, -1. The
+    first points and the flags have a row for each line. Points nearer than ``shortest`` to the one
+    before are left out, and so are lines of too few points.
     """
-    count = len(chains.ends)
-    partner = np.full(2 * count, -1, np.int32)  # of each end of a chain, 2 c and 2 c + 1
-    waiting = np.full(len(crossings.places), -1, np.int32)
-    for end in range(2 * count):
+    count, partner = len(chains.ends), partners(links, crossings, chains)
+    done, lines, total = np.zeros(count, np.uint8), 0, 0
+    points, faces = np.empty((len(chains.points), 3)), np.empty(len(chains.points), np.int32)
+    first, closed = np.zeros(count + 1, np.int64), np.zeros(count, np.uint8)
+    for turn in range(3):  # open lines from their beginnings; the rest of them; closed lines
+        for start in range(2 * count):
+            is_open = chains.ends[start // 2, start % 2] >= 0 and partner[start] < 0
+            if done[start // 2] or (turn < 2 and not is_open) or (turn != 1 and start % 2):
+                continue
+            begin, end = total, start
+            while end >= 0 and not done[end // 2]:
+                done[end // 2] = 1
+                total = append_chain(chains, end, shortest, points, faces, begin, total)
+                end = partner[end ^ 1]
+            if not is_open and total > begin + 1:
+                total -= 1  # the first point again
+            else:
+                faces[total - 1] = -1
+            if total - begin < (2 if is_open else 3):
+                total = begin
+                continue
+            closed[lines] = not is_open
+            lines += 1
+            first[lines] = total
+    return points[:total], faces[:total], first[: lines + 1], closed[:lines]
+
+
+@kernel
+def partners(links: Ints, crossings: Any, chains: Any) -> Ints:
+    """Return the end of a chain that each end continues with, -1 for none.
+
+    The ends of chain c are 2 c and 2 c + 1. At an edge of more than two faces lines end.
+    """
+    count = 2 * len(chains.ends)
+    partner = np.full(count, -1, np.int32)
+    waiting = np.full(len(crossings.positions), -1, np.int32)
+    for end in range(count):
         c = chains.ends[end // 2, end % 2]
         if c < 0 or faces_at(links, crossings.half_edges[c, 0]) > 2:
             continue
@@ -471,48 +538,32 @@ def link_chains(
             waiting[c] = end
         else:
             partner[end], partner[waiting[c]] = waiting[c], end
-    done, lines = np.zeros(count, np.uint8), 0
-    points, faces = np.empty((len(chains.points), 3)), np.empty(len(chains.points), np.int32)
-    first, closed = np.zeros(count + 1, np.int64), np.zeros(count, np.uint8)
-    total = 0
-    for turn in range(3):  # open lines from where they begin; what is left of them; closed ones
-        for start in range(2 * count):
-            is_open = chains.ends[start // 2, start % 2] >= 0 and partner[start] < 0
-            if done[start // 2] or (turn < 2 and not is_open) or (turn != 1 and start % 2):
-                continue
-            begin, end, last = total, start, start
-            while not done[end // 2]:
-                chain = end // 2
-                done[chain] = 1
-                lo, hi = chains.first[chain, 0], chains.first[chain + 1, 0]
-                for i in range(hi - lo):
-                    source = lo + i if end % 2 == 0 else hi - 1 - i
-                    if total > begin:
-                        way = 0.0
-                        for axis in range(3):
-                            way += (chains.points[source, axis] - points[total - 1, axis]) ** 2
-                        if way > shortest * shortest:
-                            faces[total - 1] = chains.faces[chain, 0]
-                        elif i == hi - lo - 1:  # the crossing, not what nearly is there
-                            total -= 1
-                        else:
-                            continue
-                    for axis in range(3):
-                        points[total, axis] = chains.points[source, axis]
-                    total += 1
-                last = end ^ 1
-                if partner[last] < 0:
-                    break
-                end = partner[last]
-            is_closed = not is_open
-            if is_closed and total > begin + 1:
-                total -= 1  # the first point again
+    return partner
+
+
+@inlined
+def append_chain(
+    chains: Any, end: int, shortest: float, points: Floats, faces: Ints, begin: int, total: int
+) -> int:
+    """Append a chain, from one of its ends on, to the line that begins at point ``begin``.
+
+    Fills ``points`` and ``faces`` from ``total`` on; returns the new total.
+    """
+    chain = end // 2
+    lo, hi = chains.first[chain, 0], chains.first[chain + 1, 0]
+    for i in range(hi - lo):
+        source = lo + i if end % 2 == 0 else hi - 1 - i
+        if total > begin:
+            way = 0.0
+            for axis in range(3):
+                way += (chains.points[source, axis] - points[total - 1, axis]) ** 2
+            if way > shortest * shortest:
+                faces[total - 1] = chains.faces[chain, 0]
+            elif i == hi - lo - 1:  # the crossing replaces the point that is nearly there
+                total -= 1
             else:
-                faces[total - 1] = -1
-            if total - begin < (3 if is_closed else 2):
-                total = begin
                 continue
-            closed[lines] = is_closed
-            lines += 1
-            first[lines] = total
-    return points[:total], faces[:total], first[: lines + 1], closed[:lines]
+        for axis in range(3):
+            points[total, axis] = chains.points[source, axis]
+        total += 1
+    return total

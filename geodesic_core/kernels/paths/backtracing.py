@@ -1,14 +1,18 @@
-"""Shortest paths from a finished sweep (section 3.5).
+"""Backtracing of shortest paths from a finished sweep (section 3.5).
 
-Each vertex keeps its winning window: the half-edge it came over, the unfolded pseudosource and the
-pseudosource's id. A path is walked from vertex to pseudosource by unfolding the faces on the line
-between them; at a pseudosource it turns toward that vertex's own winner. This copy replaces the
-paper's walk around the pseudosource in search of a window, and with it every window list
-(section 7).
+Each vertex keeps its winning window: the half-edge that the window crossed last, the unfolded
+pseudosource and the node of that pseudosource. A path consists of straight lines from node to node.
+Each line is walked backward, from its end to its pseudosource, by unfolding the faces on the way.
+There the path turns toward the pseudosource's own winning window. This copy replaces the paper's
+walk around the pseudosource in search of a window, and with it every window list (section 7).
 
-Merged windows have no true pseudosource. Where the path crosses the edge on which two were merged,
-it turns toward the pseudosource of the one that it meets there (section 4.3): it is a path on the
-surface, no shorter than the exact one, and longer than the field says by ξ at most.
+A merged window has no true pseudosource. Where the walk crosses the edge on which two windows were
+merged, it turns toward the pseudosource of the one that covers the crossing (section 4.3). Such a
+path is no shorter than the exact one, and longer than the field's value by ξ at most.
+
+The sweep does not record from which face of an irregular edge a line came. There the walk *forks*:
+it tries the faces in turn, and goes back to the latest fork when it is lost. Any line that ends at
+the pseudosource, straight and of the right length, will do.
 """
 
 import math
@@ -17,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.kernels.jit import kernel, pointer
+from geodesic_core.kernels.jit import inlined, kernel, pointer, pointers
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     AROUND,
@@ -31,31 +35,37 @@ from geodesic_core.kernels.mesh.half_edges import (
     NO_FACE,
     OPPOSITE,
     PINCHED,
+    ROW,
     SIN_LEFT,
     SIN_RIGHT,
     TAIL,
     following,
-    point_in_frame,
     previous,
+    weights_in_frame,
 )
-from geodesic_core.kernels.sweep.segments import distance_to_segment, is_segment
+from geodesic_core.kernels.sweep.segments import distance_to_segment
 from geodesic_core.kernels.sweep.state import (
     ENTRY_EDGE,
     FACE,
     LEFT,
     LEFT_REFERENCE,
+    MERGE,
+    MERGE_INTS,
     MERGED_ON,
     NODE,
     PREDECESSOR,
     RIGHT,
     RIGHT_REFERENCE,
+    SEGMENT,
+    SITE,
     SPLIT,
+    WINNER,
 )
-from geodesic_core.tolerances import GAP, ON_PATH, SAME_PLACE, WIDEST_ERROR
+from geodesic_core.tolerances import FORKS, GAP, ON_PATH, SAME_PLACE, TRIES, WIDEST_ERROR
 
 
 class Winners(NamedTuple):
-    """What a finished sweep leaves for backtracing: arrays of its `Wavefront`, and one more."""
+    """The results of a sweep that backtracing reads; all but the first are its `Wavefront`'s."""
 
     nearest: Ints
     """(N,): index of the nearest source, by node; -1 where unreached"""
@@ -71,117 +81,372 @@ class Winners(NamedTuple):
     piece_ends: Floats
 
 
+class View(NamedTuple):
+    """A mesh and the results of a sweep, with pointers in place of arrays.
+
+    With the arrays themselves, each call counts their references: tracing took 2.5 to 3 times as
+    long.
+    """
+
+    mesh: Any
+    """A `Topology` of pointers"""
+    winners: Any
+    """`Winners` of pointers"""
+    vertex_count: int
+    site_rows: int
+    segment_rows: int
+    merging: bool
+
+
+class Line(NamedTuple):
+    """A straight line of the path: the part that is fixed while it is walked."""
+
+    end: int
+    """The node at which the walk begins"""
+    length: float
+    """Distance of that node from the source, mesh units"""
+    sw: float
+    """SW of the window, see `window`: 0 for parallel rays, else 1"""
+    slack: float
+    """Mesh units by which a distance along the line may exceed one that it is compared with"""
+
+
+class Walk(NamedTuple):
+    """The state of a walk: a point of the line, in the frame of the half-edge that it lies on."""
+
+    half_edge: int
+    x: float
+    """Position on the half-edge, mesh units from its tail"""
+    sx: float
+    sy: float
+    """The unfolded pseudosource; sy <= 0 where the face of the half-edge has been crossed, and
+    sy >= 0 where it lies ahead"""
+    sigma: float
+    """σ of the window; for parallel rays the distance at x"""
+    walked: float
+    """Length of the line from its end to here, mesh units"""
+    reference: int
+    """Merges that are still to be undone, see `window`"""
+    node_count: int
+    """Number of nodes on the trail"""
+    after: int
+    """At an irregular edge, the half-edge whose face was tried last; -1 before the first"""
+
+
+class Sight(NamedTuple):
+    """The apex of the face ahead and the pseudosource, as seen from a walk."""
+
+    apex: int
+    ax: float
+    ay: float
+    """Position of the apex"""
+    to_apex: float
+    """Distance of the apex, mesh units"""
+    to_source: float
+    """Distance of the pseudosource, mesh units; 0 for parallel rays"""
+    distance: float
+    """Distance of the walk's point from the source along the line, mesh units"""
+
+
+class Trail(NamedTuple):
+    """The path so far, filled from its end, as raw pointers; see `trace_path`."""
+
+    nodes: Any
+    parameters: Any
+    faces: Any
+    room: int
+
+
+class Forks(NamedTuple):
+    """A stack of walks at points where another face may be tried."""
+
+    floats: Floats
+    """(FORKS, 5): x, sx, sy, sigma, walked"""
+    ints: Ints
+    """(FORKS, 4): half_edge, reference, node_count, after"""
+
+
 # Outcomes
 TRACED = 0
 NO_ROOM = 1  # the path has more points than the arrays hold: grow, and call again
 LOST = 2  # the line left the surface: a defect
 
-TRIES = 64
-"""How many edges a straight piece is tried over, per point of the longest path, before it is lost.
-
-Sheets upon each other, around a sharp tip, can be gone through in more ways than time allows.
-"""
-
-FORKS = 64
-"""Irregular edges on a straight piece where other faces are still to be tried, at most."""
-
 
 @kernel
-def cross_edge(
-    x: float, sx: float, sy: float, sw: float, length: float, cosine: float, sine: float
-) -> tuple[float, float, float]:
-    """Walk from (x, 0) toward s, of weight sw, and out over the left edge of a face.
+def trace_path(
+    topology: Any,
+    winners: Any,
+    target: int,
+    nodes: Ints,
+    parameters: Floats,
+    faces: Ints,
+) -> tuple[int, int]:
+    """Trace the path from node ``target`` to its source; return (outcome, number of nodes).
 
-    Returns the exit's distance from the tail and s in the frame of that edge, whose own face is
-    ahead again (y > 0).
+    Fills ``nodes`` and ``parameters`` with half-edges h, crossed at this share of their length, or
+    -1 - v for a vertex or site v. Fills ``faces``: number i is crossed between the nodes i and
+    i + 1. A vertex on the way continues the path with its own winner: a line may pass it straight
+    on either side only where it is flat. O(faces crossed).
     """
-    along, ahead = sx * cosine + sy * sine, sy * cosine - sx * sine
-    ex, ey = x * cosine, -x * sine
-    if ahead <= 0.0:  # within rounding, s lies on the edge's line, or before it
-        return min(max(along, 0.0), length), along, ahead
-    u = ex - (along - sw * ex) * ey / (ahead - sw * ey)
-    return min(max(u, 0.0), length), along, ahead
+    view = view_of(topology, winners)
+    trail = Trail(pointer(nodes), pointer(parameters), pointer(faces), len(nodes))
+    forks = Forks(np.empty((FORKS, 5)), np.empty((FORKS, 4), np.int32))
+    nodes[0], parameters[0] = -1 - target, 0.0
+    count, v = 1, target
+    while winners.winner_ints[v, ENTRY_EDGE] >= 0:
+        outcome, count, v = trace_line(view, v, trail, forks, count)
+        if outcome != TRACED:
+            return outcome, count
+        if count >= len(nodes):
+            return NO_ROOM, count
+        nodes[count], parameters[count] = -1 - v, 0.0
+        count += 1
+    return TRACED, count
 
 
 @kernel
-def leave(
-    geometry: Floats,
-    h: int,
-    x: float,
-    sx: float,
-    sy: float,
-    sw: float,
-    is_left: bool,
-) -> tuple[int, float, float, float, float]:
-    """Walk from (x, 0) on h toward s, out over the left or the right edge of the face.
+def view_of(topology: Any, winners: Any) -> View:
+    """Return the View of a mesh and of winners, which the caller must hold meanwhile."""
+    return View(
+        pointers(topology),
+        pointers(winners),
+        len(topology.total_angle),
+        len(winners.site_ints),
+        len(winners.piece_ints),
+        len(winners.reference) > 0,
+    )
 
-    Returns that half-edge, the exit in its frame, s in the same, behind it, and how far it was.
+
+@kernel
+def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[int, int, int]:
+    """Trace the line that ends at node v; return (outcome, number of nodes, its first node).
+
+    Appends to ``trail``; ``forks`` is scratch memory.
     """
-    if is_left:
-        m, side = previous(h), geometry[h, LENGTH_LEFT]
-        cosine, sine = geometry[h, COS_LEFT], geometry[h, SIN_LEFT]
-    else:  # the same, in the mirror
-        m, side = following(h), geometry[h, LENGTH_RIGHT]
-        cosine, sine = geometry[h, COS_RIGHT], geometry[h, SIN_RIGHT]
-        x, sx = geometry[h, LENGTH] - x, sw * geometry[h, LENGTH] - sx
-    u, sx, sy = cross_edge(x, sx, sy, sw, side, cosine, sine)
-    step = math.hypot(u * cosine - x, u * sine)
-    if is_left:
-        u, sx = side - u, sw * side - sx
-    return m, u, sx, -sy, step
+    open_forks, milestone = 0, count
+    line, walk, start = jump_to_window(view, v, count)
+    trail.faces[count - 1] = walk.half_edge // 3
+    if start >= 0:
+        return TRACED, count, start
+    for _ in range(TRIES * trail.room):
+        walk = unmerge(view, walk)
+        kind = view.mesh.links[ROW * walk.half_edge + OPPOSITE]
+        h, same = next_face(view.mesh.links, walk.half_edge, walk.after)
+        if kind == NO_FACE and open_forks == 0:
+            start = nearer_end(view, line, walk)
+            return (TRACED if start >= 0 else LOST), walk.node_count, start
+        is_lost = h < 0
+        if not is_lost:
+            if kind == IRREGULAR and open_forks < FORKS:
+                open_forks = push_fork(forks, open_forks, walk, h)
+            if walk.node_count >= trail.room:
+                return NO_ROOM, walk.node_count, -1
+            walk = enter(view, line, walk, h, same)
+            sight = look_ahead(view, line, walk)
+            milestone, is_wound = append_node(view, trail, walk, milestone)
+            is_wrong = is_wound or is_too_far(view, line, walk, sight)
+            is_lost = open_forks > 0 and is_wrong
+        if not is_lost:
+            start = start_in_face(view, line, walk, sight, open_forks == 0)
+            if start >= 0:
+                return TRACED, walk.node_count, start
+            is_left, is_tie = side_of_apex(view, line, walk, sight)
+            if is_tie and open_forks < FORKS:
+                other = leave(view, line, walk, not is_left)
+                open_forks = push_fork(forks, open_forks, other, -1)
+            walk = leave(view, line, walk, is_left)
+            is_lost = open_forks > 0 and is_past_start(view, line, walk, sight)
+        if is_lost:
+            if open_forks == 0:
+                return LOST, walk.node_count, -1
+            open_forks -= 1
+            walk = walk_at_fork(forks, open_forks)
+    return LOST, walk.node_count, -1
 
 
 @kernel
-def put_fork(
-    forks: Floats,
-    fork_ints: Ints,
-    i: int,
-    m: int,
-    x: float,
-    sx: float,
-    sy: float,
-    walked: float,
-    sigma: float,
-    after: int,
-    reference: int,
-    count: int,
-) -> None:
-    """Note at i where a line may go on otherwise: over m, into the faces that follow ``after``."""
-    forks[i, 0], forks[i, 1], forks[i, 2], forks[i, 3], forks[i, 4] = x, sx, sy, walked, sigma
-    fork_ints[i, 0], fork_ints[i, 1] = m, after
-    fork_ints[i, 2], fork_ints[i, 3] = reference, count
+def jump_to_window(view: Any, v: int, count: int) -> tuple[Line, Walk, int]:
+    """Begin the line that ends at node v, on the half-edge that its winning window crossed last.
+
+    Returns as well the node where the line begins, if that is in the same face; else -1.
+    """
+    mesh, winners = view.mesh, view.winners
+    m = as_int64(winners.winner_ints[WINNER * v + ENTRY_EDGE])
+    reference = -1 - as_int64(winners.winner_ints[WINNER * v + PREDECESSOR])
+    if view.merging:
+        reference = as_int64(winners.reference[v])
+    root, distance = pseudosource_of(reference), winners.distance[v]
+    length = mesh.geometry[ROW * m + LENGTH]
+    sx, sy = winners.winner[2 * v], winners.winner[2 * v + 1]
+    sw = 0.0 if is_segment(view, root) else 1.0
+    slack = (WIDEST_ERROR if view.merging else SAME_PLACE) * distance
+    ax, ay = target_in_frame(view, v, m)
+    rise = sw * ay - sy
+    x = (sx * ay - ax * sy) / rise if rise > 0.0 else sx
+    x = min(max(x, 0.0), length)
+    walked = math.hypot(ax - x, ay)
+    sigma = distance - walked
+    if sw > 0.0:
+        sigma -= math.hypot(sx - x, sy)
+    start, tail, head = -1, mesh.links[ROW * m + TAIL], mesh.links[ROW * m + HEAD]
+    if row_in_face(view, root, m // 3) >= 0 or segment_in_face(view, root, m // 3) >= 0:
+        start = root
+    elif tail == root or is_on_path(winners, tail, math.hypot(ax, ay), distance, v):
+        start = as_int64(tail)
+    elif head == root or is_on_path(winners, head, math.hypot(ax - length, ay), distance, v):
+        start = as_int64(head)
+    walk = Walk(m, x, sx, sy, sigma, walked, reference, as_int64(count), -1)
+    return Line(as_int64(v), distance, sw, slack), walk, start
+
+
+@inlined
+def as_int64(number: Any) -> int:
+    """Return a number of an array of int32 as int64, like all numbers in the named tuples here."""
+    return number + 0
+
+
+@inlined
+def pseudosource_of(reference: int) -> int:
+    """Node of the pseudosource; -1 where it is unknown until merges are undone."""
+    return -1 - reference if reference < 0 else -1
+
+
+@inlined
+def unmerge(view: Any, walk: Walk) -> Walk:
+    """Undo the merges on the half-edge of a walk: go on with the window that covered x (4.3)."""
+    merges, merge_ints = view.winners.merges, view.winners.merge_ints
+    reference, sx, sy, sigma = walk.reference, walk.sx, walk.sy, walk.sigma
+    while reference >= 0 and merge_ints[MERGE_INTS * reference + MERGED_ON] == walk.half_edge:
+        is_left = walk.x <= merges[MERGE * reference + SPLIT]
+        side = MERGE * reference + (LEFT if is_left else RIGHT)
+        sx, sy, sigma = merges[side], merges[side + 1], merges[side + 2]
+        before = LEFT_REFERENCE if is_left else RIGHT_REFERENCE
+        reference = as_int64(merge_ints[MERGE_INTS * reference + before])
+    return Walk(
+        walk.half_edge,
+        walk.x,
+        sx,
+        sy,
+        sigma,
+        walk.walked,
+        reference,
+        walk.node_count,
+        walk.after,
+    )
 
 
 @kernel
-def row_in_face(winners: Any, node: int, face: int) -> int:
-    """Row of a site in a face; -1 where it is not in that face, or no site."""
-    rows = len(winners.site_ints)
-    if rows == 0 or node < winners.site_ints[0, NODE]:
-        return -1
-    for k in range(rows):
-        if winners.site_ints[k, NODE] == node and winners.site_ints[k, FACE] == face:
-            return k
+def next_face(links: Any, m: int, after: int) -> tuple[int, bool]:
+    """Half-edge across that of m, and whether it runs the same way; -1 if there is none.
+
+    Across an irregular edge it is the first, or the one that follows ``after``.
+    """
+    if links[ROW * m + OPPOSITE] != IRREGULAR:
+        return (links[ROW * m + OPPOSITE] if after < 0 else -1), False
+    same, h, is_next = True, m, after < 0
+    while True:
+        code = links[ROW * h + AROUND]
+        h = code >> 1
+        if code & 1 == 0:
+            same = not same
+        if h == m:
+            return -1, False
+        if is_next:
+            return h, same
+        is_next = h == after
+
+
+@kernel
+def nearer_end(view: Any, line: Line, walk: Walk) -> int:
+    """End of a boundary edge that the path goes on by, where rounding led its line over the edge.
+
+    It is the end that lies nearer to the source on the way; -1 if it is farther than the line's.
+    """
+    distance, row = view.winners.distance, ROW * walk.half_edge
+    tail, head = view.mesh.links[row + TAIL], view.mesh.links[row + HEAD]
+    to_head = view.mesh.geometry[row + LENGTH] - walk.x
+    end = tail if distance[tail] + walk.x <= distance[head] + to_head else head
+    return end if distance[end] < line.length else -1
+
+
+@inlined
+def enter(view: Any, line: Line, walk: Walk, h: int, same: bool) -> Walk:
+    """Turn to the face across the edge, in the frame of its half-edge h; add a node."""
+    length, x, sx = view.mesh.geometry[ROW * walk.half_edge + LENGTH], walk.x, walk.sx
+    if not same:
+        x, sx = length - x, line.sw * length - sx
+    return Walk(
+        h, x, sx, -walk.sy, walk.sigma, walk.walked, walk.reference, walk.node_count + 1, -1
+    )
+
+
+@inlined
+def look_ahead(view: Any, line: Line, walk: Walk) -> Sight:
+    """Return the apex of the face ahead, and how far it and the pseudosource are."""
+    geometry, row, x = view.mesh.geometry, ROW * walk.half_edge, walk.x
+    ax = geometry[row + COS_LEFT] * geometry[row + LENGTH_LEFT]
+    ay = geometry[row + SIN_LEFT] * geometry[row + LENGTH_LEFT]
+    to_apex = math.sqrt((ax - x) * (ax - x) + ay * ay)
+    to_source = 0.0
+    if line.sw > 0.0:
+        to_source = math.sqrt((walk.sx - x) * (walk.sx - x) + walk.sy * walk.sy)
+    return Sight(
+        as_int64(view.mesh.links[row + APEX]), ax, ay, to_apex, to_source, walk.sigma + to_source
+    )
+
+
+@inlined
+def append_node(view: Any, trail: Any, walk: Walk, milestone: int) -> tuple[int, bool]:
+    """Append the walk's point to ``trail``; return the milestone, and whether the walk winds.
+
+    In a face that the path did not come from, a line may wind about a tip without end. It does
+    where it crosses the half-edge of its *milestone* again, an earlier node. The milestone moves up
+    whenever the number of nodes has doubled, so that any cycle is found in the end.
+    """
+    i, h = walk.node_count - 1, walk.half_edge
+    trail.nodes[i], trail.parameters[i] = h, walk.x / view.mesh.geometry[ROW * h + LENGTH]
+    trail.faces[i] = h // 3
+    milestone = min(milestone, i)
+    is_wound = milestone < i and trail.nodes[milestone] == h
+    return (i if walk.node_count >= 2 * milestone else milestone), is_wound
+
+
+@inlined
+def is_too_far(view: Any, line: Line, walk: Walk, sight: Sight) -> bool:
+    """Whether a line through this face contradicts a distance.
+
+    It is longer than the distance of its end, or a shorter way to the apex than the apex's distance
+    allows.
+    """
+    if walk.walked + sight.distance > line.length + line.slack:
+        return True
+    return view.winners.distance[sight.apex] > sight.distance + sight.to_apex + line.slack
+
+
+@kernel
+def start_in_face(view: Any, line: Line, walk: Walk, sight: Sight, is_certain: bool) -> int:
+    """Node of the face ahead at which the line begins; -1 if it goes on.
+
+    After a fork it is not certain that the path came through this face. Then its pseudosource must
+    be where it was unfolded to.
+    """
+    distance, h, root = view.winners.distance, walk.half_edge, pseudosource_of(walk.reference)
+    length = view.mesh.geometry[ROW * h + LENGTH]
+    most = math.inf if is_certain else sight.to_source
+    most = most * (1.0 + SAME_PLACE) + GAP * length
+    if row_in_face(view, root, h // 3) >= 0:
+        px, py = target_in_frame(view, root, h)
+        if math.hypot(px - walk.x, py) <= most:
+            return root
+    k = segment_in_face(view, root, h // 3)
+    if k >= 0:
+        off = distance_to_segment(view.mesh.geometry, view.winners.piece_ends, k, h, walk.x, 0.0)
+        if is_certain or distance[root] + off <= walk.sigma + SAME_PLACE * length:
+            return root
+    is_root = sight.apex == root and sight.to_apex <= most
+    if is_root or is_on_path(view.winners, sight.apex, sight.to_apex, sight.distance, line.end):
+        return sight.apex
     return -1
-
-
-@kernel
-def segment_in_face(winners: Any, node: int, face: int) -> int:
-    """Row of a piece in a face; -1 where it is not in that face, or no piece."""
-    if is_segment(winners.piece_ints, node):
-        for k in range(len(winners.piece_ints)):
-            if winners.piece_ints[k, NODE] == node and winners.piece_ints[k, FACE] == face:
-                return k
-    return -1
-
-
-@kernel
-def target_in_frame(topology: Any, winners: Any, node: int, h: int) -> tuple[float, float]:
-    """Where the target lies in the frame of h: the apex, or a site in the face."""
-    geometry = topology.geometry
-    if node < len(topology.total_angle):
-        reach = geometry[h, LENGTH_LEFT]
-        return geometry[h, COS_LEFT] * reach, geometry[h, SIN_LEFT] * reach
-    return point_in_frame(geometry, h, winners.site_weights[row_in_face(winners, node, h // 3)])
 
 
 @kernel
@@ -197,215 +462,145 @@ def is_on_path(winners: Any, u: int, reach: float, here: float, target: int) -> 
     return distance[u] + reach <= allowed and distance[u] < distance[target]
 
 
-@kernel
-def nearer_end(winners: Any, u: int, to_u: float, w: int, to_w: float, target: int) -> int:
-    """End of a boundary edge over which a line that follows the boundary strays by rounding; or -1.
+@inlined
+def side_of_apex(view: Any, line: Line, walk: Walk, sight: Sight) -> tuple[bool, bool]:
+    """Return (whether the pseudosource is left of the apex, whether only rounding says so).
 
-    The path goes on by that end which lies nearer to the source on the way.
+    The latter happens in faces of no area.
     """
-    distance = winners.distance
-    end = u if distance[u] + to_u <= distance[w] + to_w else w
-    return end if distance[end] < distance[target] else -1
+    ahead = (sight.ax - walk.x) * walk.sy
+    aside = sight.ay * (walk.sx - line.sw * walk.x)
+    if view.mesh.flags[sight.apex] & PINCHED == 0:
+        return ahead >= aside, False
+    is_tie = abs(ahead - aside) <= GAP * (abs(ahead) + abs(aside))
+    is_near = sight.to_apex <= GAP * view.mesh.geometry[ROW * walk.half_edge + LENGTH]
+    return ahead >= aside, is_tie or is_near
 
 
 @kernel
-def unmerge(
-    winners: Any, reference: int, h: int, x: float, sx: float, sy: float, sigma: float
-) -> tuple[int, float, float, float]:
-    """Undo the merges on h: the window that covered x; its reference, sx, sy and σ."""
-    while reference >= 0 and winners.merge_ints[reference, MERGED_ON] == h:
-        left = x <= winners.merges[reference, SPLIT]
-        column = LEFT if left else RIGHT
-        sx, sy = winners.merges[reference, column], winners.merges[reference, column + 1]
-        sigma = winners.merges[reference, column + 2]
-        reference = winners.merge_ints[reference, LEFT_REFERENCE if left else RIGHT_REFERENCE]
-    return reference, sx, sy, sigma
+def leave(view: Any, line: Line, walk: Walk, is_left: bool) -> Walk:
+    """Hop over the face ahead, to its left or its right edge.
 
-
-@kernel
-def next_face(links: Ints, m: int, after: int) -> tuple[int, bool]:
-    """Half-edge across that of m, and whether it runs the same way; -1 if there is none.
-
-    Across an irregular edge the first is returned, or that which follows ``after``.
+    The right edge is left as the left one is, in the mirror.
     """
-    if links[m, OPPOSITE] != IRREGULAR:
-        return (links[m, OPPOSITE] if after < 0 else -1), False
-    same, h, passed = True, m, after < 0
-    while True:
-        code = links[h, AROUND]
-        h = code >> 1
-        if code & 1 == 0:
-            same = not same
-        if h == m:
-            return -1, False
-        if passed:
-            return h, same
-        passed = h == after
+    geometry, h, sw = view.mesh.geometry, walk.half_edge, line.sw
+    row = ROW * h
+    if is_left:
+        m, side = previous(h), geometry[row + LENGTH_LEFT]
+        cosine, sine = geometry[row + COS_LEFT], geometry[row + SIN_LEFT]
+        x, sx = walk.x, walk.sx
+    else:
+        m, side = following(h), geometry[row + LENGTH_RIGHT]
+        cosine, sine = geometry[row + COS_RIGHT], geometry[row + SIN_RIGHT]
+        x, sx = geometry[row + LENGTH] - walk.x, sw * geometry[row + LENGTH] - walk.sx
+    u, sx, sy = cross_edge(x, sx, walk.sy, sw, side, cosine, sine)
+    step = math.hypot(u * cosine - x, u * sine)
+    if is_left:
+        u, sx = side - u, sw * side - sx
+    sigma = walk.sigma if sw > 0.0 else walk.sigma - step
+    return Walk(m, u, sx, -sy, sigma, walk.walked + step, walk.reference, walk.node_count, -1)
 
 
 @kernel
-def trace_path(
-    topology: Any,
-    winners: Any,
-    target: int,
-    nodes: Ints,
-    parameters: Floats,
-    faces: Ints,
-) -> tuple[int, int]:
-    """Trace the path from node ``target`` to its source; return (outcome, number of nodes).
+def cross_edge(
+    x: float, sx: float, sy: float, sw: float, length: float, cosine: float, sine: float
+) -> tuple[float, float, float]:
+    """Walk from (x, 0) toward s, of weight sw, and out over the left edge of a face.
 
-    A vertex on the way takes over with its own winner: a line through it may go on straight on
-    either side only where it is flat. What is filled in is a half-edge h, crossed at ``parameters``
-    of its length, or -1 - v for a vertex or site v. ``faces[i]`` is crossed between the nodes i and
-    i + 1. O(faces crossed).
+    Returns the exit's distance from the tail, and s in the frame of that edge, whose own face is
+    ahead again (y > 0).
     """
-    nodes[0], parameters[0] = -1 - target, 0.0
-    count, v = 1, target
-    while winners.winner_ints[v, ENTRY_EDGE] >= 0:
-        outcome, count, v = trace_line(topology, winners, v, nodes, parameters, faces, count)
-        if outcome != TRACED:
-            return outcome, count
-        if count >= len(nodes):
-            return NO_ROOM, count
-        nodes[count], parameters[count] = -1 - v, 0.0
-        count += 1
-    return TRACED, count
+    along, ahead = sx * cosine + sy * sine, sy * cosine - sx * sine
+    ex, ey = x * cosine, -x * sine
+    if ahead <= 0.0:  # within rounding, s lies on the edge's line, or before it
+        return min(max(along, 0.0), length), along, ahead
+    u = ex - (along - sw * ex) * ey / (ahead - sw * ey)
+    return min(max(u, 0.0), length), along, ahead
+
+
+@inlined
+def is_past_start(view: Any, line: Line, walk: Walk, sight: Sight) -> bool:
+    """Whether the walk has gone beyond the pseudosource, which was not in the face just left.
+
+    Where merges are still to be undone on the edge ahead, it has not. A pseudosource on the edge
+    itself may be beyond, in a face of no area.
+    """
+    m, reference = walk.half_edge, walk.reference
+    if reference >= 0 and view.winners.merge_ints[MERGE_INTS * reference + MERGED_ON] == m:
+        return False
+    close = SAME_PLACE * view.mesh.geometry[ROW * m + LENGTH]
+    if line.sw == 0.0:
+        return walk.sigma - view.winners.distance[pseudosource_of(reference)] < -close
+    return -walk.sy < -close or (-walk.sy <= close and sight.to_source <= close)
 
 
 @kernel
-def trace_line(
-    topology: Any,
-    winners: Any,
-    v: int,
-    nodes: Ints,
-    parameters: Floats,
-    faces: Ints,
-    count: int,
-) -> tuple[int, int, int]:
-    """Trace the straight piece that ends at node v; return (outcome, nodes so far, its beginning).
+def push_fork(forks: Any, size: int, walk: Walk, after: int) -> int:
+    """Store a walk that may go on otherwise, into the faces that follow ``after``.
 
-    Across an irregular edge it is not known from which face the path came: the faces are tried in
-    turn. Of several that lead to the pseudosource, straight and at the right distance, any will do.
-    A wrong one is given up where a vertex is farther than the way to it would be.
+    Writes row ``size`` of ``forks``; returns the new size.
     """
-    links, geometry, distance = topology.links, topology.geometry, winners.distance
-    m, root = winners.winner_ints[v, ENTRY_EDGE], winners.winner_ints[v, PREDECESSOR]
-    sx, sy, sigma = winners.winner[v, 0], winners.winner[v, 1], 0.0
-    reference = winners.reference[v] if len(winners.reference) > 0 else -1 - root
-    if reference >= 0:
-        root = -1  # not known before the merges are undone
-    sw = 0.0 if is_segment(winners.piece_ints, root) else 1.0
-    face, length = m // 3, geometry[m, LENGTH]
-    ax, ay = target_in_frame(topology, winners, v, m)
-    faces[count - 1] = face
-    if row_in_face(winners, root, face) >= 0 or segment_in_face(winners, root, face) >= 0:
-        return TRACED, count, root
-    tail, head = links[m, TAIL], links[m, HEAD]
-    if tail == root or is_on_path(winners, tail, math.hypot(ax, ay), distance[v], v):
-        return TRACED, count, tail
-    if head == root or is_on_path(winners, head, math.hypot(ax - length, ay), distance[v], v):
-        return TRACED, count, head
-    # From there back over m itself
-    rise = sw * ay - sy
-    x = (sx * ay - ax * sy) / rise if rise > 0.0 else sx
-    x = min(max(x, 0.0), length)
-    walked = math.hypot(ax - x, ay)
-    sigma = distance[v] - walked  # of a strip, the distance at x
-    if sw > 0.0:
-        sigma -= math.hypot(sx - x, sy)
-    # Where other faces may be tried: what was known there, and which one was the last
-    forks, fork_ints = np.empty((FORKS, 5)), np.empty((FORKS, 4), np.int32)
-    fork_count, after, milestone = 0, -1, count
-    slack = (WIDEST_ERROR if len(winners.reference) > 0 else SAME_PLACE) * distance[v]
-    for _ in range(TRIES * len(nodes)):
-        # At (x, 0) on m, whose face lies ahead; the pseudosource is behind
-        if reference >= 0:
-            reference, sx, sy, sigma = unmerge(winners, reference, m, x, sx, sy, sigma)
-            root = -1 - reference if reference < 0 else -1
-        h, same = next_face(links, m, after)
-        is_lost = h < 0
-        if is_lost and after < 0 and fork_count == 0 and links[m, OPPOSITE] == NO_FACE:
-            length = geometry[m, LENGTH]
-            stop = nearer_end(winners, links[m, TAIL], x, links[m, HEAD], length - x, v)
-            return (TRACED if stop >= 0 else LOST), count, stop
-        if not is_lost:
-            if links[m, OPPOSITE] == IRREGULAR and fork_count < FORKS:
-                put_fork(
-                    forks, fork_ints, fork_count, m, x, sx, sy, walked, sigma, h, reference, count
-                )
-                fork_count += 1
-            length = geometry[m, LENGTH]
-            sy = -sy
-            if not same:
-                x, sx = length - x, sw * length - sx
-            if count >= len(nodes):
-                return NO_ROOM, count, -1
-            nodes[count], parameters[count], face = h, x / length, h // 3
-            faces[count] = face
-            # In a face that the path did not come from, a line may wind about a tip without end.
-            milestone = min(milestone, count)
-            is_wound = milestone < count and nodes[milestone] == h
-            count += 1
-            if count >= 2 * milestone:
-                milestone = count - 1
-            # At (x, 0) on h, its face and the pseudosource ahead
-            apex = links[h, APEX]
-            ax = geometry[h, COS_LEFT] * geometry[h, LENGTH_LEFT]
-            ay = geometry[h, SIN_LEFT] * geometry[h, LENGTH_LEFT]
-            reach = math.sqrt((ax - x) * (ax - x) + ay * ay)
-            rest = math.sqrt((sx - x) * (sx - x) + sy * sy) if sw > 0.0 else 0.0
-            here = sigma + rest
-            is_too_long = walked + here > distance[v] + slack
-            is_wrong = is_wound or is_too_long or distance[apex] > here + reach + slack
-            is_lost = fork_count > 0 and is_wrong
-            if not is_lost:
-                # The root may be in this face, but elsewhere, where the path did not come from it.
-                most = rest if fork_count > 0 else math.inf
-                if row_in_face(winners, root, face) >= 0:
-                    px, py = target_in_frame(topology, winners, root, h)
-                    if math.hypot(px - x, py) <= most * (1.0 + SAME_PLACE) + GAP * length:
-                        return TRACED, count, root
-                k = segment_in_face(winners, root, face)
-                if k >= 0:
-                    ends = pointer(winners.piece_ends)
-                    off = distance_to_segment(pointer(geometry), ends, k, h, x, 0.0)
-                    if fork_count == 0 or distance[root] + off <= sigma + SAME_PLACE * length:
-                        return TRACED, count, root
-                is_root = apex == root and reach <= most * (1.0 + SAME_PLACE) + GAP * length
-                if is_root or is_on_path(winners, apex, reach, here, v):
-                    return TRACED, count, apex
-            ahead, aside = (ax - x) * sy, ay * (sx - sw * x)
-            is_left = ahead >= aside  # s is left of the apex
-            # In a face of no area rounding alone may say so.
-            is_tie = abs(ahead - aside) <= GAP * (abs(ahead) + abs(aside))
-            is_tie = topology.flags[apex] & PINCHED != 0 and (is_tie or reach <= GAP * length)
-            if is_tie and not is_lost and fork_count < FORKS:
-                g, u, ux, uy, step = leave(geometry, h, x, sx, sy, sw, not is_left)
-                far, below = walked + step, sigma if sw > 0.0 else sigma - step
-                put_fork(
-                    forks, fork_ints, fork_count, g, u, ux, uy, far, below, -1, reference, count
-                )
-                fork_count += 1
-            m, x, sx, sy, step = leave(geometry, h, x, sx, sy, sw, is_left)
-            walked, left = walked + step, -sy  # how far the root is, at least
-            if sw == 0.0:
-                sigma -= step
-                left = sigma - distance[root]
-            # In a face that the path did not come from, the line ends where there is no root; or
-            # before it meets the edge on which windows were merged. A root that lies on the edge
-            # may be beyond, in a face of no area.
-            is_due = reference >= 0 and winners.merge_ints[reference, MERGED_ON] == m
-            close = SAME_PLACE * geometry[m, LENGTH]
-            ends = left < -close or (sw > 0.0 and left <= close and rest <= close)
-            is_lost = is_lost or (fork_count > 0 and not is_due and ends)
-            after = -1
-        if is_lost:
-            if fork_count == 0:
-                return LOST, count, -1
-            fork_count -= 1
-            x, sx = forks[fork_count, 0], forks[fork_count, 1]
-            sy, walked, sigma = forks[fork_count, 2], forks[fork_count, 3], forks[fork_count, 4]
-            m, after = fork_ints[fork_count, 0], fork_ints[fork_count, 1]
-            reference, count = fork_ints[fork_count, 2], fork_ints[fork_count, 3]
-            root = -1 - reference if reference < 0 else -1
-    return LOST, count, -1
+    floats, ints = forks.floats, forks.ints
+    floats[size, 0], floats[size, 1], floats[size, 2] = walk.x, walk.sx, walk.sy
+    floats[size, 3], floats[size, 4] = walk.sigma, walk.walked
+    ints[size, 0], ints[size, 1] = walk.half_edge, walk.reference
+    ints[size, 2], ints[size, 3] = walk.node_count, after
+    return size + 1
+
+
+@kernel
+def walk_at_fork(forks: Any, i: int) -> Walk:
+    """Return the walk of row i of ``forks``."""
+    floats, ints = forks.floats, forks.ints
+    return Walk(
+        as_int64(ints[i, 0]),
+        floats[i, 0],
+        floats[i, 1],
+        floats[i, 2],
+        floats[i, 3],
+        floats[i, 4],
+        as_int64(ints[i, 1]),
+        as_int64(ints[i, 2]),
+        as_int64(ints[i, 3]),
+    )
+
+
+@kernel
+def row_in_face(view: Any, node: int, face: int) -> int:
+    """Row of a site in a face; -1 where it is not in that face, or no site."""
+    if view.site_rows == 0 or node < view.winners.site_ints[NODE]:
+        return -1
+    ints = view.winners.site_ints
+    for k in range(view.site_rows):
+        if ints[SITE * k + NODE] == node and ints[SITE * k + FACE] == face:
+            return k
+    return -1
+
+
+@inlined
+def is_segment(view: Any, node: int) -> bool:
+    """Whether a node is a segment of a curve."""
+    rows, ints = view.segment_rows, view.winners.piece_ints
+    return rows > 0 and ints[NODE] <= node <= ints[SEGMENT * (rows - 1) + NODE]
+
+
+@kernel
+def segment_in_face(view: Any, node: int, face: int) -> int:
+    """Row of a segment in a face; -1 where it is not in that face, or no segment."""
+    if is_segment(view, node):
+        ints = view.winners.piece_ints
+        for k in range(view.segment_rows):
+            if ints[SEGMENT * k + NODE] == node and ints[SEGMENT * k + FACE] == face:
+                return k
+    return -1
+
+
+@kernel
+def target_in_frame(view: Any, node: int, h: int) -> tuple[float, float]:
+    """Position of a node in the frame of h: of the apex, or of a site in the face."""
+    geometry, row = view.mesh.geometry, ROW * h
+    if node < view.vertex_count:
+        reach = geometry[row + LENGTH_LEFT]
+        return geometry[row + COS_LEFT] * reach, geometry[row + SIN_LEFT] * reach
+    k = row_in_face(view, node, h // 3)
+    return weights_in_frame(geometry, view.winners.site_weights, 3 * k, h)

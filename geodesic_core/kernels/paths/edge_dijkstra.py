@@ -1,6 +1,6 @@
-"""A path along edges: a first upper bound of the distance between two vertices (section 5, step 1).
+"""A path along edges: a first upper bound of a distance between two vertices (section 5, step 1).
 
-Dijkstra's search, directed by the lower bounds of `prune` (A*).
+Dijkstra's search, directed by the lower bounds of `pruning` (A*).
 """
 
 from typing import Any
@@ -13,18 +13,15 @@ from geodesic_core.kernels.mesh.half_edges import APEX, HEAD, LENGTH, LENGTH_LEF
 from geodesic_core.kernels.sweep.pruning import touch
 from geodesic_core.kernels.sweep.queues import HEAP_SIZE, pop_nearest, push_or_raise
 from geodesic_core.kernels.sweep.state import PREDECESSOR, SETTLED, WINNER, view_of
-
-ASTAR_WEIGHT = 1.15
-"""Weight of the lower bound: the path may come out longer than the shortest by this factor.
-
-Shortening makes up for it, but for turns around the other side of an obstacle. Against 1, a third
-to a half of this step's time; 1.3 gains little more here and loses it in the next.
-"""
+from geodesic_core.tolerances import ASTAR_WEIGHT
 
 
 @kernel
 def search_edges(topology: Any, wavefront: Any, bounds: Any, begin: int, end: int) -> None:
-    """Search from ``begin`` until ``end`` is settled; PREDECESSOR holds the vertex before."""
+    """Search from ``begin`` until ``end`` is settled.
+
+    Modifies the distances, PREDECESSOR, status and heap of ``wavefront``.
+    """
     wave = view_of(topology, wavefront, bounds)
     mesh, vertices = wave.mesh, wave.vertices
     touch(wave, begin)
@@ -45,9 +42,10 @@ def search_edges(topology: Any, wavefront: Any, bounds: Any, begin: int, end: in
 
 @kernel
 def relax(wave: Any, v: int, u: int, length: float) -> None:
-    """Offer u the path over v; what is settled stays, though by haste it may not be the shortest.
+    """Offer u the path over v, unless u is settled.
 
-    To settle vertices anew took 0.5 s on one pair in a hundred, of 1.4 million faces.
+    By the weight of the heuristic a settled vertex may not have its shortest path. To settle it
+    anew took 0.5 s on one pair in a hundred, on 1.4 million faces.
     """
     vertices = wave.vertices
     distance = vertices.distance[v] + length
@@ -61,7 +59,7 @@ def relax(wave: Any, v: int, u: int, length: float) -> None:
 
 @kernel
 def vertices_to(predecessor: Any, end: int) -> Ints:
-    """Return the vertices of the path that was found, from ``end`` back to where it began."""
+    """Return the vertices of the path that was found, from ``end`` back to its beginning."""
     count, v = 1, end
     while predecessor[v] >= 0:
         v = predecessor[v]

@@ -1,14 +1,14 @@
 """A path along edges, shortened across the faces beside it (section 5, step 1).
 
-The path becomes a strip of faces, known by its portals: the half-edges over which it enters them,
-so that a portal's tail lies left of the path and its head right. A funnel walk finds the shortest
-path within the strip. Where that bends around a vertex and less than π lies beyond, the strip is
-led past the vertex on its other side, and so on until the path is straight wherever it can be: a
-local minimum, which is mostly the shortest path already.
+The path becomes a strip of faces. A strip is known by its *portals*, the half-edges over which it
+enters its faces: a portal's tail lies left of the path and its head right. A funnel walk finds the
+shortest path within the strip. Where that bends around a vertex and the angle beyond the vertex is
+less than π, the strip is led past the vertex on its other side. This goes on until the path is
+straight wherever it can be: a local minimum, which is mostly the shortest path already.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,19 +27,20 @@ from geodesic_core.kernels.mesh.half_edges import (
     following,
     previous,
 )
-from geodesic_core.tolerances import STRAIGHT
+from geodesic_core.tolerances import PASSES, STRAIGHT
 
 # Sides on which a strip passes a vertex; a vertex that it cannot pass divides the path
 NEITHER = 0
 RIGHT = 1
 LEFT = 2
 
-_MOST_PASSES = 400
+_SPARE_PORTALS = 256
+"""Room for portals that a strip gains when it is led past vertices, in all."""
 
 
 @kernel
 def shortened(topology: Any, path: Ints) -> float:
-    """Return the length of a path along edges, given by its vertices, after it was shortened."""
+    """Shorten a path along edges, given by its vertices; return its length, mesh units."""
     length = 0.0
     begin = 0
     sides = np.empty(len(path), np.int8)
@@ -55,7 +56,7 @@ def shortened(topology: Any, path: Ints) -> float:
 
 @kernel
 def shortened_part(topology: Any, path: Ints, sides: Any) -> float:
-    """Shorten a part of a path, which a strip of faces accompanies all along."""
+    """Shorten a part of a path that has a strip of faces beside it all along; return its length."""
     strip, size = strip_along(topology, path, sides)
     room = len(strip)
     other = np.empty(room, np.int32)
@@ -63,11 +64,11 @@ def shortened_part(topology: Any, path: Ints, sides: Any) -> float:
     bends, bend_sides = np.empty(room, np.int32), np.empty(room, np.int8)
     turns = np.empty(room)
     length = math.inf
-    for _ in range(_MOST_PASSES):
+    for _ in range(PASSES):
         if size == 0:  # the path is an edge
             return min(length, straight(topology, path[0], path[-1]))
         unfold_strip(topology, strip, size, ends)
-        taut, count = funnel(ends, size, bends, bend_sides, turns)
+        taut, count = pull_taut(ends, size, bends, bend_sides, turns)
         if taut >= length * (1.0 - STRAIGHT):
             return min(taut, length)
         length = taut
@@ -99,9 +100,9 @@ def corner_toward(topology: Any, v: int, u: int, column: int) -> int:
 
 @kernel
 def side_to_pass(topology: Any, before: int, v: int, after: int) -> int:
-    """Side of v with the lesser angle between two of its neighbours, of those without a hole.
+    """Side of v with the lesser angle between two of its neighbours; one without a hole.
 
-    On an irregular edge there are more sides than two, and none is taken.
+    At the end of an irregular edge there are more than two sides. Then it is NEITHER.
     """
     if topology.flags[v] & SEAM:
         return NEITHER
@@ -129,9 +130,9 @@ def angle_on_right(topology: Any, before: int, v: int, after: int) -> float:
 
 @kernel
 def strip_along(topology: Any, path: Ints, sides: Any) -> tuple[Ints, int]:
-    """Return the portals of a strip along a path, with room for more, and how many there are."""
+    """Return the portals of a strip along a path, with room for more, and their number."""
     links = topology.links
-    room = 256
+    room = _SPARE_PORTALS
     for v in path:
         room += 4 * (topology.first_corner[v + 1] - topology.first_corner[v])
     strip = np.empty(room, np.int32)
@@ -162,9 +163,10 @@ def strip_along(topology: Any, path: Ints, sides: Any) -> tuple[Ints, int]:
 
 @kernel
 def unfold_strip(topology: Any, strip: Ints, size: int, ends: Floats) -> None:
-    """Unfold a strip into the plane: rows of left x, y and right x, y; start at first, end at last.
+    """Unfold a strip into the plane: fill ``ends`` with rows of left x, y and right x, y.
 
-    The start is the vertex before the first portal, at the origin; row i + 1 is portal i.
+    Row i is portal i, and the last row the vertex at the end. The vertex at the start, before the
+    first portal, is the origin.
     """
     geometry = topology.geometry
     h = topology.links[strip[0], OPPOSITE]
@@ -191,63 +193,86 @@ def area(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> fl
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
+class Funnel(NamedTuple):
+    """The part of the plane that is in sight of the string's last bend, through the portals."""
+
+    px: float
+    py: float
+    """The last bend, the funnel's apex"""
+    lx: float
+    ly: float
+    """The end of a portal that bounds the sight on the left"""
+    left: int
+    """Number of that portal"""
+    rx: float
+    ry: float
+    """The same on the right"""
+    right: int
+
+
+@inlined
+def open_funnel(ends: Floats, i: int, px: float, py: float) -> Funnel:
+    """Return the funnel from an apex through portal i."""
+    return Funnel(px, py, ends[i, 0], ends[i, 1], i, ends[i, 2], ends[i, 3], i)
+
+
+@inlined
+def narrow_funnel(ends: Floats, i: int, funnel: Funnel) -> tuple[int, Funnel]:
+    """Narrow a funnel to portal i; return the side on which it closes, or NEITHER, and it."""
+    px, py, lx, ly, left, rx, ry, right = funnel
+    nx, ny = ends[i, 2], ends[i, 3]
+    if area(px, py, rx, ry, nx, ny) >= 0.0:
+        if area(px, py, lx, ly, nx, ny) > 0.0:
+            return LEFT, funnel
+        rx, ry, right = nx, ny, i
+    nx, ny = ends[i, 0], ends[i, 1]
+    side = NEITHER
+    if area(px, py, lx, ly, nx, ny) <= 0.0:
+        if area(px, py, rx, ry, nx, ny) >= 0.0:
+            lx, ly, left = nx, ny, i
+        else:
+            side = RIGHT
+    return side, Funnel(px, py, lx, ly, left, rx, ry, right)
+
+
 @kernel
-def funnel(
+def pull_taut(
     ends: Floats, size: int, bends: Ints, bend_sides: Any, turns: Floats
 ) -> tuple[float, int]:
-    """Pull a string taut within a strip; return its length and how often it bends.
+    """Pull a string taut within a strip; return its length and the number of its bends.
 
-    ``bends`` are portals at whose left or right end the string bends, ``turns`` by how much.
+    Fills ``bends`` with the portals at whose ends the string bends, ``bend_sides`` with the sides
+    of these ends, and ``turns`` with the angles, radians.
     """
-    count = 0
-    px, py, length = 0.0, 0.0, 0.0  # the apex of the funnel
-    left, right = 0, 0
-    lx, ly, rx, ry = ends[0, 0], ends[0, 1], ends[0, 2], ends[0, 3]
-    dx, dy = 0.0, 0.0  # the piece before
-    i = 1
+    count, length, dx, dy = 0, 0.0, 0.0, 0.0  # (dx, dy): the straight part before
+    i, funnel = 1, open_funnel(ends, 0, 0.0, 0.0)
     while True:
         side = NEITHER
-        if i <= size:
-            nx, ny = ends[i, 2], ends[i, 3]
-            if area(px, py, rx, ry, nx, ny) >= 0.0:
-                if area(px, py, lx, ly, nx, ny) <= 0.0:
-                    rx, ry, right = nx, ny, i
-                else:
-                    side = LEFT
-            nx, ny = ends[i, 0], ends[i, 1]
-            if side == NEITHER and area(px, py, lx, ly, nx, ny) <= 0.0:
-                if area(px, py, rx, ry, nx, ny) >= 0.0:
-                    lx, ly, left = nx, ny, i
-                else:
-                    side = RIGHT
-            if side == NEITHER:
-                i += 1
-                continue
+        while i <= size:
+            side, funnel = narrow_funnel(ends, i, funnel)
+            if side != NEITHER:
+                break
+            i += 1
         # The string reaches the end, or bends where the funnel closes
-        bx, by, place = ends[size, 0], ends[size, 1], size
+        bx, by, portal = ends[size, 0], ends[size, 1], size
         if side == LEFT:
-            bx, by, place = lx, ly, left
+            bx, by, portal = funnel.lx, funnel.ly, funnel.left
         elif side == RIGHT:
-            bx, by, place = rx, ry, right
-        ex, ey = bx - px, by - py
+            bx, by, portal = funnel.rx, funnel.ry, funnel.right
+        ex, ey = bx - funnel.px, by - funnel.py
         length += math.sqrt(ex * ex + ey * ey)
         if count > 0:
             turns[count - 1] = abs(math.atan2(dx * ey - dy * ex, dx * ex + dy * ey))
-        if place >= size or count >= len(bends):
+        if portal >= size or count >= len(bends):
             return length, count
-        bends[count], bend_sides[count] = place, side
+        bends[count], bend_sides[count] = portal, side
         count += 1
-        px, py, dx, dy = bx, by, ex, ey
+        dx, dy = ex, ey
         # On from the first portal that leaves this vertex behind
-        i = place + 1
-        if side == LEFT:
-            while i < size and ends[i, 0] == bx and ends[i, 1] == by:
-                i += 1
-        else:
-            while i < size and ends[i, 2] == bx and ends[i, 3] == by:
-                i += 1
-        left, right = i, i
-        lx, ly, rx, ry = ends[i, 0], ends[i, 1], ends[i, 2], ends[i, 3]
+        i, column = portal + 1, 0 if side == LEFT else 2
+        while i < size and ends[i, column] == bx and ends[i, column + 1] == by:
+            i += 1
+        funnel = open_funnel(ends, i, bx, by)
         i += 1
 
 
@@ -261,9 +286,9 @@ def around_bends(
     turns: Floats,
     other: Ints,
 ) -> tuple[bool, int]:
-    """Lead a strip past its bends on their other side, where the path gets shorter by it.
+    """Lead a strip past its bends on their other side, where that shortens the path.
 
-    Writes the new strip to ``other``; returns whether it is another one, and its size.
+    Writes the new strip to ``other``; returns whether it differs, and its size.
     """
     links = topology.links
     copied, new_size = 0, 0
@@ -304,12 +329,12 @@ def pass_beyond(
     side: int,
     size: int,
     other: Ints,
-    place: int,
+    begin: int,
 ) -> int:
-    """Write the portals around a vertex on its other side, in place of those from first to last.
+    """Write the portals around a vertex on its other side, which replace those from first to last.
 
-    They go to ``other`` from ``place`` on; returns where they end, or -1 if a hole is in the way or
-    there is no room. An edge that starts or ends at an end of the path is none.
+    They are written to ``other`` from row ``begin`` on. Returns the row after the last, or -1 if a
+    hole is in the way or there is no room. An edge at an end of the path is no portal.
     """
     links = topology.links
     entered = links[strip[first], OPPOSITE]
@@ -320,7 +345,7 @@ def pass_beyond(
         h = links[previous(entered), OPPOSITE]
         goal = following(strip[last])
     if h == goal:
-        # One face on both sides: what is left of the strip must begin and end where it did.
+        # One face on both sides: the rest of the strip must begin and end where it did.
         if (
             last + 1 == size
             and first > 0
@@ -328,20 +353,20 @@ def pass_beyond(
         ):
             return -1
         if first == 0 and last + 1 < size:
-            begin = links[strip[last + 1], OPPOSITE]
-            if links[begin, APEX] != links[entered, APEX]:
+            h_after = links[strip[last + 1], OPPOSITE]
+            if links[h_after, APEX] != links[entered, APEX]:
                 return -1
-    is_end = first == 0
+    is_end, row = first == 0, begin
     while h >= 0:
         if h == goal and last + 1 == size:
-            return place
+            return row
         if not is_end:
-            if place >= len(other):
+            if row >= len(other):
                 return -1
-            other[place] = h
-            place += 1
+            other[row] = h
+            row += 1
         if h == goal:
-            return place
+            return row
         is_end = False
         h = links[following(h) if side == LEFT else previous(h), OPPOSITE]
     return -1

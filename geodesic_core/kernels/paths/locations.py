@@ -1,67 +1,80 @@
-"""From the nodes of a traced path to points of the surface, in the caller's numbering."""
+"""Locations: the nodes of a traced path as points of the surface, in the caller's numbering."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, next_around
 
 
-@kernel
-def place_nodes(
-    topology: Any,
-    faces: Ints,
-    nodes: Ints,
-    parameters: Floats,
-    face_of: Ints,
-    weights: Floats,
-    vertex_of: Longs,
-    points: Floats,
-) -> None:
-    """Fill the canonical face, its barycentric weights, the vertex (or -1) and the position.
+class Locations(NamedTuple):
+    """Points of the surface, a row each."""
 
-    Nodes as in `backtrace.trace_path`; a vertex of no face has face -1, and sites are left as they
-    are. ``faces`` are the caller's.
+    faces: Ints
+    """(N,): the canonical face, the lowest that holds the point; -1 for a vertex of no face"""
+    weights: Floats
+    """(N, 3): barycentric, in that face"""
+    vertices: Longs
+    """(N,): the vertex, or -1"""
+    points: Floats
+    """(N, 3): positions, mesh units"""
+
+
+@kernel
+def locate_nodes(
+    topology: Any, faces: Ints, nodes: Ints, parameters: Floats, locations: Any
+) -> None:
+    """Fill ``locations`` with the points of nodes as `backtracing.trace_path` has them.
+
+    ``faces`` are the caller's. Sites are skipped, but for their weights, which become 0.
     """
     for i in range(len(nodes)):
         v, t = -1 - nodes[i], parameters[i]
         if v < 0 and (t == 0.0 or 1.0 - t == 0.0 or 1.0 - t == 1.0):
             # At a vertex, also where t is too small to tell
             v = topology.links[nodes[i], TAIL if t < 0.5 else HEAD]
-        weights[i, 0], weights[i, 1], weights[i, 2] = 0.0, 0.0, 0.0
-        if v >= len(topology.total_angle):
-            continue  # a site
-        if v >= 0:
-            vertex_of[i] = topology.outer_vertex[v]
-            points[i] = topology.positions[v]
-            lowest = -1
-            for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
-                face = topology.outer_face[topology.corners[c] // 3]
-                if lowest < 0 or face < lowest:
-                    lowest = face
-            face_of[i] = lowest
-            weights[i, corner_of(topology, faces, lowest, v) if lowest >= 0 else 0] = 1.0
-            continue
-        h = nodes[i]
-        u, w = topology.links[h, TAIL], topology.links[h, HEAD]
-        lowest, g = topology.outer_face[h // 3], h
-        while True:
-            g = next_around(topology.links, g)
-            if g < 0 or g == h:
-                break
-            lowest = min(lowest, topology.outer_face[g // 3])
-        vertex_of[i], face_of[i] = -1, lowest
-        weights[i, corner_of(topology, faces, lowest, u)] = 1.0 - t
-        weights[i, corner_of(topology, faces, lowest, w)] = t
-        for axis in range(3):
-            points[i, axis] = (1.0 - t) * topology.positions[u, axis] + t * topology.positions[
-                w, axis
-            ]
+        for k in range(3):
+            locations.weights[i, k] = 0.0
+        if v < 0:
+            locate_on_edge(topology, faces, nodes[i], t, locations, i)
+        elif v < len(topology.total_angle):
+            locate_vertex(topology, faces, v, locations, i)
+
+
+@inlined
+def locate_vertex(topology: Any, faces: Ints, v: int, locations: Any, i: int) -> None:
+    """Fill row i of ``locations``, whose weights are 0, with inner vertex v."""
+    lowest = -1
+    for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
+        face = topology.outer_face[topology.corners[c] // 3]
+        if lowest < 0 or face < lowest:
+            lowest = face
+    locations.faces[i], locations.vertices[i] = lowest, topology.outer_vertex[v]
+    corner = corner_of(topology, faces, lowest, v) if lowest >= 0 else 0
+    locations.weights[i, corner] = 1.0
+    for axis in range(3):
+        locations.points[i, axis] = topology.positions[v, axis]
+
+
+@inlined
+def locate_on_edge(topology: Any, faces: Ints, h: int, t: float, locations: Any, i: int) -> None:
+    """Fill row i of ``locations``, whose weights are 0, with the point at share t along h."""
+    links, positions, outer_face = topology.links, topology.positions, topology.outer_face
+    u, w = links[h, TAIL], links[h, HEAD]
+    lowest, g = outer_face[h // 3], next_around(links, h)
+    while g >= 0 and g != h:
+        lowest = min(lowest, outer_face[g // 3])
+        g = next_around(links, g)
+    locations.faces[i], locations.vertices[i] = lowest, -1
+    locations.weights[i, corner_of(topology, faces, lowest, u)] = 1.0 - t
+    locations.weights[i, corner_of(topology, faces, lowest, w)] = t
+    for axis in range(3):
+        locations.points[i, axis] = (1.0 - t) * positions[u, axis] + t * positions[w, axis]
 
 
 @kernel
 def corner_of(topology: Any, faces: Ints, face: int, v: int) -> int:
-    """Return which corner of a face inner vertex v is; both as the caller has them."""
+    """Return the corner of the caller's face that inner vertex v is."""
     for k in range(2):
         if topology.inner_vertex[faces[face, k]] == v:
             return k
@@ -69,12 +82,13 @@ def corner_of(topology: Any, faces: Ints, face: int, v: int) -> int:
 
 
 @kernel
-def leave_out_repeated(face_of: Ints, weights: Floats, kept: Flags) -> None:
-    """Mark which places differ from the one before: a path through a vertex meets several edges."""
-    for i in range(len(face_of)):
-        kept[i] = 1
-        if i > 0 and face_of[i] == face_of[i - 1]:
-            same = True
-            for k in range(3):
-                same = same and weights[i, k] == weights[i - 1, k]
-            kept[i] = 0 if same else 1
+def flag_new(faces: Ints, weights: Floats, is_new: Flags) -> None:
+    """Fill ``is_new``: whether each location differs from the one before.
+
+    A path through a vertex meets several edges at the same point.
+    """
+    for i in range(len(faces)):
+        same = i > 0 and faces[i] == faces[i - 1]
+        for k in range(3):
+            same = same and weights[i, k] == weights[i - 1, k]
+        is_new[i] = not same

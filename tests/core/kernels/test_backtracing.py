@@ -1,4 +1,4 @@
-"""Outcomes of the backtrace beside the path itself, which `tests/core/test_paths.py` checks."""
+"""Outcomes of backtracing; paths themselves are checked in `tests/core/fields/test_paths.py`."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def solved(name, source):
 
 
 @pytest.mark.parametrize("name", ["jittered_grid", "comb", "crumpled_torus"])
-def test_too_little_room_is_told_and_enough_is_enough(name):
+def test_too_little_room_is_an_outcome_and_enough_is_enough(name):
     topology, wave = solved(name, 0)
     target = int(
         np.argmax(np.where(np.isfinite(wave.vertices.distance), wave.vertices.distance, -1))

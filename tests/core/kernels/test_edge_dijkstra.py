@@ -7,11 +7,12 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.control import Control
-from geodesic_core.kernels.paths.edge_dijkstra import ASTAR_WEIGHT, search_edges, vertices_to
+from geodesic_core.kernels.paths.edge_dijkstra import search_edges, vertices_to
 from geodesic_core.kernels.sweep import state
 from geodesic_core.kernels.sweep.bounds import exact_bounds
 from geodesic_core.kernels.sweep.state import PREDECESSOR, TOUCHED
 from geodesic_core.search.landmarks import Landmarks
+from geodesic_core.tolerances import ASTAR_WEIGHT
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.meshes import mesh_of
@@ -37,7 +38,7 @@ def test_a_path_along_edges_of_the_length_told(case):
 
 
 @zoo.each(zoo.SMALL)
-def test_no_longer_than_the_shortest_by_the_haste(case):
+def test_no_longer_than_the_shortest_by_the_weight(case):
     for start, end, _, length in edge_paths(mesh_of(case), all_pairs(case)):
         shortest = graph.edge_distances(case.vertices, case.faces, start)[end]
         assert shortest * (1 - 1e-12) <= length <= ASTAR_WEIGHT * shortest * (1 + 1e-12)
@@ -57,7 +58,7 @@ def test_the_same_on_larger_meshes(name):
 
 
 @pytest.mark.parametrize("name", ["crags_with_holes", "crumpled_torus", "bow_tie_of_fans"])
-def test_landmarks_do_not_lengthen_it_beyond_the_haste(name):
+def test_landmarks_do_not_lengthen_it_beyond_the_weight(name):
     case = zoo.SMALL[name]
     mesh = mesh_of(case)
     topology = mesh.topology

@@ -11,7 +11,7 @@ from geodesic_core.kernels.paths.funnel import (
     NEITHER,
     RIGHT,
     angle_on_right,
-    funnel,
+    pull_taut,
     shortened,
     shortened_part,
     side_to_pass,
@@ -171,7 +171,7 @@ def pulled(portals, end):
     size = len(portals)
     bends, sides = np.empty(size + 1, np.int32), np.empty(size + 1, np.int8)
     turns = np.empty(size + 1)
-    length, count = funnel(ends, size, bends, sides, turns)
+    length, count = pull_taut(ends, size, bends, sides, turns)
     return length, list(zip(bends[:count].tolist(), sides[:count].tolist(), strict=True)), turns
 
 

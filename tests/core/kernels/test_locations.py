@@ -5,28 +5,21 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
-from geodesic_core.kernels.paths.locations import leave_out_repeated, place_nodes
+from geodesic_core.kernels.paths.locations import Locations, flag_new, locate_nodes
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 
 NAMES = ["crags_with_holes", "cube", "bow_tie_of_fans", "single_triangle", "isolated_vertices"]
 
 
-def placed(mesh, nodes, parameters):
+def located_points(mesh, nodes, parameters):
     """Face, weights, vertex and position of each node."""
     count = len(nodes)
     faces, vertices = np.empty(count, np.int32), np.empty(count, np.int64)
     weights, points = np.empty((count, 3)), np.empty((count, 3))
-    place_nodes(
-        mesh.topology,
-        mesh.faces,
-        np.asarray(nodes, np.int32),
-        np.asarray(parameters, float),
-        faces,
-        weights,
-        vertices,
-        points,
-    )
+    nodes, parameters = np.asarray(nodes, np.int32), np.asarray(parameters, float)
+    located = Locations(faces, weights, vertices, points)
+    locate_nodes(mesh.topology, mesh.faces, nodes, parameters, located)
     return faces, weights, vertices, points
 
 
@@ -42,7 +35,7 @@ def test_vertices(name):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     everyone = np.arange(len(case.vertices))
     nodes = -1 - mesh.topology.inner_vertex[everyone]
-    faces, weights, vertices, points = placed(mesh, nodes, np.zeros(len(nodes)))
+    faces, weights, vertices, points = located_points(mesh, nodes, np.zeros(len(nodes)))
     np.testing.assert_array_equal(vertices, everyone)
     np.testing.assert_array_equal(points, mesh.vertices)
     assert faces.tolist() == [lowest_face(mesh, [v]) for v in everyone.tolist()]
@@ -58,7 +51,7 @@ def test_points_of_edges(name, t):
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     links = mesh.topology.links
     nodes = np.arange(len(links))[:: 7 if WITHOUT_JIT else 1]
-    faces, weights, vertices, points = placed(mesh, nodes, np.full(len(nodes), t))
+    faces, weights, vertices, points = located_points(mesh, nodes, np.full(len(nodes), t))
     assert (vertices == -1).all()
     ends = mesh.topology.outer_vertex[links[nodes][:, [TAIL, HEAD]]]
     for (tail, head), face, row, point in zip(
@@ -78,7 +71,7 @@ def test_ends_of_edges_are_vertices(t, at_tail):
     """Also where the parameter is too small to tell from an end."""
     mesh = gc.TriangleMesh(*zoo.octahedron())
     nodes = np.arange(len(mesh.topology.links))
-    faces, weights, vertices, points = placed(mesh, nodes, np.full(len(nodes), t))
+    faces, weights, vertices, points = located_points(mesh, nodes, np.full(len(nodes), t))
     ends = mesh.topology.links[nodes, TAIL if at_tail else HEAD]
     np.testing.assert_array_equal(vertices, mesh.topology.outer_vertex[ends])
     np.testing.assert_array_equal(points, mesh.vertices[vertices])
@@ -86,12 +79,12 @@ def test_ends_of_edges_are_vertices(t, at_tail):
     np.testing.assert_array_equal(weights.max(axis=1), 1.0)
 
 
-def test_repeated_places_are_left_out():
+def test_repeated_locations_are_not_new():
     faces = np.array([3, 3, 3, 4, 4, 3, 3], np.int32)
     weights = np.array(
         [(1, 0, 0), (1, 0, 0), (0, 1, 0), (0, 1, 0), (0, 0.5, 0.5), (1, 0, 0), (1, 0, 0)],
         dtype=float,
     )
-    kept = np.empty(7, np.uint8)
-    leave_out_repeated(faces, weights, kept)
-    assert kept.tolist() == [1, 0, 1, 1, 1, 1, 0]
+    is_new = np.empty(7, np.uint8)
+    flag_new(faces, weights, is_new)
+    assert is_new.tolist() == [1, 0, 1, 1, 1, 1, 0]
