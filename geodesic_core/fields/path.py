@@ -10,6 +10,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InternalError
 from geodesic_core.fields.sources import Nodes
+from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths import backtracing, locations
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.paths.locations import Locations
@@ -122,11 +123,11 @@ def trace(mesh: TriangleMesh, winners: Winners, v: int) -> tuple[Ints, Floats, I
         nodes, parameters = np.empty(room, np.int32), np.empty(room)
         faces = np.empty(room, np.int32)
         outcome, count = backtracing.trace_path(mesh.topology, winners, v, nodes, parameters, faces)
-        if outcome == backtracing.TRACED:
+        if outcome == Outcome.FINISHED:
             return nodes[:count], parameters[:count], faces[: count - 1]
         # A shortest path crosses a face at most once, and an approximate one hardly more often:
         # a longer walk is lost as well.
-        if outcome == backtracing.LOST or room > 4 * len(mesh.faces) + 256:
+        if outcome == Outcome.LOST or room > 4 * len(mesh.faces) + 256:
             raise InternalError(
                 f"the path to node {v} left the surface after {count} points; "
                 f"please report this mesh"

@@ -1,13 +1,15 @@
-"""Outcomes of kernels that can end in several ways; the module above them raises."""
+"""The ways in which kernels end; the module above them raises."""
 
 from enum import IntEnum
 
 
 class Outcome(IntEnum):
-    """How a slice of a sweep ended, or the propagation of one list in it."""
+    """How a kernel ended."""
 
     FINISHED = 0
     """Nothing is left to do"""
+
+    # A slice of a sweep, or the propagation of one list in it
     RUNNING = 1
     """The budget is used up"""
     POOL_FULL = 2
@@ -20,3 +22,21 @@ class Outcome(IntEnum):
     """There is no room to record what may be merged next"""
     RUNAWAY = 6
     """A list came up again and again"""
+
+    # A traced path
+    PATH_FULL = 7
+    """The path has more points than the arrays hold"""
+    LOST = 8
+    """The line left the surface: a defect"""
+
+    # The vertices and faces of a mesh
+    NOT_FINITE = 9
+    """A coordinate is NaN or infinite"""
+    TOO_LARGE = 10
+    """A coordinate is beyond LARGEST_COORDINATE"""
+    OUT_OF_RANGE = 11
+    """A face names a vertex that is not there"""
+    REPEATED_VERTEX = 12
+    """A face names a vertex twice"""
+    TOO_SHORT = 13
+    """An edge is longer than 0, and shorter than SHORTEST_EDGE"""

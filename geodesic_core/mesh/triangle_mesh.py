@@ -11,6 +11,7 @@ from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 from geodesic_core.kernels.mesh import build
 from geodesic_core.kernels.mesh.half_edges import Topology
+from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.mesh import canonical
 from geodesic_core.mesh.closest_point import NearestFace
 from geodesic_core.mesh.degeneracies import (
@@ -137,7 +138,7 @@ class TriangleMesh:
         notes: Sequence[str],
     ) -> None:
         outcome, _ = build.check_arrays(points, triangles)
-        if outcome != build.SOUND:
+        if outcome != Outcome.FINISHED:
             check_vertices(points)
             check_corners(triangles.reshape(-1), np.full(len(triangles), 3), len(points))
         vertex_map: Longs | None = None
@@ -527,13 +528,13 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
 def _prepare(vertices: Floats, faces: Ints, free: Longs) -> Topology:
     """Return the topology of the faces that are not blocked."""
     topology, outcome, bad = _built(vertices, faces, free)
-    if outcome == build.TOO_SHORT:
+    if outcome == Outcome.TOO_SHORT:
         joined = lowest_joined(len(vertices), edges_of_no_length(vertices, faces[free]))
         topology, outcome, bad = _built(vertices, joined[faces].astype(np.int32), free)
         topology.inner_vertex[:] = topology.inner_vertex[joined]
         # Renumbered without the components of vertices that joined others.
         topology.component[:] = np.unique(topology.component[joined], return_inverse=True)[1]
-    if outcome == build.TOO_SHORT:
+    if outcome == Outcome.TOO_SHORT:
         face = int(topology.outer_face[bad])
         raise InvalidMesh(
             f"face {face} is {faces[face].tolist()} and has an edge shorter than "

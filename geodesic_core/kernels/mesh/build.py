@@ -40,6 +40,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     following,
     previous,
 )
+from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.tolerances import (
     LARGEST_COORDINATE,
     NO_AREA,
@@ -48,32 +49,24 @@ from geodesic_core.tolerances import (
     SHORTEST_EDGE,
 )
 
-# Outcomes
-SOUND = 0
-NOT_FINITE = 1
-OUT_OF_RANGE = 2
-REPEATED_VERTEX = 3
-TOO_SHORT = 4
-TOO_LARGE = 5
-
 
 @kernel
-def check_arrays(vertices: Floats, faces: Ints | Longs) -> tuple[int, int]:
+def check_arrays(vertices: Floats, faces: Ints | Longs) -> tuple[Outcome, int]:
     """Check positions and indices; return (outcome, id of the first element at fault)."""
     for v in range(vertices.shape[0]):
         for axis in range(3):
             if not math.isfinite(vertices[v, axis]):
-                return NOT_FINITE, v
+                return Outcome.NOT_FINITE, v
             if abs(vertices[v, axis]) > LARGEST_COORDINATE:
-                return TOO_LARGE, v
+                return Outcome.TOO_LARGE, v
     count = vertices.shape[0]
     for f in range(faces.shape[0]):
         a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
         if a < 0 or a >= count or b < 0 or b >= count or c < 0 or c >= count:
-            return OUT_OF_RANGE, f
+            return Outcome.OUT_OF_RANGE, f
         if a in (b, c) or b == c:
-            return REPEATED_VERTEX, f
-    return SOUND, 0
+            return Outcome.REPEATED_VERTEX, f
+    return Outcome.FINISHED, 0
 
 
 _MORTON_BITS = 10
@@ -444,7 +437,7 @@ def count_edges(links: Ints) -> int:
 
 
 @kernel
-def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[int, int]:
+def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[Outcome, int]:
     """Fill the arrays of ``topology`` in O(V + F); return (outcome, inner face at fault)."""
     inner_faces = renumber(
         vertices,
@@ -458,12 +451,12 @@ def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[int, i
     angles, pinched = np.empty(len(opposite)), np.zeros(len(inner_faces), np.uint8)
     face = fill_geometry(topology.positions, inner_faces, topology.geometry, angles, pinched)
     if face >= 0:
-        return TOO_SHORT, face
+        return Outcome.TOO_SHORT, face
     unfold_fans(inner_faces, opposite, angles, pinched, topology)
     across = crossings(inner_faces, opposite, pinched, topology.flags)
     fill_links(inner_faces, opposite, across, around, topology.links)
     topology.component[:] = label_components(faces, len(vertices))
-    return SOUND, -1
+    return Outcome.FINISHED, -1
 
 
 def empty_topology(vertex_count: int, face_count: int) -> Topology:

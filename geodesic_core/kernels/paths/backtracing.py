@@ -43,6 +43,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     previous,
     weights_in_frame,
 )
+from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.sweep.segments import distance_to_segment
 from geodesic_core.kernels.sweep.state import (
     ENTRY_EDGE,
@@ -166,12 +167,6 @@ class Forks(NamedTuple):
     """(FORKS, 4): half_edge, reference, node_count, after"""
 
 
-# Outcomes
-TRACED = 0
-NO_ROOM = 1  # the path has more points than the arrays hold: grow, and call again
-LOST = 2  # the line left the surface: a defect
-
-
 @kernel
 def trace_path(
     topology: Any,
@@ -180,7 +175,7 @@ def trace_path(
     nodes: Ints,
     parameters: Floats,
     faces: Ints,
-) -> tuple[int, int]:
+) -> tuple[Outcome, int]:
     """Trace the path from node ``target`` to its source; return (outcome, number of nodes).
 
     Fills ``nodes`` and ``parameters`` with half-edges h, crossed at this share of their length, or
@@ -195,13 +190,13 @@ def trace_path(
     count, v = 1, target
     while winners.winner_ints[v, ENTRY_EDGE] >= 0:
         outcome, count, v = trace_line(view, v, trail, forks, count)
-        if outcome != TRACED:
+        if outcome != Outcome.FINISHED:
             return outcome, count
         if count >= len(nodes):
-            return NO_ROOM, count
+            return Outcome.PATH_FULL, count
         nodes[count], parameters[count] = -1 - v, 0.0
         count += 1
-    return TRACED, count
+    return Outcome.FINISHED, count
 
 
 @kernel
@@ -218,7 +213,7 @@ def view_of(topology: Any, winners: Any) -> View:
 
 
 @kernel
-def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[int, int, int]:
+def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[Outcome, int, int]:
     """Trace the line that ends at node v; return (outcome, number of nodes, its first node).
 
     Appends to ``trail``; ``forks`` is scratch memory.
@@ -227,20 +222,20 @@ def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[i
     line, walk, start = jump_to_window(view, v, count)
     trail.faces[count - 1] = walk.half_edge // 3
     if start >= 0:
-        return TRACED, count, start
+        return Outcome.FINISHED, count, start
     for _ in range(TRIES * trail.room):
         walk = unmerge(view, walk)
         kind = view.mesh.links[ROW * walk.half_edge + OPPOSITE]
         h, same = next_face(view.mesh.links, walk.half_edge, walk.after)
         if kind == NO_FACE and open_forks == 0:
             start = nearer_end(view, line, walk)
-            return (TRACED if start >= 0 else LOST), walk.node_count, start
+            return (Outcome.FINISHED if start >= 0 else Outcome.LOST), walk.node_count, start
         is_lost = h < 0
         if not is_lost:
             if kind == IRREGULAR and open_forks < FORKS:
                 open_forks = push_fork(forks, open_forks, walk, h)
             if walk.node_count >= trail.room:
-                return NO_ROOM, walk.node_count, -1
+                return Outcome.PATH_FULL, walk.node_count, -1
             walk = enter(view, line, walk, h, same)
             sight = look_ahead(view, line, walk)
             milestone, is_wound = append_node(view, trail, walk, milestone)
@@ -249,7 +244,7 @@ def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[i
         if not is_lost:
             start = start_in_face(view, line, walk, sight, open_forks == 0)
             if start >= 0:
-                return TRACED, walk.node_count, start
+                return Outcome.FINISHED, walk.node_count, start
             is_left, is_tie = side_of_apex(view, line, walk, sight)
             if is_tie and open_forks < FORKS:
                 other = leave(view, line, walk, not is_left)
@@ -258,10 +253,10 @@ def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[i
             is_lost = open_forks > 0 and is_past_start(view, line, walk, sight)
         if is_lost:
             if open_forks == 0:
-                return LOST, walk.node_count, -1
+                return Outcome.LOST, walk.node_count, -1
             open_forks -= 1
             walk = walk_at_fork(forks, open_forks)
-    return LOST, walk.node_count, -1
+    return Outcome.LOST, walk.node_count, -1
 
 
 @kernel

@@ -7,7 +7,8 @@ import geodesic_core as gc
 from geodesic_core.control import Control
 from geodesic_core.fields.sweep import winners_of
 from geodesic_core.kernels.mesh.half_edges import APEX, OPPOSITE
-from geodesic_core.kernels.paths.backtracing import LOST, NO_ROOM, TRACED, trace_path
+from geodesic_core.kernels.outcome import Outcome
+from geodesic_core.kernels.paths.backtracing import trace_path
 from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources
 from geodesic_core.kernels.sweep.state import ENTRY_EDGE, PREDECESSOR
 from tests.support import zoo
@@ -43,12 +44,12 @@ def test_too_little_room_is_an_outcome_and_enough_is_enough(name):
         np.argmax(np.where(np.isfinite(wave.vertices.distance), wave.vertices.distance, -1))
     )
     outcome, nodes, faces = trace(topology, wave, target, 1000)
-    assert outcome == TRACED
+    assert outcome == Outcome.FINISHED
     assert len(nodes) > 4
     for room in range(1, len(nodes)):
-        assert trace(topology, wave, target, room)[0] == NO_ROOM
+        assert trace(topology, wave, target, room)[0] == Outcome.PATH_FULL
     again, same, crossed = trace(topology, wave, target, len(nodes))
-    assert again == TRACED
+    assert again == Outcome.FINISHED
     np.testing.assert_array_equal(same, nodes)
     np.testing.assert_array_equal(crossed, faces)
 
@@ -71,7 +72,7 @@ def broken(name):
 def test_a_line_that_leaves_the_surface_is_lost():
     topology, wave, v = broken("jittered_grid")
     outcome, nodes, _ = trace(topology, wave, v, 100)
-    assert outcome == LOST
+    assert outcome == Outcome.LOST
     assert nodes.tolist() == [-1 - v]
 
 

@@ -241,8 +241,8 @@ def topology_as_given(case) -> Topology:
 def test_the_order_in_memory_does_not_show(case):
     topology, plain = topology_of(case), topology_as_given(case)
     source = int(case.faces[-1, 0])
-    found = finished(topology, started(topology, source)).distance[topology.inner_vertex]
-    expected = finished(plain, started(plain, source)).distance
+    found = finished(topology, started(topology, source)).vertices.distance[topology.inner_vertex]
+    expected = finished(plain, started(plain, source)).vertices.distance
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
