@@ -72,7 +72,6 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
     left, right = left_of(wave, h), right_of(wave, h)
     ax, ay = left.cosine * left.length, left.sine * left.length
     overlap = OVERLAP * right.start
-    best = load_window(wave, wave.pool.scratch, nearest)
     to_left, to_right = NO_CHAIN, NO_CHAIN
     for i in range(count):
         window = load_window(wave, wave.pool.scratch, i)
@@ -85,9 +84,9 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
             goes_right = x >= (crossing - overlap) * rise
             goes_left = x <= (crossing + overlap) * rise
             if not goes_right and window.b1 > crossing:
-                goes_right = not is_beaten(wave, window, best, crossing, window.b1)
+                goes_right = not is_beaten(wave, window, nearest, crossing, window.b1)
             if not goes_left and window.b0 < crossing:
-                goes_left = not is_beaten(wave, window, best, crossing, window.b0)
+                goes_left = not is_beaten(wave, window, nearest, crossing, window.b0)
         elif i != nearest:
             is_beyond = window.b0 >= crossing if goes_left else window.b1 <= crossing
             if is_beyond and bent_distance(window, ax, ay)[0] >= least:
@@ -216,17 +215,19 @@ def deliver_right(wave: Any, h: int, chain: Chain) -> None:
 
 
 @kernel
-def is_beaten(wave: Any, window: Window, best: Window, crossing: float, b: float) -> bool:
+def is_beaten(wave: Any, window: Window, nearest: int, crossing: float, b: float) -> bool:
     """Whether a window is nowhere nearest between the nearest path to the apex and b.
 
-    That path, of the window ``best``, crosses the edge at ``crossing``; ``window`` covers it, and
-    all up to b. Back from the edge both run through the same faces, until the path meets the ray of
-    ``window`` to b, or begins between its rays. Where they meet the ray is no nearer, or else
-    ``window`` would be nearest to the apex, too. Beyond an edge of several faces, though, they may
-    have come by different ones.
+    That path, of the window ``nearest``, crosses the edge at ``crossing``; ``window`` covers it,
+    and all up to b. Back from the edge both run through the same faces, until the path meets the
+    ray of ``window`` to b, or begins between its rays. Where they meet the ray is no nearer, or
+    else ``window`` would be nearest to the apex, too. Beyond an edge of several faces, though, they
+    may have come by different ones.
     """
-    is_irregular, is_parallel = wave.sizes.crossings > 0, window.weight * best.weight == 0.0
-    if merging(wave) or is_irregular or is_parallel:
+    if merging(wave) or wave.sizes.crossings > 0:
+        return False
+    best = load_window(wave, wave.pool.scratch, nearest)
+    if window.weight * best.weight == 0.0:
         return False
     dx, dy = window.sx - b, window.sy
     nx, ny = best.sx - crossing, best.sy

@@ -100,9 +100,10 @@ def trim_list(wave: Any, h: int) -> int:
         last, new, count = trim_against_earlier(wave, limits, last, new, count)
         if new.b1 <= new.b0:
             continue
-        if count == 0 and not is_within(new, new.b1, limits.from_tail + new.b1):
-            continue
-        if count > 0 and new.b0 > last.b1 and new.b0 - last.b1 <= limits.gap:
+        if count == 0:
+            if not is_within(new, new.b1, limits.from_tail + new.b1):
+                continue
+        elif new.b0 > last.b1 and new.b0 - last.b1 <= limits.gap:
             new = between(new, last.b1, new.b1)
         if merging(wave) and count > 0:
             is_merged, last = merge_into(wave, h, last, new)

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from geodesic_core.kernels.jit import as_ints, kernel, prefetch
+from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
 from geodesic_core.kernels.mesh.half_edges import (
     AROUND,
     HEAD,
@@ -44,13 +44,13 @@ from geodesic_core.kernels.sweep.window import (
 )
 
 
-@kernel
+@inlined
 def free_windows(wave: Any) -> int:
     """Return the number of windows that can be taken before the pool must grow."""
     return wave.counters[FREE_SIZE] + wave.sizes.windows - wave.counters[FRESH]
 
 
-@kernel
+@inlined
 def take_window(wave: Any) -> int:
     """Take a slot from the pool; the caller has checked that there is one. Modifies the pool."""
     slot = wave.counters[FREE_FIRST]
@@ -63,7 +63,7 @@ def take_window(wave: Any) -> int:
     return slot
 
 
-@kernel
+@inlined
 def release_list(wave: Any, h: int) -> None:
     """Give all windows of the list of h back to the pool, in O(1)."""
     pool = wave.pool
@@ -74,7 +74,7 @@ def release_list(wave: Any, h: int) -> None:
     pool.lists[row + SIZE] = 0
 
 
-@kernel
+@inlined
 def put_window(wave: Any, window: Window) -> int:
     """Write a window to a slot from the pool, and return the slot. Modifies the pool."""
     slot = take_window(wave)
