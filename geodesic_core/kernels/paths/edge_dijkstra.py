@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Ints
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import APEX, HEAD, LENGTH, LENGTH_LEFT, OUT_LEFT, ROW
 from geodesic_core.kernels.sweep.pruning import touch
 from geodesic_core.kernels.sweep.queues import HEAP_SIZE, pop_nearest, push_or_raise
@@ -26,9 +26,9 @@ def search_edges(topology: Any, wavefront: Any, bounds: Any, begin: int, end: in
     mesh, vertices = wave.mesh, wave.vertices
     touch(wave, begin)
     vertices.distance[begin] = 0.0
-    push_or_raise(wave, begin, 0.0)
+    push_or_raise(wave.queues, wave.counters, begin, 0.0)
     while wave.counters[HEAP_SIZE] > 0:
-        v = pop_nearest(wave)
+        v = pop_nearest(wave.queues, wave.counters)
         vertices.status[v] = SETTLED
         if v == end:
             return
@@ -40,7 +40,7 @@ def search_edges(topology: Any, wavefront: Any, bounds: Any, begin: int, end: in
                 relax(wave, v, mesh.links[row + APEX], mesh.geometry[row + LENGTH_LEFT])
 
 
-@kernel
+@inlined
 def relax(wave: Any, v: int, u: int, length: float) -> None:
     """Offer u the path over v, unless u is settled.
 
@@ -54,7 +54,8 @@ def relax(wave: Any, v: int, u: int, length: float) -> None:
             touch(wave, u)
         vertices.distance[u] = distance
         vertices.winner_ints[WINNER * u + PREDECESSOR] = v
-        push_or_raise(wave, u, distance + ASTAR_WEIGHT * vertices.heuristic[u])
+        key = distance + ASTAR_WEIGHT * vertices.heuristic[u]
+        push_or_raise(wave.queues, wave.counters, u, key)
 
 
 @kernel

@@ -133,7 +133,7 @@ def settle_nearest(wave: Any) -> Outcome:
     first, last = mesh.first_corner[v], mesh.first_corner[v + 1]
     if emits and room_to_emit(wave, v) > free_windows(wave):
         return Outcome.POOL_FULL
-    pop_nearest(wave)
+    pop_nearest(wave.queues, wave.counters)
     if wave.counters[HEAP_SIZE] > 0:
         prefetch_around(wave, queues.heap[0])
     if vertices.status[v] != SETTLED:

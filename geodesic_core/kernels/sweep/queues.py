@@ -23,13 +23,16 @@ def precedes(key: float, v: int, other_key: float, u: int) -> bool:
 
 
 @kernel
-def push_or_raise(wave: Any, v: int, key: float) -> None:
-    """Put v into the heap, or move it up after its key has decreased. Modifies the heap."""
-    queues = wave.queues
+def push_or_raise(queues: Any, counters: Any, v: int, key: float) -> None:
+    """Put v into the heap, or move it up after its key has decreased. Modifies the heap.
+
+    It takes no more of the view than it needs: a search along edges took twice as long when all of
+    it was passed.
+    """
     i = queues.heap_place[v]
     if i < 0:
-        i = wave.counters[HEAP_SIZE]
-        wave.counters[HEAP_SIZE] = i + 1
+        i = counters[HEAP_SIZE]
+        counters[HEAP_SIZE] = i + 1
     while i > 0:
         parent = (i - 1) // _ARITY
         u, parent_key = queues.heap[parent], queues.heap_keys[parent]
@@ -43,13 +46,12 @@ def push_or_raise(wave: Any, v: int, key: float) -> None:
 
 
 @kernel
-def pop_nearest(wave: Any) -> int:
+def pop_nearest(queues: Any, counters: Any) -> int:
     """Remove and return the nearest vertex; the heap must not be empty. Modifies the heap."""
-    queues = wave.queues
     nearest = queues.heap[0]
     queues.heap_place[nearest] = -1
-    size = wave.counters[HEAP_SIZE] - 1
-    wave.counters[HEAP_SIZE] = size
+    size = counters[HEAP_SIZE] - 1
+    counters[HEAP_SIZE] = size
     if size > 0:
         v, key = queues.heap[size], queues.heap_keys[size]
         i = 0

@@ -61,7 +61,7 @@ def relax_vertex(
         vertices.reference[v] = reference
     if distance < known:
         vertices.distance[v] = distance
-        push_or_raise(wave, v, distance)
+        push_or_raise(wave.queues, wave.counters, v, distance)
 
 
 @kernel
@@ -106,7 +106,7 @@ def illuminate_vertex(
         lo, hi = min(lo, angle), max(hi, angle)
     vertices.light[row + LIT_FROM], vertices.light[row + LIT_TO] = lo, hi
     if vertices.status[v] == SETTLED:
-        push_or_raise(wave, v, vertices.distance[v])
+        push_or_raise(wave.queues, wave.counters, v, vertices.distance[v])
 
 
 @kernel

@@ -29,7 +29,7 @@ def empty():
 
 
 def drained(view) -> list[int]:
-    return [int(pop_nearest(view)) for _ in range(view.counters[HEAP_SIZE])]
+    return [int(pop_nearest(view.queues, view.counters)) for _ in range(view.counters[HEAP_SIZE])]
 
 
 @given(st.lists(st.integers(0, 5), min_size=VERTICES, max_size=VERTICES), st.randoms())
@@ -39,7 +39,7 @@ def test_vertices_leave_by_distance_and_then_by_number(distances, random):
     order = list(range(VERTICES))
     random.shuffle(order)
     for v in order:
-        push_or_raise(view, v, view.vertices.distance[v])
+        push_or_raise(view.queues, view.counters, v, view.vertices.distance[v])
     check_heap(wave)
     assert drained(view) == sorted(range(VERTICES), key=lambda v: (distances[v], v))
     assert (wave.queues.heap_place == -1).all()
@@ -53,12 +53,12 @@ def test_distances_decrease_while_others_leave(offers):
     for i, (v, distance) in enumerate(offers):
         if distance < wave.vertices.distance[v]:
             wave.vertices.distance[v] = distance
-            push_or_raise(view, v, view.vertices.distance[v])
+            push_or_raise(view.queues, view.counters, v, view.vertices.distance[v])
             waiting[v] = distance
         check_heap_order(wave)
         if i % 3 == 2 and waiting:
             nearest = min(waiting, key=lambda u: (waiting[u], u))
-            assert pop_nearest(view) == nearest
+            assert pop_nearest(view.queues, view.counters) == nearest
             del waiting[nearest]
     assert drained(view) == sorted(waiting, key=lambda u: (waiting[u], u))
 
