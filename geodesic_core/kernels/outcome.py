@@ -4,7 +4,7 @@ from enum import IntEnum
 
 
 class Outcome(IntEnum):
-    """How a kernel ended."""
+    """The end of a kernel."""
 
     FINISHED = 0
     """Nothing is left to do"""

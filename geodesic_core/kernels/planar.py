@@ -84,7 +84,7 @@ def bracketed(lo: float, hi: float, s0: Source, s1: Source, delta: float) -> flo
 
 @inlined
 def root_depth(x: float, width: float, delta: float, u: float, v: float) -> float:
-    """How far within (0, width) a root of `bisector` lies; 0 or less if outside, or no solution."""
+    """Depth of a root of `bisector` within (0, width); 0 or less if outside, or no solution."""
     r0 = u + v * x  # these two times 2 delta
     r1 = r0 - 2.0 * delta * delta
     if delta * r0 < 0.0 or delta * r1 < 0.0:

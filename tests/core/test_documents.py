@@ -1,5 +1,6 @@
-"""What the documents say of the code is so: files, modules and functions exist, examples run."""
+"""The documents, held against the code: files, links, functions and examples."""
 
+import ast
 import doctest
 import importlib
 import re
@@ -89,6 +90,15 @@ def test_functions_that_documents_name_are_there(document: str, module: str, nam
 @pytest.mark.parametrize("name", sorted({name for _, name in texts(r"^[A-Z]+_[A-Z_]+$")}))
 def test_tolerances_that_documents_name_are_there(name: str) -> None:
     assert name.startswith(VARIABLES) or name in COLUMNS or hasattr(tolerances, name)
+
+
+@pytest.mark.parametrize("folder", ["geodesic_core", "app", "tests", "benchmarks"])
+def test_docstrings_of_modules_begin_with_a_noun_or_a_verb(folder: str) -> None:
+    sources = [path for path in (ROOT / folder).rglob("*.py") if "node_modules" not in path.parts]
+    docstrings = [ast.get_docstring(ast.parse(path.read_text())) or "" for path in sources]
+    assert len(docstrings) > 10
+    openings = {text.split()[0].strip(",:") for text in docstrings if text}
+    assert not openings & {"What", "Who", "Which", "Where", "How"}
 
 
 def test_the_worked_sweep_is_what_the_code_does() -> None:

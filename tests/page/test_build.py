@@ -1,4 +1,4 @@
-"""What the page is made of, as it is served."""
+"""The parts of the page, as they are served."""
 
 import gzip
 import json

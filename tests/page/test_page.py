@@ -1,4 +1,4 @@
-"""What people do on the page, and what they see."""
+"""The page in use: clicks, keys and files, and the picture after each."""
 
 import json
 import math

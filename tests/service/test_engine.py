@@ -1,4 +1,4 @@
-"""What becomes of requests when workers are busy, slow or killed."""
+"""Requests while workers are busy, slow or killed."""
 
 import asyncio
 import gc

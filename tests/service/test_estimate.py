@@ -1,4 +1,4 @@
-"""What a query would take, against what it takes."""
+"""Estimates of queries, against their real cost."""
 
 import math
 import pickle

@@ -1,4 +1,4 @@
-"""Where positions are on the surface, over HTTP."""
+"""Positions located on the surface, over HTTP."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""What becomes of work that takes more memory than its worker has."""
+"""Tasks that take more memory than their worker may."""
 
 import resource
 import subprocess

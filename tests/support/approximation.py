@@ -1,4 +1,4 @@
-"""What must hold of approximate fields and of their paths, given the exact distances."""
+"""Checks of approximate fields and of their paths, given the exact distances."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What must hold of every path, whatever the mesh: checked on the path itself."""
+"""Checks of a path on any mesh, by the path itself."""
 
 from functools import lru_cache
 

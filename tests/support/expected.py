@@ -1,4 +1,4 @@
-"""What the oracles say of the zoo, computed once per run; and where real meshes may be found."""
+"""The oracles' distances on the zoo, computed once per run."""
 
 from functools import cache
 

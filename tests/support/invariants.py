@@ -1,4 +1,4 @@
-"""What must hold of a wavefront between any two steps of a sweep.
+"""Invariants of a wavefront between any two steps of a sweep.
 
 The order of a list along its edge is not among it: windows come in at the ends, but those of one
 side may reach past those of the other, and a list is trimmed in one pass, each window against the

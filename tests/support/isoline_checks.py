@@ -1,4 +1,4 @@
-"""What must hold of the isolines of any exact field."""
+"""Checks of the isolines of any exact field."""
 
 import itertools
 

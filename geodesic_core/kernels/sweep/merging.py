@@ -34,7 +34,7 @@ def directionality(along: float, reach: float) -> float:
 
 @inlined
 def visibility(cosine: float, width: float, difference: float, spare: float) -> float:
-    """How far from an end s' may lie so that the window's outermost ray stays in view.
+    """Largest distance of s' from an end at which the window's outermost ray is in view.
 
     On the conic, s' turns outward as it moves away: to the line toward the old pseudosource, whose
     angle to the edge has this ``cosine``, but not beyond. ``difference`` is this end's distance

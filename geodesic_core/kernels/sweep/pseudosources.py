@@ -233,7 +233,7 @@ def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) 
 
 @kernel
 def along_far_edge(wave: Any, h: int, angle: float) -> float:
-    """Where the ray from the tail of h at ``angle`` meets the far edge, from the head of h."""
+    """Place on the far edge, from the head of h, of the ray from the tail of h at ``angle``."""
     mesh = wave.mesh
     row = ROW * h
     sine, cosine = math.sin(angle), math.cos(angle)

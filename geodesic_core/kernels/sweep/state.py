@@ -151,7 +151,7 @@ class Pool(NamedTuple):
 
 
 class Vertices(NamedTuple):
-    """How vertices are reached; N counts sites and segments as well, V vertices alone."""
+    """Vertices as they are reached; N counts sites and segments as well, V vertices alone."""
 
     distance: Floats
     """(N,): least distance known, infinite where unreached; final when the sweep has finished"""

@@ -1,4 +1,4 @@
-"""What many ask for is done once, and stops when nobody waits for it any more."""
+"""Single flight: concurrent requests share a computation, which stops when nobody waits for it."""
 
 import asyncio
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What is at ``/``: for browsers the page, for others the index."""
+"""The root path: the page for browsers, the index for other clients."""
 
 import pytest
 from starlette.testclient import TestClient

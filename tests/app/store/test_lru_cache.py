@@ -1,4 +1,4 @@
-"""What is kept fits, also when it has grown, and nothing is measured without need."""
+"""The LRU cache: its items fit, also when one has grown, and none is measured without need."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What fields compute later is watched and stops as solvers do: on request, in time, in memory."""
+"""Methods of fields that compute: watched and stopped like solvers, in time and in memory."""
 
 import itertools
 

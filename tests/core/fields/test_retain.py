@@ -1,4 +1,4 @@
-"""How much a field holds in memory, and that its answers do not depend on it."""
+"""The argument ``retain``: a field holds more or less in memory, and its answers stay the same."""
 
 import numpy as np
 import pytest

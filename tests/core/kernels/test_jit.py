@@ -1,4 +1,4 @@
-"""How kernels are compiled and where they are kept."""
+"""Compilation of kernels, and their cache."""
 
 import shutil
 from pathlib import Path

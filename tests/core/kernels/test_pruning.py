@@ -1,4 +1,4 @@
-"""What bounds a pruned search, against exact distances; and what it leaves behind: nothing."""
+"""Bounds of a pruned search, against exact distances; and a search leaves nothing behind."""
 
 import math
 

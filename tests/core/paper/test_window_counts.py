@@ -1,4 +1,4 @@
-"""What the paper reports of its windows, on meshes a few sizes smaller."""
+"""The paper's counts of windows, on meshes a few sizes smaller."""
 
 import itertools
 import math

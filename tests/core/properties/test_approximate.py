@@ -1,4 +1,4 @@
-"""What holds of approximate distances on any mesh, and what the oracle says."""
+"""Properties of approximate distances on any mesh, and agreement with the oracle."""
 
 import numpy as np
 from hypothesis import given

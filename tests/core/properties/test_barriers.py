@@ -1,4 +1,4 @@
-"""What holds of any mesh with any faces blocked."""
+"""Properties of any mesh with any faces blocked."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What holds of isolines on any mesh."""
+"""Properties of isolines on any mesh."""
 
 import numpy as np
 from hypothesis import given

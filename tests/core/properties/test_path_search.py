@@ -1,4 +1,4 @@
-"""What holds of paths between two points on any mesh, and what the oracle says."""
+"""Properties of paths between two points on any mesh, and agreement with the oracle."""
 
 import numpy as np
 import pytest

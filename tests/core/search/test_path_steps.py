@@ -1,4 +1,4 @@
-"""What each step of a search did: the figures behind the paper's figure 10."""
+"""The steps of a search: the figures behind the paper's figure 10."""
 
 import itertools
 
