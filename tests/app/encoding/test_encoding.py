@@ -25,6 +25,7 @@ from app.encoding import (
     encode,
     negotiate,
 )
+from app.encoding.colours import hex_colour
 from app.queries.views import table_of_matrix, table_of_sparse
 
 ANSWER = Answer(
@@ -172,6 +173,7 @@ def test_large_matrices_become_rows_one_after_the_other(table: Table) -> None:
 
 def size_and_peak(answer: Answer, form: Representation) -> tuple[int, int]:
     """Return how many bytes an answer has, and how many are in memory at most."""
+    hex_colour(0.0)  # imports the colour map, whose memory is not the answer's
     tracemalloc.start()
     try:
         size = sum(map(len, encode(answer, form).parts))
