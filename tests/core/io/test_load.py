@@ -920,7 +920,7 @@ def test_any_damage_loads_or_is_refused(kind: str, write: Writer, data: st.DataO
     loads_or_is_refused(bytes(damaged), kind)
 
 
-# --- Files as they come ---------------------------------------------------------------------------
+# --- Real files -----------------------------------------------------------------------------------
 
 # Of the files themselves, counted by other means: components, boundary loops, vertices where fans
 # meet, vertices of no face, vertices at the position of an earlier one.
