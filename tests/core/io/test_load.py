@@ -933,6 +933,7 @@ REAL = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("name", REAL)
 def test_real_obj_files_keep_their_numbering_and_get_a_true_report(name: str) -> None:

@@ -37,6 +37,7 @@ def test_a_path_along_edges_of_the_length_told(case):
         assert sum(pieces) == pytest.approx(length, rel=1e-12, abs=0)
 
 
+@pytest.mark.slice(20)
 @zoo.each(zoo.SMALL)
 def test_no_longer_than_the_shortest_by_the_weight(case):
     for start, end, _, length in edge_paths(mesh_of(case), all_pairs(case)):
@@ -44,6 +45,7 @@ def test_no_longer_than_the_shortest_by_the_weight(case):
         assert shortest * (1 - 1e-12) <= length <= ASTAR_WEIGHT * shortest * (1 + 1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("name", ["flat", "cone_ruffle", "prism_even", "caps", "slivers_1e-05"])
 def test_the_same_on_larger_meshes(name):

@@ -72,6 +72,7 @@ def test_straight_where_there_is_one_way_only(name):
         assert shortened(mesh.topology, path) == pytest.approx(distance, rel=1e-12, abs=0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["annulus", "pinched_holes"])
 def test_never_through_a_hole(name):
     case = zoo.SMALL[name]

@@ -55,6 +55,7 @@ def watch(case, oracle, sources, starts, limit=math.inf):
     witness.finish(now)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(5)
 @pytest.mark.parametrize("name", CURVED)
 def test_every_step_on_curved_meshes(name):
@@ -79,6 +80,7 @@ def test_every_step_on_slivers(aspect):
     watch(case, exact_by_euclid, [8], [0.0])
 
 
+@pytest.mark.slow
 @pytest.mark.slice(2)
 @pytest.mark.parametrize("name", ["icosahedron", "crag", "bow_tie", "saddle_fan"])
 def test_every_step_from_several_sources(name):

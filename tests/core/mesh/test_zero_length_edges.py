@@ -180,6 +180,7 @@ def test_landmarks_lie_at_places_that_can_be_reached():
     assert (known.max(axis=0) > 0).all()
 
 
+@pytest.mark.slice(24)
 @zoo.each(zoo.SMALL)
 def test_tables_and_candidates_by_any_copy(case):
     both = Needled(case, seed=8)

@@ -25,6 +25,7 @@ def test_unfolding_solves_the_regular_solids(name):
         np.testing.assert_allclose(np.sort(row), closed_forms.REGULAR[name], rtol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(3)
 @pytest.mark.parametrize("name", FLAT)
 def test_unfolding_and_visibility_agree_on_planar_domains(name):
@@ -36,6 +37,7 @@ def test_unfolding_and_visibility_agree_on_planar_domains(name):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_unfolding_reproduces_the_closed_forms(name):
     case = zoo.KNOWN[name]
@@ -67,6 +69,7 @@ def test_box_distances_of_the_text_books():
     assert closed_forms.box((30, 12, 12), spider, fly) == pytest.approx(40)
 
 
+@pytest.mark.slow
 def test_box_agrees_with_unfolding():
     vertices, faces = zoo.box_grid((1, 2, 3))
     matrix = unfolding.distance_matrix(vertices, faces)

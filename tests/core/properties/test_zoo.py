@@ -76,6 +76,7 @@ def test_planar_faces_do_not_overlap(name):
     assert (normals[:, 2] > 0).all()
 
 
+@pytest.mark.slow
 @zoo.each(zoo.KNOWN)
 def test_closed_forms_fit_the_edges(case):
     """An edge is a shortest path on its own two faces: no closed form may exceed it."""

@@ -70,6 +70,7 @@ def test_distances_are_those_of_fields(case):
     check_layouts(mesh, points[:2], points, expected[:2], SAME)
 
 
+@pytest.mark.slice(12)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_distances_are_those_of_closed_forms(case):
@@ -98,6 +99,7 @@ def test_what_is_not_connected_is_infinite_or_left_out(name):
     assert none.nnz == 0
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("ends", ["rectangle", "square"])
 def test_results_do_not_depend_on_the_number_of_threads(ends):

@@ -94,6 +94,7 @@ def test_what_cannot_be_reached_is_left_out():
     assert seen[-1] == 1
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_the_sweep_ends_at_the_last_of_the_nearest(monkeypatch):
     """It makes hardly more windows than one to the distance, which it could not know."""
@@ -162,6 +163,7 @@ def test_it_stops_and_leaves_nothing_behind(arguments, error):
     np.testing.assert_array_equal(after.distances, before.distances)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_a_question_that_was_stopped_under_way_leaves_nothing_behind():
     mesh = gc.TriangleMesh(*zoo.icosphere(6))

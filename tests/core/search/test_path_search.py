@@ -44,6 +44,7 @@ def test_small_meshes_against_unfolding(case):
                 assert path.length == pytest.approx(distance, rel=EXACT, abs=0)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(2)
 @pytest.mark.jit
 @pytest.mark.parametrize("name", ["annulus", "obstacles", "comb", "pinched_holes"])
@@ -80,6 +81,7 @@ def test_closed_forms_between_many_vertices(case):
     check_known(case, spread(case, 40), spread(case, 51))
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("name", ["slivers_1e-05", "crowded_lines", "pleats_slivers"])
 @pytest.mark.parametrize("scale", [1e-9, 1e9])
@@ -98,6 +100,7 @@ def test_bounds_that_rounding_makes_contradict_each_other():
     check_searches(solver_of(case), 18, [438])
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("aspect", [1e-8, 1e-10])
 def test_slivers_at_the_end_of_precision(aspect):

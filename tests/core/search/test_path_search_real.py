@@ -40,6 +40,7 @@ def ends(mesh, sources, targets, seed=5):
         yield source, [int(target) for target in chosen], distances
 
 
+@pytest.mark.slow
 @pytest.mark.slice(5)
 @pytest.mark.jit
 @pytest.mark.parametrize(("name", "sources", "targets"), CASES)
