@@ -6,21 +6,22 @@ from collections.abc import Callable
 import pytest
 
 from app.engine.interface import ProgressCallback
+from app.service.service import ignore_progress
 from app.service.single_flight import SingleFlight
 
 
 class Work:
-    """Work that ends when it is told to, and counts what becomes of it."""
+    """A computation that ends when ``end`` does; it counts how often it began and was cancelled."""
 
     def __init__(self) -> None:
         self.begun = self.cancelled = 0
-        self.told: ProgressCallback = print
+        self.report: ProgressCallback = ignore_progress
         self.end: asyncio.Future[int] = asyncio.Future()
 
-    async def __call__(self, told: ProgressCallback) -> int:
+    async def __call__(self, on_progress: ProgressCallback) -> int:
         self.begun += 1
-        self.told = told
-        told(0.0)
+        self.report = on_progress
+        on_progress(0.0)
         try:
             return await self.end
         except asyncio.CancelledError:
@@ -28,13 +29,10 @@ class Work:
             raise
 
 
-def nobody(_: float) -> None: ...
-
-
 async def joined(
-    flights: SingleFlight[int], work: Work, told: ProgressCallback = nobody
+    flights: SingleFlight[int], work: Work, on_progress: ProgressCallback = ignore_progress
 ) -> "asyncio.Task[int]":
-    task = asyncio.create_task(flights.join("name", work, told))
+    task = asyncio.create_task(flights.join("name", work, on_progress))
     await asyncio.sleep(0)
     await asyncio.sleep(0)
     return task
@@ -50,7 +48,7 @@ def run(test: Callable[[SingleFlight[int], Work], object]) -> None:
     asyncio.run(main())
 
 
-def test_all_get_what_was_done_once() -> None:
+def test_all_calls_share_one_computation() -> None:
     async def test(flights: SingleFlight[int], work: Work) -> None:
         waiting = [await joined(flights, work) for _ in range(5)]
         assert "name" in flights
@@ -62,7 +60,7 @@ def test_all_get_what_was_done_once() -> None:
     run(test)
 
 
-def test_who_leaves_does_not_stop_it_for_the_others() -> None:
+def test_a_call_that_is_cancelled_leaves_the_computation_to_the_others() -> None:
     async def test(flights: SingleFlight[int], work: Work) -> None:
         first, second = await joined(flights, work), await joined(flights, work)
         first.cancel()
@@ -76,7 +74,7 @@ def test_who_leaves_does_not_stop_it_for_the_others() -> None:
     run(test)
 
 
-def test_it_stops_when_the_last_leaves() -> None:
+def test_a_computation_is_cancelled_with_the_last_call() -> None:
     async def test(flights: SingleFlight[int], work: Work) -> None:
         waiting = [await joined(flights, work) for _ in range(3)]
         for task in waiting:
@@ -90,7 +88,7 @@ def test_it_stops_when_the_last_leaves() -> None:
     run(test)
 
 
-def test_who_comes_after_the_last_has_left_begins_anew() -> None:
+def test_a_call_after_the_last_was_cancelled_begins_anew() -> None:
     async def test(flights: SingleFlight[int], work: Work) -> None:
         first = await joined(flights, work)
         first.cancel()
@@ -105,12 +103,12 @@ def test_who_comes_after_the_last_has_left_begins_anew() -> None:
     run(test)
 
 
-def test_each_has_a_deadline_of_its_own() -> None:
+def test_each_call_has_a_deadline_of_its_own() -> None:
     async def test(flights: SingleFlight[int], work: Work) -> None:
         patient = await joined(flights, work)
         with pytest.raises(TimeoutError):
             async with asyncio.timeout(0.01):
-                await flights.join("name", work, nobody)
+                await flights.join("name", work, ignore_progress)
         work.end.set_result(7)
 
         assert await patient == 7
@@ -119,31 +117,30 @@ def test_each_has_a_deadline_of_its_own() -> None:
     run(test)
 
 
-def test_a_failure_is_told_to_all_and_kept_for_nobody() -> None:
+def test_a_failure_reaches_all_calls_and_is_forgotten() -> None:
     async def test(flights: SingleFlight[int], work: Work) -> None:
         waiting = [await joined(flights, work) for _ in range(2)]
         work.end.set_exception(ValueError("no"))
-        assert [str(e) for e in await asyncio.gather(*waiting, return_exceptions=True)] == [
-            "no"
-        ] * 2
+        failures = await asyncio.gather(*waiting, return_exceptions=True)
+        assert [str(failure) for failure in failures] == ["no", "no"]
 
         again = Work()
         again.end.set_result(8)
-        assert await flights.join("name", again, nobody) == 8
+        assert await flights.join("name", again, ignore_progress) == 8
 
     run(test)
 
 
-def test_all_are_told_how_far_it_is_also_who_comes_late() -> None:
+def test_progress_is_reported_to_each_call_also_to_late_ones() -> None:
     async def test(flights: SingleFlight[int], work: Work) -> None:
         early: list[float] = []
         late: list[float] = []
-        await joined(flights, work, early.append)
-        work.told(0.25)
-        await joined(flights, work, late.append)
-        work.told(0.5)
+        first = await joined(flights, work, early.append)
+        work.report(0.25)
+        second = await joined(flights, work, late.append)
+        work.report(0.5)
         work.end.set_result(7)
-        await asyncio.sleep(0.01)
+        await asyncio.gather(first, second)
 
         assert early == [0.0, 0.25, 0.5]
         assert late == [0.25, 0.5]
