@@ -13,6 +13,7 @@ Examples
 """
 
 from geodesic_core import errors, samples
+from geodesic_core.compilation import compile_kernels, warm_up
 from geodesic_core.control import Control
 from geodesic_core.errors import GeodesicError
 from geodesic_core.fields.distance_field import DistanceField
@@ -34,7 +35,6 @@ from geodesic_core.solvers import (
     exact_distance,
     kernel_digest,
     shortest_path,
-    warm_up,
 )
 from geodesic_core.tolerances import WEIGHT_ERROR
 
@@ -58,6 +58,7 @@ __all__ = [
     "SweepStats",
     "TriangleMesh",
     "approximate_distance",
+    "compile_kernels",
     "distance_matrix",
     "errors",
     "exact_distance",

@@ -17,7 +17,7 @@ from geodesic_core.fields.distance_field import DistanceField, field_of
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep, stats_of
 from geodesic_core.fields.sources import Sources, as_sources, component_of, disconnected
-from geodesic_core.kernels.jit import sources_digest
+from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -564,24 +564,6 @@ def _shortest_through(
     if control.progress is not None:
         control.progress(1.0)
     return legs[0] if len(legs) == 1 else joined(legs)
-
-
-def warm_up() -> None:
-    """Compile the kernels of distances and paths, or load them from the cache on disk (0.1 s).
-
-    Compiling takes some tens of seconds, once on a machine. Curves, isolines and matrices compile
-    theirs at their first call.
-
-    Examples
-    --------
-    >>> gc.warm_up()
-    """
-    corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-    mesh = TriangleMesh(corners, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
-    exact_distance(mesh, 0).path_to(3)
-    approximate_distance(mesh, 0, retain="paths").path_to(3)
-    shortest_path(mesh, 0, 3, explain=True)
-    mesh.report  # noqa: B018 - computed on access
 
 
 def kernel_digest() -> str:

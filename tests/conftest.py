@@ -44,40 +44,16 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.load_profile("full" if config.option.full else profile)
 
 
-@pytest.hookimpl(optionalhook=True)
-def pytest_configure_node(node) -> None:
-    """Tell a process of pytest-xdist whether all tests are to run, or only some."""
-    node.workerinput["runs_all"] = _runs_all(node.config)
-
-
 def _runs_all(config: pytest.Config) -> bool:
-    if hasattr(config, "workerinput"):
-        return bool(config.workerinput["runs_all"])
     narrowed = config.option.keyword or config.option.markexpr
     return not narrowed and config.args_source is not pytest.Config.ArgsSource.ARGS
 
 
-@pytest.fixture(scope="session", autouse=True)
-def compiled_kernels(request: pytest.FixtureRequest, worker_id: str) -> None:
-    """Compile all kernels before all tests, where they are not in the cache, for all processes.
-
-    Every other process of pytest-xdist begins at the other end, so that two have one half each.
-    When only some are to run, each kernel is compiled when it is first called instead.
-    """
-    if WITHOUT_JIT or not _runs_all(request.config):
-        return
-    mesh = gc.TriangleMesh(*gc.samples.plane(8))
-    vertex = int(mesh.faces[0, 0])
-    curve = gc.Curve(mesh.faces[0, :2].tolist())
-    steps: list[Callable[[], object]] = [
-        gc.warm_up,
-        lambda: gc.exact_distance(mesh, vertex).isolines([0.1]),
-        lambda: gc.distance_matrix(mesh, [0], [1]),
-        lambda: gc.approximate_distance(mesh, curve),
-        lambda: gc.exact_distance(mesh, curve).isolines([0.1]),
-    ]
-    for step in steps if worker_id in ("master", "gw0") else reversed(steps):
-        step()
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile all kernels before all tests; where only some are to run, those that they call."""
+    is_controller = not hasattr(session.config, "workerinput")
+    if is_controller and not WITHOUT_JIT and _runs_all(session.config):
+        gc.compile_kernels()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

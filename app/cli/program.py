@@ -7,7 +7,7 @@ import typer
 from typer.exceptions import TyperException
 
 from app import __version__
-from app.cli import meshes, queries, serve
+from app.cli import compilation, meshes, queries, serve
 from app.cli.steps import Failure
 from app.cli.store import store
 
@@ -76,4 +76,5 @@ for command in (
 ):
     cli.command()(command)
 
+cli.command("compile")(compilation.compile_kernels)
 cli.add_typer(store, name="store")

@@ -24,7 +24,7 @@ def read(mesh_file: Path, merge: Merge) -> "tuple[OpenMesh, float]":
         from app.store.meshes import OpenMesh
         from geodesic_core import load_mesh, warm_up
 
-        warm_up()
+        warm_up(["exact", "paths"])
     with showing(f"Reading {mesh_file.name}"):
         start = perf_counter()
         opened = OpenMesh.of(load_mesh(mesh_file, merge=merge.value))

@@ -2,12 +2,15 @@
 
 import asyncio
 import logging
-from collections.abc import Coroutine
+import threading
+from collections.abc import Coroutine, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import geodesic_core as gc
+from app.engine import worker
 from app.engine.interface import Load, ProgressCallback
 from app.engine.queue import FairQueue
 from app.engine.slot import Slot, WorkerLostError
@@ -55,7 +58,7 @@ class LocalEngine:
         self._lost = self._cancelled = 0
         self._is_failing = False
         self.is_draining = False
-        self._kernels_are_compiled = asyncio.Event()
+        self._is_stopping = threading.Event()
         self._background: set[asyncio.Task[None]] = set()
 
     @property
@@ -72,9 +75,8 @@ class LocalEngine:
         return Load(len(self._waiting), idle, busy, missing, self._lost, self._cancelled)
 
     async def start(self) -> None:
-        """Start the workers, in the background."""
-        for number, slot in enumerate(reversed(self._slots)):
-            self._spawn(self._supervise(slot, goes_first=number == 0))
+        """Compile what workers need at once, then start them; in the background."""
+        self._spawn(self._compile_and_supervise())
 
     def drain(self) -> None:
         """Refuse new tasks, see ``Engine``."""
@@ -82,6 +84,7 @@ class LocalEngine:
 
     async def stop(self) -> None:
         """Kill the workers."""
+        self._is_stopping.set()
         for background in self._background:
             background.cancel()
         await asyncio.gather(*self._background, return_exceptions=True)
@@ -148,12 +151,24 @@ class LocalEngine:
         else:
             slot.retire()
 
-    async def _supervise(self, slot: Slot, *, goes_first: bool) -> None:
+    async def _compile_and_supervise(self) -> None:
+        await self._compile(worker.FIRST_KERNELS)
+        for slot in reversed(self._slots):
+            self._spawn(self._supervise(slot))
+        await self._compile(None)
+
+    async def _compile(self, questions: Sequence[str] | None) -> None:
+        """Compile kernels in processes of their own; a worker compiles what is missing then."""
+        try:
+            await asyncio.to_thread(gc.compile_kernels, questions, cancel=self._is_stopping.is_set)
+        except gc.errors.InternalError:
+            logger.exception("kernels could not be compiled ahead")
+        except gc.errors.Cancelled:
+            pass
+
+    async def _supervise(self, slot: Slot) -> None:
         """Supply a slot with living workers, for ever."""
         pause = _FIRST_PAUSE_S
-        if not goes_first:
-            # One worker compiles; the others load its kernels from the cache.
-            await self._kernels_are_compiled.wait()
         while True:
             try:
                 await slot.open()
@@ -167,7 +182,6 @@ class LocalEngine:
                 continue
             pause = _FIRST_PAUSE_S
             self._is_failing = False
-            self._kernels_are_compiled.set()
             self._open.add(slot)
             self._release(slot)
             await slot.wait_until_retired()

@@ -252,9 +252,13 @@ def run(config: WorkerConfig, signals: Signals, connection: socket.socket) -> No
             _send(messages, outcome)
 
 
+FIRST_KERNELS = ("exact", "paths")
+"""What a worker can answer as soon as it is ready; other kernels are loaded when first needed."""
+
+
 def warm_up(allowed_memory: int) -> None:
-    """Compile the kernels, or load them, and then limit the memory."""
-    gc.warm_up()
+    """Load the first kernels, and then limit the memory."""
+    gc.warm_up(FIRST_KERNELS)
     freeze()  # loaded objects live for ever; each full collection over them takes 90 ms
     limit_memory(allowed_memory)
 

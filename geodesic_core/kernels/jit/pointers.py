@@ -1,102 +1,16 @@
-"""Compilation of kernels: one decorator, one cache, raw pointers to arrays.
+"""Raw pointers to arrays within kernels: what passing them costs nothing.
 
-With ``NUMBA_DISABLE_JIT=1`` the same sources run as plain Python, so that coverage and numpy's
-bounds checks see them.
+With ``NUMBA_DISABLE_JIT=1`` they are flat views, and the kernels plain Python.
 """
 
-import hashlib
-import os
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numba
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.core.compiler import Compiler
 from numba.extending import intrinsic
 from numpy.typing import NDArray
-
-Function = TypeVar("Function", bound=Callable[..., Any])
-
-
-def sources_digest() -> str:
-    """Return a hash of all kernel sources and of numba's version: the version of the kernels.
-
-    Numba's own cache does not notice that a kernel in *another* file changed and would run stale
-    code; a cache directory named by this digest cannot.
-    """
-    package = Path(__file__).parent
-    digest = hashlib.sha256(f"numba {numba.__version__}".encode())
-    for path in [*sorted(package.rglob("*.py")), package.parent / "tolerances.py"]:
-        digest.update(path.relative_to(package.parent).as_posix().encode() + path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _cache_directory() -> str:
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    base = Path(os.environ.get("NUMBA_CACHE_DIR") or home / "geodesic" / "kernels")
-    return str(base / sources_digest())
-
-
-def _holds_pointers(kind: Any) -> bool:
-    if isinstance(kind, types.BaseTuple):
-        parts: Any = kind
-        return any(_holds_pointers(part) for part in parts)
-    return isinstance(kind, types.CPointer)
-
-
-class _Compiler(Compiler):
-    """Numba's compiler, without the entries from Python and C for what takes pointers.
-
-    Python has no pointers to call such a kernel with. Its entries unpack each field of a view, and
-    took two thirds of the time to compile a chain of small kernels.
-    """
-
-    def __init__(self, typing: Any, target: Any, library: Any, arguments: Any, *rest: Any) -> None:
-        return_type, flags, local = rest
-        if any(_holds_pointers(kind) for kind in arguments):
-            flags = flags.copy()
-            flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
-        create: Any = super().__init__
-        create(typing, target, library, arguments, return_type, flags, local)
-
-
-_CACHE_DIRECTORY = _cache_directory()
-_OPTIONS: dict[str, Any] = {
-    "cache": True,
-    "nogil": True,
-    "error_model": "numpy",
-    "fastmath": False,
-    "pipeline_class": _Compiler,
-}
-
-
-def _compile(function: Function, **options: Any) -> Function:
-    # Numba reads its cache directory while it decorates: it is lent ours for that moment only, so
-    # that other numba code in the same process keeps its own.
-    config: Any = numba.config
-    theirs = config.CACHE_DIR
-    config.CACHE_DIR = _CACHE_DIRECTORY
-    try:
-        compiled: Function = numba.njit(**_OPTIONS, **options)(function)
-    finally:
-        config.CACHE_DIR = theirs
-    return compiled
-
-
-def kernel(function: Function) -> Function:
-    """Compile a kernel: cached on disk, without the GIL, IEEE arithmetic."""
-    return _compile(function)
-
-
-def inlined(function: Function) -> Function:
-    """Compile a kernel that is pasted into its callers: for code per window, or of one caller.
-
-    LLVM leaves functions of ten arguments as calls by itself, which costs a quarter of the sweep.
-    """
-    return _compile(function, forceinline=True)
 
 
 def _interpreted_pointer(array: NDArray[Any]) -> NDArray[Any]:
@@ -121,12 +35,12 @@ def _compiled_pointer(typingcontext: Any, array: Any) -> Any:  # noqa: ARG001 - 
         (array_type,) = signature.args
         return context.make_array(array_type)(context, builder, arguments[0]).data
 
-    return types.CPointer(array.dtype)(array), codegen  # type: ignore[no-untyped-call]
+    return types.CPointer(array.dtype)(array), codegen
 
 
 def _type_of_pointers(group: Any) -> Any:
     if isinstance(group, types.Array):
-        return types.CPointer(group.dtype)  # type: ignore[no-untyped-call]
+        return types.CPointer(group.dtype)
     if isinstance(group, types.BaseNamedTuple):
         parts: Any = group
         pointers = [_type_of_pointers(part) for part in parts]
@@ -168,7 +82,7 @@ def _compiled_ints(typingcontext: Any, rows: Any) -> Any:  # noqa: ARG001
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
 
-    return types.CPointer(types.int32)(rows), codegen  # type: ignore[no-untyped-call]
+    return types.CPointer(types.int32)(rows), codegen
 
 
 def _interpreted_prefetch(array: Any, index: int) -> None:

@@ -1,0 +1,150 @@
+"""Compiled kernels on disk: one file for each, in the package or in the user's cache.
+
+A file is found by the digest of all kernel sources, the version of Python, the machine, the
+kernel's name and the types of its arguments. It is written in one step, under a lock that others
+who need the same kernel wait for.
+"""
+
+import hashlib
+import os
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numba
+from filelock import FileLock
+from numba.core import serialize
+from numba.core.compiler import CompileResult
+
+from geodesic_core.kernels.jit import machine
+
+KERNELS = Path(__file__).parents[1]
+PRECOMPILED = KERNELS / "precompiled"
+"""Kernels that came with the package; not in a checkout."""
+_DIGEST_BYTES = 32
+
+
+def sources_digest() -> str:
+    """Return a hash of all kernel sources and of numba's version: the version of the kernels.
+
+    A compiled kernel holds the code of all that it calls, from any file: an edit of one makes all
+    of them stale.
+    """
+    digest = hashlib.sha256(f"numba {numba.__version__}".encode())
+    for path in [*sorted(KERNELS.rglob("*.py")), KERNELS.parent / "tolerances.py"]:
+        digest.update(path.relative_to(KERNELS.parent).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def _digest() -> str:
+    return sources_digest()
+
+
+def users_folder() -> Path:
+    """Return where kernels are kept that were compiled on this machine."""
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or home / "geodesic" / "kernels")
+
+
+def folder_for(target: str) -> Path:
+    """Return where kernels are written that were compiled here for a machine."""
+    return users_folder() / _digest() / machine.tag(target)
+
+
+def folder() -> Path:
+    """Return where this process writes what it compiles."""
+    return folder_for(machine.target())
+
+
+@cache
+def _folders() -> list[Path]:
+    """Return where to look, in this order, all for this version of Python and of the kernels."""
+    tags = [machine.tag(level) for level in machine.levels()]
+    places = [base / _digest() / tag for base in (PRECOMPILED, users_folder()) for tag in tags]
+    return list(dict.fromkeys([*places, folder()]))
+
+
+@dataclass(frozen=True)
+class StoredKernel:
+    """A kernel for some types of arguments, on disk or to be written there."""
+
+    file_name: str
+    is_ours: bool
+    """Whether the digest covers its source; others, in tests, are not stored."""
+
+    @classmethod
+    def of(cls, function: Callable[..., Any], arguments: tuple[Any, ...]) -> "StoredKernel":
+        """Return what is stored of a function."""
+        package, _, module = function.__module__.partition("geodesic_core.kernels.")
+        types = hashlib.sha256(str(arguments).encode()).hexdigest()[:16]
+        name = f"{module}.{function.__name__}-{types}.kernel"
+        return cls(name, is_ours=not package and bool(module))
+
+    def load(self, context: Any) -> Any:
+        """Return the compiled kernel, from the first folder that has it; None where none has."""
+        for place in _folders() if self.is_ours else ():
+            try:
+                stored = (place / self.file_name).read_bytes()
+            except OSError:
+                continue
+            digest, data = stored[:_DIGEST_BYTES], stored[_DIGEST_BYTES:]
+            if hashlib.sha256(data).digest() == digest:  # else the disk lost some of it
+                context.refresh()  # numba's runtime, which the code calls, may not be there yet
+                rebuild: Any = CompileResult._rebuild
+                return rebuild(context, *serialize.loads(data))
+        return None
+
+    def save(self, compiled: Any) -> None:
+        """Write the compiled kernel into the user's cache, whole or not at all."""
+        if self.is_ours and _is_writable():
+            dump: Any = serialize.dumps
+            data = dump(compiled._reduce())
+            with tempfile.NamedTemporaryFile(dir=folder(), delete=False) as part:
+                part.write(hashlib.sha256(data).digest() + data)
+            Path(part.name).replace(folder() / self.file_name)
+
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Hold the lock of the kernel, so that one process alone compiles it."""
+        if self.is_ours and _is_writable():
+            with FileLock((folder() / self.file_name).with_suffix(".lock")):
+                yield
+        else:
+            yield
+
+
+@cache
+def _is_writable() -> bool:
+    """Return whether kernels can be written, and warn once where they cannot."""
+    try:
+        folder().mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder()):
+            return True
+    except OSError as error:
+        message = (
+            f"kernels are compiled anew in each process, since they cannot be written ({error}); "
+            f"NUMBA_CACHE_DIR names another folder"
+        )
+        warnings.warn(message, RuntimeWarning, stacklevel=2)
+        return False
+
+
+def mark(question: str) -> None:
+    """Note that all kernels for a question are there."""
+    if not is_marked(question) and _is_writable():
+        _mark_in(folder(), question).touch()
+
+
+def is_marked(question: str) -> bool:
+    """Return whether all kernels for a question are there."""
+    return any(_mark_in(place, question).exists() for place in _folders())
+
+
+def _mark_in(place: Path, question: str) -> Path:
+    return place / f"{question.replace(' ', '-')}.all"

@@ -1,0 +1,118 @@
+"""The decorators of kernels, and what happens when one is called for the first time.
+
+With ``NUMBA_DISABLE_JIT=1`` the same sources run as plain Python, so that coverage and numpy's
+bounds checks see them.
+"""
+
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, TypeVar
+
+import numba
+from numba.core.compiler import Compiler
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.dispatcher import _FunctionCompiler  # type: ignore[attr-defined]
+from numba.core.registry import CPUDispatcher
+from numba.core.sigutils import normalize_signature
+
+from geodesic_core.kernels.jit import cache, progress
+from geodesic_core.kernels.jit.linking import CompilerOfParts, CompilerOfWholes, Part
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+_OPTIONS: dict[str, Any] = {
+    "nopython": True,
+    "nogil": True,
+    "error_model": "numpy",
+    "fastmath": False,
+}
+
+
+class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]
+    """Compile kernels: those that Python calls with all their parts, unless they are on disk."""
+
+    under_way = False
+    """Whether a kernel is being compiled, so that others are parts of it; under numba's lock."""
+
+    def compile(self, args: Any, return_type: Any) -> Any:
+        """Return the compiled kernel for some types of arguments."""
+        self.pipeline_class: type[Compiler] = CompilerOfWholes
+        if _KernelCompiler.under_way:
+            self.pipeline_class = CompilerOfParts
+            return super().compile(args, return_type)
+        stored = cache.StoredKernel.of(self.py_func, args)
+        compiled = self._load(stored)
+        if compiled is None:
+            with progress.of_folder(cache.folder()), stored.lock():
+                compiled = self._load(stored)  # by the process that held the lock
+                if compiled is None:
+                    with self._whole():
+                        compiled = super().compile(args, return_type)
+                    stored.save(compiled)
+        return compiled
+
+    def _load(self, stored: cache.StoredKernel) -> Any:
+        context = self.targetdescr.target_context
+        found = stored.load(context)
+        if found is not None:
+            context.insert_user_function(found.entry_point, found.fndesc, [found.library])
+        return found
+
+    @contextmanager
+    def _whole(self) -> Iterator[None]:
+        """Compile what is called meanwhile as parts; collect no garbage, which takes a fifth."""
+        collects = gc.isenabled()
+        gc.disable()
+        _KernelCompiler.under_way = True
+        try:
+            yield
+        finally:
+            _KernelCompiler.under_way = False
+            if collects:
+                gc.enable()
+
+
+class _Kernel(CPUDispatcher):
+    """A kernel, as numba calls it: one compiled version for each list of argument types."""
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        super().__init__(function, targetoptions=options)
+        self._compiler = _KernelCompiler(function, self.targetdescr, options, {}, CompilerOfWholes)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for some types of arguments, also where only a part is there yet."""
+        with global_compiler_lock:
+            arguments, _ = normalize_signature(sig)
+            known = self.overloads.get(tuple(arguments))
+            if known and isinstance(known.library, Part) and not _KernelCompiler.under_way:
+                del self.overloads[tuple(arguments)]
+            return super().compile(sig)
+
+    def add_overload(self, cres: Any) -> None:
+        """Take in a compiled version; Python sees those only that it can call."""
+        if isinstance(cres.library, Part):
+            self.overloads[tuple(cres.signature.args)] = cres
+        else:
+            super().add_overload(cres)
+
+
+def _compiled(function: Function, **options: Any) -> Function:
+    config: Any = numba.config
+    if config.DISABLE_JIT:
+        return function
+    kernel: Any = _Kernel(function, _OPTIONS | options)
+    return kernel
+
+
+def kernel(function: Function) -> Function:
+    """Compile a kernel: cached on disk, without the GIL, IEEE arithmetic."""
+    return _compiled(function)
+
+
+def inlined(function: Function) -> Function:
+    """Compile a kernel that is pasted into its callers: for code per window, or of one caller.
+
+    LLVM leaves functions of ten arguments as calls by itself, which costs a quarter of the sweep.
+    """
+    return _compiled(function, forceinline=True)
