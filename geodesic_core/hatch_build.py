@@ -1,0 +1,53 @@
+"""Compile the kernels into a wheel, where ``GEODESIC_WHEEL_LEVELS`` names levels of processors.
+
+Without it the wheel is pure, and kernels are compiled when they are first needed. Levels are those
+of ``geodesic_core.kernels.jit.machine``, separated by spaces.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+PLATFORM = "manylinux_2_17_x86_64"
+"""Compiled kernels call the C library's arithmetic alone, which is older."""
+COMPILE = """
+from geodesic_core import compile_kernels
+from geodesic_core.kernels.jit import cache
+compile_kernels()
+print(cache.folder())
+"""
+
+
+class KernelsHook(BuildHookInterface[Any]):
+    """Puts compiled kernels into a wheel."""
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile for each level, and tag the wheel for this Python and platform."""
+        levels = os.environ.get("GEODESIC_WHEEL_LEVELS", "").split()
+        if version == "editable" or not levels:
+            return
+        for level in levels:
+            folder = compiled(Path(self.root).parent, level)
+            place = f"geodesic_core/kernels/precompiled/{folder.parent.name}/{folder.name}"
+            for path in sorted([*folder.glob("*.kernel"), *folder.glob("*.all")]):
+                build_data["force_include"][str(path)] = f"{place}/{path.name}"
+        python = f"cp{sys.version_info.major}{sys.version_info.minor}"
+        build_data["pure_python"] = False
+        build_data["tag"] = f"{python}-{python}-{PLATFORM}"
+
+
+def compiled(root: Path, level: str) -> Path:
+    """Compile all kernels for a level, unless the user's cache has them; return their folder."""
+    environment = os.environ | {
+        "PYTHONPATH": str(root),
+        "NUMBA_CPU_NAME": level,
+        "NUMBA_CPU_FEATURES": "",
+        "GEODESIC_CPU_LEVEL": level,
+    }
+    command = [sys.executable, "-c", COMPILE]
+    done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)  # noqa: S603
+    return Path(done.stdout.strip())
