@@ -1,47 +1,62 @@
-"""Paths: what a path is, checked on the path itself, at every vertex of the zoo."""
+"""Paths: what a path is, checked on the path itself, at the vertices of the zoo."""
 
 import numpy as np
 import pytest
 
 import geodesic_core as gc
 from tests.conftest import WITHOUT_JIT
-from tests.support import zoo
+from tests.support import expected, zoo
+from tests.support.approximation import (
+    GRANTED,
+    MERGING,
+    check_approximate_path,
+    each_error,
+    exact_or_not,
+    solve,
+    some_sources,
+)
 from tests.support.certificates import check_path
 from tests.support.meshes import mesh_of
 
 
-def check_paths(case, sources, at_most=10**9):
-    """Check the paths from each source to all vertices, or about ``at_most``, evenly spread."""
-    mesh = mesh_of(case)
-    for source in sources:
-        field = gc.exact_distance(mesh, source)
-        reached = np.flatnonzero(np.isfinite(field.distances))
-        for target in reached[:: len(reached) // at_most + 1].tolist():
-            if target != source:
-                path = field.path_to(target)
-                check_path(mesh, path, source, target, field.distances[target])
+def check_paths(mesh, source, exact, error, at_most=10**9):
+    """Check the paths from a source to all vertices, or about ``at_most``, evenly spread."""
+    field = solve(mesh, source, error, retain="paths")
+    reached = np.flatnonzero(np.isfinite(exact))
+    for target in reached[:: len(reached) // at_most + 1].tolist():
+        if target != source:
+            check_approximate_path(field, target, exact[target], error)
 
 
 @pytest.mark.slice(15)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
-def test_paths_to_every_vertex(case):
-    last = int(case.faces.max())
-    check_paths(case, [last] if WITHOUT_JIT else [0, last // 2, last])
+def test_paths_on_small_meshes(case):
+    mesh = mesh_of(case)
+    for source in some_sources(case, 1 if WITHOUT_JIT else 4):
+        exact = expected.matrix(case)[source]
+        check_paths(mesh, source, exact, 0)
+        check_paths(mesh, source, exact, 1e-2, at_most=30)
 
 
 @pytest.mark.slice(6)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_paths_on_larger_meshes_and_slivers(case):
-    check_paths(case, [len(case.vertices) // 3], at_most=300)
+    mesh, source = mesh_of(case), len(case.vertices) // 3
+    exact = case.distances(source)
+    check_paths(mesh, source, exact, 0, at_most=300)
+    check_paths(mesh, source, exact, 1e-3, at_most=60)
 
 
 @pytest.mark.full
 @pytest.mark.jit
-@zoo.each(zoo.KNOWN)
-def test_paths_on_larger_meshes_from_many_sources(case):
-    sources = np.random.default_rng(7).choice(len(case.vertices), 20)
-    check_paths(case, sources.tolist(), at_most=300)
+@zoo.each(zoo.KNOWN | MERGING)
+def test_paths_from_many_sources(case):
+    mesh = mesh_of(case)
+    for source in some_sources(case, 20):
+        exact = gc.exact_distance(mesh, source).distances
+        for error in GRANTED:
+            check_paths(mesh, source, exact, error, at_most=300 if error == 0 else 100)
 
 
 def test_a_path_through_saddles_has_its_vertices_as_points():
@@ -58,27 +73,58 @@ def test_a_path_through_saddles_has_its_vertices_as_points():
         assert max(path.locations[bend].barycentric) == 1.0
 
 
-def test_a_path_ends_at_the_nearest_of_several_sources():
-    case = zoo.SMALL["torus"]
+@exact_or_not
+@pytest.mark.parametrize(
+    ("case", "roots"),
+    [
+        pytest.param(zoo.SMALL["torus"], (0, 25, 50), id="torus"),
+        pytest.param(MERGING["dented_ring"], (0, 70, 120), id="dented_ring"),
+        pytest.param(MERGING["islands"], (0, 70, 120), id="islands"),
+    ],
+)
+def test_a_path_ends_at_the_nearest_of_several_sources(case, roots, error):
     mesh = mesh_of(case)
-    field = gc.exact_distance(mesh, [gc.Source(0), gc.Source(25, 0.5), gc.Source(50, 0.25)])
-    for target in range(len(case.vertices)):
-        source = field.sources[field.nearest_source[target]]
-        root = (0, 25, 50)[field.nearest_source[target]]
-        if target != root:
-            length = field.distances[target] - source.start_distance
-            check_path(mesh, field.path_to(target), root, target, length)
+    first, second, third = roots
+    sources = [
+        gc.Source(first),
+        gc.Source(second, 0.5),
+        gc.Source(gc.SurfacePoint.vertex(third), 0.25),
+    ]
+    exact = gc.exact_distance(mesh, sources).distances
+    field = solve(mesh, sources, error, retain="paths")
+    assert set(field.nearest_source.tolist()) == {0, 1, 2}
+    for target in range(0, len(exact), 4 if WITHOUT_JIT else 1):
+        if target not in roots:
+            check_approximate_path(field, target, exact[target], error)
 
 
+@each_error
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("winding", [1, -1])
+def test_a_path_ends_at_the_named_one_of_sources_that_tie(error, order, winding):
+    """It ended at the other; with start distances the lengths did not fit, an internal error."""
+    vertices = [(0, 0, 0), (0.5, 0, 0), (0, 1, 0), (1, 1, 0)]
+    mesh = gc.TriangleMesh(vertices, [face[::winding] for face in ((0, 1, 2), (1, 3, 2))])
+    sources = [(gc.Source(1, 0.5), gc.Source(2))[i] for i in order]
+    field = solve(mesh, sources, error)
+    assert field.nearest_source[0] == 0
+    path = field.path_to(0)
+    np.testing.assert_array_equal(path.points[0], vertices[sources[0].point])
+    assert path.length == pytest.approx(1 - sources[0].start_distance, rel=1e-12)
+    assert path.error_bound.value == pytest.approx(0, abs=1e-12)
+
+
+@each_error
+@pytest.mark.parametrize("late", [0.0, 0.5])
 @pytest.mark.parametrize("name", ["single_triangle", "crags", "bow_tie", "isolated_vertices"])
-def test_the_path_to_the_source_is_the_source(name):
+def test_the_path_to_the_source_is_the_source(name, late, error):
     case = zoo.SMALL[name]
-    mesh = mesh_of(case)
     source = int(case.faces[0, 0])
-    path = gc.exact_distance(mesh, source).path_to(source)
+    path = solve(mesh_of(case), gc.Source(source, late), error).path_to(source)
     assert path.length == 0
+    assert path.error_bound == gc.ErrorBound("relative", 0.0, "guaranteed")
     assert len(path.points) == len(path.locations) == len(path.faces) + 1
-    np.testing.assert_array_equal(path.points, mesh.vertices[[source] * len(path.points)])
+    np.testing.assert_array_equal(path.points, case.vertices[[source] * len(path.points)])
 
 
 def test_the_path_to_a_neighbour_is_the_edge():
@@ -88,27 +134,25 @@ def test_the_path_to_a_neighbour_is_the_edge():
     np.testing.assert_array_equal(path.points, mesh.vertices[[9, 10]])
 
 
-def test_no_path_tells_why():
-    case = zoo.SMALL["two_components"]
-    mesh = mesh_of(case)
-    other = len(case.vertices) - 1
+@each_error
+def test_no_path_tells_why(error):
+    mesh = mesh_of(zoo.SMALL["two_components"])
+    other = len(mesh.vertices) - 1
     with pytest.raises(gc.errors.NoPath, match=str(other)) as caught:
-        gc.exact_distance(mesh, 0).path_to(other)
+        solve(mesh, 0, error).path_to(other)
     assert caught.value.reason == "disconnected"
-    near = gc.exact_distance(mesh, 0, max_distance=0.5)
-    with pytest.raises(gc.errors.NoPath) as caught:
-        near.path_to(1)
-    assert caught.value.reason == "beyond_max_distance"
-    with pytest.raises(gc.errors.NoPath) as caught:
-        near.path_to(other)
-    assert caught.value.reason == "disconnected"
+    near = solve(mesh, 0, error, max_distance=0.5)
+    for target, reason in ((1, "beyond_max_distance"), (other, "disconnected")):
+        with pytest.raises(gc.errors.NoPath) as caught:
+            near.path_to(target)
+        assert caught.value.reason == reason
 
 
-def test_no_path_to_an_isolated_vertex():
+@each_error
+def test_no_path_to_an_isolated_vertex(error):
     case = zoo.SMALL["isolated_vertices"]
-    mesh = mesh_of(case)
     with pytest.raises(gc.errors.NoPath) as caught:
-        gc.exact_distance(mesh, int(case.faces[0, 0])).path_to(0)
+        solve(mesh_of(case), int(case.faces[0, 0]), error).path_to(0)
     assert caught.value.reason == "disconnected"
 
 
@@ -137,7 +181,7 @@ def test_paths_carry_the_fields_error_bound():
 def test_a_path_along_the_boundary_may_stray_by_rounding():
     """It left the surface between two vertices of the boundary, and was given up."""
     case = zoo.KNOWN["slivers_1e-05"].moved(1e9 * zoo.rotation(3), (1.0, 2.0, -3.0))
-    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    mesh = mesh_of(case)
     field = gc.exact_distance(mesh, 146)
     for target in range(209, 441, 21):
         check_path(mesh, field.path_to(target), 146, target, field.distances[target])
