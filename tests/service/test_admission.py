@@ -10,6 +10,7 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
+from tests.support.processes import stopped
 from tests.support.service import TWO_TRIANGLES, ServiceClient, check_problem, serving
 from tests.support.waiting import wait_until
 
@@ -218,18 +219,20 @@ def test_keys_have_rates_of_their_own_wherever_they_come_from(tmp_path: Path) ->
 
 
 def test_requests_at_the_same_time(tmp_path: Path) -> None:
-    with limited(tmp_path, max_concurrent=1) as client, ThreadPoolExecutor(1) as pool:
-        asked = pool.submit(client.post, "/v1/meshes", params={"sample": "plane", "faces": 8})
-        wait_until(lambda: client.load.waiting == 1)  # for the worker, which starts
+    with serving(tmp_path, max_concurrent=1) as client, ThreadPoolExecutor(1) as pool:
+        client.wait_until_idle()
+        with stopped(client.workers()):
+            upload = pool.submit(client.post, "/v1/meshes", params={"sample": "plane", "faces": 8})
+            wait_until(lambda: client.load.busy == 1)
 
-        response = client.get("/v1")
-        problem = check_problem(response, 429, "rate_limited")
-        assert (problem["limit"], problem["actual"]) == (1, 2)
-        assert problem["setting"] == "GEODESIC_MAX_CONCURRENT"
-        assert response.headers["retry-after"] == "1"
-        assert client.get("/livez").status_code == 200
+            response = client.get("/v1")
+            problem = check_problem(response, 429, "rate_limited")
+            assert (problem["limit"], problem["actual"]) == (1, 2)
+            assert problem["setting"] == "GEODESIC_MAX_CONCURRENT"
+            assert response.headers["retry-after"] == "1"
+            assert client.get("/livez").status_code == 200
 
-        assert asked.result().status_code == 201
+        assert upload.result().status_code == 201
         assert client.get("/v1").status_code == 200
 
 

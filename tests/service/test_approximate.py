@@ -69,10 +69,10 @@ def test_distances_fall_short_by_no_more_than_the_bound(
     assert answer["error_bound"] == {"type": bound[0], "value": bound[1], "kind": "guaranteed"}
     ours, theirs = np.array(answer["distances"]), np.array(exact["distances"])
     assert (ours <= theirs * (1 + ROUNDING)).all()
-    granted = errors or {"relative_error": 1e-3}
-    if share := granted.get("relative_error"):
+    promised = errors or {"relative_error": 1e-3}
+    if share := promised.get("relative_error"):
         assert (ours >= theirs * (1 - share)).all()
-    if length := granted.get("absolute_error"):
+    if length := promised.get("absolute_error"):
         assert (ours >= theirs - length).all()
     assert answer["stats"]["windows_kept"] < exact["stats"]["windows_kept"]
     assert set(answer["nearest_source"]) == set(exact["nearest_source"])
@@ -154,7 +154,7 @@ def test_the_usual_error_is_one_result_with_its_spelling(client: TestClient, kno
 
 
 def test_keys_tell_methods_and_errors_apart() -> None:
-    granted: list[dict[str, Any]] = [
+    bounds: list[dict[str, Any]] = [
         {},
         {"method": "approximate", "relative_error": 1e-3},
         {"method": "approximate", "absolute_error": 1e-3},
@@ -162,9 +162,9 @@ def test_keys_tell_methods_and_errors_apart() -> None:
     ]
 
     ends = {"source": VertexPoint(vertex=0), "target": VertexPoint(vertex=1)}
-    keys = {result_key(PathQuery("m", PathRequest(**ends, **errors)), "a/b") for errors in granted}
+    keys = {result_key(PathQuery("m", PathRequest(**ends, **errors)), "a/b") for errors in bounds}
 
-    assert len(keys) == len(granted)
+    assert len(keys) == len(bounds)
 
 
 # Paths
@@ -205,13 +205,13 @@ def test_a_path_carries_its_own_certificate(client: TestClient, knot: str, error
 
 def test_get_answers_as_post_and_is_cached(client: TestClient, knot: str) -> None:
     link = f"/v1/meshes/{knot}/path?{WRITTEN_ENDS}"
-    asked = f"{link}&method=approximate&relative_error=0.05&absolute_error=2"
+    rough = f"{link}&method=approximate&relative_error=0.05&absolute_error=2"
     body = {"method": "approximate", "relative_error": 0.05, "absolute_error": 2}
 
-    got = client.get(asked)
+    got = client.get(rough)
 
     assert got.json() == path(client, knot, **body).json()
-    assert client.get(asked, headers={"If-None-Match": got.headers["etag"]}).status_code == 304
+    assert client.get(rough, headers={"If-None-Match": got.headers["etag"]}).status_code == 304
     for other in (link, f"{link}&method=exact", f"{link}&method=approximate"):
         response = client.get(other, headers={"If-None-Match": got.headers["etag"]})
         assert response.status_code == 200

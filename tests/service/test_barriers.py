@@ -81,15 +81,15 @@ def test_spellings_of_barriers_are_one_query(
     assert (again.content, again.headers["server-timing"]) == (first.content, "kept")
     assert first.json()["unreachable"] == {"disconnected": 0, "beyond_max_distance": 0}
     size = MeshSize(len(walled.vertices), len(walled.faces), 1.0)
-    asked = [
+    queries = [
         DistancesQuery.ask(
-            "m", size, DistancesRequest(sources=[{"vertex": 0}], barriers=given), Settings()
+            "m", size, DistancesRequest(sources=[{"vertex": 0}], barriers=barriers), Settings()
         )
-        for given in ([3, 1], [1, 3, 3], [1])
+        for barriers in ([3, 1], [1, 3, 3], [1])
     ]
-    keys = [result_key(query, "a/b") for query in asked]
+    keys = [result_key(query, "a/b") for query in queries]
     assert keys[0] == keys[1] != keys[2]
-    assert asked[0].barriers.tolist() == [1, 3]
+    assert queries[0].barriers.tolist() == [1, 3]
 
 
 def test_reasons_are_those_of_the_blocked_mesh(client: TestClient, plane: str) -> None:
@@ -118,9 +118,9 @@ def test_points_are_found_on_the_blocked_mesh(
     place = walled.locate(inside)
 
     for source in ({"position": inside}, {"position": inside, "max_distance": 0.1}):
-        (told,) = distances(client, plane, sources=[source], barriers=WALL).json()["sources"]
-        assert told["face"] == place.face_index
-        assert told["position"] == walled.position(place).tolist() != inside
+        (echoed,) = distances(client, plane, sources=[source], barriers=WALL).json()["sources"]
+        assert echoed["face"] == place.face_index
+        assert echoed["position"] == walled.position(place).tolist() != inside
 
 
 def test_points_inside_barriers_are_refused(client: TestClient, plane: str) -> None:
@@ -181,12 +181,12 @@ def test_positions_are_located_without_barriers(client: TestClient, plane: str) 
 
 
 def test_an_estimate_counts_the_blocked_mesh(client: TestClient, plane: str) -> None:
-    told = ask(client, plane, "distances", "?estimate=true", barriers=WHOLE_WALL).json()
+    estimated = ask(client, plane, "distances", "?estimate=true", barriers=WHOLE_WALL).json()
     real = ask(client, plane, "distances", barriers=WHOLE_WALL)
 
-    assert told["response_bytes"] == pytest.approx(len(real.content), rel=0.05)
+    assert estimated["response_bytes"] == pytest.approx(len(real.content), rel=0.05)
     free = ask(client, plane, "distances", "?estimate=true").json()
-    assert told["seconds"] >= free["seconds"] > 0
+    assert estimated["seconds"] >= free["seconds"] > 0
 
 
 def test_blocked_meshes_are_kept_while_they_fit(tmp_path: Path) -> None:

@@ -75,9 +75,7 @@ def test_small_bodies_need_no_thread(
 
 
 @pytest.mark.parametrize("count", [1, POINTS])
-def test_what_is_wrong_is_told_of_bodies_of_any_size(
-    client: TestClient, plane: str, count: int
-) -> None:
+def test_faults_are_named_in_bodies_of_any_size(client: TestClient, plane: str, count: int) -> None:
     link = f"/v1/meshes/{plane}/distances"
     headers = {"Content-Type": "application/json"}
     targets = [{"vertex": i % 100} for i in range(count)]

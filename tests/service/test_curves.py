@@ -16,8 +16,8 @@ DIAGONAL = [{"vertex": 12 * i} for i in range(4)]
 
 
 def paths(client: TestClient, mesh_id: str, query: str = "", **body: Any) -> Any:
-    asked = {"source": {"polyline": DIAGONAL}, "targets": [{"vertex": 10}]} | body
-    return client.post(f"/v1/meshes/{mesh_id}/paths{query}", json=asked)
+    request = {"source": {"polyline": DIAGONAL}, "targets": [{"vertex": 10}]} | body
+    return client.post(f"/v1/meshes/{mesh_id}/paths{query}", json=request)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=["exact", "approximate"])
@@ -25,7 +25,7 @@ def test_distances_are_the_library_s(client: TestClient, method: dict) -> None:
     knot = upload_sample(client, "knot", 3000)
     mesh = stored_mesh(client, knot)
     curve = gc.shortest_path(mesh, 3, 700).locations
-    asked = [{"face": at.face_index, "barycentric": list(at.barycentric)} for at in curve]
+    polyline = [{"face": at.face_index, "barycentric": list(at.barycentric)} for at in curve]
     sources = [gc.Source(gc.Curve(curve), 0.5), 1200]
     target = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5))
     solve = gc.approximate_distance if method else gc.exact_distance
@@ -33,7 +33,7 @@ def test_distances_are_the_library_s(client: TestClient, method: dict) -> None:
     field = solve(mesh, sources, targets=[target], **errors)
 
     body: dict[str, Any] = {
-        "sources": [{"polyline": asked, "start_distance": 0.5}, {"vertex": 1200}],
+        "sources": [{"polyline": polyline, "start_distance": 0.5}, {"vertex": 1200}],
         "include": ["nearest_source"],
         **method,
     }
@@ -48,12 +48,12 @@ def test_distances_are_the_library_s(client: TestClient, method: dict) -> None:
     assert answer["distances"] == field.distances.tolist()
     assert answer["nearest_source"] == field.nearest_source.tolist()
     assert some["distances"] == [field.distance_at(target), field.distances[9]]
-    told, other = answer["sources"]
-    assert told["start_distance"] == 0.5
-    assert [point["position"] for point in told["polyline"]] == [
+    echoed, other = answer["sources"]
+    assert echoed["start_distance"] == 0.5
+    assert [point["position"] for point in echoed["polyline"]] == [
         mesh.position(mesh.point(at)).tolist() for at in curve
     ]
-    assert told["polyline"][0]["vertex"] == 3
+    assert echoed["polyline"][0]["vertex"] == 3
     assert other["vertex"] == 1200
 
 
@@ -123,12 +123,12 @@ def test_refused_curves(
     client: TestClient, plane: str, polyline: Any, code: str, places: list[str]
 ) -> None:
     for query in ("", "?estimate=true"):
-        asked = client.post(
+        field = client.post(
             f"/v1/meshes/{plane}/distances{query}",
             json={"sources": [{"vertex": 0}, {"polyline": polyline}]},
         )
         for response, where in (
-            (asked, "/sources/1"),
+            (field, "/sources/1"),
             (paths(client, plane, query, source={"polyline": polyline}), "/source"),
         ):
             problem = check_problem(response, 422, code)
@@ -147,8 +147,8 @@ def test_curves_are_sources_of_sweeps_only(client: TestClient, plane: str) -> No
         ("matrix", {"sources": [curve], "targets": [{"vertex": 0}]}, "/sources/0"),
         ("nearest", {"source": curve, "candidates": [{"vertex": 0}]}, "/source"),
     ):
-        asked = {"targets": [{"vertex": 1}]} | body if operation == "paths" else body
-        refused = client.post(f"/v1/meshes/{plane}/{operation}", json=asked)
+        request = {"targets": [{"vertex": 1}]} | body if operation == "paths" else body
+        refused = client.post(f"/v1/meshes/{plane}/{operation}", json=request)
         problem = check_problem(refused, 422, "invalid_request")
         assert [fault["pointer"] for fault in problem["errors"]] == [place]
 

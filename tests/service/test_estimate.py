@@ -1,8 +1,8 @@
 """Estimates of queries, against their real cost."""
 
-import math
 import pickle
 import tracemalloc
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -24,11 +24,11 @@ from app.queries import (
 )
 from app.schemas.points import StrictModel
 from app.store.meshes import OpenMesh
-from tests.support.service import check_problem, granted, stored_mesh, upload_sample
+from tests.support.service import check_problem, context, stored_mesh, upload_sample
 
 MESHES = {"knot": 8000, "sphere": 5000, "plane": 10_000}
-_RNG = np.random.default_rng(8)
-SOME, MANY = ([{"vertex": i} for i in _RNG.integers(0, 2000, n).tolist()] for n in (40, 700))
+RNG = np.random.default_rng(8)
+SOME, MANY = ([{"vertex": i} for i in RNG.integers(0, 2000, n).tolist()] for n in (40, 700))
 INSIDE = {"face": 1040, "barycentric": [0.2, 0.3, 0.5]}
 CORNER = {"face": 1040, "barycentric": [1, 0, 0]}
 ROUGH = {"method": "approximate", "relative_error": 0.01}
@@ -85,6 +85,7 @@ def ids(client: TestClient) -> dict[str, str]:
     return {name: upload_sample(client, name, faces) for name, faces in MESHES.items()}
 
 
+@pytest.mark.slice(18)
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("name", QUERIES)
 def test_bytes_of_the_response(
@@ -93,35 +94,35 @@ def test_bytes_of_the_response(
     operation, body, formats, factor = QUERIES[name]
     link = f"/v1/meshes/{ids[mesh]}/{operation}"
     for written in formats:
-        told = client.post(f"{link}?format={written}&estimate=true", json=body).json()
+        estimated = client.post(f"{link}?format={written}&estimate=true", json=body).json()
         real = client.post(f"{link}?format={written}", json=body)
 
         assert real.status_code == 200
-        assert told["media_type"] == real.headers["content-type"].partition(";")[0]
-        assert told["is_estimate"] is True
-        assert told["mesh_id"] == ids[mesh]
-        assert 1 / factor <= told["response_bytes"] / len(real.content) <= factor
+        assert estimated["media_type"] == real.headers["content-type"].partition(";")[0]
+        assert estimated["is_estimate"] is True
+        assert estimated["mesh_id"] == ids[mesh]
+        assert 1 / factor <= estimated["response_bytes"] / len(real.content) <= factor
 
 
-_ENDS = [{"vertex": i} for i in range(6)]
+ENDS = [{"vertex": i} for i in range(6)]
 
 
 @pytest.mark.parametrize(
     ("operation", "body"),
     [
-        ("distances", {"sources": _ENDS[:1], "max_distance": 0.5}),
-        ("distances", {"sources": _ENDS[:1], "targets": _ENDS}),
+        ("distances", {"sources": ENDS[:1], "max_distance": 0.5}),
+        ("distances", {"sources": ENDS[:1], "targets": ENDS}),
         ("path", {"source": {"vertex": 0}, "target": {"vertex": 4}}),
         ("path", {"source": {"vertex": 0}, "target": {"vertex": 4}, "method": "approximate"}),
-        ("paths", {"source": {"vertex": 0}, "targets": _ENDS, "max_distance": 0.5}),
+        ("paths", {"source": {"vertex": 0}, "targets": ENDS, "max_distance": 0.5}),
         *(
-            ("matrix", {"sources": _ENDS, "targets": _ENDS[::-1], **limit, "layout": layout})
+            ("matrix", {"sources": ENDS, "targets": ENDS[::-1], **limit, "layout": layout})
             for layout in ("dense", "sparse", "pairs")
             for limit in ({}, {"max_distance": 0.5})
         ),
-        ("matrix", {"sources": _ENDS[:1] * 12, "targets": _ENDS * 2, **PAIRS}),
-        ("nearest", {"source": {"vertex": 0}, "candidates": _ENDS[3:]}),
-        ("nearest", {"source": {"vertex": 0}, "candidates": _ENDS, "k": 5, "max_distance": 0.5}),
+        ("matrix", {"sources": ENDS[:1] * 12, "targets": ENDS * 2, **PAIRS}),
+        ("nearest", {"source": {"vertex": 0}, "candidates": ENDS[3:]}),
+        ("nearest", {"source": {"vertex": 0}, "candidates": ENDS, "k": 5, "max_distance": 0.5}),
         ("locate", {"points": [[0, 0, 9]] * 9, "max_distance": 1}),
     ],
 )
@@ -130,10 +131,10 @@ def test_what_is_out_of_reach_is_not_counted(
 ) -> None:
     link = f"/v1/meshes/{apart}/{operation}"
 
-    told = client.post(f"{link}?estimate=true", json=body).json()
+    estimated = client.post(f"{link}?estimate=true", json=body).json()
 
     size = len(client.post(link, json=body).content)
-    assert 1 / 1.1 <= told["response_bytes"] / size <= 1.1
+    assert 1 / 1.1 <= estimated["response_bytes"] / size <= 1.1
 
 
 # Positions are looked for without any state; what is said of paths comes on top of it.
@@ -141,22 +142,25 @@ STATEFUL = [name for name, (operation, *_) in QUERIES.items() if operation != "l
 ALLOCATED = [name for name in STATEFUL if QUERIES[name][0] != "paths"]
 
 
+@pytest.mark.slice(12)
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("name", ALLOCATED)
 def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mesh: str) -> None:
-    opened = OpenMesh(("", b""), gc.Solver(stored_mesh(client, ids[mesh])), [])
-    query = query_of(name)
-    told = estimate(query, Representation(JSON), opened, lambda: False)
+    surface, query = stored_mesh(client, ids[mesh]), query_of(name)
+    unmeasured, opened = (OpenMesh(("", b""), gc.Solver(surface), []) for _ in range(2))
+    query.answer(unmeasured, context())  # loads kernels, whose memory is not the answer's
+    estimated = estimate(query, Representation(JSON), opened, lambda: False)
     tracemalloc.start()
     try:
-        query.answer(opened, granted())
+        query.answer(opened, context())
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()
 
-    assert 1 / 3 <= told.memory_bytes / peak <= 3
+    assert 1 / 3 <= estimated.memory_bytes / peak <= 3
 
 
+@pytest.mark.slice(8)
 @pytest.mark.parametrize("name", STATEFUL)
 def test_memory_that_suffices(
     client: TestClient, ids: dict[str, str], name: str, monkeypatch: pytest.MonkeyPatch
@@ -166,11 +170,11 @@ def test_memory_that_suffices(
         monkeypatch.setattr(f"{module}.available_cores", lambda: 1)
     opened = OpenMesh(("", b""), gc.Solver(stored_mesh(client, ids["sphere"])), [])
     query = query_of(name)
-    told = estimate(query, Representation(JSON), opened, lambda: False)
+    estimated = estimate(query, Representation(JSON), opened, lambda: False)
 
     with pytest.raises(gc.errors.MemoryLimitExceeded):
-        query.answer(opened, granted(memory=told.memory_bytes // 3))
-    query.answer(opened, granted(memory=3 * told.memory_bytes))
+        query.answer(opened, context(memory=estimated.memory_bytes // 3))
+    query.answer(opened, context(memory=3 * estimated.memory_bytes))
 
 
 def test_seconds_grow_with_the_work(client: TestClient, ids: dict[str, str]) -> None:
@@ -196,17 +200,25 @@ def test_seconds_grow_with_the_work(client: TestClient, ids: dict[str, str]) -> 
     assert few < seconds("large", "nearest", source=INSIDE, candidates=MANY, k=len(MANY))
 
 
-def test_seconds_are_of_the_right_order(client: TestClient, ids: dict[str, str]) -> None:
-    """A machine may well be some times faster or slower; not a hundred."""
-    link = f"/v1/meshes/{ids['plane']}/distances"
-    told, took = [], []
-    for source in range(5):
-        body = {"sources": [{"vertex": 4000 + source}]}
-        told.append(client.post(f"{link}?estimate=true", json=body).json()["seconds"])
-        timing = client.post(link, json=body).headers["server-timing"]
-        took.append(float(timing.partition("compute;dur=")[2].partition(",")[0]) / 1e3)
+def test_seconds_of_all_kinds_are_off_by_one_factor(
+    client: TestClient, ids: dict[str, str]
+) -> None:
+    """That factor is the machine's; each kind is allowed five times as much, or as little."""
+    opened = OpenMesh(("", b""), gc.Solver(stored_mesh(client, ids["knot"])), [])
+    factors = {}
+    for name in ("all", "rough", "pairs", "nearest", "legs", "rough path", "lines", "rough paths"):
+        query = query_of(name)
+        estimated = estimate(query, Representation(JSON), opened, lambda: False).seconds
+        factors[name] = min(processor_seconds(query, opened) for _ in range(3)) / estimated
 
-    assert abs(math.log10(min(told) / min(took))) < 2
+    assert max(factors.values()) / min(factors.values()) < 25, factors
+
+
+def processor_seconds(query: Query[Any], opened: OpenMesh) -> float:
+    """Return how long the processor works on an answer, whatever else it has to do."""
+    start = process_time()
+    query.answer(opened, context())
+    return process_time() - start
 
 
 def test_an_estimate_is_not_kept_and_computes_nothing(
@@ -215,15 +227,15 @@ def test_an_estimate_is_not_kept_and_computes_nothing(
     body = {"sources": [{"vertex": 77, "start_distance": 0.125}]}
     link = f"/v1/meshes/{ids['knot']}/distances"
 
-    told = client.post(f"{link}?estimate=true", json=body)
+    estimated = client.post(f"{link}?estimate=true", json=body)
     real = client.post(link, json=body)
 
-    assert told.headers["cache-control"] == "no-store"
-    assert told.headers["content-type"] == "application/json"
-    assert "etag" not in told.headers
+    assert estimated.headers["cache-control"] == "no-store"
+    assert estimated.headers["content-type"] == "application/json"
+    assert "etag" not in estimated.headers
     assert "compute" in real.headers["server-timing"], "no result was there"
     assert client.post(f"{link}?estimate=false", json=body).headers["server-timing"] == "kept"
-    assert client.post(f"{link}?estimate=true", json=body).json() == told.json()
+    assert client.post(f"{link}?estimate=true", json=body).json() == estimated.json()
 
 
 def test_a_get_is_estimated_as_its_post(client: TestClient, ids: dict[str, str]) -> None:

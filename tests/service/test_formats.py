@@ -139,7 +139,7 @@ def test_each_format_is_there_by_its_name_and_by_accept_or_refused(
 
 def test_distances_as_a_coloured_mesh(client: TestClient, knot: str) -> None:
     body = BODIES["distances"] | {"include": ["nearest_source", "gradient"]}
-    told = ask(client, knot, "distances", "json", **body).json()
+    answer = ask(client, knot, "distances", "json", **body).json()
     arrays = {
         name: np.load(BytesIO(client.get(f"/v1/meshes/{knot}/arrays/{name}").content))
         for name in ("vertices", "faces")
@@ -152,15 +152,17 @@ def test_distances_as_a_coloured_mesh(client: TestClient, knot: str) -> None:
     assert ply.vertices.tolist() == arrays["vertices"].tolist()
     assert ply.faces.tolist() == arrays["faces"].tolist()
     raw = ply.metadata["_ply_raw"]["vertex"]["data"]
-    assert raw["distance"].tolist() == told["distances"]
-    assert raw["nearest_source"].tolist() == told["nearest_source"]
+    assert raw["distance"].tolist() == answer["distances"]
+    assert raw["nearest_source"].tolist() == answer["nearest_source"]
     gradient = np.column_stack([raw[f"gradient_{x}"] for x in "xyz"])
-    np.testing.assert_array_equal(gradient, np.array(told["gradient"], float))
+    np.testing.assert_array_equal(gradient, np.array(answer["gradient"], float))
     colours = ply.visual.vertex_colors[:, :3]
     assert colours[0].tolist() == [68, 1, 84], "viridis begins with violet"
-    assert colours[np.argmax(told["distances"])].tolist() == [253, 231, 37], "and ends with yellow"
+    assert colours[np.argmax(answer["distances"])].tolist() == [253, 231, 37], (
+        "and ends with yellow"
+    )
     light = colours @ [0.2126, 0.7152, 0.0722]
-    order = np.argsort(told["distances"])
+    order = np.argsort(answer["distances"])
     assert (np.diff(light[order]) > -1.0).all(), "farther is lighter"
 
 
@@ -168,39 +170,41 @@ def test_what_is_unreachable_is_infinite_and_grey_or_an_empty_cell(
     client: TestClient, apart: str
 ) -> None:
     body = {"sources": [{"vertex": 1}], "include": ["nearest_source"]}
-    told = ask(client, apart, "distances", "json", **body).json()
-    assert told["distances"][3:] == [None] * 3
+    answer = ask(client, apart, "distances", "json", **body).json()
+    assert answer["distances"][3:] == [None] * 3
 
     ply = trimesh.load(
         BytesIO(ask(client, apart, "distances", "ply", **body).content), "ply", process=False
     )
     raw = ply.metadata["_ply_raw"]["vertex"]["data"]
-    assert raw["distance"].tolist() == told["distances"][:3] + [np.inf] * 3
+    assert raw["distance"].tolist() == answer["distances"][:3] + [np.inf] * 3
     assert raw["nearest_source"].tolist() == [0, 0, 0, -1, -1, -1]
     assert (ply.visual.vertex_colors[3:, :3] == 128).all()
 
     rows = rows_of(ask(client, apart, "distances", "csv", **body))
     assert list(rows[0]) == ["vertex", "distance", "nearest_source"]
     assert numbers(rows, "vertex") == [0, 1, 2, 3, 4, 5]
-    assert numbers(rows, "distance") == told["distances"]
-    assert numbers(rows, "nearest_source") == told["nearest_source"]
+    assert numbers(rows, "distance") == answer["distances"]
+    assert numbers(rows, "nearest_source") == answer["nearest_source"]
 
 
 def test_a_table_of_distances_has_all_that_is_included(client: TestClient, knot: str) -> None:
     body = BODIES["distances"] | {"include": ["gradient"]}
-    told = ask(client, knot, "distances", "json", **body).json()
+    answer = ask(client, knot, "distances", "json", **body).json()
     rows = rows_of(ask(client, knot, "distances", "csv", **body))
-    assert numbers(rows, "distance") == told["distances"]
-    assert numbers(rows, "gradient_x", "gradient_y", "gradient_z") == told["gradient"]
+    assert numbers(rows, "distance") == answer["distances"]
+    assert numbers(rows, "gradient_x", "gradient_y", "gradient_z") == answer["gradient"]
 
 
 def test_a_table_of_targets(client: TestClient, plane: str) -> None:
     targets = [{"vertex": 3}, {"face": 5, "barycentric": [0.2, 0.3, 0.5]}]
     body = {"sources": [{"vertex": 60}], "targets": targets}
     rows = rows_of(ask(client, plane, "distances", "csv", **body))
-    told = ask(client, plane, "distances", "json", **body).json()
+    answer = ask(client, plane, "distances", "json", **body).json()
     assert list(rows[0]) == ["target", "distance"]
-    assert numbers(rows, "target", "distance") == [[i, d] for i, d in enumerate(told["distances"])]
+    assert numbers(rows, "target", "distance") == [
+        [i, d] for i, d in enumerate(answer["distances"])
+    ]
     link = f"/v1/meshes/{plane}/distances?format=ply"
     check_problem(client.post(link, json=body), 406, "not_acceptable")
 
@@ -239,8 +243,8 @@ def test_a_mesh_whose_vertices_were_merged_is_written_with_those_it_has(client: 
 
 def test_a_path_in_each_format_is_the_same(client: TestClient, knot: str) -> None:
     body = {"source": {"vertex": 3}, "target": {"face": 40, "barycentric": [0.2, 0.3, 0.5]}}
-    told = ask(client, knot, "path", "json", **body).json()
-    points = told["points"]
+    answer = ask(client, knot, "path", "json", **body).json()
+    points = answer["points"]
     assert len(points) > 2
 
     assert polylines_of(ask(client, knot, "path", "obj", **body).text) == [("", points)]
@@ -250,11 +254,11 @@ def test_a_path_in_each_format_is_the_same(client: TestClient, knot: str) -> Non
     assert numbers(rows, *POINT) == points
     assert numbers(rows, "point") == list(range(len(points)))
     assert {row["status"] for row in rows} == {"ok"}
-    assert numbers(rows, "length") == [told["length"]] * len(points)
-    assert numbers(rows, "face") == [each["face"] for each in told["locations"]]
-    assert numbers(rows, *"uvw") == [each["barycentric"] for each in told["locations"]]
-    assert table.headers["geodesic-length"] == repr(told["length"])
-    assert json.loads(table.headers["geodesic-error-bound"]) == told["error_bound"]
+    assert numbers(rows, "length") == [answer["length"]] * len(points)
+    assert numbers(rows, "face") == [each["face"] for each in answer["locations"]]
+    assert numbers(rows, *"uvw") == [each["barycentric"] for each in answer["locations"]]
+    assert table.headers["geodesic-length"] == repr(answer["length"])
+    assert json.loads(table.headers["geodesic-error-bound"]) == answer["error_bound"]
     assert "geodesic-locations" not in table.headers
 
     collection = ask(client, knot, "path", "geojson", **body).json()
@@ -262,15 +266,15 @@ def test_a_path_in_each_format_is_the_same(client: TestClient, knot: str) -> Non
     assert collection["type"] == "FeatureCollection"
     assert "those of the mesh" in collection["units"]
     assert not {"coordinates", "geometry", "geometries", "properties"} & set(collection), "RFC 7946"
-    assert collection["target"] == told["target"]
+    assert collection["target"] == answer["target"]
     assert feature["type"] == "Feature"
     assert feature["geometry"] == {"type": "LineString", "coordinates": points}
-    assert feature["properties"] == {"status": "ok", "length": told["length"]}
+    assert feature["properties"] == {"status": "ok", "length": answer["length"]}
 
     box, ((element, drawn),) = drawing_of(ask(client, knot, "path", "svg", **body))
     assert element.tag == f"{SVG}polyline"
     assert drawn == flat(points)
-    assert float(element.attrib["data-length"]) == told["length"]
+    assert float(element.attrib["data-length"]) == answer["length"]
     check_box(box, drawn)
 
 
@@ -315,10 +319,10 @@ def test_where_there_is_no_path_each_format_says_why(client: TestClient, apart: 
     assert drawing_of(ask(client, apart, "path", "svg", **body)) == ([0, 0, 1, 1], [])
 
 
-def test_paths_are_told_apart_also_those_that_are_not_there(client: TestClient, apart: str) -> None:
+def test_paths_have_names_also_those_that_are_not_there(client: TestClient, apart: str) -> None:
     body = {"source": {"vertex": 1}, "targets": [{"vertex": 2}, {"vertex": 4}, {"vertex": 0}]}
-    told = ask(client, apart, "paths", "json", **body).json()["paths"]
-    there = [(i, path["points"]) for i, path in enumerate(told) if path["points"] is not None]
+    answer = ask(client, apart, "paths", "json", **body).json()["paths"]
+    there = [(i, path["points"]) for i, path in enumerate(answer) if path["points"] is not None]
     assert [i for i, _ in there] == [0, 2]
 
     found = polylines_of(ask(client, apart, "paths", "obj", **body).text)
@@ -342,14 +346,14 @@ def test_paths_are_told_apart_also_those_that_are_not_there(client: TestClient, 
 
 
 def test_isolines_closed_open_and_none(client: TestClient, plane: str) -> None:
-    told = ask(client, plane, "isolines", "json").json()["isolines"]
+    answer = ask(client, plane, "isolines", "json").json()["isolines"]
     lines = [
         (level["level"], line | {"line": i})
-        for level in told
+        for level in answer
         for i, line in enumerate(level["lines"])
     ]
     assert {line["closed"] for _, line in lines} == {True, False}
-    assert told[2] == {"level": 9.0, "lines": []}
+    assert answer[2] == {"level": 9.0, "lines": []}
     ends = [line["points"] + line["points"][:1] * line["closed"] for _, line in lines]
 
     found = polylines_of(ask(client, plane, "isolines", "obj").text)
@@ -402,12 +406,12 @@ def test_a_matrix_as_rows(client: TestClient, apart: str, layout: str) -> None:
         "targets": [{"vertex": 1}, {"vertex": 2}],
         "layout": layout,
     }
-    told = ask(client, apart, "matrix", "json", **body).json()
+    answer = ask(client, apart, "matrix", "json", **body).json()
     response = ask(client, apart, "matrix", "csv", **body)
     rows = rows_of(response)
     assert list(rows[0]) == ["source", "target", "distance"]
     found = [tuple(row) for row in numbers(rows, "source", "target", "distance")]
-    distances = told["distances"]
+    distances = answer["distances"]
     if layout == "dense":
         assert found == [(i, j, distances[i][j]) for i in (0, 1) for j in (0, 1)]
         assert found[2][2] is None
@@ -415,9 +419,9 @@ def test_a_matrix_as_rows(client: TestClient, apart: str, layout: str) -> None:
         assert found == [(i, i, distances[i]) for i in (0, 1)]
         assert found[1][2] is None
     else:
-        assert found == list(zip(told["rows"], told["columns"], distances, strict=True))
+        assert found == list(zip(answer["rows"], answer["columns"], distances, strict=True))
         assert len(found) == 2
-    assert json.loads(response.headers["geodesic-unreachable"]) == told["unreachable"]
+    assert json.loads(response.headers["geodesic-unreachable"]) == answer["unreachable"]
 
 
 def test_nearest_and_located_points(client: TestClient, plane: str) -> None:
@@ -425,11 +429,11 @@ def test_nearest_and_located_points(client: TestClient, plane: str) -> None:
         ("nearest", "nearest", "candidate"),
         ("locate", "points", "point"),
     ):
-        told = ask(client, plane, kind, "json").json()[members]
-        told = [{index: i} | each if each else {index: i} for i, each in enumerate(told)]
+        answer = ask(client, plane, kind, "json").json()[members]
+        answer = [{index: i} | each if each else {index: i} for i, each in enumerate(answer)]
         rows = rows_of(ask(client, plane, kind, "csv"))
         features = ask(client, plane, kind, "geojson").json()["features"]
-        for expected, row, feature in zip(told, rows, features, strict=True):
+        for expected, row, feature in zip(answer, rows, features, strict=True):
             (found,) = numbers([row], *row)
             found = dict(zip(row, found, strict=True))
             assert found[index] == expected[index]

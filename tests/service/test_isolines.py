@@ -11,7 +11,7 @@ import geodesic_core as gc
 from app.queries import IsolinesQuery
 from app.store.meshes import OpenMesh
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep
-from tests.support.service import check_problem, granted, serving, stored_mesh, upload_sample
+from tests.support.service import check_problem, context, serving, stored_mesh, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 METHODS = ({}, {"method": "approximate", "relative_error": 0.05})
@@ -24,8 +24,8 @@ def knot(client: TestClient) -> str:
 
 def isolines(client: TestClient, mesh_id: str, query: str = "", **body: Any) -> Any:
     body.setdefault("sources", [{"vertex": 0}])
-    asked = {name: value for name, value in body.items() if value is not ...}
-    return client.post(f"/v1/meshes/{mesh_id}/isolines{query}", json=asked)
+    request = {name: value for name, value in body.items() if value is not ...}
+    return client.post(f"/v1/meshes/{mesh_id}/isolines{query}", json=request)
 
 
 def check_lines(found: list[dict[str, Any]], expected: list[gc.Isoline]) -> None:
@@ -46,11 +46,13 @@ def test_lines_are_the_library_s(client: TestClient, knot: str, method: dict) ->
         field = gc.approximate_distance(mesh, sources, 0.05, retain="windows")
     else:
         field = gc.exact_distance(mesh, sources, retain="windows")
-    asked = [INSIDE | {"start_distance": 0.25}, {"vertex": 700}]
+    sources = [INSIDE | {"start_distance": 0.25}, {"vertex": 700}]
     levels = [2.0, 0.1, 2.0, 99.0]
 
-    named = isolines(client, knot, sources=asked, levels=levels, chord_error=1e-3, **method).json()
-    spaced = isolines(client, knot, sources=asked, count=3, **method).json()
+    named = isolines(
+        client, knot, sources=sources, levels=levels, chord_error=1e-3, **method
+    ).json()
+    spaced = isolines(client, knot, sources=sources, count=3, **method).json()
 
     assert [each["level"] for each in named["isolines"]] == levels
     for each, expected in zip(
@@ -133,28 +135,28 @@ def test_the_grant_is_in_force_throughout(
     request = IsolinesQuery.model.model_validate({"sources": [INSIDE], "count": 4, **method})
     query = IsolinesQuery("m", IsolinesQuery.normalized(request))
     watched: list[dict[str, Any]] = []
-    run, asked = RepeatableSweep.run, 0
+    run, checks = RepeatableSweep.run, 0
 
     def watch(sweep: RepeatableSweep, control: Any, **keep: Any) -> Any:
         watched.append({"cancel": control.cancel, "memory_limit": control.memory_limit})
         return run(sweep, control, **keep)
 
     def cancel() -> bool:
-        nonlocal asked
-        asked += 1
-        return asked == stop_at
+        nonlocal checks
+        checks += 1
+        return checks == stop_at
 
     monkeypatch.setattr(RepeatableSweep, "run", watch)
     stop_at = -1
-    query.answer(opened, granted(cancel, memory=10**9))
+    query.answer(opened, context(cancel, memory=10**9))
 
     assert watched == [{"cancel": cancel, "memory_limit": 10**9}] * sweeps
-    assert asked >= sweeps + 1 + 2 * 4, "each sweep, all faces, and cutting and joining each level"
-    for stop_at in range(1, asked + 1):
-        asked = 0
+    assert checks >= sweeps + 1 + 2 * 4, "each sweep, all faces, and cutting and joining each level"
+    for stop_at in range(1, checks + 1):
+        checks = 0
         with pytest.raises(gc.errors.Cancelled):
-            query.answer(opened, granted(cancel))
-        assert asked == stop_at
+            query.answer(opened, context(cancel))
+        assert checks == stop_at
 
 
 def test_components_without_a_source_have_no_lines(client: TestClient, apart: str) -> None:
@@ -219,8 +221,8 @@ def test_limits(tmp_path: Path) -> None:
         mesh_id = upload_sample(client, "plane", 200)
 
         assert isolines(client, mesh_id, levels=[0.3, 0.2]).status_code == 200
-        for asked in ({"count": 6}, {"levels": [0.5] * 6}):
-            problem = check_problem(isolines(client, mesh_id, **asked), 422, "limit_exceeded")
+        for request in ({"count": 6}, {"levels": [0.5] * 6}):
+            problem = check_problem(isolines(client, mesh_id, **request), 422, "limit_exceeded")
             assert (problem["actual"], problem["limit"]) == (6, 5)
             assert problem["setting"] == "GEODESIC_MAX_LEVELS"
         many = isolines(client, mesh_id, sources=[{"vertex": 0}] * 4, count=1)

@@ -11,7 +11,7 @@ import geodesic_core as gc
 from app.queries import LocateQuery
 from app.store.meshes import OpenMesh
 from geodesic_core.mesh.closest_point import NearestFace
-from tests.support.service import NPY, check_problem, granted, serving, stored_mesh, upload_sample
+from tests.support.service import NPY, check_problem, context, serving, stored_mesh, upload_sample
 
 
 def locate(client: TestClient, mesh_id: str, headers: Any = None, **body: Any) -> Any:
@@ -176,6 +176,6 @@ def test_the_search_tree_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(NearestFace, "__init__", note)
     positions = np.random.default_rng(2).normal(size=(50, 3)).tolist()
     query = LocateQuery("m", LocateQuery.model.model_validate({"points": positions}))
-    first, second = (query.answer(opened, granted()).members["points"] for _ in range(2))
+    first, second = (query.answer(opened, context()).members["points"] for _ in range(2))
     assert first == second
     assert len(made) == 1

@@ -20,8 +20,8 @@ def knot(client: TestClient) -> str:
 
 
 def paths(client: TestClient, mesh_id: str, query: str = "", **body: Any) -> Any:
-    asked = {"source": {"vertex": 3}, "targets": TARGETS} | body
-    return client.post(f"/v1/meshes/{mesh_id}/paths{query}", json=asked)
+    request = {"source": {"vertex": 3}, "targets": TARGETS} | body
+    return client.post(f"/v1/meshes/{mesh_id}/paths{query}", json=request)
 
 
 @pytest.mark.parametrize("method", METHODS, ids=["exact", "approximate"])

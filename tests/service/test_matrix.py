@@ -35,8 +35,8 @@ def table(client: TestClient, knot: str) -> np.ndarray:
 def matrix(
     client: TestClient, mesh_id: str, query: str = "", headers: Any = None, **body: Any
 ) -> Any:
-    asked = {"sources": SOURCES, "targets": TARGETS} | body
-    return client.post(f"/v1/meshes/{mesh_id}/matrix{query}", json=asked, headers=headers)
+    request = {"sources": SOURCES, "targets": TARGETS} | body
+    return client.post(f"/v1/meshes/{mesh_id}/matrix{query}", json=request, headers=headers)
 
 
 def test_distances_are_the_library_s(client: TestClient, knot: str, table: np.ndarray) -> None:
@@ -104,9 +104,9 @@ def test_a_sparse_matrix_has_what_is_near(client: TestClient, knot: str, table: 
 
 
 def test_pairs(client: TestClient, knot: str, table: np.ndarray) -> None:
-    asked = {"targets": TARGETS[:3], "layout": "pairs"}
-    answer = matrix(client, knot, **asked).json()
-    npy = matrix(client, knot, headers=NPY, **asked)
+    body = {"targets": TARGETS[:3], "layout": "pairs"}
+    answer = matrix(client, knot, **body).json()
+    npy = matrix(client, knot, headers=NPY, **body)
 
     np.testing.assert_allclose(answer["distances"], table.diagonal(), rtol=1e-12)
     np.testing.assert_array_equal(np.load(BytesIO(npy.content)), answer["distances"])

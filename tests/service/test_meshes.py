@@ -146,7 +146,7 @@ def test_the_report_names_what_a_mesh_is_made_of(client: TestClient) -> None:
     assert len(report["warnings"]) == 5
 
 
-def test_edges_of_no_length_are_told_of_and_their_ends_are_one_place(client: TestClient) -> None:
+def test_edges_of_no_length_are_reported_and_their_ends_are_one_place(client: TestClient) -> None:
     needle = {
         "vertices": [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0]],
         "faces": [[0, 1, 2], [0, 2, 4], [4, 2, 3]],
@@ -314,28 +314,30 @@ def test_arrays_are_immutable_and_cached(client: TestClient, plane: str) -> None
 
 
 @pytest.mark.parametrize(
-    ("asked", "expected"),
+    ("requested", "expected"),
     [
         ("bytes=0-9", slice(0, 10)),
         ("bytes=6-", slice(6, None)),
         ("bytes=-5", slice(-5, None)),
     ],
 )
-def test_ranges(client: TestClient, plane: str, asked: str, expected: slice) -> None:
+def test_ranges(client: TestClient, plane: str, requested: str, expected: slice) -> None:
     link = f"/v1/meshes/{plane}/arrays/vertices"
     whole = client.get(link).content
 
-    part = client.get(link, headers={"Range": asked})
+    part = client.get(link, headers={"Range": requested})
 
     assert part.status_code == 206
     assert part.content == whole[expected]
 
 
-@pytest.mark.parametrize("asked", ["bytes=9-2", "bytes=x", "bytes=", "lines=0-9", "bytes=-"])
-def test_ranges_that_make_no_sense_are_ignored(client: TestClient, plane: str, asked: str) -> None:
+@pytest.mark.parametrize("requested", ["bytes=9-2", "bytes=x", "bytes=", "lines=0-9", "bytes=-"])
+def test_ranges_that_make_no_sense_are_ignored(
+    client: TestClient, plane: str, requested: str
+) -> None:
     link = f"/v1/meshes/{plane}/arrays/vertices"
 
-    assert client.get(link, headers={"Range": asked}).content == client.get(link).content
+    assert client.get(link, headers={"Range": requested}).content == client.get(link).content
 
 
 def test_ranges_outside(client: TestClient, plane: str) -> None:
@@ -411,7 +413,7 @@ def test_a_damaged_mesh_does_not_hide_the_others(tmp_path: Path) -> None:
         check_problem(client.get(f"/v1/meshes/{damaged}"), 500, "mesh_damaged")
 
 
-def test_damage_is_told(tmp_path: Path) -> None:
+def test_damage_is_reported(tmp_path: Path) -> None:
     with serving(tmp_path) as client:
         mesh_id = upload_sample(client, "plane", 100)
         array = tmp_path / "meshes" / mesh_id / "vertices.npy"

@@ -18,8 +18,8 @@ def knot(client: TestClient) -> str:
 
 
 def nearest(client: TestClient, mesh_id: str, query: str = "", **body: Any) -> Any:
-    asked = {"source": {"vertex": 3}, "candidates": CANDIDATES} | body
-    return client.post(f"/v1/meshes/{mesh_id}/nearest{query}", json=asked)
+    request = {"source": {"vertex": 3}, "candidates": CANDIDATES} | body
+    return client.post(f"/v1/meshes/{mesh_id}/nearest{query}", json=request)
 
 
 @pytest.mark.parametrize("k", [1, 5, len(CANDIDATES)])

@@ -15,7 +15,7 @@ from app.schemas.points import VertexPoint
 from app.schemas.requests import PathRequest
 from tests.support.service import NPY, check_problem, serving, stored_mesh, upload_sample
 
-_ENDS = {"source": {"vertex": 0}, "target": {"vertex": 60}}
+ENDS = {"source": {"vertex": 0}, "target": {"vertex": 60}}
 
 
 def test_paths_are_the_library_s(client: TestClient, plane: str) -> None:
@@ -112,15 +112,15 @@ def test_refused_gets(client: TestClient, plane: str, query: str, code: str, pla
         ({"source": {"vertex": 0}}, "invalid_request", ["/target"]),
         ({"source": 0, "target": 1}, "invalid_request", ["/source", "/target"]),
         (
-            _ENDS | {"waypoints": [{"vertex": 3}, {"vertex": -3}]},
+            ENDS | {"waypoints": [{"vertex": 3}, {"vertex": -3}]},
             "invalid_point",
             ["/waypoints/1/vertex"],
         ),
-        (_ENDS | {"waypoints": {"vertex": 3}}, "invalid_request", ["/waypoints"]),
-        (_ENDS | {"waypoints": [3]}, "invalid_request", ["/waypoints/0"]),
-        (_ENDS | {"explain": 1}, "invalid_request", ["/explain"]),
+        (ENDS | {"waypoints": {"vertex": 3}}, "invalid_request", ["/waypoints"]),
+        (ENDS | {"waypoints": [3]}, "invalid_request", ["/waypoints/0"]),
+        (ENDS | {"explain": 1}, "invalid_request", ["/explain"]),
         (
-            _ENDS | {"method": "approximate", "waypoints": [{"vertex": 3}], "explain": True},
+            ENDS | {"method": "approximate", "waypoints": [{"vertex": 3}], "explain": True},
             "invalid_request",
             ["/waypoints", "/explain"],
         ),
@@ -137,7 +137,7 @@ def test_refused_posts(
 def test_waypoints_are_passed_in_order(client: TestClient, plane: str) -> None:
     path = gc.shortest_path(stored_mesh(client, plane), 0, 60, [90, 5, 5])
 
-    body = _ENDS | {"waypoints": [{"vertex": 90}, {"vertex": 5}, {"vertex": 5}]}
+    body = ENDS | {"waypoints": [{"vertex": 90}, {"vertex": 5}, {"vertex": 5}]}
     answer = client.post(f"/v1/meshes/{plane}/path", json=body).json()
     got = client.get(f"/v1/meshes/{plane}/path?from=v0&to=v60&via=v90&via=v5&via=v5")
 
@@ -180,7 +180,7 @@ def test_waypoints_are_limited(tmp_path: Path) -> None:
 
         assert limits["GEODESIC_MAX_WAYPOINTS"] == 2
         assert client.get(f"{link}?from=v0&to=v60&via=v3&via=v4").status_code == 200
-        body = _ENDS | {"waypoints": [{"vertex": 3}] * 3}
+        body = ENDS | {"waypoints": [{"vertex": 3}] * 3}
         for response in (
             client.get(f"{link}?from=v0&to=v60&via=v3&via=v4&via=v5"),
             client.post(link, json=body),
@@ -193,7 +193,7 @@ def test_waypoints_are_limited(tmp_path: Path) -> None:
 @pytest.mark.parametrize("by", ["get", "body", "parameter"])
 def test_explained_paths_tell_their_steps(client: TestClient, plane: str, by: str) -> None:
     link = f"/v1/meshes/{plane}/path"
-    body = _ENDS | {"waypoints": [{"vertex": 90}]}
+    body = ENDS | {"waypoints": [{"vertex": 90}]}
     response = {
         "get": lambda: client.get(f"{link}?from=v0&to=v60&via=v90&explain=true"),
         "body": lambda: client.post(link, json=body | {"explain": True}),
@@ -260,14 +260,14 @@ def test_no_path_beyond_a_largest_distance(client: TestClient, plane: str, metho
 
     for limit, status in ((length, "ok"), (0.999 * length, "no_path"), (0, "no_path")):
         posted = client.post(link, json=body | {"max_distance": limit}).json()
-        asked = {"from": "v0", "to": "v60", "method": method, "max_distance": limit}
-        assert client.get(link, params=asked).json() == posted
+        parameters = {"from": "v0", "to": "v60", "method": method, "max_distance": limit}
+        assert client.get(link, params=parameters).json() == posted
         assert posted["status"] == status
         assert posted.get("reason") == (None if status == "ok" else "beyond_max_distance")
 
 
 def test_the_largest_distance_is_that_of_the_whole_path(client: TestClient, plane: str) -> None:
-    body = {**_ENDS, "waypoints": [{"vertex": 7}]}
+    body = {**ENDS, "waypoints": [{"vertex": 7}]}
     link = f"/v1/meshes/{plane}/path"
     length = client.post(link, json=body).json()["length"]
 
@@ -284,7 +284,7 @@ def test_the_largest_distance_is_that_of_the_whole_path(client: TestClient, plan
 def test_largest_distances_that_are_none(client: TestClient, plane: str, limit: object) -> None:
     link = f"/v1/meshes/{plane}/path"
 
-    posted = client.post(link, json={**_ENDS, "max_distance": limit})
+    posted = client.post(link, json={**ENDS, "max_distance": limit})
     got = client.get(link, params={"from": "v0", "to": "v60", "max_distance": limit})
 
     for response, place in ((posted, "/max_distance"), (got, "/query/max_distance")):

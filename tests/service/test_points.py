@@ -28,7 +28,7 @@ from app.schemas.requests import (
     PathsRequest,
 )
 from app.store.meshes import OpenMesh
-from tests.support.service import check_problem, distances, granted, stored_mesh, upload_sample
+from tests.support.service import check_problem, context, distances, stored_mesh, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 ENDS = {"source": {"vertex": 3}, "target": INSIDE}
@@ -224,7 +224,7 @@ def test_all_spellings_of_a_point_give_one_answer(
         tags.add(back.headers["etag"])
 
     assert {name: len(different) for name, different in bodies.items()} == dict.fromkeys(bodies, 1)
-    # What was asked names the answer; max_distance, which text does not have, is no part of it.
+    # The question names the answer; max_distance, which text does not have, is no part of it.
     assert len(tags) == len({text_of(point) for point in written})
 
 
@@ -313,7 +313,7 @@ def test_looking_for_points_can_be_stopped() -> None:
         with pytest.raises(gc.errors.Cancelled, match="looked for"):
             query.answer(
                 OpenMesh(("", b""), gc.Solver(mesh), []),
-                granted(lambda: True),
+                context(lambda: True),
             )
 
 
@@ -371,7 +371,7 @@ def test_points_that_are_refused(
     client: TestClient, apart: str, point: Any, code: str, member: str, message: str
 ) -> None:
     good = {"vertex": 0}
-    asked = [
+    requests = [
         ("distances", {"sources": [good, point]}, "/sources/1"),
         ("distances", {"sources": [good], "targets": [good, good, point]}, "/targets/2"),
         ("path", {"source": point, "target": good}, "/source"),
@@ -384,7 +384,7 @@ def test_points_that_are_refused(
         ("nearest", {"source": point, "candidates": [good]}, "/source"),
         ("nearest", {"source": good, "candidates": [good, point]}, "/candidates/1"),
     ]
-    for operation, body, place in asked:
+    for operation, body, place in requests:
         for estimate in ("", "?estimate=true"):
             response = client.post(f"/v1/meshes/{apart}/{operation}{estimate}", json=body)
             problem = check_problem(response, 422, code)

@@ -91,14 +91,14 @@ def test_the_same_query_is_not_solved_again(client: TestClient, plane: str) -> N
 
 
 def test_the_hash_of_a_query_is_stable(monkeypatch: pytest.MonkeyPatch) -> None:
-    def asked(**body: Any) -> DistancesQuery:
+    def query_of(**body: Any) -> DistancesQuery:
         return DistancesQuery("m", DistancesRequest.model_validate(body))
 
-    query = asked(sources=[{"vertex": 1}], targets=[{"vertex": 2}])
-    twin = asked(
+    query = query_of(sources=[{"vertex": 1}], targets=[{"vertex": 2}])
+    twin = query_of(
         sources=[{"vertex": 1, "start_distance": 0}], targets=[{"vertex": 2}], max_distance=None
     )
-    other = asked(sources=[{"vertex": 1}])
+    other = query_of(sources=[{"vertex": 1}])
     key = result_key(query, "a/b")
 
     assert key == result_key(twin, "a/b")
@@ -199,7 +199,7 @@ def test_bodies_that_are_no_query(
         ),
     ],
 )
-def test_all_that_is_wrong_is_told_at_once(
+def test_all_faults_are_named_at_once(
     client: TestClient, plane: str, headers: Any, parameters: Any, body: Any, places: list[str]
 ) -> None:
     query = {"sources": [{"vertex": 0}], **body}

@@ -281,8 +281,8 @@ def check_survivors(topology, wave, h: int, before: Windows, count: int, limit: 
     survivors = Windows(np.full(count, h), wave.pool.scratch[:count], np.zeros(count))
     promised = before.least(places[None]).min(axis=0)
     kept = np.minimum(survivors.least(places[None]).min(axis=0, initial=math.inf), along)
-    asked = promised <= limit
-    assert (kept[asked] <= promised[asked] * (1 + ROUNDING)).all()
+    within = promised <= limit
+    assert (kept[within] <= promised[within] * (1 + ROUNDING)).all()
 
 
 class Watch:
@@ -335,8 +335,8 @@ class Watch:
         along = np.minimum(tail + shares * length, head + (1 - shares) * length)
         found = np.minimum(self.seen, along)
         found[inside] = np.minimum(found[inside], self.seen[opposite[inside], ::-1])
-        asked = inside[:, None] & (self.exact.edges <= self.limit)
-        exact = self.exact.edges[asked]
+        within = inside[:, None] & (self.exact.edges <= self.limit)
+        exact = self.exact.edges[within]
         # A sampled point is itself rounded: it shows beside the source, where distances vanish.
         atol = 1e-15 * exact.max(initial=0.0, where=np.isfinite(exact))
-        np.testing.assert_allclose(found[asked], exact, rtol=ROUNDING, atol=atol)
+        np.testing.assert_allclose(found[within], exact, rtol=ROUNDING, atol=atol)

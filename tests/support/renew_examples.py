@@ -17,8 +17,8 @@ from app.http.openapi import EXAMPLES
 from tests.service.test_examples import JOB, OPERATIONS, replay, send, set_up
 from tests.support.service import serving
 
-_NUMBERS = re.compile(r"\[\n\s*((?:-?[\d.e+-]+|null)(?:,\s*(?:-?[\d.e+-]+|null))*)\s*\]")
-_REQUEST = "5d0c1b7e9f2a4c68b3e7d90a1f26c845"
+NUMBERS = re.compile(r"\[\n\s*((?:-?[\d.e+-]+|null)(?:,\s*(?:-?[\d.e+-]+|null))*)\s*\]")
+REQUEST = "5d0c1b7e9f2a4c68b3e7d90a1f26c845"
 
 
 def renew() -> None:
@@ -55,14 +55,14 @@ def value_of(response: Any, media_type: str, job_id: str) -> Any:
     value = json.loads(text)
     if response.status_code == 202:
         value = json.loads(text.replace(value["id"], JOB))
-    return value | ({"request_id": _REQUEST} if "request_id" in value else {})
+    return value | ({"request_id": REQUEST} if "request_id" in value else {})
 
 
 def written(examples: dict[str, Any]) -> str:
     """Return examples as JSON, the numbers of a list on one line."""
     text = json.dumps(examples, indent=2, ensure_ascii=False)
     in_line = lambda match: "[" + re.sub(r"\s*,\s*", ", ", match[1]) + "]"  # noqa: E731
-    return _NUMBERS.sub(in_line, text) + "\n"
+    return NUMBERS.sub(in_line, text) + "\n"
 
 
 if __name__ == "__main__":

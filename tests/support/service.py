@@ -23,7 +23,7 @@ from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
 from geodesic_core.fields import repeatable_sweep
 from tests.support.processes import workers_of
-from tests.support.waiting import wait_until
+from tests.support.waiting import LONG_S, wait_until
 
 NPY = {"Accept": "application/x-npy"}
 TWO_TRIANGLES = {
@@ -40,10 +40,14 @@ def is_ready(client: Any) -> bool:
 
 
 class ServiceClient(TestClient):
-    """A client of a service in this process, which can tell of its engine and of its workers."""
+    """A client of a service in this process, which knows its engine and its workers.
+
+    Without other settings there is one worker, and one for small work, and much time.
+    """
 
     def __init__(self, store: Path, **settings: Any) -> None:
-        app = create_app(Settings(store=store, **{"workers": 1} | settings))
+        own = {"workers": 1, "deadline_s": LONG_S} | settings
+        app = create_app(Settings(store=store, **own))
         super().__init__(app, raise_server_exceptions=False)
         self.engine: Engine = app.state.service.engine
         self._others = workers_of(os.getpid())
@@ -91,17 +95,17 @@ def apart(client: TestClient) -> str:
 def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> str:
     """Put a mesh into a store on which no service runs."""
     store = MeshStore(root)
-    books = MeshCatalog(root, store, 2**60, evicts=False)
+    catalog = MeshCatalog(root, store, 2**60, evicts=False)
 
-    async def keep() -> str:
-        async with books.scratch_folder() as folder:
+    async def add() -> str:
+        async with catalog.scratch_folder() as folder:
             written = store.write_aside(mesh, folder / "mesh", owner)
-            await books.add(written)
+            await catalog.add(written)
             return written.mesh_id
 
     with owned(root):
-        books.prepare()
-        return anyio.run(keep)
+        catalog.prepare()
+        return anyio.run(add)
 
 
 def upload_sample(client: TestClient, name: str, faces: int) -> str:
@@ -116,19 +120,19 @@ def distances(client: TestClient, mesh_id: str, headers: Any = None, **body: Any
     return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
 
 
-def new_fields(room: int = 10**9, store: Path = Path("nowhere")) -> FieldCache:
-    """Return no fields yet, but those of a store, if there is one."""
-    return FieldCache(room, FieldStore(store, 10**9), "this code")
+def field_cache(capacity: int = 10**9) -> FieldCache:
+    """Return an empty cache of fields, over an empty store."""
+    return FieldCache(capacity, FieldStore(Path("nowhere"), 10**9), "this code")
 
 
-def granted(
+def context(
     cancel: Callable[[], bool] = lambda: False,
     memory: int = 2**40,
     fields: FieldCache | None = None,
 ) -> ExecutionContext:
-    """Return a grant that nobody reads the progress of, by default with no field known."""
-    known = new_fields() if fields is None else fields
-    return ExecutionContext(cancel, lambda _: None, known, memory, 10**7, 10**7)
+    """Return what a query needs to run in this process, by default with an empty cache."""
+    fields = field_cache() if fields is None else fields
+    return ExecutionContext(cancel, lambda _: None, fields, memory, 10**7, 10**7)
 
 
 def stored_mesh(client: TestClient, mesh_id: str) -> gc.TriangleMesh:

@@ -1,6 +1,5 @@
 """Fields are kept between questions, and no answer tells whether its own was."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,11 +8,9 @@ import pytest
 
 import geodesic_core as gc
 from app.encoding import Representation, encode
-from app.engine.worker import Signals, Worker
 from app.queries import DistancesQuery, FieldCache, IsolinesQuery, PathsQuery
 from app.store.meshes import OpenMesh
-from tests.service.test_engine import asked, config
-from tests.support.service import granted, new_fields, store_mesh
+from tests.support.service import context, field_cache
 
 APPROXIMATE = {"method": "approximate", "relative_error": 0.01}
 
@@ -25,7 +22,7 @@ def opened() -> OpenMesh:
 
 def ask(opened: OpenMesh, fields: FieldCache, kind: Any, **body: Any) -> bytes:
     query = kind("id", kind.normalized(kind.model(**body)))
-    answer = query.answer(opened, granted(fields=fields))
+    answer = query.answer(opened, context(fields=fields))
     return b"".join(encode(answer, Representation("application/json")).parts)
 
 
@@ -37,7 +34,7 @@ TARGETS = [{"vertex": vertex} for vertex in (5, 400, 901)]
 def test_paths_after_distances_need_no_sweep(
     opened: OpenMesh, sweeps: list[int], accuracy: dict[str, Any]
 ) -> None:
-    fields = new_fields()
+    fields = field_cache()
     source = {"vertex": 3}
     ask(opened, fields, DistancesQuery, sources=[source], **accuracy)
     assert len(sweeps) == 1
@@ -46,7 +43,7 @@ def test_paths_after_distances_need_no_sweep(
 
     assert len(sweeps) == 1
     assert found == ask(
-        opened, new_fields(1), PathsQuery, source=source, targets=TARGETS, **accuracy
+        opened, field_cache(1), PathsQuery, source=source, targets=TARGETS, **accuracy
     ), "the same as without"
     assert len(sweeps) == 2
 
@@ -67,16 +64,16 @@ def test_an_answer_is_the_same_of_a_field_that_was_kept(
     body = orjson.loads(orjson.dumps(body))
     for target in body.get("targets", []):
         target.pop("start_distance", None)
-    fields = new_fields()
+    fields = field_cache()
     ask(opened, fields, DistancesQuery, sources=SOURCES, **accuracy)
 
     first, again = (ask(opened, fields, kind, **body, **accuracy) for _ in range(2))
 
-    assert first == again == ask(opened, new_fields(1), kind, **body, **accuracy)
+    assert first == again == ask(opened, field_cache(1), kind, **body, **accuracy)
 
 
 def test_what_is_asked_otherwise_is_another_field(opened: OpenMesh, sweeps: list[int]) -> None:
-    fields = new_fields()
+    fields = field_cache()
     different: list[dict[str, Any]] = [
         {"sources": [{"vertex": 3}]},
         {"sources": [{"vertex": 4}]},
@@ -100,7 +97,7 @@ def test_what_is_asked_otherwise_is_another_field(opened: OpenMesh, sweeps: list
 
 
 def test_spellings_of_one_point_are_one_field(opened: OpenMesh, sweeps: list[int]) -> None:
-    fields = new_fields()
+    fields = field_cache()
     mesh = opened.mesh
     face = int(np.flatnonzero((mesh.faces == 3).any(axis=1))[0])
     weights = (mesh.faces[face] == 3).astype(float).tolist()
@@ -117,7 +114,7 @@ def test_spellings_of_one_point_are_one_field(opened: OpenMesh, sweeps: list[int
 def test_fields_go_when_there_is_no_more_room(opened: OpenMesh, sweeps: list[int]) -> None:
     one = gc.exact_distance(opened.mesh, 0).nbytes
     sweeps.clear()
-    fields = new_fields(2 * one)
+    fields = field_cache(2 * one)
     for vertex in (0, 1, 0, 2, 0, 1):
         ask(opened, fields, DistancesQuery, sources=[{"vertex": vertex}])
         assert fields.nbytes <= 2 * one
@@ -150,18 +147,3 @@ def test_questions_about_one_field_go_to_one_worker() -> None:
     for other in ({"vertex": 4}, {"vertex": 3, "start_distance": 1.0}):
         assert affinity_keys(DistancesQuery, sources=[other])[0] != about[0]
     assert affinity_keys(DistancesQuery, sources=[{"vertex": 3}], **APPROXIMATE)[0] != about[0]
-
-
-def test_a_worker_drops_fields_with_their_mesh(tmp_path: Path) -> None:
-    meshes = [gc.TriangleMesh(*gc.samples.plane(faces)) for faces in (200, 300)]
-    settings = config(tmp_path, worker_mesh_bytes=meshes[1].nbytes + 1, worker_field_bytes=10**6)
-    state = Worker(settings, Signals())
-    ids = [store_mesh(tmp_path, mesh) for mesh in meshes]
-    for mesh_id in ids:
-        query = asked(mesh_id)
-        opened = state._open(query)
-        query.answer(opened, granted(fields=state.fields))
-
-    assert [name for (name, _), _ in state.fields._fields] == [ids[1]]
-    state._forget_all()
-    assert state.fields.nbytes == 0
