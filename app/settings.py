@@ -30,7 +30,7 @@ def available_cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _memory() -> int:
+def available_memory() -> int:
     """Return the bytes of memory of this machine, or of its container if fewer."""
     physical = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     limit = Path("/sys/fs/cgroup/memory.max")
@@ -40,7 +40,7 @@ def _memory() -> int:
 
 def _worker_memory(data: dict[str, Any]) -> int:
     # The rest is for the API process, the disk cache and other programs.
-    return max(GIB, _memory() * 4 // 5 // int(data["workers"]))
+    return max(GIB, available_memory() * 4 // 5 // int(data["workers"]))
 
 
 def _query_bytes(data: dict[str, Any]) -> int:

@@ -1,18 +1,14 @@
 """Every code of the error table, met by a client of a service that runs."""
 
-import errno
 import os
 import signal
-import socket
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-import orjson
 import pytest
 from starlette.routing import compile_path
 from starlette.testclient import TestClient
@@ -20,8 +16,10 @@ from starlette.testclient import TestClient
 from app.errors import CODES
 from app.main import create_app
 from app.settings import Settings
-from tests.support.processes import Server, stopped
+from tests.support.disks import fill_disk
+from tests.support.processes import stopped
 from tests.support.service import (
+    SLOW_FACES,
     TWO_TRIANGLES,
     ServiceClient,
     check_problem,
@@ -42,13 +40,14 @@ class Site:
         client.headers.update(ALICE)
         self.client, self.store = client, store
         self.small = upload_sample(client, "plane", 200)
-        self.slow = upload_sample(client, "sphere", 300_000)
-        self._starts = count(1)
+        self.slow = upload_sample(client, "sphere", SLOW_FACES)
+        self.start_distances = count(1)
         self.patch = pytest.MonkeyPatch()
 
     def ask(self, mesh_id: str, headers: Any = None, **body: Any) -> Any:
-        """Ask for distances that nobody has asked for before."""
-        body.setdefault("sources", [{"vertex": 0, "start_distance": next(self._starts)}])
+        """Ask for distances that were not asked for before."""
+        source = {"vertex": 0, "start_distance": next(self.start_distances)}
+        body.setdefault("sources", [source])
         return self.client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
 
     def send(self, content: str, media_type: str = "application/json") -> Any:
@@ -91,7 +90,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         "max_sources": 2,
         "query_memory_bytes": 50_000_000,
         "cancel_grace_s": LONG_S,
-        "deadline_s": LONG_S,
     }
     with serving(store, **limits) as client:
         yield Site(client, store)
@@ -109,8 +107,9 @@ def dismissed(site: Site) -> Any:
 
 
 def too_large(site: Site) -> Any:
-    mesh_id = upload_sample(site.client, "sphere", 600_000)
-    return site.ask(mesh_id, targets=TARGET)
+    mesh_id = upload_sample(site.client, "knot", 30_000)
+    lines = {"sources": [{"vertex": 0}], "count": 500}  # windows are kept for each level
+    return site.client.post(f"/v1/meshes/{mesh_id}/isolines", json=lines)
 
 
 def limited(site: Site) -> Any:
@@ -154,10 +153,7 @@ def damaged(site: Site) -> Any:
 
 
 def no_disk(site: Site) -> Any:
-    async def write(*_: Any) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    site.patch.setattr("app.http.uploads._write", write)
+    fill_disk(site.patch, "upload")
     return site.client.post("/v1/meshes", json=TWO_TRIANGLES)
 
 
@@ -172,41 +168,10 @@ def late(site: Site) -> Any:
 
 
 def draining(site: Site) -> Any:
-    """Tell a service to stop while it works, and then end a query that had begun to arrive."""
-    server = Server(site.store / "process", GEODESIC_DRAIN_S=str(LONG_S))
-    try:
-        small = upload_sample(server.client, "plane", 200)
-        link, body = f"/v1/meshes/{small}/distances", b'{"sources": [{"vertex": 0}]}'
-        head = (
-            f"POST {link} HTTP/1.1\r\nHost: x\r\n"
-            f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
-        )
-        with (
-            socket.create_connection(server.address) as arriving,
-            stopped(server.both_workers()),
-            server.begin_query(small),
-        ):
-            arriving.sendall(head.encode() + body[:9])
-            wait_until(server.listens)
-            server.process.send_signal(signal.SIGTERM)
-            wait_until(lambda: not server.listens())
-            arriving.sendall(body[9:])
-            return response_of(arriving, link)
-    finally:
-        server.close()
-
-
-def response_of(connection: socket.socket, path: str) -> Any:
-    head, _, body = b"".join(iter(lambda: connection.recv(65536), b"")).partition(b"\r\n\r\n")
-    lines = head.decode().split("\r\n")
-    return SimpleNamespace(
-        status_code=int(lines[0].split()[1]),
-        headers={name.lower(): value for name, value in (line.split(": ") for line in lines[1:])},
-        text=body.decode(),
-        json=lambda: orjson.loads(body),
-        url=SimpleNamespace(path=path),
-        request=SimpleNamespace(method="POST"),
-    )
+    app = create_app(Settings(store=site.store / "other", workers=1))
+    with TestClient(app) as client:
+        app.state.service.drain()
+        return client.post("/v1/meshes", json=TWO_TRIANGLES)
 
 
 MANY = [{"vertex": 0}] * 3

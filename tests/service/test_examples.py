@@ -5,6 +5,7 @@ import re
 from base64 import b64decode
 from collections.abc import Iterator, Mapping
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -73,10 +74,11 @@ def test_every_operation_has_an_example_that_succeeds() -> None:
 
 
 def test_an_example_of_a_parameter_that_is_not_there_is_refused(
-    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     example = {"a": {"summary": "a", "parameters": {"colour": 1}, "response": {"status": 200}}}
-    monkeypatch.setattr("app.http.openapi._examples", lambda _: example)
+    (tmp_path / "getAbout.json").write_text(json.dumps(example))
+    monkeypatch.setattr("app.http.openapi.EXAMPLES", tmp_path)
     about = {"operationId": "getAbout", "responses": {"200": {"description": "well"}}}
     document = {"paths": {"/v1": {"get": about}}, "components": {"schemas": {}}}
 

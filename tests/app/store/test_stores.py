@@ -307,4 +307,7 @@ def test_what_gets_no_files_is_given_back(roomy: ResultStore, tmp_path: Path) ->
 
     with pytest.raises(FileExistsError):
         anyio.run(roomy.with_files, taken)
-    assert not roomy._in_use
+    (tmp_path / "results" / "m").unlink()
+    assert find(roomy, "m/a") is not None
+    roomy.forget_mesh("m")
+    assert find(roomy, "m/a") is None, "what is in use would stay"
