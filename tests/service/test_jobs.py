@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from datetime import datetime, timedelta, tzinfo
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -36,19 +37,25 @@ def small(one: ServiceClient) -> str:
 
 
 @pytest.fixture(scope="module")
+def medium(one: ServiceClient) -> str:
+    """The id of a mesh on which distances take a few tenths of a second."""
+    return upload_sample(one, "sphere", 80_000)
+
+
+@pytest.fixture(scope="module")
 def slow(one: ServiceClient) -> str:
     return upload_sample(one, "sphere", SLOW_FACES)
 
 
 @pytest.fixture
-def _held(one: ServiceClient) -> Iterator[None]:
+def held_workers(one: ServiceClient) -> Iterator[None]:
     """Workers that get no further; what they have been given is running all the same."""
     with stopped(one.workers()):
         yield
 
 
 @pytest.fixture(autouse=True)
-def _stop_what_runs(one: ServiceClient) -> Iterator[None]:
+def dismiss_what_runs(one: ServiceClient) -> Iterator[None]:
     yield
     for job in one.get("/v1/jobs").json()["jobs"]:
         if job["finished"] is None:
@@ -56,12 +63,12 @@ def _stop_what_runs(one: ServiceClient) -> Iterator[None]:
     one.wait_until_idle()
 
 
-_starts = count()
+start_distances = count()
 
 
 def submit(client: TestClient, mesh_id: str, headers: Any = (), **body: Any) -> Any:
-    """Ask for what nobody has asked for before."""
-    body = {"sources": [{"vertex": 0, "start_distance": next(_starts)}]} | body
+    """Submit a query that was not asked before."""
+    body = {"sources": [{"vertex": 0, "start_distance": next(start_distances)}]} | body
     headers = {**ASYNC, **dict(headers)}
     return client.post(f"/v1/meshes/{mesh_id}/distances", json=body, headers=headers)
 
@@ -78,8 +85,8 @@ def wait_for(client: TestClient, job: str, status: str) -> dict[str, Any]:
 
 
 def test_a_job_from_its_beginning_to_its_end(one: ServiceClient, small: str) -> None:
-    asked = {"sources": [{"vertex": 5}], "targets": [{"vertex": 9}]}
-    response = one.post(f"/v1/meshes/{small}/distances", json=asked, headers=ASYNC)
+    body = {"sources": [{"vertex": 5}], "targets": [{"vertex": 9}]}
+    response = one.post(f"/v1/meshes/{small}/distances", json=body, headers=ASYNC)
 
     assert response.headers["preference-applied"] == "respond-async"
     assert response.headers["location"] == job_of(response)
@@ -90,7 +97,7 @@ def test_a_job_from_its_beginning_to_its_end(one: ServiceClient, small: str) -> 
     assert "problem" not in job
     answer = one.get(job["links"]["results"])
     assert answer.status_code == 200
-    assert answer.json() == one.post(f"/v1/meshes/{small}/distances", json=asked).json()
+    assert answer.json() == one.post(f"/v1/meshes/{small}/distances", json=body).json()
 
 
 def test_every_query_can_be_a_job(one: ServiceClient, small: str) -> None:
@@ -126,7 +133,7 @@ def test_a_job_answers_in_the_format_that_was_asked_for(one: ServiceClient, smal
     assert again.status_code == 304
 
 
-def test_what_is_wrong_is_told_at_once(one: ServiceClient, small: str) -> None:
+def test_a_wrong_query_is_refused_at_once(one: ServiceClient, small: str) -> None:
     check_problem(submit(one, small, sources=[{"vertex": 10**6}]), 422, "invalid_point")
     check_problem(submit(one, "0" * 32), 404, "mesh_not_found")
 
@@ -141,7 +148,7 @@ def test_a_failed_job_answers_with_its_own_problem(one: ServiceClient, small: st
     assert problem["errors"] == document["problem"]["errors"]
 
 
-@pytest.mark.usefixtures("_held")
+@pytest.mark.usefixtures("held_workers")
 def test_an_answer_that_is_not_there_yet(one: ServiceClient, small: str) -> None:
     job = job_of(submit(one, small))
 
@@ -150,11 +157,15 @@ def test_an_answer_that_is_not_there_yet(one: ServiceClient, small: str) -> None
     assert int(response.headers["retry-after"]) > 0
 
 
-def test_progress_never_falls(one: ServiceClient, slow: str) -> None:
-    job = job_of(submit(one, slow))
-    seen = [one.get(job).json()]
-    while seen[-1]["finished"] is None:
+def test_progress_never_falls(one: ServiceClient, medium: str) -> None:
+    job = job_of(submit(one, medium))
+    seen: list[dict[str, Any]] = []
+
+    def has_finished() -> bool:
         seen.append(one.get(job).json())
+        return seen[-1]["finished"] is not None
+
+    wait_until(has_finished)
 
     shares = [document["progress"] for document in seen]
     assert shares == sorted(shares)
@@ -218,7 +229,7 @@ def test_one_key_is_one_job(one: ServiceClient, small: str) -> None:
     assert job_of(submit(one, small, {"Idempotency-Key": "k2"}, **body)) != job
 
 
-@pytest.mark.usefixtures("_held")
+@pytest.mark.usefixtures("held_workers")
 def test_the_key_of_a_dismissed_job_can_be_sent_again(one: ServiceClient, small: str) -> None:
     body = {"sources": [{"vertex": 3}]}
     job = job_of(submit(one, small, {"Idempotency-Key": "k3"}, **body))
@@ -227,16 +238,16 @@ def test_the_key_of_a_dismissed_job_can_be_sent_again(one: ServiceClient, small:
     assert job_of(submit(one, small, {"Idempotency-Key": "k3"}, **body)) != job
 
 
-@pytest.mark.usefixtures("_held")
-def test_a_full_queue_takes_no_jobs(one: ServiceClient, slow: str) -> None:
-    jobs = [job_of(submit(one, slow)) for _ in range(5)]
+@pytest.mark.usefixtures("held_workers")
+def test_a_full_queue_takes_no_jobs(one: ServiceClient, medium: str) -> None:
+    jobs = [job_of(submit(one, medium)) for _ in range(5)]
     assert one.get(jobs[-1]).json()["status"] == "accepted"
 
-    response = submit(one, slow)
+    response = submit(one, medium)
     check_problem(response, 503, "queue_full")
     assert int(response.headers["retry-after"]) > 0
     one.delete(jobs[-1])
-    job_of(submit(one, slow))
+    job_of(submit(one, medium))
 
 
 def events_of(client: TestClient, job: str, **headers: str) -> list[tuple[int, dict[str, Any]]]:
@@ -253,8 +264,8 @@ def events_of(client: TestClient, job: str, **headers: str) -> list[tuple[int, d
     return found
 
 
-def test_events_lead_to_the_end(one: ServiceClient, slow: str) -> None:
-    job = job_of(submit(one, slow))
+def test_events_lead_to_the_end(one: ServiceClient, medium: str) -> None:
+    job = job_of(submit(one, medium))
     events = events_of(one, job)
 
     ids = [number for number, _ in events]
@@ -273,12 +284,14 @@ def test_events_go_on_where_a_client_left(one: ServiceClient, small: str) -> Non
     assert events_of(one, job, **{"Last-Event-ID": "none of ours"}) == [(last, document)]
 
 
-def test_a_job_is_one_computation_with_who_waits(one: ServiceClient, slow: str) -> None:
+def test_a_client_that_waits_shares_the_computation_of_a_job(
+    one: ServiceClient, medium: str
+) -> None:
     """A client that waits for what a job computes gets the same, and the job goes on without it."""
     body = {"sources": [{"vertex": 77}], "targets": [{"vertex": 5}]}
-    link = f"/v1/meshes/{slow}/distances"
+    link = f"/v1/meshes/{medium}/distances"
     with stopped(one.workers()):
-        job = job_of(submit(one, slow, **body))
+        job = job_of(submit(one, medium, **body))
         wait_for(one, job, "running")
         response = one.post(link, json=body, headers={"X-Timeout-Ms": "100"})
         check_problem(response, 504, "deadline_exceeded")
@@ -301,11 +314,23 @@ def test_a_job_has_a_deadline_of_its_own(tmp_path: Path) -> None:
         assert (problem["limit"], problem["setting"]) == (0.3, "GEODESIC_JOB_DEADLINE_S")
 
 
-def test_jobs_are_forgotten_after_a_while(tmp_path: Path) -> None:
-    with serving(tmp_path, job_ttl=0.5, results_bytes=1) as client:
+def test_jobs_are_forgotten_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calendar = Calendar()
+    monkeypatch.setattr("app.jobs.manager.datetime", calendar)
+    with serving(tmp_path, job_ttl=0.1, results_bytes=1) as client:
         job = job_of(submit(client, upload_sample(client, "plane", 50)))
         assert wait_for(client, job, "failed")["problem"]["code"] == "storage_full"
+        calendar.days += 1
         wait_until(lambda: client.get(job).status_code == 404)
+
+
+class Calendar:
+    """Shows the time of yesterday, or of some days later."""
+
+    days = -1
+
+    def now(self, zone: tzinfo) -> datetime:
+        return datetime.now(zone) + timedelta(days=self.days)
 
 
 def test_answers_of_jobs_outlive_those_that_are_only_kept(tmp_path: Path) -> None:

@@ -1,15 +1,18 @@
-"""The service as a process of its own: how it ends, and what becomes of clients that leave."""
+"""The service as a process of its own: clients that leave, restarts, and how it ends."""
 
 import os
 import signal
-import socket
 from collections.abc import Iterator
-from pathlib import Path
+from dataclasses import dataclass
+from typing import Any
 
 import pytest
 
 import geodesic_core as gc
-from tests.support.meshes import named_mesh
+from app.settings import MIB
+from app.store.layout import StoreError, owned
+from app.store.meshes import MeshStore
+from tests.support.meshes import named_mesh, real_mesh
 from tests.support.processes import (
     Server,
     are_gone,
@@ -25,23 +28,188 @@ from tests.support.waiting import LONG_S, wait_until
 PATIENT = {"GEODESIC_DRAIN_S": str(10 * LONG_S), "GEODESIC_CANCEL_GRACE_S": str(10 * LONG_S)}
 """What runs at the end, and what is to stop, has longer than any test waits."""
 
+PLY = {"Content-Type": "model/ply"}
+
 ENDED_WELL = (0, -signal.SIGTERM)
 
 
+@pytest.fixture(scope="module")
+def started() -> Iterator[list[Server]]:
+    """The services that were started for these tests, the latest one last."""
+    servers: list[Server] = []
+    yield servers
+    for server in servers:
+        server.close()
+
+
+def latest_server(started: list[Server], stores: pytest.TempPathFactory) -> Server:
+    """Return the latest service, or a new one where that has ended: a start takes 3 s."""
+    if not started or not started[-1].listens():
+        started.append(Server(stores.mktemp("store"), **PATIENT))
+    return started[-1]
+
+
 @pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    server = Server(tmp_path, **PATIENT)
-    yield server
-    server.close()
+def server(started: list[Server], tmp_path_factory: pytest.TempPathFactory) -> Server:
+    """A service that runs: that of the test before, unless it has ended."""
+    return latest_server(started, tmp_path_factory)
 
 
-def test_workers_die_with_their_parent_however_busy(server: Server) -> None:
+# It goes on
+
+
+def test_a_client_that_hangs_up_stops_its_query(server: Server) -> None:
+    cancelled, solved = "geodesic_cancellations_total", 'geodesic_solves_total{kind="distances"}'
     mesh_id = upload_sample(server.client, "sphere", SLOW_FACES)
     workers = server.both_workers()
+    before, metrics = total_time(workers), [server.metric(name) for name in (cancelled, solved)]
 
-    with server.begin_query(mesh_id):
-        server.process.kill()
-        wait_until(lambda: are_gone(workers))
+    with server.begin_query(mesh_id) as connection:
+        wait_until(lambda: total_time(workers) - before > 20e6)  # it has begun
+        with stopped([max(workers, key=lambda pid: processor_time(pid)[10])]):
+            connection.close()
+            wait_until(lambda: server.metric(cancelled) == metrics[0] + 1)
+
+    wait_until(lambda: server.metric('geodesic_workers{state="idle"}') == 2)
+    assert server.metric(solved) == metrics[1]
+    assert server.workers() == workers
+
+
+def test_a_client_that_hangs_up_while_it_uploads(server: Server) -> None:
+    with server.connect("/v1/meshes?format=obj", b"v 0 0 0\n" * 100, leave_out=9):
+        wait_until(lambda: any((server.store / "tmp").iterdir()))
+
+    wait_until(lambda: not any((server.store / "tmp").iterdir()))
+    assert server.listens()
+
+
+def test_a_worker_is_killed_while_it_writes_a_mesh(server: Server) -> None:
+    unfinished, meshes = server.store / "tmp", server.client.get("/v1/meshes").json()
+    workers = server.both_workers()
+
+    with server.connect("/v1/meshes?sample=sphere&faces=400000", b"") as connection:
+        wait_until(lambda: any(unfinished.glob("*/mesh/*")))
+        for pid in workers:
+            os.kill(pid, signal.SIGKILL)
+        answer = connection.recv(20)
+
+    assert answer.startswith(b"HTTP/1.1 500")
+    wait_until(lambda: not any(unfinished.iterdir()))
+    assert server.client.get("/v1/meshes").json() == meshes
+
+
+@pytest.mark.parametrize("name", ["rough_scan", "horse97k.ply"])
+def test_exact_distances_of_a_scan(server: Server, name: str) -> None:
+    mesh = named_mesh(name)
+    if name.endswith(".ply"):
+        upload: dict[str, Any] = {"content": real_mesh(name).read_bytes(), "headers": PLY}
+    else:
+        upload = {"json": {"vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist()}}
+    report = server.client.post("/v1/meshes", **upload).json()
+    assert (report["vertices"], report["faces"]) == (len(mesh.vertices), len(mesh.faces))
+
+    link, query = f"/v1/meshes/{report['id']}", {"sources": [{"vertex": 0}]}
+    answer = server.client.post(f"{link}/distances", json=query).json()
+
+    assert answer["distances"] == gc.exact_distance(mesh, 0).distances.tolist()
+    assert answer["unreachable"] == {"disconnected": 0, "beyond_max_distance": 0}
+    path = server.client.get(f"{link}/path?from=v0&to=v99").json()
+    assert path["length"] == pytest.approx(answer["distances"][99], rel=1e-10)
+
+
+# It starts again
+
+
+ASYNC = {"Prefer": "respond-async"}
+
+
+def submit(server: Server, mesh_id: str, source: int = 0) -> str:
+    query = {"sources": [{"vertex": source}], "targets": [{"vertex": 1}]}
+    response = server.client.post(f"/v1/meshes/{mesh_id}/distances", json=query, headers=ASYNC)
+    assert response.status_code == 202
+    return str(response.headers["location"])
+
+
+def status_of(server: Server, job: str) -> str:
+    return str(server.client.get(job).json()["status"])
+
+
+@dataclass
+class Restart:
+    """What a service was doing when it was killed, and the one that was started on its store."""
+
+    meshes: Any
+    done: str
+    """A job that had finished"""
+    answer: Any
+    lost: str
+    """A job that ran"""
+    server: Server
+
+
+@pytest.fixture(scope="module")
+def restart(started: list[Server], tmp_path_factory: pytest.TempPathFactory) -> Restart:
+    """Kill a service while a body arrives and a job keeps a worker busy, and start another."""
+    first = latest_server(started, tmp_path_factory)
+    small, slow = (
+        upload_sample(first.client, name, faces)
+        for name, faces in (("plane", 200), ("sphere", SLOW_FACES))
+    )
+    meshes = first.client.get("/v1/meshes").json()
+    done = submit(first, small)
+    wait_until(lambda: status_of(first, done) == "successful")
+    answer = first.client.get(f"{done}/results").json()
+    workers = first.both_workers()
+    with first.connect("/v1/meshes?format=obj", b"v 0 0 0\n" * (MIB // 4), leave_out=9):
+        wait_until(lambda: any(first.store.glob("tmp/*/upload")))
+        with pytest.raises(StoreError, match="in use by another process"):
+            owned(first.store).__enter__()
+        lost = submit(first, slow, 5)
+        wait_until(lambda: status_of(first, lost) == "running")
+        first.kill()
+    wait_until(lambda: are_gone(workers))  # however busy they are
+    assert any(first.store.glob("tmp/*/upload"))
+    started.append(Server(first.store, **PATIENT))
+    return Restart(meshes, done, answer, lost, started[-1])
+
+
+def test_a_body_that_arrived_when_the_service_was_killed_is_removed(restart: Restart) -> None:
+    store = restart.server.store
+
+    assert list((store / "tmp").iterdir()) == []
+    assert restart.server.client.get("/v1/meshes").json() == restart.meshes
+    for mesh in restart.meshes["meshes"]:
+        assert list(MeshStore(store).damage(mesh["id"])) == []
+
+
+def test_a_job_that_had_finished_has_its_answer_after_a_restart(restart: Restart) -> None:
+    assert restart.server.client.get(f"{restart.done}/results").json() == restart.answer
+
+
+def test_a_job_that_ran_says_after_a_restart_why_it_failed(restart: Restart) -> None:
+    client = restart.server.client
+
+    job = client.get(restart.lost).json()
+    assert job["status"] == "failed"
+    assert job["problem"]["code"] == "engine_unavailable"
+    assert job["problem"]["hint"] == "send the query again"
+    response = client.get(f"{restart.lost}/results")
+    assert (response.status_code, response.json()["code"]) == (503, "engine_unavailable")
+
+    again = submit(restart.server, job["mesh_id"], 5)
+    wait_until(lambda: status_of(restart.server, again) == "successful")
+
+
+# It ends
+
+
+def test_ends_in_good_order(server: Server) -> None:
+    workers = server.workers()
+
+    server.process.send_signal(signal.SIGTERM)
+
+    assert server.process.wait(LONG_S) in ENDED_WELL
+    assert are_gone(workers)
 
 
 def test_the_process_that_workers_are_forked_from_killed(server: Server) -> None:
@@ -59,104 +227,33 @@ def test_the_process_that_workers_are_forked_from_killed(server: Server) -> None
     assert server.client.get(f"/v1/meshes/{mesh_id}/path?from=v0&to=v9").status_code == 200
 
     server.process.send_signal(signal.SIGTERM)
-    server.process.wait(LONG_S)
-    wait_until(lambda: are_gone({survivor}))
-
-
-def test_a_client_that_hangs_up_stops_its_query(server: Server) -> None:
-    mesh_id = upload_sample(server.client, "sphere", SLOW_FACES)
-    workers = server.both_workers()
-    before = total_time(workers)
-
-    with server.begin_query(mesh_id):
-        wait_until(lambda: total_time(workers) - before > 20e6)  # it has begun
-        os.kill(busiest := max(workers, key=lambda pid: processor_time(pid)[10]), signal.SIGSTOP)
-    wait_until(lambda: "geodesic_cancellations_total 1.0" in server.metrics())
-    os.kill(busiest, signal.SIGCONT)
-
-    wait_until(lambda: 'geodesic_workers{state="idle"} 2.0' in server.metrics())
-    assert 'geodesic_solves_total{kind="distances"} 1.0' not in server.metrics()
-    assert server.workers() == workers
-
-
-def test_a_client_that_hangs_up_while_it_uploads(server: Server, tmp_path: Path) -> None:
-    with socket.create_connection(server.address) as connection:
-        connection.sendall(
-            b"POST /v1/meshes?format=obj HTTP/1.1\r\nHost: x\r\nContent-Length: 1000\r\n\r\nv 0 0 0"
-        )
-        wait_until(lambda: any((tmp_path / "tmp").iterdir()))
-
-    wait_until(lambda: not any((tmp_path / "tmp").iterdir()))
-    assert server.listens()
-
-
-def test_ends_in_good_order(server: Server) -> None:
-    workers = server.workers()
-
-    server.process.send_signal(signal.SIGTERM)
-
     assert server.process.wait(LONG_S) in ENDED_WELL
-    assert are_gone(workers)
+    wait_until(lambda: are_gone({survivor}))
 
 
 def test_what_runs_when_the_service_is_to_stop_ends_well_and_all_else_is_refused(
     server: Server,
 ) -> None:
     mesh_id = upload_sample(server.client, "plane", 200)
-    with stopped(server.both_workers()):
+    link, body = f"/v1/meshes/{mesh_id}/distances", b'{"sources": [{"vertex": 3}]}'
+    with server.connect(link, body, leave_out=9) as arriving, stopped(server.both_workers()):
         running = server.begin_query(mesh_id)
         server.process.send_signal(signal.SIGTERM)
         wait_until(lambda: not server.listens())
+        arriving.sendall(body[-9:])
+        refusal = b"".join(iter(lambda: arriving.recv(65536), b""))
         assert server.process.poll() is None
 
+    assert refusal.startswith(b"HTTP/1.1 503")
+    assert b'"code":"draining"' in refusal
     with running:
         assert running.recv(20).startswith(b"HTTP/1.1 200")
     assert server.process.wait(LONG_S) in ENDED_WELL
 
 
-ASYNC = {"Prefer": "respond-async"}
-
-
-def submit(server: Server, mesh_id: str, source: int = 0) -> str:
-    query = {"sources": [{"vertex": source}], "targets": [{"vertex": 1}]}
-    asked = server.client.post(f"/v1/meshes/{mesh_id}/distances", json=query, headers=ASYNC)
-    assert asked.status_code == 202
-    return str(asked.headers["location"])
-
-
-def status_of(server: Server, job: str) -> str:
-    return str(server.client.get(job).json()["status"])
-
-
-def test_jobs_survive_a_restart(tmp_path: Path) -> None:
-    """One that had finished has its answer still, one that ran says why it failed."""
-    first = Server(tmp_path)
-    mesh_id = upload_sample(first.client, "plane", 200)
-    done = submit(first, mesh_id)
-    wait_until(lambda: status_of(first, done) == "successful")
-    answer = first.client.get(f"{done}/results").json()
-    with stopped(first.both_workers()):
-        lost = submit(first, mesh_id, 5)
-        wait_until(lambda: status_of(first, lost) == "running")
-        first.process.kill()
-        first.close()
-
-    second = Server(tmp_path)
-    try:
-        assert second.client.get(f"{done}/results").json() == answer
-        job = second.client.get(lost).json()
-        assert job["status"] == "failed"
-        assert job["problem"]["code"] == "engine_unavailable"
-        assert job["problem"]["hint"] == "send the query again"
-        response = second.client.get(f"{lost}/results")
-        assert (response.status_code, response.json()["code"]) == (503, "engine_unavailable")
-        again = submit(second, mesh_id, 5)
-        wait_until(lambda: status_of(second, again) == "successful")
-    finally:
-        second.close()
-
-
-def test_who_watches_a_job_does_not_keep_the_service_from_stopping(server: Server) -> None:
+def test_a_client_that_watches_a_job_does_not_keep_the_service_from_stopping(
+    server: Server,
+) -> None:
     mesh_id = upload_sample(server.client, "plane", 200)
     with stopped(server.both_workers()):
         job = submit(server, mesh_id)
@@ -167,19 +264,3 @@ def test_who_watches_a_job_does_not_keep_the_service_from_stopping(server: Serve
 
             assert server.process.wait(LONG_S) in ENDED_WELL
             assert not any('"status": "failed"' in line for line in lines), "it is still to be told"
-
-
-@pytest.mark.parametrize("name", ["rough_scan", "horse97k.ply"])
-def test_exact_distances_of_a_scan(server: Server, name: str) -> None:
-    mesh = named_mesh(name)
-    arrays = {"vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist()}
-    report = server.client.post("/v1/meshes", json=arrays).json()
-    assert (report["vertices"], report["faces"]) == (len(mesh.vertices), len(mesh.faces))
-
-    query = {"sources": [{"vertex": 0}]}
-    answer = server.client.post(f"/v1/meshes/{report['id']}/distances", json=query).json()
-
-    assert answer["distances"] == gc.exact_distance(mesh, 0).distances.tolist()
-    assert answer["unreachable"] == {"disconnected": 0, "beyond_max_distance": 0}
-    path = server.client.get(f"/v1/meshes/{report['id']}/path?from=v0&to=v99").json()
-    assert path["length"] == pytest.approx(answer["distances"][99], rel=1e-10)

@@ -27,9 +27,11 @@ def test_listens_before_it_is_ready(tmp_path, monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(Slot, "open", open_later)
     with TestClient(create_app(Settings(store=tmp_path, workers=1))) as client:
-        assert client.get("/livez").json() == {"status": "ok"}
-        response = client.get("/readyz")
-        check_problem(response, 503, "engine_unavailable")
-        assert response.headers["retry-after"] == "1"
-        may_start.set()
+        try:
+            assert client.get("/livez").json() == {"status": "ok"}
+            response = client.get("/readyz")
+            check_problem(response, 503, "engine_unavailable")
+            assert response.headers["retry-after"] == "1"
+        finally:
+            may_start.set()
         wait_until(lambda: is_ready(client))

@@ -26,7 +26,9 @@ class Server:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
-        own = {"GEODESIC_STORE": str(store), "GEODESIC_WORKERS": "1", **settings}
+        self.store = store
+        own = {"GEODESIC_STORE": str(store), "GEODESIC_WORKERS": "1"}
+        own |= {"GEODESIC_DEADLINE_S": str(LONG_S)} | settings
         self.process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
             [*COMMAND_LINE, "serve", "--port", str(port)], env=os.environ | own, cwd=ROOT
         )
@@ -51,6 +53,11 @@ class Server:
     def metrics(self) -> list[str]:
         return self.client.get("/metrics").text.splitlines()
 
+    def metric(self, name: str) -> float:
+        """Return the value of a metric, with its labels as they are written; 0 without one."""
+        values = (line.rpartition(" ") for line in self.metrics())
+        return next((float(value) for found, _, value in values if found == name), 0.0)
+
     def workers(self) -> set[int]:
         return workers_of(self.process.pid)
 
@@ -58,24 +65,33 @@ class Server:
         wait_until(lambda: len(self.workers()) == 2)
         return self.workers()
 
-    def begin_query(self, mesh_id: str) -> socket.socket:
-        """Ask for distances; wait until a worker has been given the query, not for the answer."""
-        body = b'{"sources": [{"vertex": 0}], "targets": [{"vertex": 1}]}'
+    def connect(self, path: str, body: bytes, *, leave_out: int = 0) -> socket.socket:
+        """Post a JSON body on a connection of its own, but for the last bytes; await no answer."""
         head = (
-            f"POST /v1/meshes/{mesh_id}/distances HTTP/1.1\r\nHost: x\r\n"
+            f"POST {path} HTTP/1.1\r\nHost: x\r\n"
             f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
         )
         connection = socket.create_connection(self.address)
-        connection.sendall(head.encode() + body)
-        wait_until(lambda: 'geodesic_workers{state="busy"} 1.0' in self.metrics())
+        connection.sendall(head.encode() + body[: len(body) - leave_out])
         return connection
+
+    def begin_query(self, mesh_id: str) -> socket.socket:
+        """Ask for distances; wait until a worker has been given the query, not for the answer."""
+        body = b'{"sources": [{"vertex": 0}], "targets": [{"vertex": 1}]}'
+        connection = self.connect(f"/v1/meshes/{mesh_id}/distances", body)
+        wait_until(lambda: self.metric('geodesic_workers{state="busy"}') == 1)
+        return connection
+
+    def kill(self) -> None:
+        """Kill the process, and wait until it is gone."""
+        self.process.kill()
+        self.process.wait()
 
     def close(self) -> None:
         """Kill the process, where it has not ended by itself."""
         self.client.close()
         if self.process.poll() is None:
-            self.process.kill()
-        self.process.wait()
+            self.kill()
 
 
 @contextmanager

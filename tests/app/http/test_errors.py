@@ -70,6 +70,7 @@ def database_error(code: int) -> sqlite3.OperationalError:
         (core.NotConverged("in circles"), "limit_exceeded"),
         (MemoryError(), "memory_limit"),
         (OSError(errno.ENOSPC, "full"), "storage_full"),
+        (OSError(errno.EDQUOT, "no more for you"), "storage_full"),
         (OSError(errno.EIO, "broken"), "internal_error"),
         (database_error(sqlite3.SQLITE_FULL), "storage_full"),
         (database_error(sqlite3.SQLITE_BUSY), "internal_error"),
