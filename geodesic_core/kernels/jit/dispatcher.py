@@ -28,6 +28,9 @@ _OPTIONS: dict[str, Any] = {
     "fastmath": False,
 }
 
+compiled_here: list[str] = []
+"""Kernels that this process compiled, in order, for it found them nowhere."""
+
 
 class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]
     """Compile kernels: those that Python calls with all their parts, unless they are on disk."""
@@ -49,6 +52,7 @@ class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]
                 if compiled is None:
                     with self._whole():
                         compiled = super().compile(args, return_type)
+                    compiled_here.append(stored.file_name)
                     stored.save(compiled)
         return compiled
 

@@ -1,0 +1,73 @@
+"""One question of each kind, asked of the installed library: ``python each_kind.py``.
+
+It ends with an error where one is not answered, or where a kernel had to be compiled.
+"""
+
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import geodesic_core as gc
+from geodesic_core.kernels.jit.dispatcher import compiled_here
+
+MESH = gc.TriangleMesh(*gc.samples.terrain(2000))
+LAST = len(MESH.vertices) - 1
+POINT = gc.SurfacePoint.face(3, (0.2, 0.3, 0.5))
+ON_EDGE = MESH.point_on_edge(*MESH.faces[7, :2].tolist(), 0.4)
+CURVE = gc.Curve(MESH.faces[0, :2].tolist())
+
+
+def read() -> object:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "mesh.obj")
+        lines = [f"v {x} {y} {z}" for x, y, z in MESH.vertices.tolist()]
+        lines += [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in MESH.faces.tolist()]
+        path.write_text("\n".join(lines))
+        return gc.load_mesh(path).report
+
+
+def irregular() -> object:
+    """Three faces at one edge."""
+    vertices = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1)]
+    mesh = gc.TriangleMesh(vertices, [(0, 1, 2), (1, 0, 3), (0, 1, 4)])
+    return gc.exact_distance(mesh, 2).path_to(3)
+
+
+QUESTIONS: dict[str, Callable[[], object]] = {
+    "exact": lambda: gc.exact_distance(MESH, 0),
+    "path of a field": lambda: gc.exact_distance(MESH, [0, POINT]).path_to(LAST),
+    "path to a point": lambda: gc.exact_distance(MESH, ON_EDGE, targets=[POINT]).path_to(POINT),
+    "distance at a point": lambda: gc.exact_distance(MESH, 0).distance_at(POINT),
+    "windows": lambda: gc.exact_distance(MESH, 0, retain="windows").distance_at(POINT),
+    "gradient": lambda: gc.exact_distance(MESH, 0).gradient,
+    "two points": lambda: gc.shortest_path(MESH, POINT, LAST, explain=True),
+    "waypoints": lambda: gc.Solver(MESH).shortest_path(0, LAST, [ON_EDGE]),
+    "approximate": lambda: gc.approximate_distance(MESH, 0),
+    "approximate path": lambda: gc.approximate_distance(MESH, POINT).path_to(LAST),
+    "isolines": lambda: gc.exact_distance(MESH, 0).isolines([0.1, 0.2]),
+    "approximate isolines": lambda: gc.approximate_distance(MESH, 0).isolines([0.1]),
+    "curve": lambda: gc.exact_distance(MESH, CURVE).path_to(LAST),
+    "isolines of a curve": lambda: gc.exact_distance(MESH, CURVE).isolines([0.1]),
+    "approximate curve": lambda: gc.approximate_distance(MESH, CURVE).path_to(LAST),
+    "barriers": lambda: gc.exact_distance(MESH, LAST, barriers=[0, 1]).path_to(LAST // 2),
+    "limit": lambda: gc.exact_distance(MESH, 0, max_distance=0.3),
+    "matrix": lambda: gc.distance_matrix(MESH, [0, POINT], [LAST]),
+    "nearest": lambda: gc.nearest(MESH, 0, [5, LAST], k=2),
+    "file and report": read,
+    "irregular edge": irregular,
+}
+
+
+def main() -> None:
+    for name, ask in QUESTIONS.items():
+        start = time.perf_counter()
+        assert ask() is not None
+        print(f"{time.perf_counter() - start:6.2f} s  {name}")  # noqa: T201 - its output
+    if compiled_here:
+        sys.exit(f"compiled: {compiled_here}")
+
+
+if __name__ == "__main__":
+    main()
