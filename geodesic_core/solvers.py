@@ -5,10 +5,9 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
@@ -27,6 +26,9 @@ from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
 from geodesic_core.validation import as_barriers, as_limit, check_choice, is_number
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Retain = Literal["distances", "paths", "windows"]
 """Contents of a field in memory: each word includes the ones before it."""
@@ -446,7 +448,7 @@ class Solver:
         cancel: Callable[[], bool] | None = None,
         deadline_s: float | None = None,
         memory_limit: int | None = None,
-    ) -> Floats | csr_array:
+    ) -> "Floats | csr_array":
         """Return the exact distances from each source to each target, as `distance_matrix` does.
 
         The memory of one of the threads is reused by the next call.

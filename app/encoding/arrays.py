@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, save_npz
 
 from app.encoding.answer import Answer, Encoded
 from app.encoding.headers import headers_of
@@ -28,6 +27,8 @@ def to_octets(answer: Answer, dtype: str) -> Encoded:
 
 def to_npz(answer: Answer, dtype: str) -> Encoded:
     """Encode a sparse matrix as `scipy.sparse.load_npz` reads it."""
+    from scipy.sparse import coo_array, save_npz
+
     _, rows, columns = (answer.members[name] for name in answer.arrays)
     distances = _body(answer, dtype)
     table = coo_array((distances, (rows, columns)), shape=answer.members["shape"]).tocsr()

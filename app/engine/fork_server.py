@@ -1,13 +1,17 @@
 """The fork server: a process that has imported what workers need, and forks them.
 
 Imports take 2 s and a fork 10 ms. A fork of the service itself would copy its threads' locks.
+What the library and the queries import late is imported here too: else each worker would wait for
+it at its first query, and have a copy of its own, which counts against its memory.
 """
 
 import multiprocessing
 from multiprocessing import forkserver
 
+LATE = "igl", "manifold3d", "scipy.sparse", "scipy.spatial", "trimesh.exchange.stl"
+
 CONTEXT = multiprocessing.get_context("forkserver")
-CONTEXT.set_forkserver_preload(["app.engine.worker"])
+CONTEXT.set_forkserver_preload(["app.engine.worker", *LATE])
 
 
 def start() -> None:

@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
-from scipy.spatial.distance import cdist
 
 import geodesic_core as gc
 from app.queries.points import SurfacePoints, components_of, positions_of
@@ -134,6 +132,8 @@ def straight_between(
     max_distance: float | None,
 ) -> NDArray[np.float64]:
     """Return the straight distances (N, M); infinite between components and beyond the limit."""
+    from scipy.spatial.distance import cdist
+
     table: NDArray[np.float64] = cdist(positions_of(mesh, sources), positions_of(mesh, targets))
     table[components_of(mesh, sources)[:, None] != components_of(mesh, targets)] = np.inf
     return _limited(table, max_distance)
@@ -158,6 +158,8 @@ def straight_to_nearest(
     max_distance: float | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the straight distances of targets, or of all vertices, and the nearest sources."""
+    from scipy.spatial import KDTree
+
     ends = mesh.vertices if targets is None else positions_of(mesh, targets)
     components = mesh.components if targets is None else components_of(mesh, targets)
     straight, nearest = KDTree(positions_of(mesh, sources)).query(ends)

@@ -4,11 +4,10 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
 
 import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer
@@ -32,6 +31,9 @@ from app.queries.views import table_of_matrix, table_of_sparse
 from app.schemas.requests import MatrixRequest
 from app.settings import Settings, available_cores
 from app.store.meshes import OpenMesh
+
+if TYPE_CHECKING:
+    from scipy.sparse import coo_array
 
 _CELLS = "cells of the matrix"
 _AT_A_TIME = 2**20
@@ -184,8 +186,10 @@ def _describe_ends(
 
 def _straight_sparse(
     mesh: gc.TriangleMesh, sources: SurfacePoints, targets: SurfacePoints, limit: float | None
-) -> coo_array:
+) -> "coo_array":
     """Return the finite straight distances, computed for some sources at a time."""
+    from scipy.sparse import coo_array
+
     size = max(1, _AT_A_TIME // len(targets))
     rows, columns, values = [], [], []
     for first in range(0, len(sources), size):

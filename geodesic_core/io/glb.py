@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.io.contents import FileContents, note_on_ignored
@@ -27,6 +26,8 @@ def read_glb(data: bytes, max_faces: int | None) -> FileContents:
     TooManyFaces
         There are more faces than ``max_faces``.
     """
+    import trimesh
+
     check_face_count(count_faces(_read_document(data)), max_faces)
     scene = trimesh.load_scene(
         io.BytesIO(data), file_type="glb", process=False, skip_materials=True

@@ -4,7 +4,6 @@ import io
 import re
 
 import numpy as np
-from trimesh.exchange.stl import load_stl
 
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.io.contents import FileContents
@@ -26,6 +25,8 @@ def read_stl(data: bytes, max_faces: int | None) -> FileContents:
     TooManyFaces
         There are more faces than ``max_faces``.
     """
+    from trimesh.exchange.stl import load_stl
+
     triangles = int.from_bytes(data[_HEADER - 4 : _HEADER], "little")
     expected = _HEADER + triangles * _TRIANGLE
     if len(data) == expected:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import igl
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
@@ -15,6 +14,8 @@ class NearestFace:
     """
 
     def __init__(self, vertices: Floats, faces: Ints, surface: Longs) -> None:
+        import igl
+
         self._surface = surface
         self._arrays = vertices, faces[surface].astype(np.int64)
         self._tree: Any = igl.AABB()

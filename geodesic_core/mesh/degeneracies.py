@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from geodesic_core.arrays import Floats, Longs
 
@@ -35,12 +33,19 @@ def edges_of_no_length(vertices: Floats, faces: NDArray[np.integer]) -> Longs:
 
 
 def lowest_joined(vertex_count: int, edges: Longs) -> Longs:
-    """Return for each vertex the lowest that these edges join it to, or itself; O(V + E)."""
-    graph = coo_array((np.ones(len(edges)), tuple(edges.T)), shape=(vertex_count, vertex_count))
-    _, label = connected_components(graph, directed=False)
-    _, lowest = np.unique(label, return_index=True)
-    joined: Longs = lowest[label]
-    return joined
+    """Return for each vertex the lowest that these edges join it to, or itself.
+
+    O((V + E) log V): of the parts that an edge leads out of, half or more end in two rounds.
+    """
+    joined: Longs = np.arange(vertex_count)
+    while True:
+        parts = joined[edges]
+        apart = parts[parts[:, 0] != parts[:, 1]]
+        if len(apart) == 0:
+            return joined
+        np.minimum.at(joined, apart.max(axis=1), apart.min(axis=1))
+        while (joined != joined[joined]).any():
+            joined = joined[joined]
 
 
 def first_equal(rows: NDArray[Any]) -> Longs:

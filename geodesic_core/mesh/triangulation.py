@@ -6,7 +6,6 @@ the very surface that it encloses. Every polygon gives at least one triangle: on
 three different corners gives one that repeats a vertex.
 """
 
-import manifold3d
 import numpy as np
 from numpy.typing import NDArray
 
@@ -119,6 +118,8 @@ def _clipped(flat: Floats) -> list[tuple[int, int, int]]:
     Where corners are in line, manifold3d makes slivers. They take in the triangle beyond their
     longest edge.
     """
+    import manifold3d
+
     cut = manifold3d.triangulate([flat])
     apex: dict[tuple[int, int], int] = {}  # of the triangle on the left of each directed edge
     for triangle in cut.tolist():

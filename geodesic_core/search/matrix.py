@@ -4,10 +4,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
-from scipy.sparse import coo_array, csr_array
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
@@ -20,6 +19,9 @@ from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import available_cores, share_out
 from geodesic_core.tolerances import AT_LIMIT
 from geodesic_core.validation import as_limit, check_choice, is_index
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 Layout = Literal["dense", "sparse", "pairs"]
 
@@ -45,7 +47,7 @@ def distance_matrix(
     cancel: Callable[[], bool] | None = None,
     deadline_s: float | None = None,
     memory_limit: int | None = None,
-) -> Floats | csr_array:
+) -> "Floats | csr_array":
     """Return the exact geodesic distances from each source to each target.
 
     Parameters
@@ -110,7 +112,7 @@ def find_matrix(
     layout: Layout,
     threads: int | None,
     control: Control,
-) -> Floats | csr_array:
+) -> "Floats | csr_array":
     """Do as `distance_matrix` does; the first `TargetSweep` and a `PathSearch` come from makers."""
     limit = as_limit(max_distance)
     check_choice("layout", layout, get_args(Layout))
@@ -261,8 +263,10 @@ class _Sparse(_Grid):
         self._found[source] = targets[near], distances[near]
         self.nbytes += 12 * int(np.count_nonzero(near))
 
-    def result(self) -> csr_array:
+    def result(self) -> "csr_array":
         """Return the matrix."""
+        from scipy.sparse import coo_array
+
         rows = np.repeat(np.arange(self.sweeps), [len(targets) for targets, _ in self._found])
         columns, values = (np.concatenate(parts) for parts in zip(*self._found, strict=True))
         if self.symmetric:

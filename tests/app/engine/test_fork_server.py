@@ -1,0 +1,27 @@
+"""The fork server, and what workers find loaded."""
+
+import ast
+from pathlib import Path
+
+from app.engine.fork_server import LATE
+from tests.support.fresh import told_by
+from tests.support.paths import ROOT
+
+WORK = [ROOT / "geodesic_core", ROOT / "app/encoding", ROOT / "app/queries"]
+
+
+def late_imports(path: Path) -> set[str]:
+    """Return the modules that the functions of a source import."""
+    functions = [
+        node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)
+    ]
+    inner = [node for function in functions for node in ast.walk(function)]
+    plain = {name.name for node in inner if isinstance(node, ast.Import) for name in node.names}
+    return plain | {node.module or "" for node in inner if isinstance(node, ast.ImportFrom)}
+
+
+def test_workers_find_loaded_what_is_imported_late() -> None:
+    wanted = {name for room in WORK for path in room.rglob("*.py") for name in late_imports(path)}
+    assert {"igl", "scipy.sparse"} < wanted
+    modules = ", ".join(["app.engine.worker", *LATE])
+    assert told_by(f"import sys, {modules}; print({wanted!r} - set(sys.modules))") == "set()\n"
