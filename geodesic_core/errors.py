@@ -12,6 +12,7 @@ They form a tree::
     ├── DeadlineExceeded        the time the caller granted is over
     ├── MemoryLimitExceeded     the memory the caller granted does not suffice
     ├── NotConverged            an approximate sweep went in circles
+    ├── MissingExtra            a package is not installed that few calls need; an ImportError too
     └── InternalError           a broken invariant: a defect of this library, please report it
 """
 
@@ -195,6 +196,29 @@ class NotConverged(GeodesicError):  # noqa: N818
     >>> issubclass(gc.errors.NotConverged, gc.GeodesicError)
     True
     """
+
+
+class MissingExtra(GeodesicError, ImportError):  # noqa: N818
+    """A call that needs a package which is not installed, and which an extra brings.
+
+    Parameters
+    ----------
+    call
+        The call.
+    package
+        The package that it needs.
+    extra
+        The extra of this library that brings it.
+
+    Examples
+    --------
+    >>> print(gc.errors.MissingExtra("mesh.locate", "libigl", "locate"))
+    mesh.locate needs libigl: pip install 'geodesic-core[locate]'
+    """
+
+    def __init__(self, call: str, package: str, extra: str) -> None:
+        super().__init__(f"{call} needs {package}: pip install 'geodesic-core[{extra}]'")
+        self.extra = extra
 
 
 class InternalError(GeodesicError):

@@ -467,7 +467,8 @@ class Solver:
 
         Raises
         ------
-        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded,
+        MissingExtra
             As in the function.
 
         Examples

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.extras import extra
 
 
 class NearestFace:
@@ -14,7 +15,8 @@ class NearestFace:
     """
 
     def __init__(self, vertices: Floats, faces: Ints, surface: Longs) -> None:
-        import igl
+        with extra("locate", "libigl", "TriangleMesh.locate"):
+            import igl
 
         self._surface = surface
         self._arrays = vertices, faces[surface].astype(np.int64)

@@ -333,6 +333,8 @@ class TriangleMesh:
             farther away.
         InvalidArgument
             The distance is not a number, 0 or more.
+        MissingExtra
+            libigl is not installed; the extra ``locate`` brings it.
 
         Notes
         -----

@@ -11,6 +11,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, NoPath
+from geodesic_core.extras import extra
 from geodesic_core.fields.sources import as_points, component_of, ends_of
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -77,6 +78,8 @@ def distance_matrix(
     ------
     InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `exact_distance`.
+    MissingExtra
+        The layout is sparse, and SciPy is not installed; the extra ``sparse`` brings it.
 
     Notes
     -----
@@ -253,7 +256,11 @@ class _Sparse(_Grid):
     """The finite distances."""
 
     def __init__(self, *arguments: Any) -> None:
+        with extra("sparse", "SciPy", 'distance_matrix(layout="sparse")'):
+            from scipy.sparse import coo_array
+
         super().__init__(*arguments)
+        self._from_triples = coo_array
         self._found = [(np.empty(0, np.int32), np.empty(0))] * self.sweeps
         self.nbytes = 0
 
@@ -265,8 +272,6 @@ class _Sparse(_Grid):
 
     def result(self) -> "csr_array":
         """Return the matrix."""
-        from scipy.sparse import coo_array
-
         rows = np.repeat(np.arange(self.sweeps), [len(targets) for targets, _ in self._found])
         columns, values = (np.concatenate(parts) for parts in zip(*self._found, strict=True))
         if self.symmetric:
@@ -278,7 +283,7 @@ class _Sparse(_Grid):
             values = np.concatenate([values, values[off]])
         if self.flipped:
             rows, columns = columns, rows
-        return coo_array((values, (rows, columns)), shape=self.shape).tocsr()
+        return self._from_triples((values, (rows, columns)), shape=self.shape).tocsr()
 
 
 class _Pairs:

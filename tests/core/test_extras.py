@@ -1,0 +1,64 @@
+"""Extras: without their packages few calls are refused, and all others answer."""
+
+import pytest
+
+import geodesic_core as gc
+from geodesic_core.errors import MissingExtra
+from geodesic_core.extras import extra
+from tests.support.fresh import told_by
+
+WITHOUT = """
+import sys
+sys.modules["scipy"] = sys.modules["igl"] = None
+import numpy as np
+import geodesic_core as gc
+mesh = gc.TriangleMesh(*gc.samples.plane(8))
+"""
+REFUSED = [
+    (
+        "sparse",
+        "gc.distance_matrix(mesh, [0], [1], layout='sparse')",
+        "distance_matrix(layout=\"sparse\") needs SciPy: pip install 'geodesic-core[sparse]'",
+    ),
+    (
+        "locate",
+        "mesh.locate([0.5, 0.5, 1.0])",
+        "TriangleMesh.locate needs libigl: pip install 'geodesic-core[locate]'",
+    ),
+]
+ANSWERED = """
+field = gc.exact_distance(mesh, 0, retain="windows")
+assert field.path_to(8).length > 0.0
+assert field.isolines([0.1])
+assert gc.approximate_distance(mesh, 0).gradient.shape == mesh.vertices.shape
+assert gc.distance_matrix(mesh, [0, 1], [2, 3]).shape == (2, 2)
+assert gc.nearest(mesh, 0, [1, 8]).indices.tolist() == [0]
+corners = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [3, 1, 0]], float)
+dart = gc.TriangleMesh.from_polygons(corners, [0, 1, 2, 3], [4])
+needle = gc.TriangleMesh(corners[[0, 1, 2, 2]], [[0, 1, 2], [1, 3, 2], [0, 1, 3]])
+assert needle.report.zero_length_edges.count == 1
+import trimesh
+shape = trimesh.Trimesh(corners, dart.faces, process=False)
+for kind in ("stl", "glb"):
+    assert len(gc.load_mesh(trimesh.Scene(shape).export(file_type=kind), kind).faces) == 2
+print("answered")
+"""
+
+
+@pytest.mark.parametrize(("name", "call", "message"), REFUSED, ids=["sparse", "locate"])
+def test_what_is_missing_is_named(name: str, call: str, message: str) -> None:
+    catch = "except gc.errors.MissingExtra as error: print(error, error.extra)"
+    told = told_by(f"{WITHOUT}\ntry: {call}\n{catch}")
+    assert told == f"{message} {name}\n"
+
+
+def test_all_else_needs_no_extras() -> None:
+    assert told_by(WITHOUT + ANSWERED) == "answered\n"
+
+
+def test_a_missing_extra_is_an_import_error_as_well() -> None:
+    with pytest.raises(ImportError) as raised, extra("locate", "libigl", "a call"):
+        import no_such_package  # type: ignore[import-not-found]  # noqa: F401, PLC0415
+    assert isinstance(raised.value, MissingExtra)
+    assert isinstance(raised.value, gc.GeodesicError)
+    assert isinstance(raised.value.__cause__, ModuleNotFoundError)
