@@ -1,4 +1,4 @@
-"""Build the page (``app/web``) with the package, or from a checkout with ``python hatch_build.py``.
+"""Build the page (``app/web``) with the service, or from a checkout with ``python hatch_build.py``.
 
 Arguments name scripts of ``package.json`` to run instead: ``python hatch_build.py lint test``.
 

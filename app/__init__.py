@@ -1,3 +1,3 @@
 """The HTTP service over ``geodesic_core``."""
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"

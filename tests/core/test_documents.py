@@ -12,7 +12,12 @@ from geodesic_core import kernels, tolerances
 from tests.support.paths import ROOT
 
 DOCUMENTS = sorted(
-    [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "benchmarks" / "RESULTS.md"]
+    [
+        *ROOT.glob("*.md"),
+        *(ROOT / "docs").rglob("*.md"),
+        ROOT / "benchmarks" / "RESULTS.md",
+        ROOT / "geodesic_core" / "README.md",
+    ]
 )
 ROOMS = ["", "sweep.", "paths.", "isolines.", "mesh."]
 """Of the kernels, which documents name without their package."""
