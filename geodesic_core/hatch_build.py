@@ -14,6 +14,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 PLATFORM = "manylinux_2_17_x86_64"
 """Compiled kernels call the C library's arithmetic alone, which is older."""
+LEVELS = os.environ.get("GEODESIC_WHEEL_LEVELS", "").split()
 COMPILE = """
 from geodesic_core import compile_kernels
 from geodesic_core.kernels.jit import cache
@@ -25,12 +26,16 @@ print(cache.folder())
 class KernelsHook(BuildHookInterface[Any]):
     """Puts compiled kernels into a wheel."""
 
+    def dependencies(self) -> list[str]:
+        """Return the requirements for compiling: what the library itself requires."""
+        required: list[str] = self.metadata.core.dependencies
+        return required if LEVELS else []
+
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile for each level, and tag the wheel for this Python and platform."""
-        levels = os.environ.get("GEODESIC_WHEEL_LEVELS", "").split()
-        if version == "editable" or not levels:
+        if version == "editable" or self.target_name != "wheel" or not LEVELS:
             return
-        for level in levels:
+        for level in LEVELS:
             folder = compiled(Path(self.root).parent, level)
             place = f"geodesic_core/kernels/precompiled/{folder.parent.name}/{folder.name}"
             for path in sorted([*folder.glob("*.kernel"), *folder.glob("*.all")]):
