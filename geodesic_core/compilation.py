@@ -15,6 +15,7 @@ from geodesic_core import samples
 from geodesic_core.errors import Cancelled, InternalError
 from geodesic_core.kernels.jit import cache, machine, progress
 from geodesic_core.mesh.curve import Curve
+from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.solvers import Solver, approximate_distance, exact_distance
 
@@ -29,9 +30,13 @@ def _curve(mesh: TriangleMesh) -> Curve:
     return Curve(mesh.faces[0, :2].tolist())
 
 
+_INSIDE = SurfacePoint.face(0, (0.2, 0.3, 0.5))
+
+
 def _exact() -> None:
     mesh = _mesh()
-    exact_distance(mesh, 0)
+    exact_distance(mesh, 0, targets=[_INSIDE])
+    exact_distance(mesh, 0, retain="windows").distance_at(_INSIDE)
     mesh.report  # noqa: B018 - computed on access
 
 
@@ -43,7 +48,7 @@ def _paths() -> None:
 
 
 def _approximate() -> None:
-    approximate_distance(_mesh(), 0, retain="paths").path_to(8)
+    approximate_distance(_mesh(), 0, targets=[_INSIDE], retain="paths").path_to(8)
 
 
 def _isolines() -> None:
@@ -52,12 +57,12 @@ def _isolines() -> None:
 
 def _curves() -> None:
     mesh = _mesh()
-    exact_distance(mesh, _curve(mesh)).isolines([0.1])
+    exact_distance(mesh, _curve(mesh), targets=[_INSIDE]).isolines([0.1])
 
 
 def _approximate_curves() -> None:
     mesh = _mesh()
-    approximate_distance(mesh, _curve(mesh))
+    approximate_distance(mesh, _curve(mesh), targets=[_INSIDE])
 
 
 QUESTIONS: dict[str, Callable[[], None]] = {

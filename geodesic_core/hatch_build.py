@@ -37,7 +37,7 @@ class KernelsHook(BuildHookInterface[Any]):
             return
         for level in LEVELS:
             folder = compiled(Path(self.root).parent, level)
-            place = f"geodesic_core/kernels/precompiled/{folder.parent.name}/{folder.name}"
+            place = f"kernels/precompiled/{folder.parent.name}/{folder.name}"
             for path in sorted([*folder.glob("*.kernel"), *folder.glob("*.all")]):
                 build_data["force_include"][str(path)] = f"{place}/{path.name}"
         python = f"cp{sys.version_info.major}{sys.version_info.minor}"

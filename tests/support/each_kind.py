@@ -48,9 +48,12 @@ QUESTIONS: dict[str, Callable[[], object]] = {
     "approximate path": lambda: gc.approximate_distance(MESH, POINT).path_to(LAST),
     "isolines": lambda: gc.exact_distance(MESH, 0).isolines([0.1, 0.2]),
     "approximate isolines": lambda: gc.approximate_distance(MESH, 0).isolines([0.1]),
-    "curve": lambda: gc.exact_distance(MESH, CURVE).path_to(LAST),
+    "approximate targets": lambda: gc.approximate_distance(MESH, 0, targets=[POINT]).path_to(POINT),
+    "curve": lambda: gc.exact_distance(MESH, CURVE, targets=[POINT]).path_to(POINT),
     "isolines of a curve": lambda: gc.exact_distance(MESH, CURVE).isolines([0.1]),
-    "approximate curve": lambda: gc.approximate_distance(MESH, CURVE).path_to(LAST),
+    "approximate curve": lambda: gc.approximate_distance(MESH, CURVE, targets=[POINT]).path_to(
+        POINT
+    ),
     "barriers": lambda: gc.exact_distance(MESH, LAST, barriers=[0, 1]).path_to(LAST // 2),
     "limit": lambda: gc.exact_distance(MESH, 0, max_distance=0.3),
     "matrix": lambda: gc.distance_matrix(MESH, [0, POINT], [LAST]),

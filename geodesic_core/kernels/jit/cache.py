@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from filelock import FileLock
 from numba.core import serialize
 from numba.core.compiler import CompileResult
 
@@ -113,6 +112,8 @@ class StoredKernel:
     def lock(self) -> Iterator[None]:
         """Hold the lock of the kernel, so that one process alone compiles it."""
         if self.is_ours and _is_writable():
+            from filelock import FileLock  # not needed where all is compiled
+
             with FileLock((folder() / self.file_name).with_suffix(".lock")):
                 yield
         else:
