@@ -1,6 +1,7 @@
 """The two distributions of this repository: one version, and each its own folder."""
 
 import re
+import subprocess
 import tomllib
 import zipfile
 from itertools import chain
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 
 from app import __version__
+from geodesic_core.kernels.jit.cache import PRECOMPILED
 from tests.support.fresh import told_by
 from tests.support.paths import ROOT
 
@@ -67,6 +69,23 @@ def test_a_wheel_has_the_sources_of_its_package_and_nothing_else(
     sources.discard("geodesic_core/hatch_build.py")
     examples = {f"app/examples/{path.name}" for path in (ROOT / "openapi/examples").iterdir()}
     assert names == (sources if package == "geodesic_core" else sources | examples)
+
+
+def test_compiled_kernels_lie_in_the_wheel_where_the_library_looks_for_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wheels = pytest.importorskip("hatchling.builders.wheel")
+    level = tmp_path / "digest" / "cp311-x86-64-v3"
+    level.mkdir(parents=True)
+    (level / "sweep.kernel").touch()
+    done = subprocess.CompletedProcess([], 0, f"{level}\n")
+    monkeypatch.setattr(subprocess, "run", lambda *_, **__: done)
+    monkeypatch.setenv("GEODESIC_WHEEL_LEVELS", "x86-64-v3")
+    monkeypatch.delenv("HATCH_BUILD_NO_HOOKS", raising=False)
+    builder = wheels.WheelBuilder(str(LIBRARY))
+    (wheel,) = builder.build(directory=str(tmp_path), versions=["standard"])
+    place = PRECOMPILED.relative_to(ROOT) / level.relative_to(tmp_path) / "sweep.kernel"
+    assert place.as_posix() in zipfile.ZipFile(wheel).namelist()
 
 
 def test_the_example_of_the_library_runs() -> None:
