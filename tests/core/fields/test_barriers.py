@@ -41,6 +41,7 @@ BLOCKABLE = {
 # What distances are ------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.slice(2)
 @pytest.mark.parametrize(
     "cells",
@@ -63,6 +64,7 @@ def test_blocked_cells_of_a_grid(cells):
         np.testing.assert_allclose(field.distances, matrix[source], rtol=EXACT, atol=0)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(2)
 @pytest.mark.jit
 @pytest.mark.parametrize("seed", range(4))

@@ -37,6 +37,7 @@ def with_middles(line):
     return np.vstack([points, 0.5 * (points[1:] + points[:-1])])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1 if WITHOUT_JIT else 4))
 def test_stadiums_around_a_segment(seed):
     rng = np.random.default_rng(seed)
@@ -164,6 +165,7 @@ def test_bands_around_a_box():
     assert end.length == pytest.approx(4 * (2 - 2 * 0.2), rel=1e-11)
 
 
+@pytest.mark.slow
 def test_points_on_a_box_are_at_the_level_by_unfolding():
     size = 3, 2, 2
     mesh = gc.TriangleMesh(*zoo.voxels(list(itertools.product(*map(range, size)))))

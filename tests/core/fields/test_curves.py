@@ -104,6 +104,7 @@ def check_path_from(mesh, path, curve, target, distance):
         assert all(face in holders(mesh, end) for end in ends)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(3)
 @pytest.mark.jit
 @pytest.mark.parametrize("seed", range(12))
@@ -133,6 +134,7 @@ def test_distances_among_obstacles_are_those_of_the_visibility_graph(seed):
         np.testing.assert_allclose(field.distances, expected, rtol=EXACT, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3 if WITHOUT_JIT else 12))
 def test_distances_on_a_plane_are_those_of_segments(seed):
     rng = np.random.default_rng(seed)
@@ -177,6 +179,7 @@ def test_distances_on_a_plane_are_those_of_segments(seed):
     np.testing.assert_allclose(later[0].gradient, away, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(3)
 @pytest.mark.parametrize("seed", range(2 if WITHOUT_JIT else 8))
 def test_distances_on_a_box_are_least_over_the_curve(seed):

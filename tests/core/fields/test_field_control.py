@@ -101,6 +101,7 @@ def test_progress_grows(mesh, name, call):
         assert np.diff(seen).max() < 0.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "call"), LONG)
 def test_cancel_stops_wherever_it_is_asked(mesh, name, call):
     field = FIELDS[name](mesh)
@@ -115,6 +116,7 @@ def test_cancel_stops_wherever_it_is_asked(mesh, name, call):
     assert flat(CALLS[call](field)) == expected
 
 
+@pytest.mark.slice(30)
 @pytest.mark.parametrize(
     ("watch", "error"),
     [({"deadline_s": 1e-9}, DeadlineExceeded), ({"memory_limit": 1000}, MemoryLimitExceeded)],

@@ -40,6 +40,7 @@ def check_all(mesh, sources, field, levels, *, crossings=True):
             check_crossings(mesh, sources, level, lines)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
@@ -98,6 +99,7 @@ def test_lines_along_edges_are_one_and_whole(share, scale):
             check_pieces(mesh, line)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(2)
 @LEVELS
 def test_lines_through_vertices_are_one_and_whole(share):
@@ -189,6 +191,7 @@ def test_circles_on_a_cube():
     np.testing.assert_allclose(lengths, [1.5 * math.pi * 0.3, 1.5 * math.pi], rtol=2e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(2)
 @pytest.mark.jit
 @zoo.each({name: zoo.SMALL[name] for name in ("hills", "annulus", "crumpled_torus", "box_1x2x3")})
@@ -321,6 +324,7 @@ def test_chord_errors_that_are_none(chord_error):
         field.isolines([0.5], chord_error)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize(
     "name",

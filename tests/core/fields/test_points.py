@@ -44,6 +44,7 @@ ORACLE = zoo.SMALL | {
 }
 
 
+@pytest.mark.slice(24)
 @pytest.mark.jit
 @zoo.each(ORACLE)
 def test_distances_are_those_of_a_mesh_with_vertices_there(case):

@@ -63,6 +63,7 @@ def domain(seed) -> tuple[np.ndarray, np.ndarray]:
     return zoo.drop_unused(points, zoo.without_cells(faces, columns, map(tuple, cells.tolist())))
 
 
+@pytest.mark.slow
 @pytest.mark.slice(3)
 @pytest.mark.parametrize("seed", range(2 if WITHOUT_JIT else 12))
 def test_planar_domains_with_polygonal_holes(seed):
@@ -90,6 +91,7 @@ def test_convex_planar_domains(name):
     check_table(mesh, points, [closed_forms.plane(places, i) for i in range(len(points))])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1, 1, 1), (2, 4, 3), (1, 2, 6)])
 def test_boxes(size):
     mesh = gc.TriangleMesh(*zoo.box_grid(size))

@@ -38,6 +38,7 @@ def test_windows_find_what_a_sweep_to_the_point_finds(case):
                 check_path(mesh, kept.path_to(target), source, target, distance)
 
 
+@pytest.mark.slice(12)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_windows_on_meshes_of_closed_forms(case):
