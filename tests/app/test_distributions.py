@@ -88,6 +88,7 @@ def test_compiled_kernels_lie_in_the_wheel_where_the_library_looks_for_them(
     assert place.as_posix() in zipfile.ZipFile(wheel).namelist()
 
 
+@pytest.mark.slow
 def test_the_example_of_the_library_runs() -> None:
     (example,) = re.findall(r"```python\n(.*?)```", (LIBRARY / "README.md").read_text(), re.DOTALL)
     assert float(told_by(example).split()[0]) > 3.0  # half way around the sphere

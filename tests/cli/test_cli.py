@@ -892,6 +892,7 @@ def test_help_needs_no_numbers(arguments: list[str]) -> None:
     assert not loaded_by(*arguments) & {"numpy", "numba", "fastapi"}
 
 
+@pytest.mark.slow
 def test_commands_load_no_packages_that_they_do_not_need(tmp_path: Path) -> None:
     mesh, out = str(tmp_path / "mesh.ply"), str(tmp_path / "d.npy")
     assert not loaded_by("sample", "plane", mesh) & SLOW

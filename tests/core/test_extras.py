@@ -44,6 +44,8 @@ for kind in ("stl", "glb"):
 print("answered")
 """
 
+pytestmark = pytest.mark.slow  # a process each
+
 
 @pytest.mark.parametrize(("name", "call", "message"), REFUSED, ids=["sparse", "locate"])
 def test_what_is_missing_is_named(name: str, call: str, message: str) -> None:

@@ -4,6 +4,8 @@ import pytest
 
 from tests.support.fresh import told_by
 
+pytestmark = pytest.mark.slow  # a process each
+
 SLOW = {"scipy", "igl", "trimesh", "manifold3d"}
 MESH = "mesh = gc.TriangleMesh(*gc.samples.plane(8))\n"
 EXACT = MESH + "assert gc.exact_distance(mesh, 0).path_to(8).length > 0.0"

@@ -111,7 +111,8 @@ def test_json_is_the_service_s(
     name, *options = command.split()
     ran = run(name, knot_file, *options, "--out", "x.json")
 
-    assert (ran.code, ran.err) == (0, "")
+    said = [line for line in ran.err.splitlines() if not line.startswith("Compiling kernels")]
+    assert (ran.code, said) == (0, [])
     answer = client.post(f"/v1/meshes/{report['id']}/{operation}", json=body)
     assert answer.status_code == 200, answer.text
     assert Path("x.json").read_bytes() == answer.content

@@ -74,20 +74,23 @@ class StoredKernel:
     """A kernel for some types of arguments, on disk or to be written there."""
 
     file_name: str
-    is_ours: bool
-    """Whether the digest covers its source; others, in tests, are not stored."""
+    has_source: bool
+    """Whether it was read from a file; without, its version is not known, and it is not stored."""
 
     @classmethod
     def of(cls, function: Callable[..., Any], arguments: tuple[Any, ...]) -> "StoredKernel":
         """Return what is stored of a function."""
-        package, _, module = function.__module__.partition("geodesic_core.kernels.")
-        types = hashlib.sha256(str(arguments).encode()).hexdigest()[:16]
-        name = f"{module}.{function.__name__}-{types}.kernel"
-        return cls(name, is_ours=not package and bool(module))
+        version = hashlib.sha256(str(arguments).encode())
+        source = Path(function.__code__.co_filename)
+        if source.is_file() and not source.is_relative_to(KERNELS):  # the digest leaves it out
+            version.update(source.read_bytes())
+        module = function.__module__.removeprefix("geodesic_core.kernels.")
+        name = f"{module}.{function.__name__}-{version.hexdigest()[:16]}.kernel"
+        return cls(name, has_source=source.is_file())
 
     def load(self, context: Any) -> Any:
         """Return the compiled kernel, from the first folder that has it; None where none has."""
-        for place in _folders() if self.is_ours else ():
+        for place in _folders() if self.has_source else ():
             try:
                 stored = (place / self.file_name).read_bytes()
             except OSError:
@@ -101,7 +104,7 @@ class StoredKernel:
 
     def save(self, compiled: Any) -> None:
         """Write the compiled kernel into the user's cache, whole or not at all."""
-        if self.is_ours and _is_writable():
+        if self.has_source and _is_writable():
             dump: Any = serialize.dumps
             data = dump(compiled._reduce())
             with tempfile.NamedTemporaryFile(dir=folder(), delete=False) as part:
@@ -111,7 +114,7 @@ class StoredKernel:
     @contextmanager
     def lock(self) -> Iterator[None]:
         """Hold the lock of the kernel, so that one process alone compiles it."""
-        if self.is_ours and _is_writable():
+        if self.has_source and _is_writable():
             from filelock import FileLock  # not needed where all is compiled
 
             with FileLock((folder() / self.file_name).with_suffix(".lock")):

@@ -3,6 +3,8 @@
 import ast
 from pathlib import Path
 
+import pytest
+
 from app.engine.fork_server import LATE
 from tests.support.fresh import told_by
 from tests.support.paths import ROOT
@@ -20,6 +22,7 @@ def late_imports(path: Path) -> set[str]:
     return plain | {node.module or "" for node in inner if isinstance(node, ast.ImportFrom)}
 
 
+@pytest.mark.slow
 def test_workers_find_loaded_what_is_imported_late() -> None:
     wanted = {name for room in WORK for path in room.rglob("*.py") for name in late_imports(path)}
     assert {"igl", "scipy.sparse"} < wanted

@@ -128,13 +128,13 @@ def test_many_addresses_take_bounded_memory_and_no_thread() -> None:
     limits = RateLimits(a_minute=1, at_once=1)
 
     with watched_memory() as memory:
-        for n in range(30_000):
+        for n in range(15_000):
             refusal_of(limits, caller_number(n))
 
     assert memory[0] < 4_000_000
     assert threading.active_count() == threads
-    remembered = [refusal_of(limits, caller_number(n)) is not None for n in range(29_999, 0, -1)]
-    assert remembered == [True] * 10_000 + [False] * 19_999
+    remembered = [refusal_of(limits, caller_number(n)) is not None for n in range(14_999, -1, -1)]
+    assert remembered == [True] * 10_000 + [False] * 5_000
 
 
 @pytest.mark.parametrize(

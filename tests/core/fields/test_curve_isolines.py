@@ -179,6 +179,7 @@ def test_points_on_a_box_are_at_the_level_by_unfolding():
             assert level * (1 - 1e-9) <= min(known) <= level + 2e-5
 
 
+@pytest.mark.slow
 @pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)

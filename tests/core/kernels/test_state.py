@@ -89,6 +89,7 @@ def test_every_step_from_several_sources(name):
     watch(case, exact_by_unfolding, [0, last, last // 2], [0.3, 0.0, 0.1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [0.0, 0.7, 1.5])
 def test_every_step_within_a_limit(limit):
     watch(CASES["icosahedron"], exact_by_unfolding, [0], [0.0], limit)
