@@ -161,7 +161,7 @@ class LocalEngine:
         """Compile kernels in processes of their own; a worker compiles what is missing then."""
         try:
             await asyncio.to_thread(gc.compile_kernels, questions, cancel=self._is_stopping.is_set)
-        except gc.errors.InternalError:
+        except (gc.errors.InternalError, OSError):
             logger.exception("kernels could not be compiled ahead")
         except gc.errors.Cancelled:
             pass
@@ -287,7 +287,12 @@ class LocalEngine:
     def _spawn(self, coroutine: Coroutine[Any, Any, None]) -> None:
         background = asyncio.create_task(coroutine)
         self._background.add(background)
-        background.add_done_callback(self._background.discard)
+        background.add_done_callback(self._forget)
+
+    def _forget(self, background: asyncio.Task[None]) -> None:
+        self._background.discard(background)
+        if not background.cancelled() and background.exception() is not None:
+            logger.error("a task of the engine failed", exc_info=background.exception())
 
 
 def _unavailable() -> ProblemError:
