@@ -67,13 +67,13 @@ def _approximate_curves() -> None:
 
 QUESTIONS: dict[str, Callable[[], None]] = {
     "exact": _exact,
-    "paths": _paths,
     "approximate": _approximate,
-    "isolines": _isolines,
+    "paths": _paths,
     "curves": _curves,
     "approximate curves": _approximate_curves,
+    "isolines": _isolines,
 }
-"""What needs kernels of its own, those first that most need."""
+"""What needs kernels of its own. Neighbours share few, so that their processes seldom wait."""
 
 
 def compile_kernels(
@@ -84,8 +84,8 @@ def compile_kernels(
     Parameters
     ----------
     questions
-        What to compile for, of ``"exact"``, ``"paths"``, ``"approximate"``, ``"isolines"``,
-        ``"curves"`` and ``"approximate curves"``; None for all.
+        What to compile for, of ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
+        ``"approximate curves"`` and ``"isolines"``; None for all.
     cancel
         Called ten times a second; compilation ends once it returns True.
 
