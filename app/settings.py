@@ -19,6 +19,8 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 from app.access import ApiKey, parse_keys
 
 PREFIX = "GEODESIC_"
+LIBRARY_VARIABLES = {"GEODESIC_CPU_LEVEL", "GEODESIC_QUIET"}
+"""Variables that the library reads: they are no settings of the service, and no mistakes."""
 MIB = 2**20
 GIB = 2**30
 LEAST_WORKER_MEMORY = 512 * MIB
@@ -186,7 +188,7 @@ class Settings(BaseSettings):
 
     @model_validator(mode="after")
     def _no_unknown_variable(self) -> Self:
-        known = {variable_of(name) for name in type(self).model_fields}
+        known = {variable_of(name) for name in type(self).model_fields} | LIBRARY_VARIABLES
         unknown = sorted(
             name
             for name in os.environ

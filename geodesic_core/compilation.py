@@ -1,7 +1,7 @@
 """Compilation of kernels ahead of their first use, in as many processes as there are cores.
 
-A kernel is compiled for the types of its arguments, so the way to compile it is to use it: each of
-the `QUESTIONS` asks something small.
+A kernel is compiled for the types of its arguments, so the way to compile it is to run it: each of
+the `WORKLOADS` solves something small.
 """
 
 import os
@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from geodesic_core import samples
@@ -17,9 +18,11 @@ from geodesic_core.kernels.jit import cache, machine, progress
 from geodesic_core.mesh.curve import Curve
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.search.threads import available_cores
 from geodesic_core.solvers import Solver, approximate_distance, exact_distance
 
 _POLL_S = 0.1
+_INSIDE = SurfacePoint.face(0, (0.2, 0.3, 0.5))
 
 
 def _mesh() -> TriangleMesh:
@@ -28,9 +31,6 @@ def _mesh() -> TriangleMesh:
 
 def _curve(mesh: TriangleMesh) -> Curve:
     return Curve(mesh.faces[0, :2].tolist())
-
-
-_INSIDE = SurfacePoint.face(0, (0.2, 0.3, 0.5))
 
 
 def _exact() -> None:
@@ -57,7 +57,7 @@ def _isolines() -> None:
 
 def _curves() -> None:
     mesh = _mesh()
-    exact_distance(mesh, _curve(mesh), targets=[_INSIDE]).isolines([0.1])
+    exact_distance(mesh, _curve(mesh), targets=[_INSIDE])
 
 
 def _approximate_curves() -> None:
@@ -65,112 +65,126 @@ def _approximate_curves() -> None:
     approximate_distance(mesh, _curve(mesh), targets=[_INSIDE])
 
 
-QUESTIONS: dict[str, Callable[[], None]] = {
+WORKLOADS: dict[str, Callable[[], None]] = {
     "exact": _exact,
     "approximate": _approximate,
-    "paths": _paths,
+    "approximate-curves": _approximate_curves,
     "curves": _curves,
-    "approximate curves": _approximate_curves,
     "isolines": _isolines,
+    "paths": _paths,
 }
-"""What needs kernels of its own. Neighbours share few, so that their processes seldom wait."""
+"""Calls that together use all kernels. Neighbours share few, so their processes seldom wait."""
 
 
 def compile_kernels(
-    questions: Sequence[str] | None = None, *, cancel: Callable[[], bool] | None = None
+    workloads: Sequence[str] | None = None, *, cancel: Callable[[], bool] | None = None
 ) -> None:
     """Compile the kernels that are neither in the package nor in the cache on disk.
 
     Parameters
     ----------
-    questions
-        What to compile for, of ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
-        ``"approximate curves"`` and ``"isolines"``; None for all.
+    workloads
+        Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
+        ``"approximate-curves"`` and ``"isolines"``; None for all.
     cancel
         Called ten times a second; compilation ends once it returns True.
 
     Raises
     ------
     Cancelled
-        ``cancel`` returned True. What was compiled so far is in the cache.
+        ``cancel`` returned True. Kernels that were finished are in the cache.
     InternalError
-        A process that compiles failed; its message is on standard error.
+        A compiling process failed; its message is on standard error.
 
     Notes
     -----
-    All kernels take about 80 s of processor time, in as many processes as there are cores. Progress
-    is written to standard error, unless ``GEODESIC_QUIET`` is set.
+    All kernels take about 80 s of processor time, in as many processes as there are cores. The
+    number of compiled kernels is written to standard error, unless ``GEODESIC_QUIET`` is set. Where
+    the cache cannot be written, nothing is compiled ahead.
 
     Examples
     --------
     >>> gc.compile_kernels(["exact"])
     """
-    waiting = [name for name in questions or QUESTIONS if not cache.is_marked(name)]
-    if getattr(sys, "frozen", False):  # there is no interpreter to start
-        for name in waiting:
-            answer(name)
+    waiting = [name for name in workloads or WORKLOADS if not cache.is_complete(name)]
+    if not waiting or not cache.is_in_use():
         return
-    running: dict[str, subprocess.Popen[bytes]] = {}
+    if getattr(sys, "frozen", False):  # an application without an interpreter to start
+        run_shared(waiting)
+        return
+    running: list[subprocess.Popen[bytes]] = []
     try:
-        with progress.of_folder(cache.folder_for(machine.shared_target())):
-            while waiting or running:
-                while waiting and len(running) < (os.cpu_count() or 1):
-                    name = waiting.pop(0)
-                    running[name] = _start(name)
+        with progress.shown(cache.folder_for(machine.best_target())):
+            running += [_start(waiting) for _ in range(min(available_cores(), len(waiting)))]
+            while running:
                 time.sleep(_POLL_S)
                 if cancel is not None and cancel():
                     raise Cancelled
-                for name in [name for name in running if running[name].poll() is not None]:
-                    code = running.pop(name).returncode
-                    if code:
-                        raise InternalError(f"compiling kernels for {name} failed with {code}")
+                for process in [each for each in running if each.poll() is not None]:
+                    running.remove(process)
+                    if process.returncode:
+                        raise InternalError(f"compiling kernels failed with {process.returncode}")
     finally:
-        for process in running.values():
+        for process in running:
             process.terminate()
             process.wait()
 
 
-def warm_up(questions: Sequence[str] | None = None) -> None:
-    """Load kernels into this process, and compile those before that are missing.
+def warm_up(workloads: Sequence[str] | None = None) -> None:
+    """Load kernels into this process, after compiling those that are missing.
 
-    Without it, the first question of each kind does the same for the kernels that it needs. All
-    take 0.3 s to load.
+    Without it, kernels are loaded or compiled at their first use. Loading all takes 0.3 s.
 
     Parameters
     ----------
-    questions
+    workloads
         As in `compile_kernels`.
 
     Raises
     ------
     InternalError
-        A process that compiles failed; its message is on standard error.
+        A compiling process failed; its message is on standard error.
 
     Examples
     --------
     >>> gc.warm_up(["exact"])
     """
-    compile_kernels(questions)
-    for name in questions or QUESTIONS:
-        answer(name)
+    compile_kernels(workloads)
+    for name in workloads or WORKLOADS:
+        run(name)
 
 
-def answer(name: str) -> None:
-    """Ask one of the `QUESTIONS`, and mark its kernels as compiled."""
-    QUESTIONS[name]()
-    cache.mark(name)
+def run(name: str) -> None:
+    """Run one of the `WORKLOADS`, and record that its kernels are compiled."""
+    WORKLOADS[name]()
+    cache.mark_complete(name)
 
 
-def _start(name: str) -> "subprocess.Popen[bytes]":
-    """Start a process that compiles what a question needs, and writes nothing but errors."""
+def run_shared(names: Sequence[str]) -> None:
+    """Run workloads together with all processes that do the same: each is run by one of them.
+
+    One process for several workloads is better than a process for each. Kernels that they share are
+    translated once.
+    """
+    from filelock import Timeout  # not needed where all is compiled
+
+    for timeout in (0.0, -1.0):  # first those that are free; then wait for the others
+        for name in names:
+            with suppress(Timeout), cache.claim(name, timeout):
+                if not cache.is_complete(name):
+                    run(name)
+
+
+def _start(names: Sequence[str]) -> "subprocess.Popen[bytes]":
+    """Start a process that compiles the kernels of workloads, and prints only errors."""
     root = str(Path(__file__).parents[1])
     environment = os.environ | {
         "PYTHONPATH": os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")])),
         "GEODESIC_QUIET": "1",
     }
-    target = machine.shared_target()
+    target = machine.best_target()
     if target in machine.LEVELS:
         environment |= {"NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}
-    program = f"from geodesic_core import compilation as c; c.answer({name!r})"
+    program = f"from geodesic_core import compilation; compilation.run_shared({list(names)!r})"
     command = [sys.executable, "-c", program]
     return subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL)  # noqa: S603

@@ -1,4 +1,4 @@
-"""Compile the kernels into a wheel, where ``GEODESIC_WHEEL_LEVELS`` names levels of processors.
+"""Compile kernels into the wheel, for the levels of processors in ``GEODESIC_WHEEL_LEVELS``.
 
 Without it the wheel is pure, and kernels are compiled when they are first needed. Levels are those
 of ``geodesic_core.kernels.jit.machine``, separated by spaces.
@@ -13,13 +13,13 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 PLATFORM = "manylinux_2_17_x86_64"
-"""Compiled kernels call the C library's arithmetic alone, which is older."""
+"""Compiled kernels call only arithmetic of the C library, which is in each glibc of that age."""
 LEVELS = os.environ.get("GEODESIC_WHEEL_LEVELS", "").split()
 COMPILE = """
 from geodesic_core import compile_kernels
-from geodesic_core.kernels.jit import cache
+from geodesic_core.kernels.jit import cache, machine
 compile_kernels()
-print(cache.folder())
+print(cache.folder_for(machine.best_target()))
 """
 
 
@@ -47,12 +47,12 @@ class KernelsHook(BuildHookInterface[Any]):
 
 def compiled(root: Path, level: str) -> Path:
     """Compile all kernels for a level, unless the user's cache has them; return their folder."""
-    environment = os.environ | {
-        "PYTHONPATH": str(root),
-        "NUMBA_CPU_NAME": level,
-        "NUMBA_CPU_FEATURES": "",
-        "GEODESIC_CPU_LEVEL": level,
-    }
+    environment = os.environ | {"PYTHONPATH": str(root), "GEODESIC_CPU_LEVEL": level}
     command = [sys.executable, "-c", COMPILE]
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=True)  # noqa: S603
-    return Path(done.stdout.strip())
+    folder = Path(done.stdout.strip())
+    if not folder.name.endswith(level):
+        raise RuntimeError(
+            f"this machine cannot run kernels for {level}, so it cannot compile them"
+        )
+    return folder

@@ -75,7 +75,7 @@ class LocalEngine:
         return Load(len(self._waiting), idle, busy, missing, self._lost, self._cancelled)
 
     async def start(self) -> None:
-        """Compile what workers need at once, then start them; in the background."""
+        """Compile the first kernels, then start the workers; in the background."""
         self._spawn(self._compile_and_supervise())
 
     def drain(self) -> None:
@@ -157,10 +157,10 @@ class LocalEngine:
             self._spawn(self._supervise(slot))
         await self._compile(None)
 
-    async def _compile(self, questions: Sequence[str] | None) -> None:
-        """Compile kernels in processes of their own; a worker compiles what is missing then."""
+    async def _compile(self, workloads: Sequence[str] | None) -> None:
+        """Compile kernels in processes of their own; where that fails, workers compile them."""
         try:
-            await asyncio.to_thread(gc.compile_kernels, questions, cancel=self._is_stopping.is_set)
+            await asyncio.to_thread(gc.compile_kernels, workloads, cancel=self._is_stopping.is_set)
         except (gc.errors.InternalError, OSError):
             logger.exception("kernels could not be compiled ahead")
         except gc.errors.Cancelled:

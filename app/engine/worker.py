@@ -253,7 +253,7 @@ def run(config: WorkerConfig, signals: Signals, connection: socket.socket) -> No
 
 
 FIRST_KERNELS = ("exact", "paths")
-"""What a worker can answer as soon as it is ready; other kernels are loaded when first needed."""
+"""Workloads that a worker is ready for when it starts; other kernels are loaded at first use."""
 
 
 def warm_up(allowed_memory: int) -> None:

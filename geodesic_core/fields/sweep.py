@@ -59,7 +59,7 @@ def sweep_nodes(
     )
     if not nodes.has_site_targets:
         return run_sweep(mesh, wave, bounds, control, share_done, limit_of)
-    surface_points.watch_sites(topology, wave, bounds, nodes.first_target)
+    surface_points.watch_sites(wave.sites.ints, wave.pool.lists, nodes.first_target)
     wave = run_sweep(mesh, wave, bounds, control, share_done, limit_of)
     surface_points.reach_sites_inside(topology, wave, bounds, nodes.first_target)
     return wave

@@ -168,7 +168,7 @@ class PathSearch:
             raise leg.lost("along edges")
         leg.log.add("dijkstra", upper + beside, wave)
         path = edge_dijkstra.vertices_to(wave.vertices.winner_ints[:, PREDECESSOR], first)
-        pruning.forget(topology, wave, bounds)
+        pruning.forget(topology, wave)
         # Unfolding rounds: by more than the slack of the searches, where faces are slivers.
         upper = min(upper, funnel.shortened(topology, path) * (1.0 + STRAIGHT)) + beside
         if leg.start.point.face_index == leg.end.point.face_index:
@@ -228,10 +228,8 @@ class PathSearch:
         return sweep_nodes(self.mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: share)
 
     def _forget(self) -> None:
-        topology = self.mesh.topology
-        merging = merging_bounds(math.inf, GUIDE_ERROR, math.inf)
-        pruning.forget(topology, self._toward, merging)
-        pruning.forget(topology, self._outward, exact_bounds(math.inf))
+        pruning.forget(self.mesh.topology, self._toward)
+        pruning.forget(self.mesh.topology, self._outward)
 
 
 class _End:

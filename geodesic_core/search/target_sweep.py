@@ -71,7 +71,7 @@ class TargetSweep:
             distances: Floats = wave.vertices.distance[nodes.targets]
         finally:
             if _RESET * wave.counters[TOUCHED] < len(self.mesh.vertices):
-                pruning.forget(self.mesh.topology, wave, bounds)
+                pruning.forget(self.mesh.topology, wave)
             else:
                 self._wave = self._new_wave()
         distances[distances > limit] = np.inf

@@ -1,14 +1,16 @@
 import ast
 import os
+import re
 from pathlib import Path
 
 import pytest
 from pydantic import ValidationError
 
-from app.settings import GIB, MIB, Settings, available_memory, variable_of
+from app.settings import GIB, LIBRARY_VARIABLES, MIB, Settings, available_memory, variable_of
 from tests.support.service import distances, serving, upload_sample
 
 TESTS = Path(__file__).parents[1]
+LIBRARY = TESTS.parent / "geodesic_core"
 
 TEXTS = {
     "store": ("/somewhere", Path("/somewhere")),
@@ -144,6 +146,15 @@ def test_unknown_variable_stops_the_start(monkeypatch: pytest.MonkeyPatch, name:
 
     with pytest.raises(ValidationError, match=rf"unknown setting GEODESIC_{name}; there are"):
         Settings()
+
+
+def test_variables_that_the_library_reads_are_no_mistakes(monkeypatch: pytest.MonkeyPatch) -> None:
+    sources = (path.read_text() for path in LIBRARY.rglob("*.py") if path.name != "hatch_build.py")
+    read = {name for source in sources for name in re.findall(r"GEODESIC_[A-Z_]+", source)}
+    assert read == LIBRARY_VARIABLES
+    for name in read:
+        monkeypatch.setenv(name, "1")
+    Settings()
 
 
 @pytest.mark.parametrize(

@@ -8,10 +8,11 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core import compilation
-from geodesic_core.errors import InternalError
+from geodesic_core.errors import InternalError, InvalidArgument
 from geodesic_core.kernels.jit import cache, machine, progress
 from tests.support import each_kind
 from tests.support.paths import ROOT
+from tests.support.waiting import wait_until
 
 pytestmark = [pytest.mark.jit, pytest.mark.slow]
 
@@ -26,17 +27,17 @@ def run(*arguments: str, **environment: str) -> "subprocess.CompletedProcess[str
     )
 
 
-def test_no_question_needs_a_kernel_that_was_not_compiled_ahead():
+def test_no_call_needs_a_kernel_that_was_not_compiled_ahead():
     gc.compile_kernels()
     asked = run(each_kind.__file__)
     assert asked.returncode == 0, asked.stderr
 
 
-def test_as_many_kernels_are_told_of_as_there_are():
+def test_the_reported_number_of_kernels_is_the_true_one():
     gc.compile_kernels()
-    if machine.shared_target() == machine.target():
+    if machine.best_target() == machine.target():
         pytest.skip("tests compile more kernels into the same folder")
-    folder = cache.folder_for(machine.shared_target())
+    folder = cache.folder_for(machine.best_target())
     assert len(list(folder.glob("*.kernel"))) == progress.KERNELS
 
 
@@ -54,13 +55,70 @@ except gc.errors.Cancelled:
 
 
 def test_a_process_that_fails_is_an_error(monkeypatch):
-    def fail(_: str) -> "subprocess.Popen[bytes]":
+    def fail(_: list[str]) -> "subprocess.Popen[bytes]":
         return subprocess.Popen([sys.executable, "-c", "raise SystemExit(3)"])
 
     monkeypatch.setattr(compilation, "_start", fail)
-    monkeypatch.setattr(cache, "is_marked", lambda _: False)
-    with pytest.raises(InternalError, match="exact failed with 3"):
+    monkeypatch.setattr(cache, "is_complete", lambda _: False)
+    with pytest.raises(InternalError, match="failed with 3"):
         gc.compile_kernels(["exact"])
+
+
+SHARED = """
+import os, sys, time
+from geodesic_core import compilation
+log, dies_at = sys.argv[1:]
+def workload(name):
+    def run():
+        if name == dies_at:
+            print("here", flush=True)
+            time.sleep(60)
+        with open(log, "a") as lines:
+            print(name, file=lines)
+    return run
+compilation.WORKLOADS = {name: workload(name) for name in "abc"}
+compilation.run_shared("abc")
+"""
+
+
+def test_each_workload_is_run_once_by_the_processes_that_share_them(tmp_path):
+    log = tmp_path / "log"
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-c", SHARED, str(log)]
+    dying = subprocess.Popen([*command, "a"], env=environment, stdout=subprocess.PIPE)  # noqa: S603
+    assert dying.stdout.readline() == b"here\n"  # it holds "a"
+    others = [subprocess.Popen([*command, "-"], env=environment) for _ in range(2)]  # noqa: S603
+    wait_until(lambda: log.exists() and len(log.read_text().split()) == 2)
+    dying.kill()
+    dying.wait()
+    assert [other.wait() for other in others] == [0, 0]
+    assert sorted(log.read_text().split()) == ["a", "b", "c"]
+    dying.stdout.close()
+
+
+def test_plain_python_leaves_no_record_of_compiled_kernels(tmp_path):
+    program = 'from geodesic_core import compilation; compilation.run("exact")'
+    ended = run("-c", program, NUMBA_CACHE_DIR=str(tmp_path), NUMBA_DISABLE_JIT="1")
+    assert ended.returncode == 0, ended.stderr
+    assert not list(tmp_path.rglob("*.all"))
+
+
+def test_without_a_folder_to_write_to_nothing_is_compiled_ahead(tmp_path):
+    (tmp_path / "file").write_text("no folder")
+    program = """
+from geodesic_core import compilation
+compilation._start = None
+compilation.compile_kernels(["exact"])
+"""
+    ended = run("-c", program, NUMBA_CACHE_DIR=str(tmp_path / "file"), GEODESIC_CPU_LEVEL="none")
+    assert ended.returncode == 0, ended.stderr
+    assert "cannot be written" in ended.stderr
+
+
+def test_an_unknown_level_is_refused(monkeypatch):
+    monkeypatch.setenv("GEODESIC_CPU_LEVEL", "x86-64-v9")
+    with pytest.raises(InvalidArgument, match="x86-64-v9, not one of x86-64-v3, x86-64-v2, none"):
+        machine.levels()
 
 
 def test_a_processor_below_the_levels_compiles_and_says_so(tmp_path):
@@ -70,8 +128,12 @@ import geodesic_core as gc
 mesh = gc.TriangleMesh(*gc.samples.plane(2))
 print(gc.exact_distance(mesh, 0).distances.round(3).tolist())
 """
-    told = {"NUMBA_CACHE_DIR": str(tmp_path), "GEODESIC_CPU_LEVEL": "none", "GEODESIC_QUIET": ""}
-    asked = run("-c", program, **told)
+    environment = {
+        "NUMBA_CACHE_DIR": str(tmp_path),
+        "GEODESIC_CPU_LEVEL": "none",
+        "GEODESIC_QUIET": "",
+    }
+    asked = run("-c", program, **environment)
     assert asked.stdout.strip() == "[0.0, 1.0, 1.0, 1.414]"
     assert "Compiling kernels for this machine, once" in asked.stderr
     (folder,) = {path.parent for path in tmp_path.rglob("*.kernel")}

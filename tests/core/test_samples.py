@@ -85,6 +85,7 @@ def test_a_size_out_of_the_domain_is_refused(name: str, faces: int) -> None:
         samples.SAMPLES[name](faces)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("name", ["terrain", "obstacles"])
 def test_any_size_from_the_fewest_on_is_a_sound_mesh(name: str) -> None:

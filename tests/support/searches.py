@@ -108,4 +108,4 @@ def edge_paths(mesh: gc.TriangleMesh, pairs) -> Iterator[tuple[int, int, np.ndar
             edge_dijkstra.vertices_to(wave.vertices.winner_ints[:, state.PREDECESSOR], first),
             length,
         )
-        pruning.forget(topology, wave, bounds)
+        pruning.forget(topology, wave)

@@ -36,7 +36,8 @@ class FaceWindows(NamedTuple):
 def sort_by_half_edge(rows: Floats, first: Longs, windows: Floats) -> None:
     """Sort ``rows`` stably by half-edge into ``windows``, and fill ``first``; O(K + F)."""
     ints = rows.view(np.int32)
-    first[:] = 0
+    for h in range(len(first)):
+        first[h] = 0
     for i in range(len(rows)):
         first[ints[i, NEXT] + 1] += 1
     for h in range(len(first) - 1):
@@ -44,7 +45,8 @@ def sort_by_half_edge(rows: Floats, first: Longs, windows: Floats) -> None:
     free = first.copy()
     for i in range(len(rows)):
         h = ints[i, NEXT]
-        windows[free[h]] = rows[i]
+        for column in range(WIDTH):
+            windows[free[h], column] = rows[i, column]
         free[h] += 1
 
 

@@ -1,8 +1,8 @@
 """Compiled kernels on disk: one file for each, in the package or in the user's cache.
 
 A file is found by the digest of all kernel sources, the version of Python, the machine, the
-kernel's name and the types of its arguments. It is written in one step, under a lock that others
-who need the same kernel wait for.
+kernel's name and the types of its arguments. It is written in one step. While a process compiles a
+kernel it holds a lock, and others that need the same kernel wait for it.
 """
 
 import hashlib
@@ -14,13 +14,16 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numba
 from numba.core import serialize
 from numba.core.compiler import CompileResult
 
 from geodesic_core.kernels.jit import machine
+
+if TYPE_CHECKING:
+    from filelock import FileLock
 
 KERNELS = Path(__file__).parents[1]
 PRECOMPILED = KERNELS / "precompiled"
@@ -46,24 +49,24 @@ def _digest() -> str:
 
 
 def users_folder() -> Path:
-    """Return where kernels are kept that were compiled on this machine."""
+    """Return the root folder of the kernels that were compiled on this machine."""
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return Path(os.environ.get("NUMBA_CACHE_DIR") or home / "geodesic" / "kernels")
 
 
 def folder_for(target: str) -> Path:
-    """Return where kernels are written that were compiled here for a machine."""
+    """Return the user's folder of kernels compiled for a machine."""
     return users_folder() / _digest() / machine.tag(target)
 
 
 def folder() -> Path:
-    """Return where this process writes what it compiles."""
+    """Return the folder that this process writes kernels to."""
     return folder_for(machine.target())
 
 
 @cache
 def _folders() -> list[Path]:
-    """Return where to look, in this order, all for this version of Python and of the kernels."""
+    """Return the folders to search, in order."""
     tags = [machine.tag(level) for level in machine.levels()]
     places = [base / _digest() / tag for base in (PRECOMPILED, users_folder()) for tag in tags]
     return list(dict.fromkeys([*places, folder()]))
@@ -74,23 +77,23 @@ class StoredKernel:
     """A kernel for some types of arguments, on disk or to be written there."""
 
     file_name: str
-    has_source: bool
-    """Whether it was read from a file; without, its version is not known, and it is not stored."""
+    is_storable: bool
+    """False without a source file: its version is unknown then."""
 
     @classmethod
     def of(cls, function: Callable[..., Any], arguments: tuple[Any, ...]) -> "StoredKernel":
-        """Return what is stored of a function."""
+        """Return the stored kernel of a function."""
         version = hashlib.sha256(str(arguments).encode())
         source = Path(function.__code__.co_filename)
         if source.is_file() and not source.is_relative_to(KERNELS):  # the digest leaves it out
             version.update(source.read_bytes())
         module = function.__module__.removeprefix("geodesic_core.kernels.")
         name = f"{module}.{function.__name__}-{version.hexdigest()[:16]}.kernel"
-        return cls(name, has_source=source.is_file())
+        return cls(name, is_storable=source.is_file())
 
     def load(self, context: Any) -> Any:
         """Return the compiled kernel, from the first folder that has it; None where none has."""
-        for place in _folders() if self.has_source else ():
+        for place in _folders() if self.is_storable else ():
             try:
                 stored = (place / self.file_name).read_bytes()
             except OSError:
@@ -104,7 +107,7 @@ class StoredKernel:
 
     def save(self, compiled: Any) -> None:
         """Write the compiled kernel into the user's cache, whole or not at all."""
-        if self.has_source and _is_writable():
+        if self.is_storable and _is_writable():
             dump: Any = serialize.dumps
             data = dump(compiled._reduce())
             with tempfile.NamedTemporaryFile(dir=folder(), delete=False) as part:
@@ -114,7 +117,7 @@ class StoredKernel:
     @contextmanager
     def lock(self) -> Iterator[None]:
         """Hold the lock of the kernel, so that one process alone compiles it."""
-        if self.has_source and _is_writable():
+        if self.is_storable and _is_writable():
             from filelock import FileLock  # not needed where all is compiled
 
             with FileLock((folder() / self.file_name).with_suffix(".lock")):
@@ -139,16 +142,28 @@ def _is_writable() -> bool:
         return False
 
 
-def mark(question: str) -> None:
-    """Note that all kernels for a question are there."""
-    if not is_marked(question) and _is_writable():
-        _mark_in(folder(), question).touch()
+def is_in_use() -> bool:
+    """Return whether kernels are compiled at all, and can be written."""
+    config: Any = numba.config
+    return not config.DISABLE_JIT and _is_writable()
 
 
-def is_marked(question: str) -> bool:
-    """Return whether all kernels for a question are there."""
-    return any(_mark_in(place, question).exists() for place in _folders())
+def claim(workload: str, timeout: float) -> "FileLock":
+    """Return the lock of a workload, for the one process that runs it.
+
+    Entering it raises filelock's Timeout after ``timeout`` seconds; with -1 it waits.
+    """
+    from filelock import FileLock
+
+    return FileLock(folder() / f"{workload}.lock", timeout=timeout)
 
 
-def _mark_in(place: Path, question: str) -> Path:
-    return place / f"{question.replace(' ', '-')}.all"
+def mark_complete(workload: str) -> None:
+    """Record that all kernels of a workload are on disk."""
+    if not is_complete(workload) and is_in_use():
+        (folder() / f"{workload}.all").touch()
+
+
+def is_complete(workload: str) -> bool:
+    """Return whether all kernels of a workload are on disk."""
+    return any((place / f"{workload}.all").exists() for place in _folders())

@@ -17,8 +17,9 @@ from numba.core.registry import CPUDispatcher
 from numba.core.sigutils import normalize_signature
 
 from geodesic_core.kernels.jit import cache, progress
-from geodesic_core.kernels.jit.linking import CompilerOfParts, CompilerOfWholes, Part
+from geodesic_core.kernels.jit.linking import Part, PartCompiler, WholeCompiler
 
+types: Any = numba.types
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 _OPTIONS: dict[str, Any] = {
@@ -29,32 +30,37 @@ _OPTIONS: dict[str, Any] = {
 }
 
 compiled_here: list[str] = []
-"""Kernels that this process compiled, in order, for it found them nowhere."""
+"""Files of the kernels that this process compiled, in order."""
 
 
 class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]
-    """Compile kernels: those that Python calls with all their parts, unless they are on disk."""
+    """Compiler of one kernel: loads what is on disk, and compiles other kernels inside as parts."""
 
     under_way = False
-    """Whether a kernel is being compiled, so that others are parts of it; under numba's lock."""
+    """Whether a kernel is being compiled: those it calls are its parts. Guarded by numba's lock."""
 
     def compile(self, args: Any, return_type: Any) -> Any:
         """Return the compiled kernel for some types of arguments."""
-        self.pipeline_class: type[Compiler] = CompilerOfWholes
+        self.pipeline_class: type[Compiler] = WholeCompiler
         if _KernelCompiler.under_way:
-            self.pipeline_class = CompilerOfParts
+            self.pipeline_class = PartCompiler
             return super().compile(args, return_type)
         stored = cache.StoredKernel.of(self.py_func, args)
         compiled = self._load(stored)
         if compiled is None:
-            with progress.of_folder(cache.folder()), stored.lock():
+            with progress.shown(cache.folder()), stored.lock():
                 compiled = self._load(stored)  # by the process that held the lock
                 if compiled is None:
-                    with self._whole():
+                    with self._compiling_parts():
                         compiled = super().compile(args, return_type)
                     compiled_here.append(stored.file_name)
                     stored.save(compiled)
         return compiled
+
+    def _customize_flags(self, flags: Any) -> Any:
+        if self.pipeline_class is PartCompiler:
+            flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True  # no entries from Python and C
+        return flags
 
     def _load(self, stored: cache.StoredKernel) -> Any:
         context = self.targetdescr.target_context
@@ -64,8 +70,8 @@ class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]
         return found
 
     @contextmanager
-    def _whole(self) -> Iterator[None]:
-        """Compile what is called meanwhile as parts; collect no garbage, which takes a fifth."""
+    def _compiling_parts(self) -> Iterator[None]:
+        """Compile called kernels as parts, without garbage collection, which takes a fifth."""
         collects = gc.isenabled()
         gc.disable()
         _KernelCompiler.under_way = True
@@ -78,14 +84,14 @@ class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]
 
 
 class _Kernel(CPUDispatcher):
-    """A kernel, as numba calls it: one compiled version for each list of argument types."""
+    """A kernel: a numba dispatcher, with one compiled version for each list of argument types."""
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         super().__init__(function, targetoptions=options)
-        self._compiler = _KernelCompiler(function, self.targetdescr, options, {}, CompilerOfWholes)
+        self._compiler = _KernelCompiler(function, self.targetdescr, options, {}, WholeCompiler)
 
     def compile(self, sig: Any) -> Any:
-        """Compile for some types of arguments, also where only a part is there yet."""
+        """Compile for some types of arguments, even if it is compiled as a part already."""
         with global_compiler_lock:
             arguments, _ = normalize_signature(sig)
             known = self.overloads.get(tuple(arguments))
@@ -93,12 +99,22 @@ class _Kernel(CPUDispatcher):
                 del self.overloads[tuple(arguments)]
             return super().compile(sig)
 
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        """Compile for a call by another kernel: one version for integers of any width."""
+        return super().get_call_template([_widened(kind) for kind in args], kws)
+
     def add_overload(self, cres: Any) -> None:
-        """Take in a compiled version; Python sees those only that it can call."""
+        """Add a compiled version; parts are hidden from calls by Python."""
         if isinstance(cres.library, Part):
             self.overloads[tuple(cres.signature.args)] = cres
         else:
             super().add_overload(cres)
+
+
+def _widened(kind: Any) -> Any:
+    kind, widest = types.unliteral(kind), types.int64
+    is_narrow = isinstance(kind, types.Integer) and kind.bitwidth < widest.bitwidth
+    return widest if is_narrow else kind
 
 
 def _compiled(function: Function, **options: Any) -> Function:

@@ -1,4 +1,4 @@
-"""Numba's compiler, with machine code for those kernels only that Python calls.
+"""Numba's compiler, emitting machine code only for kernels that Python calls.
 
 Numba optimises every function together with all that it calls, and emits machine code for it. In a
 chain of small kernels the innermost is optimised once for each kernel above it. Here the kernels
@@ -16,10 +16,10 @@ _ENVIRONMENT = "_ZN08NumbaEnv"
 
 
 class Part(JITCodeLibrary):
-    """The code of a kernel that others call: they take it in, and it has no machine code."""
+    """The code of a kernel that is linked into others, without machine code of its own."""
 
     def finalize(self) -> None:
-        """Leave optimisation to the code that takes this part in."""
+        """Leave optimisation to the whole that links this part."""
         self._raise_if_finalized()
         self._finalized = True
 
@@ -30,7 +30,7 @@ class Part(JITCodeLibrary):
 
     @property
     def codegen(self) -> "Part":
-        """What numba gives the environment to: this part, since it is not in memory yet."""
+        """Return an object with the one method of it that numba calls: `set_env`."""
         return self
 
     def set_env(self, name: str, environment: object) -> None:
@@ -41,7 +41,7 @@ class Whole(JITCodeLibrary):
     """The code of a kernel with all its parts."""
 
     def finalize(self) -> None:
-        """Take in all parts, optimise, and emit machine code."""
+        """Link all parts, optimise, and emit machine code."""
         self._linking_libraries = _with_parts(self)
         super().finalize()
         for variable in self._final_module.global_variables:
@@ -52,7 +52,7 @@ class Whole(JITCodeLibrary):
 
 
 def _with_parts(library: Any) -> list[Any]:
-    """Return the libraries that one needs, those of its parts among them, each once."""
+    """Return the libraries that one links, and those of its parts, each once."""
     found: dict[Any, None] = {}
     waiting = [library]
     while waiting:
@@ -64,8 +64,10 @@ def _with_parts(library: Any) -> list[Any]:
     return list(found)
 
 
-class CompilerOfWholes(Compiler):
-    """Compile a kernel for Python to call."""
+class WholeCompiler(Compiler):
+    """Compiler of a kernel that Python calls."""
+
+    library_class: type[JITCodeLibrary] = Whole
 
     def __init__(
         self,
@@ -77,25 +79,12 @@ class CompilerOfWholes(Compiler):
         flags: Any,
         local: Any,
     ) -> None:
-        library = Whole(target.codegen(), "kernel")
+        library = self.library_class(target.codegen(), "kernel")
         library.enable_object_caching()
         super().__init__(typing, target, library, arguments, returned, flags, local)
 
 
-class CompilerOfParts(Compiler):
-    """Compile a kernel for other kernels to call: without the entries from Python and C."""
+class PartCompiler(WholeCompiler):
+    """Compiler of a kernel that other kernels call."""
 
-    def __init__(
-        self,
-        typing: Any,
-        target: Any,
-        _: None,
-        arguments: Any,
-        returned: Any,
-        flags: Any,
-        local: Any,
-    ) -> None:
-        library = Part(target.codegen(), "part")
-        flags = flags.copy()
-        flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
-        super().__init__(typing, target, library, arguments, returned, flags, local)
+    library_class = Part

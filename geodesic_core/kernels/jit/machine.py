@@ -8,6 +8,8 @@ from typing import Any
 import numba
 from llvmlite import binding
 
+from geodesic_core.errors import InvalidArgument
+
 LEVELS = {
     "x86-64-v3": (
         *("cx16", "popcnt", "sse3", "ssse3", "sse4.1", "sse4.2"),
@@ -24,14 +26,15 @@ Kernels for v3 are as fast as those for the processor itself; for v2 they take a
 def levels() -> list[str]:
     """Return the levels that this processor has, best first.
 
-    ``GEODESIC_CPU_LEVEL`` names a lower one, to act as a machine of that level, or ``none``.
+    ``GEODESIC_CPU_LEVEL`` limits them to one and those below it, or to ``none``.
     """
     found: dict[str, bool] = binding.get_host_cpu_features()
-    names = [name for name, needed in LEVELS.items() if all(found.get(each) for each in needed)]
-    highest = os.environ.get("GEODESIC_CPU_LEVEL")
-    if highest:
-        names = names[names.index(highest) :] if highest in names else []
-    return names
+    highest = os.environ.get("GEODESIC_CPU_LEVEL") or next(iter(LEVELS))
+    names = [*LEVELS, "none"]
+    if highest not in names:
+        raise InvalidArgument(f"GEODESIC_CPU_LEVEL is {highest}, not one of {', '.join(names)}")
+    allowed = names[names.index(highest) : -1]
+    return [name for name in allowed if all(found.get(each) for each in LEVELS[name])]
 
 
 def target() -> str:
@@ -46,8 +49,8 @@ def target() -> str:
     return f"{name}-{hashlib.sha256(features.encode()).hexdigest()[:8]}"
 
 
-def shared_target() -> str:
-    """Return the machine to compile for ahead: the best level, which its likes share."""
+def best_target() -> str:
+    """Return the machine to compile for ahead of use: the best level, which similar ones share."""
     config: Any = numba.config
     chosen = config.CPU_NAME is not None
     return target() if chosen or not levels() else levels()[0]

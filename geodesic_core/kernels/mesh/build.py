@@ -77,12 +77,23 @@ _RADIX_BITS = 10
 
 
 @kernel
+def first_integers(count: int) -> Ints:
+    """Return 0 … count - 1; np.arange and slices take a second each to compile."""
+    numbers = np.empty(count, np.int32)
+    for i in range(count):
+        numbers[i] = i
+    return numbers
+
+
+@kernel
 def morton_codes(vertices: Floats) -> Ints:
     """Interleave the bits of each vertex's cell in a cubic grid over the bounding box."""
     low, size = np.empty(3), 0.0
     for axis in range(3):
-        low[axis] = vertices[:, axis].min()
-        size = max(size, vertices[:, axis].max() - low[axis])
+        low[axis] = high = vertices[0, axis]
+        for v in range(len(vertices)):
+            low[axis], high = min(low[axis], vertices[v, axis]), max(high, vertices[v, axis])
+        size = max(size, high - low[axis])
     scale = ((1 << _MORTON_BITS) - 1) / size if size > 0.0 else 0.0
     codes = np.empty(len(vertices), np.int32)
     for v in range(len(vertices)):
@@ -125,13 +136,13 @@ def renumber(
     """Fill the three maps and ``positions``; return the faces in inner numbering; O(V + F)."""
     codes = morton_codes(vertices)
     digits = np.empty(len(vertices), np.int32)
-    order, previous_order = outer_vertex, np.empty(len(vertices), np.int32)
-    order[:] = np.arange(len(vertices))
+    order = first_integers(len(vertices))
     for shift in range(0, 3 * _MORTON_BITS, _RADIX_BITS):
-        previous_order[:] = order
         for v in range(len(vertices)):
             digits[v] = (codes[v] >> shift) & ((1 << _RADIX_BITS) - 1)
-        counting_sort(digits, 1 << _RADIX_BITS, previous_order, order)
+        counting_sort(digits, 1 << _RADIX_BITS, order, outer_vertex)
+        for v in range(len(vertices)):
+            order[v] = outer_vertex[v]
     for v in range(len(vertices)):
         inner_vertex[order[v]] = v
         for axis in range(3):
@@ -140,7 +151,7 @@ def renumber(
     for f in range(len(faces)):
         a, b, c = inner_vertex[faces[f, 0]], inner_vertex[faces[f, 1]], inner_vertex[faces[f, 2]]
         lowest[f] = min(a, b, c)
-    counting_sort(lowest, len(vertices), np.arange(len(faces)).astype(np.int32), outer_face)
+    counting_sort(lowest, len(vertices), first_integers(len(faces)), outer_face)
     inner_faces = np.empty_like(faces)
     for f in range(len(faces)):
         for i in range(3):
@@ -161,7 +172,7 @@ def link_around(faces: Ints, vertex_count: int) -> Ints:
     for i in range(count):
         lower[i] = min(flat[i], flat[following(i)])
     order = np.empty(count, np.int32)
-    counting_sort(lower, vertex_count, np.arange(count).astype(np.int32), order)
+    counting_sort(lower, vertex_count, first_integers(count), order)
     around = np.full(count, -1, np.int32)
     first, last = np.empty(vertex_count, np.int32), np.full(vertex_count, -1, np.int32)
     for i in range(count):
@@ -328,7 +339,8 @@ def unfold_fans(faces: Ints, opposite: Ints, angles: Floats, pinched: Flags, top
     corners, corner_angles = topology.corners, topology.corner_angles
     first_corner, total_angle, flags = topology.first_corner, topology.total_angle, topology.flags
     flat = faces.reshape(-1)
-    first_corner[:] = 0
+    for v in range(len(first_corner)):
+        first_corner[v] = 0
     for h in range(len(flat)):
         first_corner[flat[h] + 1] += 1
     for v in range(len(total_angle)):
@@ -369,9 +381,9 @@ def unfold_fans(faces: Ints, opposite: Ints, angles: Floats, pinched: Flags, top
 
 
 @kernel
-def label_components(faces: Ints, vertex_count: int) -> Ints:
-    """Return the connected component of each vertex, numbered by first appearance; O(V + F)."""
-    parent = np.arange(vertex_count).astype(np.int32)
+def label_components(faces: Ints, component: Ints) -> None:
+    """Fill the connected component of each vertex, numbered by first appearance; O(V + F)."""
+    parent = first_integers(len(component))
     for f in range(faces.shape[0]):
         root = faces[f, 0]
         while parent[root] != root:
@@ -386,16 +398,14 @@ def label_components(faces: Ints, vertex_count: int) -> Ints:
                 low, high = min(root, other), max(root, other)
                 parent[high] = low
                 root = low
-    label = np.empty(vertex_count, np.int32)
     count = 0
-    for v in range(vertex_count):
+    for v in range(len(component)):
         # A parent is never a higher vertex than its child, so it is labelled already.
         if parent[v] == v:
-            label[v] = count
+            component[v] = count
             count += 1
         else:
-            label[v] = label[parent[v]]
-    return label
+            component[v] = component[parent[v]]
 
 
 @kernel
@@ -455,7 +465,7 @@ def build_topology(vertices: Floats, faces: Ints, topology: Any) -> tuple[Outcom
     unfold_fans(inner_faces, opposite, angles, pinched, topology)
     across = crossings(inner_faces, opposite, pinched, topology.flags)
     fill_links(inner_faces, opposite, across, around, topology.links)
-    topology.component[:] = label_components(faces, len(vertices))
+    label_components(faces, topology.component)
     return Outcome.FINISHED, -1
 
 

@@ -13,15 +13,13 @@ from typing import Any
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL
-from geodesic_core.kernels.sweep.bounds import LANDMARKS, merging
+from geodesic_core.kernels.sweep.bounds import LANDMARKS
 from geodesic_core.kernels.sweep.state import (
     COUNTERS,
     ENTRY_EDGE,
     FACE,
     FAR,
     FREE_FIRST,
-    LIGHT,
-    LIST,
     LIT_FROM,
     LIT_TO,
     MARKS,
@@ -30,12 +28,9 @@ from geodesic_core.kernels.sweep.state import (
     SENT_AT,
     SENT_FROM,
     SENT_TO,
-    SITE,
     SIZE,
     TOUCHED,
-    WINNER,
     is_pruned,
-    view_of,
 )
 from geodesic_core.tolerances import LANDMARK_ERROR, SINGLE_PRECISION
 
@@ -131,49 +126,45 @@ def may_pass(wave: Any, v: int) -> bool:
 
 
 @kernel
-def forget(topology: Any, wavefront: Any, bounds: Any) -> None:
+def forget(topology: Any, wavefront: Any) -> None:
     """Reset the wavefront to its first state, in time proportional to the vertices touched.
 
     Modifies the wavefront.
     """
-    wave = view_of(topology, wavefront, bounds)
-    mesh, pool, vertices, sites = wave.mesh, wave.pool, wave.vertices, wave.sites
-    for i in range(wave.counters[TOUCHED]):
+    pool, vertices, sites = wavefront.pool, wavefront.vertices, wavefront.sites
+    merges = len(vertices.upper) > 0
+    for i in range(wavefront.counters[TOUCHED]):
         v = vertices.touched[i]
         vertices.distance[v] = math.inf
-        vertices.winner_ints[WINNER * v + ENTRY_EDGE] = -1
-        vertices.winner_ints[WINNER * v + PREDECESSOR] = -1
+        vertices.winner_ints[v, ENTRY_EDGE] = vertices.winner_ints[v, PREDECESSOR] = -1
         vertices.status[v] = FAR
-        wave.queues.heap_place[v] = -1
-        if merging(wave):
+        wavefront.queues.heap_place[v] = -1
+        if merges:
             vertices.upper[v] = math.inf
             vertices.reference[v] = -1
-            row = LIGHT * v
-            vertices.light[row + LIT_FROM], vertices.light[row + LIT_TO] = 1.0, -1.0
-            vertices.light[row + SENT_FROM], vertices.light[row + SENT_TO] = 1.0, -1.0
-            vertices.light[row + SENT_AT] = math.inf
-        for c in range(mesh.first_corner[v], mesh.first_corner[v + 1]):
+            vertices.light[v, LIT_FROM], vertices.light[v, LIT_TO] = 1.0, -1.0
+            vertices.light[v, SENT_FROM], vertices.light[v, SENT_TO] = 1.0, -1.0
+            vertices.light[v, SENT_AT] = math.inf
+        for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
             # Windows lie only on faces of vertices that were touched.
-            face = mesh.corners[c] // 3
+            face = topology.corners[c] // 3
             for h in range(3 * face, 3 * face + 3):
-                pool.lists[LIST * h + SIZE] = 0
-                pool.lists[LIST * h + MARKS] = 0
-                if mesh.flags[v] & (SEAM | PINCHED):
+                pool.lists[h, SIZE] = pool.lists[h, MARKS] = 0
+                if topology.flags[v] & (SEAM | PINCHED):
                     pool.crossings[h] = -1
-                if merging(wave):
+                if merges:
                     pool.runs[h] = 0
-    for k in range(wave.sizes.sites):
-        node, face = sites.ints[SITE * k + NODE], sites.ints[SITE * k + FACE]
+    for k in range(len(sites.ints)):
+        node, face = sites.ints[k, NODE], sites.ints[k, FACE]
         vertices.distance[node] = math.inf
-        vertices.winner_ints[WINNER * node + ENTRY_EDGE] = -1
-        vertices.winner_ints[WINNER * node + PREDECESSOR] = -1
-        if merging(wave):
+        vertices.winner_ints[node, ENTRY_EDGE] = vertices.winner_ints[node, PREDECESSOR] = -1
+        if merges:
             vertices.reference[node] = -1
         for h in range(3 * face, 3 * face + 3):
-            pool.lists[LIST * h + MARKS] = 0
+            pool.lists[h, MARKS] = 0
     for i in range(COUNTERS):
-        wave.counters[i] = 0
-    wave.counters[FREE_FIRST] = -1
+        wavefront.counters[i] = 0
+    wavefront.counters[FREE_FIRST] = -1
 
 
 @kernel

@@ -9,6 +9,7 @@ windows that cross its face. No vertex is inserted, so that there are no slivers
 import math
 from typing import Any
 
+from geodesic_core.arrays import Ints
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -86,20 +87,18 @@ def emit_site(wave: Any, k: int) -> None:
 
 
 @kernel
-def watch_sites(topology: Any, wavefront: Any, bounds: Any, first: int) -> None:
+def watch_sites(sites: Ints, lists: Ints, first: int) -> None:
     """Have the sites from row ``first`` on reached by the windows that cross their faces.
 
-    Modifies the marks of the faces' lists.
+    ``sites`` (S, 3) and ``lists`` (3F, 4) are those of `Sites` and `Pool`; modifies NEXT_SITE of
+    the first and MARKS of the second.
     """
-    wave = view_of(topology, wavefront, bounds)
-    pool, sites = wave.pool, wave.sites
-    for k in range(first, wave.sizes.sites):
-        face = sites.ints[SITE * k + FACE]
-        marks = pool.lists[LIST * 3 * face + MARKS]
-        sites.ints[SITE * k + NEXT_SITE] = (marks >> SITE_SHIFT) - 1
+    for k in range(first, len(sites)):
+        face = sites[k, FACE]
+        sites[k, NEXT_SITE] = (lists[3 * face, MARKS] >> SITE_SHIFT) - 1
         for h in range(3 * face, 3 * face + 3):
-            others = pool.lists[LIST * h + MARKS] & ((1 << SITE_SHIFT) - 1)
-            pool.lists[LIST * h + MARKS] = others | (k + 1) << SITE_SHIFT
+            others = lists[h, MARKS] & ((1 << SITE_SHIFT) - 1)
+            lists[h, MARKS] = others | (k + 1) << SITE_SHIFT
 
 
 @kernel

@@ -208,6 +208,7 @@ def test_distances_on_a_box_are_least_over_the_curve(seed):
         assert field.distances[v] == pytest.approx(expected, rel=EXACT)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(8)
 @pytest.mark.parametrize("error", [None, 1e-3])
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)

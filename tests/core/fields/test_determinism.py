@@ -38,6 +38,7 @@ def test_two_runs_agree(name, error):
     assert answer(meshes[0], 7, error, retain="distances") == first
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @exact_or_not
 def test_threads_that_share_a_mesh_do_not_disturb_one_another(error):

@@ -62,6 +62,7 @@ def test_distances_are_those_of_a_mesh_with_vertices_there(case):
         np.testing.assert_allclose(found, matrix[v, at], rtol=EXACT, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(8)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_all_ways_to_a_distance_agree(case):

@@ -52,6 +52,7 @@ def test_the_same_on_larger_meshes_and_slivers(case):
     check_shortened(mesh, random_pairs(mesh, 300))
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_mostly_it_is_the_distance_already():
     """Smooth or not: far below the paths along edges, which are 4 to 12 % too long."""

@@ -246,6 +246,7 @@ def test_the_order_in_memory_does_not_show(case):
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_a_fan_of_many_faces_takes_linear_time():
     gc.warm_up()

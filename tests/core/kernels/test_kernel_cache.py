@@ -177,7 +177,7 @@ print(len(half.overloads))
 
 @pytest.mark.jit
 @pytest.mark.slow
-def test_a_folder_that_cannot_be_written_is_told_of(tmp_path):
+def test_a_folder_that_cannot_be_written_is_reported(tmp_path):
     (tmp_path / "file").write_text("no folder")
     process = start(USE, tmp_path / "file")
     output, errors = process.communicate()
@@ -185,21 +185,21 @@ def test_a_folder_that_cannot_be_written_is_told_of(tmp_path):
     assert "NUMBA_CACHE_DIR" in errors
 
 
-def test_compiling_is_told_when_it_takes_long(tmp_path, monkeypatch, capfd):
+def test_long_compilation_is_reported(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(progress, "_FIRST_S", 0.0)
     monkeypatch.delenv("GEODESIC_QUIET", raising=False)
     for number in range(3):
         (tmp_path / f"{number}.kernel").touch()
-    told: list[str] = []
-    with progress.of_folder(tmp_path):
-        wait_until(lambda: told.append(capfd.readouterr().err) or any(told))
-    assert f"Compiling kernels for this machine, once: 3 of {progress.KERNELS}" in "".join(told)
+    printed: list[str] = []
+    with progress.shown(tmp_path):
+        wait_until(lambda: printed.append(capfd.readouterr().err) or any(printed))
+    assert f"Compiling kernels for this machine, once: 3 of {progress.KERNELS}" in "".join(printed)
 
 
-def test_silence_can_be_had(tmp_path, monkeypatch, capfd):
+def test_nothing_is_printed_when_quiet(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(progress, "_FIRST_S", 0.0)
     monkeypatch.setenv("GEODESIC_QUIET", "1")
     before = threading.active_count()
-    with progress.of_folder(tmp_path):
+    with progress.shown(tmp_path):
         assert threading.active_count() == before
     assert capfd.readouterr().err == ""

@@ -195,9 +195,9 @@ def test_a_sweep_is_forgotten_whole(name, merges):
     budgets = [1, 300, 1 << 60] if WITHOUT_JIT else [*np.geomspace(1, 1e5, 40).astype(int), 1 << 60]
     last = len(case.vertices) - 1
     for budget in budgets:
-        wave, bounds = after(mesh, 0, last, merges=merges, budget=int(budget))
+        wave, _ = after(mesh, 0, last, merges=merges, budget=int(budget))
         assert snapshot(wave) != fresh
-        forget(mesh.topology, wave, bounds)
+        forget(mesh.topology, wave)
         assert snapshot(wave) == fresh
 
 
@@ -210,7 +210,7 @@ def test_a_search_along_edges_is_forgotten_whole(name):
     bounds = exact_bounds(math.inf, goal_at_vertex(mesh, 30))
     edge_dijkstra.search_edges(mesh.topology, wave, bounds, 0, 30)
     assert snapshot(wave) != fresh
-    forget(mesh.topology, wave, bounds)
+    forget(mesh.topology, wave)
     assert snapshot(wave) == fresh
 
 

@@ -107,6 +107,7 @@ def test_unfolding_glues_faces_of_no_area_shut(faces, start, end, expected):
     assert unfolding.distance_matrix(LINE, faces)[start, end] == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_unfolding_says_where_it_does_not_know():
     tip = [(0, 0, 0), (1, 0, 0), (1, 1e-7, 0), (1, 0, 1e-7)]
     with pytest.raises(unfolding.UnknownError):

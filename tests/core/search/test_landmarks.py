@@ -143,6 +143,7 @@ def test_no_landmark_before_as_much_was_searched():
     assert max(np.diff(counts)) == 1, "one at a time"
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_landmarks_thin_the_search():
     """On a knot, where straight distances say little; the region of the last step stays."""

@@ -265,6 +265,7 @@ def test_progress_grows_from_zero_to_one_in_the_callers_thread(mesh, layout):
     assert where == {threading.get_ident()}
 
 
+@pytest.mark.slow
 @LAYOUTS
 @pytest.mark.parametrize(
     ("arguments", "error"),
@@ -283,6 +284,7 @@ def test_it_stops(mesh, layout, arguments, error):
     check_same(solver.distance_matrix(*ends, layout=layout), whole)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("count", [1, 2])
 def test_it_stops_under_way(count):

@@ -51,6 +51,7 @@ def on_call(number, act):
     return callback
 
 
+@pytest.mark.slow
 def test_cancel_in_every_phase(mesh, answers):
     count = times_asked(mesh)
     assert count >= 4
@@ -74,6 +75,7 @@ def test_cancel_again_and_again(mesh, answers):
     assert solver.shortest_path(*FAR).length == answers[FAR][3]
 
 
+@pytest.mark.slow
 def test_the_deadline_passes_in_every_phase(mesh, answers):
     for number in range(1, times_asked(mesh) + 1):
         solver = gc.Solver(mesh)

@@ -133,6 +133,7 @@ def test_regular_solids(name):
     np.testing.assert_allclose(lengths, closed_forms.REGULAR[name], rtol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("level", [1, 3, 4])
 def test_opposite_points_of_a_sphere(level):
@@ -169,6 +170,7 @@ def test_to_a_neighbour_along_the_edge():
     np.testing.assert_array_equal(path.points, solver.mesh.vertices[[9, 10]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["crags", "thin_plate", "bow_tie_of_fans", "obtuse_pair"])
 def test_between_the_corners_of_a_face(name):
     case = zoo.SMALL[name]
@@ -177,6 +179,7 @@ def test_between_the_corners_of_a_face(name):
         check_searches(solver, a, [b, c])
 
 
+@pytest.mark.slow
 @pytest.mark.slice(2)
 @pytest.mark.parametrize("name", ["crags_with_holes", "double_frame", "open_fan", "comb"])
 def test_between_the_rims(name):
