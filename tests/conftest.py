@@ -64,7 +64,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(marker)
         if WITHOUT_JIT and item.get_closest_marker("jit"):
             item.add_marker(pytest.mark.skip(reason="kernels run in pure Python"))
-    items.sort(key=lambda item: item.get_closest_marker("page") is None)  # the longest go first
+    items.sort(key=lambda item: item.path.name != "test_page.py")  # the longest goes first
     if not config.option.full:
         _deselect(config, items, FULL_ONLY)
         _deselect_beyond_slices(config, items)

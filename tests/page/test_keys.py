@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import httpx2
 import pytest
-from playwright.sync_api import Browser, Page, Request, expect
+from playwright.sync_api import Browser, Page, Request, Route, expect
 
 from tests.page.conftest import sample, serving
 from tests.support.viewing import PLAIN, View
@@ -110,15 +110,19 @@ def test_a_key_that_no_longer_holds_is_asked_for_anew(view: View, knot: str) -> 
 
 def test_progress_is_read_with_the_key(view: View, large: str) -> None:
     streams: list[Request] = []
+    answers: list[Route] = []
+
+    def hold(answer: Route) -> None:
+        answers.append(answer)
+
     view.page.on("request", lambda each: streams.append(each) if "/events" in each.url else None)
+    view.page.route("**/results", hold)  # so that progress stays to be seen
     view.page.goto(f"/?mesh={large}&source=v0&{PLAIN}")
     view.wait("error")
-    give_key(view.page, KEY)
-
-    told = view.page.locator("#progress[value]")
-    told.wait_for()
-    first = told.get_attribute("value") or ""
-    expect(view.page.locator("#progress")).not_to_have_attribute("value", first)
+    with view.page.expect_request("**/results", timeout=90_000):
+        give_key(view.page, KEY)
+    expect(view.page.locator("#progress")).to_have_attribute("value", "1")
+    answers[0].continue_()
     view.wait()
 
     (stream,) = streams
