@@ -36,13 +36,15 @@ def _curve(mesh: TriangleMesh) -> Curve:
 def _exact() -> None:
     mesh = _mesh()
     exact_distance(mesh, 0, targets=[_INSIDE])
-    exact_distance(mesh, 0, retain="windows").distance_at(_INSIDE)
+    field = exact_distance(mesh, 0, retain="windows")
+    field.distance_at(_INSIDE)
+    field.path_to(8)
     mesh.report  # noqa: B018 - computed on access
 
 
 def _paths() -> None:
     mesh = _mesh()
-    exact_distance(mesh, 0).path_to(8)
+    # First what precedes the sweep of a search: another process compiles the sweep meanwhile.
     Solver(mesh).shortest_path(0, 8, explain=True)
     Solver(mesh).nearest(0, [3, 8])
 
@@ -187,4 +189,9 @@ def _start(names: Sequence[str]) -> "subprocess.Popen[bytes]":
         environment |= {"NUMBA_CPU_NAME": target, "NUMBA_CPU_FEATURES": ""}
     program = f"from geodesic_core import compilation; compilation.run_shared({list(names)!r})"
     command = [sys.executable, "-c", program]
-    return subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL)  # noqa: S603
+    return subprocess.Popen(  # noqa: S603
+        command,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        start_new_session=True,  # Ctrl-C is for the process that started it
+    )
