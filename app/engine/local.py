@@ -5,6 +5,7 @@ import logging
 import threading
 from collections.abc import Coroutine, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -159,8 +160,13 @@ class LocalEngine:
 
     async def _compile(self, workloads: Sequence[str] | None) -> None:
         """Compile kernels in processes of their own; where that fails, workers compile them."""
+        compile_them = partial(gc.compile_kernels, workloads, cancel=self._is_stopping.is_set)
+        compiling = asyncio.ensure_future(asyncio.to_thread(compile_them))
         try:
-            await asyncio.to_thread(gc.compile_kernels, workloads, cancel=self._is_stopping.is_set)
+            await asyncio.shield(compiling)
+        except asyncio.CancelledError:
+            await asyncio.gather(compiling, return_exceptions=True)  # until its processes are gone
+            raise
         except (gc.errors.InternalError, OSError):
             logger.exception("kernels could not be compiled ahead")
         except gc.errors.Cancelled:

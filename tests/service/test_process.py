@@ -16,6 +16,7 @@ from tests.support.meshes import named_mesh, real_mesh
 from tests.support.processes import (
     Server,
     are_gone,
+    compilers_of,
     is_running,
     parent_of,
     processor_time,
@@ -264,3 +265,17 @@ def test_a_client_that_watches_a_job_does_not_keep_the_service_from_stopping(
 
             assert server.process.wait(LONG_S) in ENDED_WELL
             assert not any('"status": "failed"' in line for line in lines), "it is still to be told"
+
+
+def test_processes_that_compile_kernels_end_with_the_service(tmp_path):
+    server = Server(
+        tmp_path / "store", waits_for_workers=False, NUMBA_CACHE_DIR=str(tmp_path / "kernels")
+    )
+    try:
+        wait_until(lambda: len(compilers_of(server.process.pid)) > 0)
+        compilers = compilers_of(server.process.pid)
+        server.process.send_signal(signal.SIGTERM)
+        server.process.wait()
+        assert are_gone(compilers)
+    finally:
+        server.close()

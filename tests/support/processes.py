@@ -22,7 +22,7 @@ COMMAND_LINE = [sys.executable, "-c", "from app.cli import main; main()"]
 class Server:
     """A service that listens, with one worker and the one for small work; settings are text."""
 
-    def __init__(self, store: Path, **settings: str) -> None:
+    def __init__(self, store: Path, *, waits_for_workers: bool = True, **settings: str) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
@@ -35,7 +35,7 @@ class Server:
         self.address = ("127.0.0.1", port)
         self.url = f"http://127.0.0.1:{port}"
         self.client = httpx2.Client(base_url=self.url, timeout=LONG_S)
-        wait_until(self.is_ready)
+        wait_until(self.is_ready if waits_for_workers else self.listens)
 
     def listens(self) -> bool:
         return self._answers("/livez")
@@ -109,13 +109,23 @@ def stopped(pids: Iterable[int]) -> Iterator[None]:
 
 def workers_of(service: int) -> set[int]:
     """Return the ids of worker processes that the fork server of a process has forked."""
-    found = set()
+    return {pid for pid, (_, elder) in _running(b"geodesic-worker").items() if elder == service}
+
+
+def compilers_of(service: int) -> set[int]:
+    """Return the ids of processes that compile kernels for a process."""
+    return {pid for pid, (parent, _) in _running(b"run_shared").items() if parent == service}
+
+
+def _running(command: bytes) -> dict[int, tuple[int, int]]:
+    """Return processes with some text in their command line: their parents, and parents' parents."""
+    found = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
-                is_worker = (entry / "cmdline").read_bytes().startswith(b"geodesic-worker")
-                if is_worker and parent_of(parent_of(int(entry.name))) == service:
-                    found.add(int(entry.name))
+                if command in (entry / "cmdline").read_bytes():
+                    parent = parent_of(int(entry.name))
+                    found[int(entry.name)] = parent, parent_of(parent)
             except (FileNotFoundError, ProcessLookupError):
                 continue
     return found
