@@ -118,7 +118,7 @@ def compilers_of(service: int) -> set[int]:
 
 
 def _running(command: bytes) -> dict[int, tuple[int, int]]:
-    """Return processes with some text in their command line: their parents, and parents' parents."""
+    """Return parents, and parents' parents, of processes by some text in their command lines."""
     found = {}
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
