@@ -36,7 +36,7 @@ def public() -> Iterator[tuple[str, Callable[..., Any]]]:
                 yield f"{prefix}.{name}", thing
                 for method, member in inspect.getmembers(thing, inspect.isroutine):
                     is_own = (getattr(member, "__module__", None) or "").startswith("geodesic_core")
-                    if is_own and not method.startswith("_"):
+                    if is_own and callable(member) and not method.startswith("_"):
                         yield f"{prefix}.{name}.{method}", member
 
 
