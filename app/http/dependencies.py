@@ -65,8 +65,8 @@ class TimeoutHeader(BaseModel):
 
 def context_of(request: Request, headers: TimeoutHeader) -> RequestContext:
     """Return the context of a request, with the lower of the client's and our own deadline."""
-    limit, own_ms = service_of(request).settings.deadline_s, headers.x_timeout_ms
-    deadline_s = limit if own_ms is None else min(limit, own_ms / 1000)
+    limit_ms, own_ms = service_of(request).settings.deadline_s * 1000, headers.x_timeout_ms
+    deadline_s = (limit_ms if own_ms is None else min(limit_ms, own_ms)) / 1000
     return RequestContext(caller_of(request), deadline_s, request.state.request_id)
 
 

@@ -1,8 +1,8 @@
 """Uploads, and the reports of meshes."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, Field, PositiveInt
+from pydantic import BaseModel, Field
 
 from app.schemas.points import StrictModel
 
@@ -19,7 +19,7 @@ class UploadParameters(StrictModel):
     sample: SampleName | None = Field(
         default=None, description="The sample to make, instead of reading a mesh"
     )
-    faces: PositiveInt | None = Field(
+    faces: Annotated[int, Field(ge=1, le=2**53 - 1)] | None = Field(
         default=None, description="Number of faces of the sample, about; 20000 if not given"
     )
 

@@ -1,13 +1,30 @@
 """Points and curves of the surface, as clients write them."""
 
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, FiniteFloat, StrictInt, Tag
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    FiniteFloat,
+    StrictInt,
+    Tag,
+)
 
+T = TypeVar("T")
+
+Count = Annotated[StrictInt, Field(ge=1, le=2**53 - 1)]
+"""A number of things, as large as all readers of JSON keep it"""
 NonNegative = Annotated[FiniteFloat, Field(ge=0)]
 Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[Coordinate, Field(gt=0)]
 Triple = tuple[Coordinate, Coordinate, Coordinate]
+Many = Annotated[list[T], Field(fail_fast=True)]
+"""A list that is refused at its first faulty item: a body has room for millions of them."""
+
+MOST_MEMBERS = 20
+"""Members of an object beyond which it is refused whole: each unknown one would be an error."""
 
 
 class StrictModel(BaseModel):
@@ -83,6 +100,8 @@ POINT_TAGS = {name: f"by {name}" for name in ("vertex", "edge", "face", "positio
 def _tag(value: Any) -> str | None:
     # Called for every point that is validated or serialized; a query may have 100 000.
     fields = value if isinstance(value, dict) else getattr(value, "__dict__", ())
+    if len(fields) > MOST_MEMBERS:
+        return None
     for name, tag in POINT_TAGS.items():
         if name in fields:
             return tag
@@ -111,7 +130,7 @@ Point = Annotated[
 class Polyline(StrictModel):
     """A curve on the surface: straight from each point to the next, in a face of both."""
 
-    polyline: list[Point] = Field(
+    polyline: Many[Point] = Field(
         min_length=1,
         description="The `locations` of a path are such points",
         examples=[[{"vertex": 0}, {"vertex": 1}]],

@@ -1,10 +1,14 @@
 """Bodies and parameters of queries."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, FiniteFloat, StrictBool, StrictInt
+from pydantic import ConfigDict, Field, FiniteFloat, StrictBool, StrictInt, model_validator
+from pydantic_core import PydanticCustomError
 
 from app.schemas.points import (
+    MOST_MEMBERS,
+    Count,
+    Many,
     NonNegative,
     Point,
     PointOrCurve,
@@ -34,10 +38,24 @@ class Accuracy(StrictModel):
     )
 
 
-class AmongBarriers(StrictModel):
+class QueryBody(StrictModel):
+    """The body of a query."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _has_few_members(cls, data: Any) -> Any:
+        if isinstance(data, dict) and len(data) > MOST_MEMBERS:
+            message = "A query has at most {limit} members, but this one has {count}"
+            raise PydanticCustomError(
+                "members", message, {"limit": MOST_MEMBERS, "count": len(data)}
+            )
+        return data
+
+
+class AmongBarriers(QueryBody):
     """A query on a mesh with blocked faces."""
 
-    barriers: list[StrictInt] = Field(
+    barriers: Many[StrictInt] = Field(
         default=[],
         description="Indices of faces that are blocked: holes, at whose corners paths may bend",
         examples=[[7, 8]],
@@ -59,12 +77,12 @@ class DistancesRequest(Accuracy, AmongBarriers):
         }
     )
 
-    sources: list[Source] = Field(min_length=1)
-    targets: list[Point] | None = Field(default=None, min_length=1)
+    sources: Many[Source] = Field(min_length=1)
+    targets: Many[Point] | None = Field(default=None, min_length=1)
     max_distance: NonNegative | None = Field(
         default=None, description="Points farther than this, in mesh units, count as unreachable"
     )
-    include: list[Literal["nearest_source", "gradient"]] = Field(
+    include: Many[Literal["nearest_source", "gradient"]] = Field(
         default=[],
         description="Further values of each point, in JSON, CSV and PLY: `nearest_source`, an "
         "index into `sources`; `gradient`, the direction in which distance grows fastest, for all "
@@ -84,11 +102,11 @@ class IsolinesRequest(Accuracy, AmongBarriers):
         }
     )
 
-    sources: list[Source] = Field(min_length=1)
-    levels: list[Positive] | None = Field(
+    sources: Many[Source] = Field(min_length=1)
+    levels: Many[Positive] | None = Field(
         default=None, min_length=1, description="Distances in mesh units; give these or `count`"
     )
-    count: Annotated[StrictInt, Field(ge=1)] | None = Field(
+    count: Count | None = Field(
         default=None,
         description="Number of levels, evenly spaced between 0 and the largest distance of a "
         "reachable vertex, both left out",
@@ -121,7 +139,7 @@ class PathRequest(Accuracy, AmongBarriers):
 
     source: Point
     target: Point
-    waypoints: list[Point] = Field(
+    waypoints: Many[Point] = Field(
         default=[],
         description="The path is shortest from each stop to the next; for `exact` only",
     )
@@ -143,7 +161,7 @@ class PathsRequest(Accuracy, AmongBarriers):
     )
 
     source: PointOrCurve
-    targets: list[Point] = Field(min_length=1)
+    targets: Many[Point] = Field(min_length=1)
     max_distance: NonNegative | None = Field(
         default=None, description="Targets farther than this, in mesh units, have no path"
     )
@@ -163,8 +181,8 @@ class MatrixRequest(AmongBarriers):
         }
     )
 
-    sources: list[Point] = Field(min_length=1)
-    targets: list[Point] = Field(min_length=1)
+    sources: Many[Point] = Field(min_length=1)
+    targets: Many[Point] = Field(min_length=1)
     max_distance: NonNegative | None = Field(
         default=None, description="Points farther than this, in mesh units, count as unreachable"
     )
@@ -187,23 +205,21 @@ class NearestRequest(AmongBarriers):
     )
 
     source: Point
-    candidates: list[Point] = Field(min_length=1)
-    k: Annotated[StrictInt, Field(ge=1)] = Field(
-        default=1, description="Number of candidates to find, at most all of them"
-    )
+    candidates: Many[Point] = Field(min_length=1)
+    k: Count = Field(default=1, description="Number of candidates to find, at most all of them")
     max_distance: NonNegative | None = Field(
         default=None, description="Candidates farther than this are left out"
     )
 
 
-class LocateRequest(StrictModel):
+class LocateRequest(QueryBody):
     """The points of the surface that are nearest to some positions."""
 
     model_config = ConfigDict(
         json_schema_extra={"examples": [{"points": [[1.0, 2.0, 3.0]], "max_distance": 0.5}]}
     )
 
-    points: list[Triple] = Field(min_length=1, description="Positions: x, y, z in mesh units")
+    points: Many[Triple] = Field(min_length=1, description="Positions: x, y, z in mesh units")
     max_distance: NonNegative | None = Field(
         default=None, description="Largest distance of the surface from a position, in mesh units"
     )

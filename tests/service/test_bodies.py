@@ -94,6 +94,6 @@ def test_faults_are_named_in_bodies_of_any_size(client: TestClient, plane: str, 
     assert places(outside, "invalid_point") == [f"/targets/{count}/vertex"]
     cut = json.dumps({"sources": sources, "targets": targets})[:-1]
     problem = check_problem(client.post(link, content=cut, headers=headers), 400, "malformed_body")
-    assert f"at character {len(cut)}" in problem["detail"]
+    assert f"at line 1 column {len(cut)}" in problem["detail"]
     array = client.post(link, json=targets)
     assert check_problem(array, 422, "invalid_request")["errors"][0]["pointer"] == ""

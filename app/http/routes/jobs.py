@@ -1,5 +1,6 @@
 """Routes of jobs: queries that are answered whether their client waits or not."""
 
+import re
 from collections.abc import AsyncIterator
 from typing import Annotated, Any
 
@@ -24,6 +25,9 @@ from app.http.responses import (
 from app.jobs import Job
 from app.schemas.meshes import ListParameters
 from app.schemas.service import JobDocument, JobList
+
+_NUMBER = re.compile("[0-9]{1,18}")
+"""A number that SQLite has room for"""
 
 router = APIRouter(prefix="/jobs", tags=["jobs"])
 
@@ -146,7 +150,8 @@ async def watch_job(
     job: JobDep,
     service: ServiceDep,
     last_event_id: Annotated[
-        str | None, Header(description="The id of the last event that the client saw")
+        str | None,
+        Header(max_length=18, description="The id of the last event that the client saw"),
     ] = None,
 ) -> AsyncIterator[ServerSentEvent]:
     """Send the job, as `GET` returns it, whenever it changes, until it has finished.
@@ -160,12 +165,13 @@ async def watch_job(
 
 def _version(event_id: str | None) -> int:
     # Any other id means that nothing was seen, as the specification says.
-    return int(event_id) if event_id is not None and event_id.isdecimal() else 0
+    return int(event_id) if event_id is not None and _NUMBER.fullmatch(event_id) else 0
 
 
 def _number(cursor: str | None) -> int | None:
     if cursor is None:
         return None
-    if not cursor.isdecimal():
-        raise problem("invalid_request", f"{cursor!r} is no next_cursor of a list of jobs")
+    if not _NUMBER.fullmatch(cursor):
+        detail = f"{cursor[:20]!r} is no next_cursor of a list of jobs"
+        raise problem("invalid_request", detail)
     return int(cursor)

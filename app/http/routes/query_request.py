@@ -4,7 +4,6 @@ Large bodies are read and checked in a thread, so that the event loop goes on. O
 40 000 points would take a tenth of a second.
 """
 
-import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
@@ -12,6 +11,7 @@ from typing import Annotated, Any, TypeVar
 from anyio import to_thread
 from fastapi import Depends, Header, Request, Response
 from pydantic import Field
+from pydantic_core import from_json
 
 from app.errors import problem
 from app.http.dependencies import (
@@ -56,14 +56,10 @@ async def offload_if_large(request: Request, do: Callable[[], T]) -> T:
 def parse_json(body: bytes) -> Any:
     """Return the value of a JSON body, or refuse the body."""
     try:
-        return json.loads(body)
-    except json.JSONDecodeError as error:
-        detail = f"{error.msg} at character {error.pos}"
-    except ValueError:
-        detail = "it is no text in UTF-8, or has a number of thousands of digits"
-    except RecursionError:
-        detail = "it is nested too deeply"
-    raise problem("malformed_body", f"the body is not JSON: {detail}")
+        return from_json(body)
+    except ValueError as error:
+        code = "invalid_request" if "number out of range" in str(error) else "malformed_body"
+        raise problem(code, f"the body cannot be read as JSON: {error}") from None
 
 
 @dataclass(frozen=True)
