@@ -24,6 +24,7 @@ from geodesic_core.search.matrix import Layout, find_matrix
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.target_sweep import TargetSweep
+from geodesic_core.search.turns import Turns
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
 from geodesic_core.validation import as_barriers, as_limit, check_choice, is_number
 
@@ -256,7 +257,8 @@ class Solver:
 
     Paths need scratch memory, about two thirds of the mesh's own arrays, and get faster with
     landmarks, which are added as searches go on (64 bytes a vertex). Matrices and nearest
-    candidates need a third. One thread at a time may use a solver.
+    candidates need a third. Threads may share a solver: calls that use its memory wait for each
+    other.
 
     Parameters
     ----------
@@ -274,6 +276,11 @@ class Solver:
         self.mesh = mesh
         self._search: PathSearch | None = None
         self._sweep: TargetSweep | None = None
+        self._turns = Turns()
+
+    def __reduce__(self) -> tuple[type["Solver"], tuple[TriangleMesh]]:
+        """Copy and pickle the mesh alone: memory and landmarks are found again."""
+        return Solver, (self.mesh,)
 
     @property
     def nbytes(self) -> int:
@@ -431,10 +438,11 @@ class Solver:
         control = Control(progress, cancel, deadline_s, memory_limit)
         limit = as_limit(max_distance)
         stops = _as_stops(self.mesh, source, target, waypoints)
-        search = self._shared_search()
-        path = _shortest_through(search, stops, limit, control, explain=explain)
-        search.add_landmark_if_due(stops[0], replace(control, progress=None))
-        return path
+        with self._turns.taken(control):
+            search = self._shared_search()
+            path = _shortest_through(search, stops, limit, control, explain=explain)
+            search.add_landmark_if_due(stops[0], replace(control, progress=None))
+            return path
 
     def distance_matrix(
         self,
@@ -479,9 +487,10 @@ class Solver:
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
         shared = self._shared_sweep, self._shared_search
-        return find_matrix(
-            self.mesh, *shared, sources, targets, max_distance, layout, threads, control
-        )
+        with self._turns.taken(control):
+            return find_matrix(
+                self.mesh, *shared, sources, targets, max_distance, layout, threads, control
+            )
 
     def nearest(
         self,
@@ -523,9 +532,10 @@ class Solver:
         [1, 0]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        return find_nearest(
-            self.mesh, self._shared_sweep, source, candidates, k, max_distance, control
-        )
+        with self._turns.taken(control):
+            return find_nearest(
+                self.mesh, self._shared_sweep, source, candidates, k, max_distance, control
+            )
 
     def _shared_search(self) -> PathSearch:
         if self._search is None:

@@ -515,6 +515,12 @@ class TriangleMesh:
         """Sentences on the defects of this mesh and their remedies, for its user."""
         return (*self._notes, *warnings_of(self.report))
 
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Become a copy; pickle and `copy` forget that arrays are read-only."""
+        for name, value in state.items():
+            self.__dict__[name] = _frozen(value) if isinstance(value, np.ndarray) else value
+        self.topology = Topology(*(_frozen(array) for array in self.topology))
+
     def __repr__(self) -> str:
         blocked = f", {len(self.barriers)} of them blocked" if len(self.barriers) else ""
         return f"TriangleMesh({len(self.vertices)} vertices, {len(self.faces)} faces{blocked})"
