@@ -2,6 +2,7 @@
 
 import asyncio
 import logging
+import sqlite3
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -227,8 +228,11 @@ class JobManager:
 
     async def _remove_expired(self) -> None:
         while True:
-            for job in await self._repository.finished_before(datetime.now(UTC) - self._ttl):
-                await self._remove(job)
+            try:
+                for job in await self._repository.finished_before(datetime.now(UTC) - self._ttl):
+                    await self._remove(job)
+            except sqlite3.Error:  # such as a full disk: there may be room the next time
+                logger.exception("expired jobs could not be removed")
             await asyncio.sleep(min(_EXPIRY_PERIOD_S, self._ttl.total_seconds()))
 
     async def _remove(self, job: Job) -> None:

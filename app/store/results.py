@@ -26,6 +26,10 @@ _SMALL = 2**16
 """Bytes of a body that is also held in memory: most of them, but for fields and long lines"""
 
 
+_ENTRY = 4096
+"""Bytes that a result in memory takes besides its body: objects, names and headers"""
+
+
 class ResultManifest(BaseModel):
     """Headers, size and checksum of a complete result, as stored beside its body."""
 
@@ -117,9 +121,9 @@ def _write(
 class ResultStore:
     """The results under ``root``, at most ``capacity`` bytes; the least recently used go first.
 
-    Up to ``memory`` bytes of small results are held in memory: all those without files, and some of
-    the others. One process owns the store and its index. `find` and `add` acquire a result, which
-    protects its files until `release`; a pinned one stays until `unpin`.
+    Small results of up to ``memory`` bytes are held in memory: all those without files, and some
+    of the others. One process owns the store and its index. `find` and `add` acquire a result,
+    which protects its files until `release`; a pinned one stays until `unpin`.
     """
 
     def __init__(self, root: Path, capacity: int, memory: int) -> None:
@@ -261,13 +265,13 @@ class ResultStore:
         if result.body is None or result.name in self._small:
             return
         self._small[result.name] = result
-        self._small_total += result.manifest.size
+        self._small_total += _ENTRY + result.manifest.size
         while self._small_total > self._memory:
             self._drop_small(next(iter(self._small)))
 
     def _drop_small(self, name: str) -> None:
         if name in self._small:
-            self._small_total -= self._small.pop(name).manifest.size
+            self._small_total -= _ENTRY + self._small.pop(name).manifest.size
 
     def _remove(self, name: str) -> None:
         self._drop_small(name)

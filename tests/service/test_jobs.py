@@ -1,6 +1,7 @@
 """Queries that are answered whether their client waits or not."""
 
 import json
+import sqlite3
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta, tzinfo
@@ -11,6 +12,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.jobs.repository import JobRepository
 from tests.support.processes import stopped
 from tests.support.service import (
     SLOW_FACES,
@@ -322,6 +324,24 @@ def test_jobs_are_forgotten_after_a_while(tmp_path: Path, monkeypatch: pytest.Mo
         assert wait_for(client, job, "failed")["problem"]["code"] == "storage_full"
         calendar.days += 1
         wait_until(lambda: client.get(job).status_code == 404)
+
+
+def test_jobs_are_forgotten_although_the_disk_was_full(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    remove, refused = JobRepository.remove, []
+
+    async def remove_later(repository: JobRepository, job_id: str) -> None:
+        if len(refused) < 2:
+            refused.append(job_id)
+            raise sqlite3.OperationalError("database or disk is full")
+        await remove(repository, job_id)
+
+    monkeypatch.setattr(JobRepository, "remove", remove_later)
+    with serving(tmp_path, job_ttl=0.1) as client:
+        job = job_of(submit(client, upload_sample(client, "plane", 50)))
+        wait_until(lambda: client.get(job).status_code == 404)
+    assert len(refused) == 2
 
 
 class Calendar:

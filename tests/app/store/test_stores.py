@@ -1,4 +1,5 @@
 import os
+import tracemalloc
 from pathlib import Path
 
 import anyio
@@ -8,7 +9,7 @@ import pytest
 import geodesic_core as gc
 from app.errors import ProblemError
 from app.store.meshes import MeshStore
-from app.store.results import ResultStore, write_result
+from app.store.results import Result, ResultStore, write_result
 from tests.support.service import store_mesh
 
 SQUARE = (
@@ -222,7 +223,7 @@ def test_results_of_a_mesh_are_forgotten(results: ResultStore, tmp_path: Path) -
 
 
 def test_small_results_are_in_memory_as_far_as_they_fit(tmp_path: Path) -> None:
-    results = ResultStore(tmp_path / "results", 10**6, memory=100)
+    results = ResultStore(tmp_path / "results", 10**6, memory=2 * 4096 + 100)
     results.prepare()
     for key in "abc":
         put(results, tmp_path, f"m/{key}")
@@ -234,6 +235,26 @@ def test_small_results_are_in_memory_as_far_as_they_fit(tmp_path: Path) -> None:
     assert find(results, "m/a").body == b"x" * 40, "read a moment ago"
     results.forget_mesh("m")
     assert find(results, "m/a") is None
+
+
+def test_the_memory_of_small_results_is_counted_whole(tmp_path: Path) -> None:
+    memory = 2**22
+    results = ResultStore(tmp_path / "results", 10**6, memory=memory)
+    headers = {"Geodesic-Method": "exact", "Geodesic-Error": "0.0", "Geodesic-Vertices": "12"}
+
+    def answer(number: int) -> Result:
+        body = [b"%0136d" % number]
+        return write_result(
+            tmp_path, f"m/{number:064x}", body, dict(headers), "code", is_cheap=True
+        )
+
+    tracemalloc.start()
+    for number in range(3000):
+        results.release(results.add(answer(number)))
+    taken = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert memory / 4 < taken < memory
+    assert find(results, f"m/{2999:064x}") is not None
 
 
 def test_what_is_held_stays_until_it_is_released(results: ResultStore, tmp_path: Path) -> None:
@@ -262,7 +283,7 @@ def test_a_failed_result_leaves_nothing(tmp_path: Path) -> None:
 
 @pytest.fixture
 def roomy(tmp_path: Path) -> ResultStore:
-    store = ResultStore(tmp_path / "results", 10**6, memory=100)
+    store = ResultStore(tmp_path / "results", 10**6, memory=2 * 4096 + 100)
     store.prepare()
     return store
 
