@@ -25,9 +25,18 @@ def read_json_mesh(body: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]
     for name in _MEMBERS:
         if name not in document:
             raise _invalid(pointer(name), f"{name} is missing")
+    if b"true" in body or b"false" in body:  # which NumPy takes for 1 and 0
+        for name in _MEMBERS:
+            _refuse_booleans(name, document[name])
     vertices = _rows(document, "vertices", "iuf", "three finite numbers")
     faces = _rows(document, "faces", "iu", "three vertex indices")
     return vertices.astype(np.float64), faces.astype(np.int64)
+
+
+def _refuse_booleans(name: str, rows: Any) -> None:
+    for i, row in enumerate(rows if isinstance(rows, list) else ()):
+        if any(isinstance(value, bool) for value in (row if isinstance(row, list) else ())):
+            raise _invalid(pointer(name, i), f"{name}[{i}] has a boolean, not a number")
 
 
 def _rows(document: dict[str, Any], name: str, kinds: str, what: str) -> NDArray[Any]:

@@ -4,6 +4,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Discriminator,
     Field,
@@ -11,12 +12,23 @@ from pydantic import (
     StrictInt,
     Tag,
 )
+from pydantic_core import PydanticCustomError
 
 T = TypeVar("T")
 
 Count = Annotated[StrictInt, Field(ge=1, le=2**53 - 1)]
 """A number of things, as large as all readers of JSON keep it"""
-NonNegative = Annotated[FiniteFloat, Field(ge=0)]
+
+
+def _no_boolean(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise PydanticCustomError("number", "Input should be a number, not a boolean")
+    return value
+
+
+NOT_BOOLEAN = BeforeValidator(_no_boolean)
+"""For numbers that may come as texts, in query parameters: these cannot be strict"""
+NonNegative = Annotated[FiniteFloat, Field(ge=0), NOT_BOOLEAN]
 Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[Coordinate, Field(gt=0)]
 Triple = tuple[Coordinate, Coordinate, Coordinate]

@@ -7,6 +7,7 @@ from pydantic_core import PydanticCustomError
 
 from app.schemas.points import (
     MOST_MEMBERS,
+    NOT_BOOLEAN,
     Count,
     Many,
     NonNegative,
@@ -26,12 +27,12 @@ class Accuracy(StrictModel):
     """The accuracy of an answer."""
 
     method: Method = "exact"
-    relative_error: Annotated[FiniteFloat, Field(gt=0, lt=1)] | None = Field(
+    relative_error: Annotated[FiniteFloat, Field(gt=0, lt=1), NOT_BOOLEAN] | None = Field(
         default=None,
         description="For `approximate`: share of the exact distance by which one may fall short; "
         "0.001 where neither error is given",
     )
-    absolute_error: Annotated[FiniteFloat, Field(gt=0)] | None = Field(
+    absolute_error: Annotated[FiniteFloat, Field(gt=0), NOT_BOOLEAN] | None = Field(
         default=None,
         description="For `approximate`: the same in mesh units; where both errors are given, "
         "both hold",

@@ -131,6 +131,22 @@ def test_the_hash_of_a_query_is_stable(monkeypatch: pytest.MonkeyPatch) -> None:
             ["/sources/0/start_distance"],
         ),
         ({"sources": [{"vertex": 0}], "max_distance": -1}, "invalid_request", ["/max_distance"]),
+        ({"sources": [{"vertex": 0}], "max_distance": True}, "invalid_request", ["/max_distance"]),
+        (
+            {"sources": [{"position": [True, 0, 0]}]},
+            "invalid_request",
+            ["/sources/0/position/0"],
+        ),
+        (
+            {"sources": [{"vertex": 0, "start_distance": False}]},
+            "invalid_request",
+            ["/sources/0/start_distance"],
+        ),
+        (
+            {"sources": [{"vertex": 0}], "method": "approximate", "relative_error": True},
+            "invalid_request",
+            ["/relative_error"],
+        ),
         ({"sources": [{"vertex": 0}], "method": "heat"}, "invalid_request", ["/method"]),
         ({"sources": [{"vertex": 0}], "include": ["paths"]}, "invalid_request", ["/include/0"]),
     ],

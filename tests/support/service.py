@@ -153,6 +153,7 @@ def check_problem(response: Any, status: int, code: str) -> dict[str, Any]:
     assert problem["type"] == f"/problems/{code}"
     assert problem["instance"] == response.url.path
     assert problem["request_id"] == response.headers["x-request-id"]
+    assert response.headers["x-content-type-options"] == "nosniff"
     assert problem["detail"]
     return problem
 

@@ -18,7 +18,10 @@ _SANE_ID = re.compile(r"[\w.:-]{1,128}")
 
 
 class RequestIdMiddleware:
-    """Middleware that gives each request an id, and turns remaining errors into problems."""
+    """Middleware that gives each request an id, and turns remaining errors into problems.
+
+    It also forbids browsers to guess the type of an answer.
+    """
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self.app = app
@@ -36,6 +39,7 @@ class RequestIdMiddleware:
         async def answer(problem: Problem) -> None:
             response = problem_response(problem, scope["path"], request_id)
             response.headers["X-Request-ID"] = request_id
+            response.headers["X-Content-Type-Options"] = "nosniff"
             await response(scope, receive, send)
 
         async def send_checked(message: Message) -> None:
@@ -44,6 +48,7 @@ class RequestIdMiddleware:
                 has_started = True
                 headers = MutableHeaders(scope=message)
                 headers["X-Request-ID"] = request_id
+                headers["X-Content-Type-Options"] = "nosniff"
                 if message["status"] >= 400 and headers.get("content-type") != PROBLEM_JSON:
                     is_replaced = True
                     await answer(self._framework_problem(message["status"], headers, scope))

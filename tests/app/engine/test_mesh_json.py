@@ -27,6 +27,13 @@ def test_reads_vertices_and_faces() -> None:
         (b'{"vertices": [[0, 0, 0], ["1", 0, 0]], "faces": []}', "invalid_request", "/vertices/1"),
         (b'{"vertices": [[0, 0, null]], "faces": []}', "invalid_request", "/vertices/0"),
         (b'{"vertices": [[true, false, true]], "faces": []}', "invalid_request", "/vertices/0"),
+        (
+            b'{"vertices": [[0, 0, 0], [1, true, 0.5]], "faces": []}',
+            "invalid_request",
+            "/vertices/1",
+        ),
+        (b'{"vertices": [[0, 0, 0]], "faces": [[0, false, 2]]}', "invalid_request", "/faces/0"),
+        (b'{"vertices": true, "faces": [false]}', "invalid_request", "/vertices"),
         (b'{"vertices": [], "faces": []}', "invalid_request", "/vertices"),
         (b'{"vertices": [[0, 0, 0]], "faces": [[0, 1.5, 2]]}', "invalid_request", "/faces/0"),
         (b'{"vertices": [[0, 0, 0]], "faces": [[0, 1, 2, 3]]}', "invalid_request", "/faces/0"),

@@ -45,6 +45,7 @@ def test_a_sane_id_of_the_client_is_kept(client: TestClient) -> None:
     response = client.get("/livez", headers={"X-Request-ID": "trace-7"})
 
     assert response.headers["x-request-id"] == "trace-7"
+    assert response.headers["x-content-type-options"] == "nosniff"
 
 
 @pytest.mark.parametrize("given", ["", "a b", "x" * 129, "<script>"])
