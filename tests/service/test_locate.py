@@ -110,7 +110,7 @@ def test_the_same_points_are_not_looked_for_again(client: TestClient, knot: str)
     [
         ({}, "invalid_request", ["/points"]),
         ({"points": []}, "invalid_request", ["/points"]),
-        ({"points": [0, 0, 0]}, "invalid_request", [f"/points/{i}" for i in range(3)]),
+        ({"points": [0, 0, 0]}, "invalid_request", ["/points/0"]),
         ({"points": [[0, 0, 0], [0, 0]]}, "invalid_request", ["/points/1/2"]),
         ({"points": [[0, 0, 0, 0]]}, "invalid_request", ["/points/0"]),
         ({"points": [[0, 0, "0"]]}, "invalid_request", ["/points/0/2"]),
