@@ -142,6 +142,11 @@ class ProblemError(Exception):
         self.problem = problem
 
 
+def draining() -> ProblemError:
+    """Return the exception for a request that the end of the service refuses or cuts off."""
+    return problem("draining", "the service is about to stop", headers={"Retry-After": "1"})
+
+
 def problem(code: str, detail: str, **members: Any) -> ProblemError:
     """Return the exception for a problem with these members."""
     return ProblemError(Problem(code, detail, **members))

@@ -151,6 +151,8 @@ class Settings(BaseSettings):
     """Seconds that a job may take."""
     job_ttl: Seconds = 86_400.0
     """Seconds until a finished job is removed, with its answer."""
+    drain_delay_s: Annotated[float, Field(ge=0, allow_inf_nan=False)] | None = None
+    """Seconds between `/readyz` saying 503 and the first refusal; 0 on loopback, else 5."""
     drain_s: Seconds = 20.0
     """Seconds that running requests get when the service is told to stop."""
     cancel_grace_s: Seconds = 2.0

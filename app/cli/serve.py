@@ -1,7 +1,10 @@
 """``geodesic serve``."""
 
+import asyncio
 import math
+from functools import partial
 from ipaddress import ip_address
+from signal import SIGHUP, SIGTERM, raise_signal, signal
 from types import FrameType
 from typing import Annotated
 
@@ -46,16 +49,33 @@ def serve(
     except StoreError as error:
         raise Failure(str(error)) from error
 
+    usual_s = 0.0 if _is_loopback(host) else 5.0  # somebody has to notice, who sends no more then
+    delay_s = usual_s if settings.drain_delay_s is None else settings.drain_delay_s
+
     class Server(uvicorn.Server):
-        """A server that drains the service as soon as it is to stop, where uvicorn does so last."""
+        """A server that drains the service as soon as it is to stop, where uvicorn does so last.
+
+        Before, it says for a while that it is not ready. A second signal ends that at once.
+        """
 
         def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+            is_first = not app.state.service.is_leaving
+            app.state.service.announce_end()
+            if is_first and delay_s > 0:
+                loop = asyncio.get_running_loop()
+                loop.call_soon_threadsafe(partial(loop.call_later, delay_s, self.drain, sig, frame))
+            else:
+                self.drain(sig, frame)
+
+        def drain(self, sig: int, frame: FrameType | None) -> None:
             app.state.service.drain()
             super().handle_exit(sig, frame)
 
     # uvicorn takes whole seconds.
     grace = math.ceil(settings.drain_s)
     server = Server(uvicorn.Config(app, host, port, timeout_graceful_shutdown=grace))
+    # The terminal is gone: the same as a request to end.
+    signal(SIGHUP, lambda *_: raise_signal(SIGTERM))
     server.run()
     if not server.started:
         raise typer.Exit(1)

@@ -17,7 +17,7 @@ from app.engine.queue import FairQueue
 from app.engine.slot import Slot, WorkerLostError
 from app.engine.work import Outcome, Task, TaskResult, Work
 from app.engine.worker import WorkerConfig
-from app.errors import Problem, ProblemError, over_limit, problem
+from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.settings import Settings
 
 logger = logging.getLogger(__name__)
@@ -248,7 +248,7 @@ class LocalEngine:
 
     def _refuse_when_draining(self) -> None:
         if self.is_draining:
-            raise problem("draining", "the service is about to stop", headers=_RETRY_AFTER)
+            raise draining()
 
     def _refuse_to_wait(self, client: str) -> None:
         if self._is_failing:

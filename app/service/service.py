@@ -85,6 +85,8 @@ class Service:
         self.engine: Engine = LocalEngine(settings, results)
         self._job_database = settings.store / JOB_DATABASE
         self.jobs = JobManager(JobRepository(self._job_database), self.results, settings.job_ttl)
+        self.is_leaving = False
+        """Whether the service is about to stop: it is not ready, whatever it still answers"""
         self.lookups = {"hit": 0, "miss": 0}
         """Lookups of results in the store"""
         self.solves: Counter[str] = Counter()
@@ -117,8 +119,13 @@ class Service:
             require_intact(self._job_database)
             yield
 
+    def announce_end(self) -> None:
+        """Say that the service is not ready, so that no new clients are sent to it."""
+        self.is_leaving = True
+
     def drain(self) -> None:
         """Prepare for the end: finish running work, and refuse new work."""
+        self.announce_end()
         self.engine.drain()
         self.jobs.end_events()
 

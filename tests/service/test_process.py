@@ -3,7 +3,9 @@
 import os
 import signal
 from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -250,6 +252,33 @@ def test_what_runs_when_the_service_is_to_stop_ends_well_and_all_else_is_refused
     with running:
         assert running.recv(20).startswith(b"HTTP/1.1 200")
     assert server.process.wait(LONG_S) in ENDED_WELL
+
+
+def test_what_takes_too_long_when_the_service_is_to_stop_is_told_so(tmp_path: Path) -> None:
+    with closing(Server(tmp_path, GEODESIC_DRAIN_S="1")) as server:
+        mesh_id = upload_sample(server.client, "plane", 200)
+        with stopped(server.both_workers()), server.begin_query(mesh_id) as running:
+            server.process.send_signal(signal.SIGTERM)
+            answer = b"".join(iter(lambda: running.recv(65536), b""))
+        assert server.process.wait(LONG_S) in ENDED_WELL
+    head, _, body = answer.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 503")
+    assert b"retry-after: 1" in head.lower()
+    assert b'"code":"draining"' in body
+
+
+@pytest.mark.parametrize("told", [signal.SIGTERM, signal.SIGHUP])
+def test_for_a_while_it_is_not_ready_and_answers_all_the_same(
+    tmp_path: Path, told: signal.Signals
+) -> None:
+    with closing(Server(tmp_path, GEODESIC_DRAIN_DELAY_S=str(10 * LONG_S))) as server:
+        mesh_id = upload_sample(server.client, "plane", 200)
+        server.process.send_signal(told)
+        wait_until(lambda: server.client.get("/readyz").status_code == 503)
+        assert server.client.get("/readyz").json()["code"] == "draining"
+        assert server.client.get(f"/v1/meshes/{mesh_id}/path?from=v0&to=v9").status_code == 200
+        server.process.send_signal(told)
+        assert server.process.wait(LONG_S) in ENDED_WELL
 
 
 def test_a_client_that_watches_a_job_does_not_keep_the_service_from_stopping(

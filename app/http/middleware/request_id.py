@@ -1,5 +1,6 @@
 """Request ids, and the guarantee that each error is answered with a problem."""
 
+import asyncio
 import logging
 import re
 from uuid import uuid4
@@ -8,7 +9,14 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.middleware.body_limit import MAX_BODY_SIZE_SCOPE_KEY
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.errors import PROBLEM_JSON, Problem, ProblemError, problem_of, problem_of_status
+from app.errors import (
+    PROBLEM_JSON,
+    Problem,
+    ProblemError,
+    draining,
+    problem_of,
+    problem_of_status,
+)
 from app.http.responses import problem_response
 from app.settings import Settings, variable_of
 
@@ -57,6 +65,10 @@ class RequestIdMiddleware:
 
         try:
             await self.app(scope, receive, send_checked)
+        except asyncio.CancelledError:  # the service stops, and waited long enough
+            if has_started:
+                raise
+            await answer(draining().problem)
         except Exception as error:
             if not isinstance(error, ProblemError):
                 logger.exception("request %s failed", request_id)

@@ -7,7 +7,7 @@ from starlette.responses import PlainTextResponse
 
 from app import __version__
 from app.encoding import FORMATS
-from app.errors import CODES, problem
+from app.errors import CODES, draining, problem
 from app.http import page
 from app.http.dependencies import ServiceDep
 from app.http.metrics import Metrics
@@ -79,8 +79,8 @@ async def get_liveness() -> Health:
 )
 async def get_readiness(service: ServiceDep) -> Health:
     """Return 200 once a worker has its kernels compiled, 503 before."""
-    if service.engine.is_draining:
-        raise problem("draining", "the service is about to stop", headers={"Retry-After": "1"})
+    if service.is_leaving:
+        raise draining()
     if not service.engine.is_ready:
         detail = "no worker is ready yet: kernels are being compiled or loaded"
         raise problem("engine_unavailable", detail, headers={"Retry-After": "1"})
