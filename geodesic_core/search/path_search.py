@@ -169,8 +169,10 @@ class PathSearch:
         leg.log.add("dijkstra", upper + beside, wave)
         path = edge_dijkstra.vertices_to(wave.vertices.winner_ints[:, PREDECESSOR], first)
         pruning.forget(topology, wave)
-        # Unfolding rounds: by more than the slack of the searches, where faces are slivers.
-        upper = min(upper, funnel.shortened(topology, path) * (1.0 + STRAIGHT)) + beside
+        if leg.slack < math.inf:  # else only what is sure: faces without area unfold to anything
+            # Unfolding rounds: by more than the slack of the searches, where faces are slivers.
+            upper = min(upper, funnel.shortened(topology, path) * (1.0 + STRAIGHT))
+        upper += beside
         if leg.start.point.face_index == leg.end.point.face_index:
             upper = min(upper, leg.straight)
         leg.log.add("shorten", upper)

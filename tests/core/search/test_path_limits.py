@@ -147,3 +147,14 @@ def test_a_limit_saves_work_and_leaves_the_search_sound():
     assert touched[1] < touched[-1]
     again = solver.shortest_path(*ends)
     assert again.points.tobytes() == path.points.tobytes()
+
+
+def test_faces_without_area_between_vertices_at_one_place():
+    """Unfolded, the ends lie upon each other; the path leads around the faces all the same."""
+    vertices = [[2, 1, 2], [0, 1, 2], [0, 2, 2], [0, 2, 2], [2, 2, 0], [0, 0, 2]]
+    mesh = gc.TriangleMesh(vertices, [[5, 1, 2], [1, 3, 0], [4, 3, 5], [5, 3, 1]])
+    assert gc.exact_distance(mesh, 2).distances[3] == 2.0
+    for source, target in ((2, 3), (3, 2)):
+        path = gc.shortest_path(mesh, source, target)
+        assert path.length == 2.0
+        np.testing.assert_array_equal(path.points[1], vertices[1])
