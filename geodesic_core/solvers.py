@@ -20,11 +20,11 @@ from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.search.call_lock import CallLock
 from geodesic_core.search.matrix import Layout, find_matrix
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.search.turns import Turns
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
 from geodesic_core.validation import as_barriers, as_limit, check_choice, is_number
 
@@ -276,7 +276,7 @@ class Solver:
         self.mesh = mesh
         self._search: PathSearch | None = None
         self._sweep: TargetSweep | None = None
-        self._turns = Turns()
+        self._lock = CallLock()
 
     def __reduce__(self) -> tuple[type["Solver"], tuple[TriangleMesh]]:
         """Copy and pickle the mesh alone: memory and landmarks are found again."""
@@ -438,7 +438,7 @@ class Solver:
         control = Control(progress, cancel, deadline_s, memory_limit)
         limit = as_limit(max_distance)
         stops = _as_stops(self.mesh, source, target, waypoints)
-        with self._turns.taken(control):
+        with self._lock.held(control):
             search = self._shared_search()
             path = _shortest_through(search, stops, limit, control, explain=explain)
             search.add_landmark_if_due(stops[0], replace(control, progress=None))
@@ -487,7 +487,7 @@ class Solver:
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
         shared = self._shared_sweep, self._shared_search
-        with self._turns.taken(control):
+        with self._lock.held(control):
             return find_matrix(
                 self.mesh, *shared, sources, targets, max_distance, layout, threads, control
             )
@@ -532,7 +532,7 @@ class Solver:
         [1, 0]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        with self._turns.taken(control):
+        with self._lock.held(control):
             return find_nearest(
                 self.mesh, self._shared_sweep, source, candidates, k, max_distance, control
             )

@@ -49,13 +49,13 @@ def serve(
     except StoreError as error:
         raise Failure(str(error)) from error
 
-    usual_s = 0.0 if _is_loopback(host) else 5.0  # somebody has to notice, who sends no more then
+    usual_s = 0.0 if _is_loopback(host) else 5.0  # time for a load balancer to notice
     delay_s = usual_s if settings.drain_delay_s is None else settings.drain_delay_s
 
     class Server(uvicorn.Server):
         """A server that drains the service as soon as it is to stop, where uvicorn does so last.
 
-        Before, it says for a while that it is not ready. A second signal ends that at once.
+        For a while before, only `/readyz` says so. A second signal ends this time.
         """
 
         def handle_exit(self, sig: int, frame: FrameType | None) -> None:
@@ -74,7 +74,7 @@ def serve(
     # uvicorn takes whole seconds.
     grace = math.ceil(settings.drain_s)
     server = Server(uvicorn.Config(app, host, port, timeout_graceful_shutdown=grace))
-    # The terminal is gone: the same as a request to end.
+    # A closed terminal ends the service in the same order.
     signal(SIGHUP, lambda *_: raise_signal(SIGTERM))
     server.run()
     if not server.started:

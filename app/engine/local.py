@@ -160,8 +160,8 @@ class LocalEngine:
 
     async def _compile(self, workloads: Sequence[str] | None) -> None:
         """Compile kernels in processes of their own; where that fails, workers compile them."""
-        compile_them = partial(gc.compile_kernels, workloads, cancel=self._is_stopping.is_set)
-        compiling = asyncio.ensure_future(asyncio.to_thread(compile_them))
+        compile_kernels = partial(gc.compile_kernels, workloads, cancel=self._is_stopping.is_set)
+        compiling = asyncio.ensure_future(asyncio.to_thread(compile_kernels))
         try:
             await asyncio.shield(compiling)
         except asyncio.CancelledError:

@@ -27,7 +27,6 @@ _POLICY = "; ".join(
 _SAFE = {
     "Content-Security-Policy": _POLICY,
     "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
 }
 _INDEX = {**_SAFE, "Cache-Control": "no-cache", "Vary": "Accept"}
 _ASSET = {**_SAFE, "Cache-Control": "public, max-age=31536000, immutable"}

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
-from app.schemas.points import StrictModel
+from app.schemas.points import LARGEST_COUNT, StrictModel
 
 Merge = Literal["none", "exact"]
 MeshFormat = Literal["obj", "off", "ply", "stl", "glb"]
@@ -19,7 +19,7 @@ class UploadParameters(StrictModel):
     sample: SampleName | None = Field(
         default=None, description="The sample to make, instead of reading a mesh"
     )
-    faces: Annotated[int, Field(ge=1, le=2**53 - 1)] | None = Field(
+    faces: Annotated[int, Field(ge=1, le=LARGEST_COUNT)] | None = Field(
         default=None, description="Number of faces of the sample, about; 20000 if not given"
     )
 

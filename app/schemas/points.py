@@ -16,8 +16,9 @@ from pydantic_core import PydanticCustomError
 
 T = TypeVar("T")
 
-Count = Annotated[StrictInt, Field(ge=1, le=2**53 - 1)]
-"""A number of things, as large as all readers of JSON keep it"""
+LARGEST_COUNT = 2**53 - 1
+"""The largest integer that every reader of JSON keeps exactly"""
+Count = Annotated[StrictInt, Field(ge=1, le=LARGEST_COUNT)]
 
 
 def _no_boolean(value: Any) -> Any:
@@ -32,7 +33,7 @@ NonNegative = Annotated[FiniteFloat, Field(ge=0), NOT_BOOLEAN]
 Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Positive = Annotated[Coordinate, Field(gt=0)]
 Triple = tuple[Coordinate, Coordinate, Coordinate]
-Many = Annotated[list[T], Field(fail_fast=True)]
+FailFastList = Annotated[list[T], Field(fail_fast=True)]
 """A list that is refused at its first faulty item: a body has room for millions of them."""
 
 MOST_MEMBERS = 20
@@ -142,7 +143,7 @@ Point = Annotated[
 class Polyline(StrictModel):
     """A curve on the surface: straight from each point to the next, in a face of both."""
 
-    polyline: Many[Point] = Field(
+    polyline: FailFastList[Point] = Field(
         min_length=1,
         description="The `locations` of a path are such points",
         examples=[[{"vertex": 0}, {"vertex": 1}]],

@@ -9,7 +9,7 @@ from app.schemas.points import (
     MOST_MEMBERS,
     NOT_BOOLEAN,
     Count,
-    Many,
+    FailFastList,
     NonNegative,
     Point,
     PointOrCurve,
@@ -56,7 +56,7 @@ class QueryBody(StrictModel):
 class AmongBarriers(QueryBody):
     """A query on a mesh with blocked faces."""
 
-    barriers: Many[StrictInt] = Field(
+    barriers: FailFastList[StrictInt] = Field(
         default=[],
         description="Indices of faces that are blocked: holes, at whose corners paths may bend",
         examples=[[7, 8]],
@@ -78,12 +78,12 @@ class DistancesRequest(Accuracy, AmongBarriers):
         }
     )
 
-    sources: Many[Source] = Field(min_length=1)
-    targets: Many[Point] | None = Field(default=None, min_length=1)
+    sources: FailFastList[Source] = Field(min_length=1)
+    targets: FailFastList[Point] | None = Field(default=None, min_length=1)
     max_distance: NonNegative | None = Field(
         default=None, description="Points farther than this, in mesh units, count as unreachable"
     )
-    include: Many[Literal["nearest_source", "gradient"]] = Field(
+    include: FailFastList[Literal["nearest_source", "gradient"]] = Field(
         default=[],
         description="Further values of each point, in JSON, CSV and PLY: `nearest_source`, an "
         "index into `sources`; `gradient`, the direction in which distance grows fastest, for all "
@@ -103,8 +103,8 @@ class IsolinesRequest(Accuracy, AmongBarriers):
         }
     )
 
-    sources: Many[Source] = Field(min_length=1)
-    levels: Many[Positive] | None = Field(
+    sources: FailFastList[Source] = Field(min_length=1)
+    levels: FailFastList[Positive] | None = Field(
         default=None, min_length=1, description="Distances in mesh units; give these or `count`"
     )
     count: Count | None = Field(
@@ -140,7 +140,7 @@ class PathRequest(Accuracy, AmongBarriers):
 
     source: Point
     target: Point
-    waypoints: Many[Point] = Field(
+    waypoints: FailFastList[Point] = Field(
         default=[],
         description="The path is shortest from each stop to the next; for `exact` only",
     )
@@ -162,7 +162,7 @@ class PathsRequest(Accuracy, AmongBarriers):
     )
 
     source: PointOrCurve
-    targets: Many[Point] = Field(min_length=1)
+    targets: FailFastList[Point] = Field(min_length=1)
     max_distance: NonNegative | None = Field(
         default=None, description="Targets farther than this, in mesh units, have no path"
     )
@@ -182,8 +182,8 @@ class MatrixRequest(AmongBarriers):
         }
     )
 
-    sources: Many[Point] = Field(min_length=1)
-    targets: Many[Point] = Field(min_length=1)
+    sources: FailFastList[Point] = Field(min_length=1)
+    targets: FailFastList[Point] = Field(min_length=1)
     max_distance: NonNegative | None = Field(
         default=None, description="Points farther than this, in mesh units, count as unreachable"
     )
@@ -206,7 +206,7 @@ class NearestRequest(AmongBarriers):
     )
 
     source: Point
-    candidates: Many[Point] = Field(min_length=1)
+    candidates: FailFastList[Point] = Field(min_length=1)
     k: Count = Field(default=1, description="Number of candidates to find, at most all of them")
     max_distance: NonNegative | None = Field(
         default=None, description="Candidates farther than this are left out"
@@ -220,7 +220,9 @@ class LocateRequest(QueryBody):
         json_schema_extra={"examples": [{"points": [[1.0, 2.0, 3.0]], "max_distance": 0.5}]}
     )
 
-    points: Many[Triple] = Field(min_length=1, description="Positions: x, y, z in mesh units")
+    points: FailFastList[Triple] = Field(
+        min_length=1, description="Positions: x, y, z in mesh units"
+    )
     max_distance: NonNegative | None = Field(
         default=None, description="Largest distance of the surface from a position, in mesh units"
     )

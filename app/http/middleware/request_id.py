@@ -28,7 +28,7 @@ _SANE_ID = re.compile(r"[\w.:-]{1,128}")
 class RequestIdMiddleware:
     """Middleware that gives each request an id, and turns remaining errors into problems.
 
-    It also forbids browsers to guess the type of an answer.
+    It also tells browsers not to guess the media type of an answer.
     """
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
@@ -42,12 +42,12 @@ class RequestIdMiddleware:
             return
         request_id = _request_id(scope)
         scope.setdefault("state", {})["request_id"] = request_id
+        own_headers = {"X-Request-ID": request_id, "X-Content-Type-Options": "nosniff"}
         has_started = is_replaced = False
 
         async def answer(problem: Problem) -> None:
             response = problem_response(problem, scope["path"], request_id)
-            response.headers["X-Request-ID"] = request_id
-            response.headers["X-Content-Type-Options"] = "nosniff"
+            response.headers.update(own_headers)
             await response(scope, receive, send)
 
         async def send_checked(message: Message) -> None:
@@ -55,8 +55,7 @@ class RequestIdMiddleware:
             if message["type"] == "http.response.start":
                 has_started = True
                 headers = MutableHeaders(scope=message)
-                headers["X-Request-ID"] = request_id
-                headers["X-Content-Type-Options"] = "nosniff"
+                headers.update(own_headers)
                 if message["status"] >= 400 and headers.get("content-type") != PROBLEM_JSON:
                     is_replaced = True
                     await answer(self._framework_problem(message["status"], headers, scope))
@@ -65,9 +64,11 @@ class RequestIdMiddleware:
 
         try:
             await self.app(scope, receive, send_checked)
-        except asyncio.CancelledError:  # the service stops, and waited long enough
-            if has_started:
+        except asyncio.CancelledError:
+            task = asyncio.current_task()
+            if has_started or task is None or not task.cancelling():
                 raise
+            # The server cancelled this request: the service stops, and has waited long enough.
             await answer(draining().problem)
         except Exception as error:
             if not isinstance(error, ProblemError):

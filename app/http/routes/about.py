@@ -78,7 +78,7 @@ async def get_liveness() -> Health:
     responses=problems("engine_unavailable", "draining"),
 )
 async def get_readiness(service: ServiceDep) -> Health:
-    """Return 200 once a worker has its kernels compiled, 503 before."""
+    """Return 200 once a worker has its kernels compiled; 503 before, and when the service stops."""
     if service.is_leaving:
         raise draining()
     if not service.engine.is_ready:

@@ -164,7 +164,7 @@ async def watch_job(
 
 
 def _version(event_id: str | None) -> int:
-    # Any other id means that nothing was seen, as the specification says.
+    # Any other text means that nothing was seen, as the specification says.
     return int(event_id) if event_id is not None and _NUMBER.fullmatch(event_id) else 0
 
 

@@ -1,4 +1,4 @@
-"""Turns: calls that use the same memory follow one another."""
+"""The lock of a solver: calls that use its memory run one after the other."""
 
 import threading
 from collections.abc import Iterator
@@ -8,24 +8,24 @@ from geodesic_core.control import SLICE_SECONDS, Control
 from geodesic_core.errors import InvalidArgument
 
 
-class Turns:
-    """A lock of memory that calls in several threads use."""
+class CallLock:
+    """A lock that a call holds, and that it waits for as its control says."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._holder: int | None = None
-        """The thread whose turn it is"""
+        """The thread that holds it"""
 
     @contextmanager
-    def taken(self, control: Control) -> Iterator[None]:
-        """Wait for a turn, and hold it until the block ends.
+    def held(self, control: Control) -> Iterator[None]:
+        """Wait for the lock, and hold it until the block ends.
 
         Raises
         ------
         Cancelled, DeadlineExceeded
             As the control says, while the call waits.
         InvalidArgument
-            A callback of the call that has the turn asks for another one.
+            A callback of the call that holds the lock asks for it again.
         """
         if self._holder == threading.get_ident():
             raise InvalidArgument(

@@ -1,4 +1,4 @@
-"""One solver in several threads: calls follow one another."""
+"""One solver in several threads: its calls run one after the other."""
 
 import copy
 import pickle
