@@ -43,6 +43,14 @@ def caller_at(host: str | None) -> Caller:
     return Caller(str(address), has_key=False)
 
 
+def is_loopback(host: str) -> bool:
+    """Tell whether a name or address, such as ``localhost`` or ``[::1]``, is this machine's."""
+    try:
+        return ip_address(host.removeprefix("[").removesuffix("]")).is_loopback
+    except ValueError:
+        return host == "localhost" or host.endswith(".localhost")
+
+
 @dataclass(frozen=True)
 class ApiKey:
     """A named key. Only the digest of its secret is stored, and no representation shows it."""

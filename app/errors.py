@@ -25,8 +25,12 @@ CODES: Mapping[str, Code] = {
     "malformed_body": Code(
         400, "Malformed body", "The body is not what its media type promises, such as broken JSON."
     ),
+    "malformed_request": Code(400, "Malformed request", "The bytes received are no HTTP request."),
     "unauthorized": Code(401, "Unauthorized", "The request needs an API key, or has a wrong one."),
     "forbidden": Code(403, "Forbidden", "The API key does not allow this request."),
+    "origin_not_allowed": Code(
+        403, "Origin not allowed", "A page elsewhere may change nothing here; see `hint`."
+    ),
     "not_found": Code(404, "Not found", "There is nothing at this address."),
     "mesh_not_found": Code(404, "Mesh not found", "No mesh with this id is in the store."),
     "job_not_found": Code(404, "Job not found", "No job with this id is known."),
@@ -50,6 +54,9 @@ CODES: Mapping[str, Code] = {
     "range_not_satisfiable": Code(
         416, "Range not satisfiable", "The requested range lies outside the content."
     ),
+    "host_not_allowed": Code(
+        421, "Host not allowed", "The service does not answer under this name; see `hint`."
+    ),
     "invalid_request": Code(
         422, "Invalid request", "A field is missing, unknown, or outside its domain; see `errors`."
     ),
@@ -66,6 +73,9 @@ CODES: Mapping[str, Code] = {
         422, "Memory limit", "The query needs more memory than the service grants to one query."
     ),
     "rate_limited": Code(429, "Rate limited", "Too many requests; see `Retry-After`."),
+    "header_too_large": Code(
+        431, "Header too large", "The request line and the headers are too large."
+    ),
     "internal_error": Code(
         500, "Internal error", "A defect of the service; please report it with the request id."
     ),
@@ -77,6 +87,9 @@ CODES: Mapping[str, Code] = {
     ),
     "queue_full": Code(
         503, "Queue full", "Too many requests wait for a worker; see `Retry-After`."
+    ),
+    "too_many_connections": Code(
+        503, "Too many connections", "The service has too many open connections; try again."
     ),
     "engine_unavailable": Code(
         503, "Engine unavailable", "No worker process can be started at the moment."
@@ -213,7 +226,11 @@ def _not_converged(error: core.NotConverged) -> Problem:
 
 
 def _system_error(error: OSError) -> Problem:
-    return _DISK_FULL if error.errno in (errno.ENOSPC, errno.EDQUOT) else _internal_error(error)
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return _DISK_FULL
+    return (
+        _NO_DESCRIPTORS if error.errno in (errno.EMFILE, errno.ENFILE) else _internal_error(error)
+    )
 
 
 def _database_error(error: sqlite3.OperationalError) -> Problem:
@@ -222,10 +239,15 @@ def _database_error(error: sqlite3.OperationalError) -> Problem:
 
 
 _DISK_FULL = Problem("storage_full", "the store has no room left on its disk")
+_NO_DESCRIPTORS = Problem(
+    "too_many_connections",
+    "the service has too many files and connections open",
+    headers={"Retry-After": "1"},
+)
 
 
-def _internal_error(error: BaseException) -> Problem:
-    return Problem("internal_error", f"unexpected {type(error).__name__}")
+def _internal_error(_error: BaseException) -> Problem:
+    return Problem("internal_error", "the service failed at this request; its log says why")
 
 
 # The first row whose type matches is used.
@@ -238,6 +260,7 @@ EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (core.DeadlineExceeded, lambda error: Problem("deadline_exceeded", str(error))),
     (core.MemoryLimitExceeded, _over_memory),
     (core.NotConverged, _not_converged),
+    (core.InternalError, lambda error: Problem("internal_error", str(error))),
     (MemoryError, lambda _: Problem("memory_limit", "the worker ran out of memory")),
     (OSError, _system_error),
     (sqlite3.OperationalError, _database_error),

@@ -13,6 +13,7 @@ from app.http import exception_handlers, page
 from app.http.metrics import Metrics, MetricsMiddleware
 from app.http.middleware.admission import AdmissionMiddleware
 from app.http.middleware.body_timeout import BodyTimeoutMiddleware
+from app.http.middleware.cross_site import CrossSiteMiddleware
 from app.http.middleware.request_id import RequestIdMiddleware
 from app.http.openapi import complete
 from app.http.routes import about, jobs, meshes, queries
@@ -43,6 +44,7 @@ def create_app(settings: Settings) -> FastAPI:
     # The last one added is the outermost.
     app.add_middleware(BodyTimeoutMiddleware, settings=settings)
     app.add_middleware(AdmissionMiddleware, settings=settings)
+    app.add_middleware(CrossSiteMiddleware, settings=settings)
     app.add_middleware(RequestIdMiddleware, settings=settings)
     app.add_middleware(MetricsMiddleware, metrics=metrics)
     if settings.cors_origins:

@@ -2,6 +2,7 @@
 
 import os
 import re
+import resource
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 from urllib.parse import urlsplit
@@ -49,6 +50,15 @@ def _query_bytes(data: dict[str, Any]) -> int:
     return min(4 * MIB, int(data["max_upload_bytes"]))
 
 
+def _connections(_data: dict[str, Any]) -> int:
+    # The other half is for files, and for the sockets of workers.
+    return min(1000, resource.getrlimit(resource.RLIMIT_NOFILE)[0] // 2)
+
+
+def _caller_connections(data: dict[str, Any]) -> int:
+    return max(1, int(data["max_connections"]) // 4)
+
+
 def _query_memory(data: dict[str, Any]) -> int:
     return min(8 * GIB, int(data["worker_memory_bytes"]) // 2)
 
@@ -89,6 +99,7 @@ def _keys(value: object) -> object:
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 _ORIGIN = re.compile(r"\*|https?://[^/\s?#@A-Z]+")
+_HOST = re.compile(r"(\*\.)?[a-z0-9_-]+(\.[a-z0-9_-]+)*|\[[0-9a-f:]+\]")
 
 
 class Settings(BaseSettings):
@@ -165,6 +176,12 @@ class Settings(BaseSettings):
     """Requests a minute that a caller may make; as many may come at once."""
     max_concurrent: PositiveInt | None = None
     """Requests of a caller that may run at the same time."""
+    max_connections: PositiveInt = Field(default_factory=_connections)
+    """Connections that may be open; 1000, or half of the process's descriptors if fewer."""
+    max_caller_connections: PositiveInt = Field(default_factory=_caller_connections)
+    """Connections from one address; a quarter of all, unless set. A proxy may need more."""
+    allowed_hosts: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
+    """Names that `Host` may have, separated by commas; `*.example.org` stands for all below it."""
     cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
     """Origins whose pages may use the service, separated by commas, or `*`."""
 
@@ -175,6 +192,16 @@ class Settings(BaseSettings):
             if not _ORIGIN.fullmatch(origin):
                 raise ValueError(f"{origin!r} is not an origin such as https://example.org, nor *")
         return origins
+
+    @field_validator("allowed_hosts")
+    @classmethod
+    def _are_hosts(cls, hosts: tuple[str, ...]) -> tuple[str, ...]:
+        for host in hosts:
+            if not _HOST.fullmatch(host):
+                raise ValueError(
+                    f"{host!r} is not a host such as example.org, in lower case and without a port"
+                )
+        return hosts
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Self:
@@ -206,6 +233,7 @@ class Settings(BaseSettings):
 _AT_MOST = (
     ("max_query_bytes", "max_upload_bytes"),
     ("query_memory_bytes", "worker_memory_bytes"),
+    ("max_caller_connections", "max_connections"),
 )
 """Pairs of settings of which the first must not exceed the second"""
 

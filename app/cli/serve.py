@@ -3,13 +3,13 @@
 import asyncio
 import math
 from functools import partial
-from ipaddress import ip_address
 from signal import SIGHUP, SIGTERM, raise_signal, signal
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
+from app.access import is_loopback
 from app.cli.steps import Failure
 from app.engine import fork_server
 
@@ -24,6 +24,8 @@ def serve(
     import uvicorn
     from pydantic import ValidationError
 
+    from app.http.connections import Connections
+    from app.http.protocol import BoundedHttpProtocol
     from app.main import create_app
     from app.settings import Settings, variable_of
     from app.store.layout import StoreError
@@ -37,7 +39,7 @@ def serve(
             if fault["type"] != "default_factory_not_called"  # for another fault's sake
         ]
         raise typer.BadParameter("; ".join(faults).replace("Value error, ", "")) from error
-    if not _is_loopback(host) and not settings.api_keys and settings.auth == "on":
+    if not is_loopback(host) and not settings.api_keys and settings.auth == "on":
         raise typer.BadParameter(
             f"anybody who reaches {host} could use the service: set GEODESIC_API_KEYS, or "
             f"GEODESIC_AUTH=off where something before it asks for keys"
@@ -49,7 +51,7 @@ def serve(
     except StoreError as error:
         raise Failure(str(error)) from error
 
-    usual_s = 0.0 if _is_loopback(host) else 5.0  # time for a load balancer to notice
+    usual_s = 0.0 if is_loopback(host) else 5.0  # time for a load balancer to notice
     delay_s = usual_s if settings.drain_delay_s is None else settings.drain_delay_s
 
     class Server(uvicorn.Server):
@@ -73,16 +75,13 @@ def serve(
 
     # uvicorn takes whole seconds.
     grace = math.ceil(settings.drain_s)
-    server = Server(uvicorn.Config(app, host, port, timeout_graceful_shutdown=grace))
+    protocol: Any = partial(BoundedHttpProtocol, connections=Connections(settings))
+    config = uvicorn.Config(
+        app, host, port, http=protocol, ws="none", timeout_graceful_shutdown=grace
+    )
+    server = Server(config)
     # A closed terminal ends the service in the same order.
     signal(SIGHUP, lambda *_: raise_signal(SIGTERM))
     server.run()
     if not server.started:
         raise typer.Exit(1)
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"

@@ -1,7 +1,7 @@
 """The OpenAPI document: FastAPI's, completed with problems, headers and examples."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,16 @@ In a wheel it is inside the package, in a checkout beside the document.
 
 _FASTAPI_VALIDATION = "Validation Error"  # FastAPI adds it to each operation with parameters
 _TEXT, _NUMBER = {"type": "string"}, {"type": "integer"}
-_REFUSALS = ("unauthorized", "rate_limited")
+_EVERYWHERE = (
+    "malformed_request",
+    "host_not_allowed",
+    "rate_limited",
+    "header_too_large",
+    "internal_error",
+    "too_many_connections",
+    "deadline_exceeded",
+)
+"""Codes of the problems that any request can meet"""
 _PROBLEM = {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}
 _SECURITY_SCHEME = {
     "type": "http",
@@ -75,8 +84,13 @@ _RANGE = {
 def complete(document: dict[str, Any]) -> dict[str, Any]:
     """Return FastAPI's ``document``, completed."""
     for template, path in document["paths"].items():
-        for operation in path.values():
-            operation["responses"] = dict(_responses(operation, template))
+        for method, operation in path.items():
+            added = list(_EVERYWHERE)
+            if not is_open(template):
+                added.append("unauthorized")
+            if method not in ("get", "head"):
+                added.append("origin_not_allowed")
+            operation["responses"] = dict(_responses(operation, added))
             if not is_open(template):
                 operation["security"] = [{"apiKey": []}, {}]
             for status, parameter in (("206", _RANGE), ("304", _CONDITION)):
@@ -92,14 +106,23 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
     return document
 
 
-def _responses(operation: Mapping[str, Any], template: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield the answers of an operation by status, with problems as such."""
+def _responses(
+    operation: Mapping[str, Any], added: Sequence[str]
+) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the answers of an operation by status, with problems as such.
+
+    Parameters
+    ----------
+    operation
+        The operation, with the problems that its route names.
+    added
+        Codes of further problems.
+    """
     answers = {
         status: response
         for status, response in operation["responses"].items()
         if response["description"] != _FASTAPI_VALIDATION
     }
-    added = ["internal_error"] if is_open(template) else ["internal_error", *_REFUSALS]
     for status, refusal in problems(*added).items():
         described = answers.get(str(status), {"description": ""})["description"]
         codes = ", ".join(filter(None, [described, refusal["description"]]))

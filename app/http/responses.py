@@ -46,6 +46,11 @@ QUERY_PROBLEMS = ("mesh_not_found", "result_too_large", "invalid_point", *WORK_P
 """Codes of the problems that a well-formed query can meet, at once or as a job"""
 
 
+def common_headers(request_id: str) -> dict[str, str]:
+    """Return the headers of every answer; browsers are not to guess its media type."""
+    return {"X-Request-ID": request_id, "X-Content-Type-Options": "nosniff"}
+
+
 def problem_response(problem: Problem, instance: str, request_id: str) -> Response:
     """Return ``problem`` as ``application/problem+json``."""
     body = orjson.dumps(problem.document(instance, request_id))

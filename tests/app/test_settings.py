@@ -20,6 +20,7 @@ TEXTS = {
     "store_evict": ("lru", "lru"),
     "auth": ("on", "on"),
     "api_keys": ("", ()),
+    "allowed_hosts": ("a.org, *.b.net", ("a.org", "*.b.net")),
     "cors_origins": ("https://a.org, http://b:80", ("https://a.org", "http://b:80")),
 }
 """What a variable says, and what is understood; all others are whole numbers."""
@@ -179,6 +180,12 @@ def test_variables_that_the_library_reads_are_no_mistakes(monkeypatch: pytest.Mo
         ("cors_origins", "https://Example.org"),
         ("cors_origins", "https://a.org https://b.org"),
         ("cors_origins", "https://a.org,"),
+        ("max_connections", "0"),
+        ("allowed_hosts", "https://a.org"),
+        ("allowed_hosts", "a.org:8000"),
+        ("allowed_hosts", "A.org"),
+        ("allowed_hosts", "a.*.org"),
+        ("allowed_hosts", "*"),
     ],
 )
 def test_senseless_value_stops_the_start(
@@ -205,6 +212,10 @@ def test_senseless_value_stops_the_start(
             {"query_memory_bytes": "2000000000", "worker_memory_bytes": "1000000000"},
             "GEODESIC_QUERY_MEMORY_BYTES is 2000000000, which is more than GEODESIC_WORKER_MEMORY",
         ),
+        (
+            {"max_caller_connections": "11", "max_connections": "10"},
+            "GEODESIC_MAX_CALLER_CONNECTIONS is 11, which is more than GEODESIC_MAX_CONNECTIONS",
+        ),
     ],
 )
 def test_contradictions_stop_the_start(
@@ -222,3 +233,13 @@ def test_contradictions_stop_the_start(
 def test_what_is_not_set_follows_what_is() -> None:
     assert Settings(max_upload_bytes=1000).max_query_bytes == 1000
     assert Settings(worker_memory_bytes=GIB).query_memory_bytes == GIB // 2
+    assert Settings(max_connections=40).max_caller_connections == 10
+    assert Settings(max_connections=1).max_caller_connections == 1
+
+
+@pytest.mark.parametrize(("descriptors", "connections"), [(200, 100), (1024, 512), (10**6, 1000)])
+def test_connections_leave_descriptors_for_files(
+    monkeypatch: pytest.MonkeyPatch, descriptors: int, connections: int
+) -> None:
+    monkeypatch.setattr("app.settings.resource.getrlimit", lambda _: (descriptors, 10**6))
+    assert Settings().max_connections == connections

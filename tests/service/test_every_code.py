@@ -17,6 +17,7 @@ from app.errors import CODES
 from app.main import create_app
 from app.settings import Settings
 from tests.support.disks import fill_disk
+from tests.support.listening import listening, read_answer
 from tests.support.processes import stopped
 from tests.support.service import (
     SLOW_FACES,
@@ -90,6 +91,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         "max_sources": 2,
         "query_memory_bytes": 50_000_000,
         "cancel_grace_s": LONG_S,
+        "allowed_hosts": ["testserver"],
     }
     with serving(store, **limits) as client:
         yield Site(client, store)
@@ -177,10 +179,27 @@ def draining(site: Site) -> Any:
 MANY = [{"vertex": 0}] * 3
 BROKEN = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 3]]}
 
+
+def on_a_connection(data: bytes, **limits: int) -> Callable[[Site], Any]:
+    """Return the provocation that sends bytes beside an open connection."""
+
+    def provoke(site: Site) -> Any:
+        few = Settings(store=site.store / "other", **limits)
+        with listening(few) as listener, listener.connect(b"GET / HTTP/1.1\r\n\r\n") as first:
+            read_answer(first)
+            return listener.send(data)
+
+    return provoke
+
+
 PROVOKED: dict[str, Callable[[Site], Any]] = {
     "malformed_body": lambda site: site.send("{"),
+    "malformed_request": on_a_connection(b"nonsense\r\n\r\n"),
     "unauthorized": lambda site: site.client.get("/v1", headers={"Authorization": "Bearer no"}),
     "forbidden": lambda site: site.client.delete(f"/v1/meshes/{site.small}", headers=BOB),
+    "origin_not_allowed": lambda site: site.client.post(
+        "/v1/meshes", json=TWO_TRIANGLES, headers={"Origin": "https://evil.example"}
+    ),
     "not_found": lambda site: site.client.get("/nowhere"),
     "mesh_not_found": lambda site: site.client.get("/v1/meshes/nonsense"),
     "job_not_found": lambda site: site.client.get("/v1/jobs/nonsense"),
@@ -194,16 +213,21 @@ PROVOKED: dict[str, Callable[[Site], Any]] = {
     "range_not_satisfiable": lambda site: site.client.get(
         f"/v1/meshes/{site.small}/arrays/faces", headers={"Range": "bytes=99999999-"}
     ),
+    "host_not_allowed": lambda site: site.client.get("/v1", headers={"Host": "evil.example"}),
     "invalid_request": lambda site: site.ask(site.small, colour="red"),
     "invalid_mesh": lambda site: site.client.post("/v1/meshes", json=BROKEN),
     "invalid_point": lambda site: site.ask(site.small, sources=[{"vertex": -1}]),
     "limit_exceeded": lambda site: site.ask(site.small, sources=MANY),
     "memory_limit": too_large,
     "rate_limited": limited,
+    "header_too_large": on_a_connection(b"GET / HTTP/1.1\r\n" + b"a:b\r\n" * 10_000),
     "internal_error": defect,
     "worker_died": killed,
     "mesh_damaged": damaged,
     "queue_full": full,
+    "too_many_connections": on_a_connection(
+        b"GET / HTTP/1.1\r\n\r\n", max_connections=1, max_caller_connections=1
+    ),
     "engine_unavailable": not_started,
     "draining": draining,
     "deadline_exceeded": late,

@@ -68,7 +68,7 @@ class Server:
     def connect(self, path: str, body: bytes, *, leave_out: int = 0) -> socket.socket:
         """Post a JSON body on a connection of its own, but for the last bytes; await no answer."""
         head = (
-            f"POST {path} HTTP/1.1\r\nHost: x\r\n"
+            f"POST {path} HTTP/1.1\r\nHost: localhost\r\n"
             f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
         )
         connection = socket.create_connection(self.address)

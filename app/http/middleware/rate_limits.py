@@ -19,17 +19,35 @@ anyway.
 """
 
 
-class RateLimits:
-    """The limits of each caller; ``None`` stands for no limit."""
+class MinuteRate:
+    """Events of each caller, at most so many a minute; as many may come at once."""
 
-    def __init__(self, a_minute: int | None, at_once: int | None) -> None:
-        self._rates = [Rate(a_minute, Duration.MINUTE)] if a_minute else []
-        self._at_once = at_once
-        self._running: Counter[str] = Counter()
+    def __init__(self, limit: int) -> None:
+        self.limit = limit
+        self._rates = [Rate(limit, Duration.MINUTE)]
         # The generic cell rate algorithm needs one number for each caller. The library's Limiter
         # would add buckets that are never dropped, and a thread that looks after them.
         self._policy = GCRA()
         self._known: OrderedDict[str, tuple[float, ...]] = OrderedDict()
+
+    def seconds_over(self, name: str) -> int:
+        """Count one event, and return 0, or the seconds to wait if there are too many."""
+        before = self._known.get(name) or self._policy.initial(self._rates)
+        now = int(monotonic() * 1000)
+        self._known[name], decision = self._policy.step(self._rates, before, now, weight=1)
+        self._known.move_to_end(name)
+        if len(self._known) > _REMEMBERED:
+            self._known.popitem(last=False)
+        return 0 if decision.allowed else max(1, ceil((decision.retry_after_ms or 0) / 1000))
+
+
+class RateLimits:
+    """The limits of each caller; ``None`` stands for no limit."""
+
+    def __init__(self, a_minute: int | None, at_once: int | None) -> None:
+        self._rate = MinuteRate(a_minute) if a_minute else None
+        self._at_once = at_once
+        self._running: Counter[str] = Counter()
 
     @contextmanager
     def counting(self, caller: Caller) -> Iterator[None]:
@@ -52,16 +70,10 @@ class RateLimits:
             raise over_limit("rate_limited", what, running, self._at_once, setting, headers=headers)
 
     def _refuse_rate(self, name: str) -> None:
-        if not self._rates:
+        if self._rate is None:
             return
-        before = self._known.get(name) or self._policy.initial(self._rates)
-        now = int(monotonic() * 1000)
-        self._known[name], decision = self._policy.step(self._rates, before, now, weight=1)
-        self._known.move_to_end(name)
-        if len(self._known) > _REMEMBERED:
-            self._known.popitem(last=False)
-        if not decision.allowed:
-            wait_s = ceil((decision.retry_after_ms or 0) / 1000)
+        wait_s = self._rate.seconds_over(name)
+        if wait_s:
             what, headers = "requests within a minute", {"Retry-After": str(wait_s)}
-            limit, setting = self._rates[0].limit, "rate_limit"
+            limit, setting = self._rate.limit, "rate_limit"
             raise over_limit("rate_limited", what, limit + 1, limit, setting, headers=headers)

@@ -17,7 +17,7 @@ from app.errors import (
     problem_of,
     problem_of_status,
 )
-from app.http.responses import problem_response
+from app.http.responses import common_headers, problem_response
 from app.settings import Settings, variable_of
 
 logger = logging.getLogger(__name__)
@@ -26,10 +26,7 @@ _SANE_ID = re.compile(r"[\w.:-]{1,128}")
 
 
 class RequestIdMiddleware:
-    """Middleware that gives each request an id, and turns remaining errors into problems.
-
-    It also tells browsers not to guess the media type of an answer.
-    """
+    """Middleware that gives each request an id, and turns remaining errors into problems."""
 
     def __init__(self, app: ASGIApp, settings: Settings) -> None:
         self.app = app
@@ -42,7 +39,7 @@ class RequestIdMiddleware:
             return
         request_id = _request_id(scope)
         scope.setdefault("state", {})["request_id"] = request_id
-        own_headers = {"X-Request-ID": request_id, "X-Content-Type-Options": "nosniff"}
+        own_headers = common_headers(request_id)
         has_started = is_replaced = False
 
         async def answer(problem: Problem) -> None:

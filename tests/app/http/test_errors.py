@@ -10,9 +10,9 @@ from geodesic_core import errors as core
 from tests.support.service import check_problem
 
 CONTRACT = {
-    400: {"malformed_body"},
+    400: {"malformed_body", "malformed_request"},
     401: {"unauthorized"},
-    403: {"forbidden"},
+    403: {"forbidden", "origin_not_allowed"},
     404: {"mesh_not_found", "job_not_found", "not_found"},
     405: {"method_not_allowed"},
     406: {"not_acceptable"},
@@ -21,10 +21,12 @@ CONTRACT = {
     413: {"upload_too_large", "result_too_large"},
     415: {"unsupported_media_type"},
     416: {"range_not_satisfiable"},
+    421: {"host_not_allowed"},
     422: {"invalid_request", "invalid_mesh", "invalid_point", "limit_exceeded", "memory_limit"},
     429: {"rate_limited"},
+    431: {"header_too_large"},
     500: {"worker_died", "mesh_damaged", "internal_error"},
-    503: {"queue_full", "engine_unavailable", "draining"},
+    503: {"queue_full", "engine_unavailable", "draining", "too_many_connections"},
     504: {"deadline_exceeded"},
     507: {"storage_full"},
 }
