@@ -1,6 +1,8 @@
 """Uploads: the body goes to a file of the store, without being held in memory."""
 
+import gzip
 import shutil
+import zlib
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import get_args
@@ -11,6 +13,7 @@ from starlette.requests import Request
 
 from app.errors import problem
 from app.schemas.meshes import MeshFormat
+from app.settings import variable_of
 
 MESH_FORMATS = get_args(MeshFormat)
 _FORMAT_OF_TYPE = {
@@ -28,14 +31,35 @@ _FORMAT_OF_TYPE = {
 _BLOCK = 2**20
 
 
-async def spool(request: Request, path: Path, file_format: str | None) -> str:
-    """Write the mesh file of a request to ``path``, and return its format."""
+async def spool(request: Request, path: Path, file_format: str | None, max_bytes: int) -> str:
+    """Write the mesh file of a request to ``path``, and return its format.
+
+    Parameters
+    ----------
+    request
+        The request.
+    path
+        The file to write.
+    file_format
+        The format that the client named, if it did.
+    max_bytes
+        Largest size of a body that comes compressed, once it is not.
+    """
     media_type = _media_type(request.headers.get("content-type"))
-    if media_type == "multipart/form-data":
+    coding = request.headers.get("content-encoding", "identity").strip().lower()
+    is_form = media_type == "multipart/form-data"
+    if coding not in ("identity", "gzip") or (is_form and coding == "gzip"):
+        detail = f"a body of Content-Encoding {coding} cannot be read here"
+        hint = "send the file itself, as it is or with gzip"
+        headers = {"Accept-Encoding": "gzip, identity"}
+        raise problem("unsupported_media_type", detail, hint=hint, headers=headers)
+    if is_form:
         guess = await _spool_form(request, path)
     else:
         await _write(path, request.stream())
         guess = _FORMAT_OF_TYPE.get(media_type)
+    if coding == "gzip":
+        await _decompress(path, max_bytes)
     if path.stat().st_size == 0:
         raise problem("invalid_mesh", "the body is empty: there is no mesh in it")
     chosen = file_format or guess
@@ -70,6 +94,22 @@ async def _write(path: Path, chunks: AsyncIterator[bytes]) -> None:
                 await to_thread.run_sync(file.write, bytes(block))
                 block.clear()
         await to_thread.run_sync(file.write, bytes(block))
+
+
+async def _decompress(path: Path, max_bytes: int) -> None:
+    """Replace a file by its content, which gzip has compressed."""
+    compressed = path.rename(path.with_name("compressed"))
+    try:
+        with gzip.open(compressed) as source, path.open("wb") as target:
+            while block := await to_thread.run_sync(source.read, _BLOCK):
+                if target.tell() + len(block) > max_bytes:
+                    detail = f"the body is larger than {max_bytes} bytes once it is decompressed"
+                    setting = variable_of("max_upload_bytes")
+                    raise problem("upload_too_large", detail, limit=max_bytes, setting=setting)
+                await to_thread.run_sync(target.write, block)
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise problem("malformed_body", f"the body is not what gzip writes: {error}") from error
+    compressed.unlink()
 
 
 def _media_type(header: str | None) -> str:

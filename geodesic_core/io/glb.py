@@ -2,18 +2,29 @@
 
 import io
 import json
-from collections.abc import Mapping
+import struct
+from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.io.contents import FileContents, note_on_ignored
+from geodesic_core.io.glb_nodes import placements
 from geodesic_core.io.limits import check_face_count
 
 _HEADER, _CHUNK_HEADER = 12, 8
 _FLOAT = 5126
 _TRIANGLES, _TRIANGLE_STRIP, _TRIANGLE_FAN = 4, 5, 6
+
+_LARGEST_DOCUMENT = 32 * 2**20
+_MOST_PARTS = 10_000
+"""Parts of a file; trimesh takes a quarter of a millisecond for each"""
+
+_Part = tuple[int, int]
+"""A mesh of the file, and a primitive of that mesh"""
 
 
 def read_glb(data: bytes, max_faces: int | None) -> FileContents:
@@ -28,50 +39,102 @@ def read_glb(data: bytes, max_faces: int | None) -> FileContents:
     """
     import trimesh
 
-    check_face_count(count_faces(_read_document(data)), max_faces)
+    tree = _read_document(data)
+    check_face_count(count_faces(tree), max_faces)
+    primitives = {
+        (mesh, number): primitive
+        for mesh, content in enumerate(tree.get("meshes", []))
+        for number, primitive in enumerate(content["primitives"])
+    }
+    if len(primitives) > _MOST_PARTS:
+        raise InvalidMesh(
+            f"the GLB file has {len(primitives)} parts, where at most {_MOST_PARTS} can be read; "
+            f"join them"
+        )
+    shown = _shown_parts(tree)
+    _check_vertex_count(tree, [primitives[part] for part, _ in shown], max_faces)
     scene = trimesh.load_scene(
-        io.BytesIO(data), file_type="glb", process=False, skip_materials=True
+        io.BytesIO(_without_nodes(tree, primitives, data)),
+        file_type="glb",
+        process=False,
+        skip_materials=True,
     )
-    order = {name: number for number, name in enumerate(scene.geometry)}
-    # trimesh walks the nodes from the last to the first.
-    nodes = reversed(scene.graph.nodes_geometry)
-    placed = [(transform, name) for transform, name in map(scene.graph.get, nodes)]
-    placed.sort(key=lambda part: order[part[1]])
+    triangles = {
+        name: (np.asarray(geometry.vertices), np.asarray(geometry.faces))
+        for name, geometry in scene.geometry.items()
+        if isinstance(geometry, trimesh.Trimesh)
+    }
     vertices, faces, count, left_out = [], [], 0, 0
-    for transform, name in placed:
-        part = scene.geometry[name]
-        if not isinstance(part, trimesh.Trimesh):
+    for part, transform in shown:
+        if _name(part) not in triangles:
             left_out += 1
             continue
+        positions, corners = triangles[_name(part)]
         with np.errstate(invalid="ignore", over="ignore"):  # the mesh refuses what is not finite
-            vertices.append(part.vertices @ transform[:3, :3].T + transform[:3, 3])
+            vertices.append(positions @ transform[:3, :3].T + transform[:3, 3])
         mirrored = np.linalg.det(transform[:3, :3]) < 0.0
-        faces.append(part.faces[:, ::-1] + count if mirrored else part.faces + count)
-        count += len(part.vertices)
+        faces.append(corners[:, ::-1] + count if mirrored else corners + count)
+        count += len(positions)
     if not faces:
         raise InvalidMesh("the GLB file's scene shows no triangles", kind="face")
-    corners = np.concatenate(faces).reshape(-1).astype(np.int64)
+    all_corners = np.concatenate(faces).reshape(-1).astype(np.int64)
     ignored = {"parts of points or lines": left_out} if left_out else {}
-    sizes = np.full(len(corners) // 3, 3)
-    return FileContents(np.concatenate(vertices), corners, sizes, note_on_ignored("GLB", ignored))
+    notes = note_on_ignored("GLB", ignored)
+    sizes = np.full(len(all_corners) // 3, 3)
+    return FileContents(np.concatenate(vertices), all_corners, sizes, notes)
+
+
+def _shown_parts(tree: Mapping[str, Any]) -> list[tuple[_Part, NDArray[np.float64]]]:
+    """Return the parts that the scene shows, in the order of the file, each with its place."""
+    shown = [
+        ((mesh, number), transform)
+        for mesh, transform in placements(tree)
+        for number in range(len(tree["meshes"][mesh]["primitives"]))
+    ]
+    return sorted(shown, key=itemgetter(0))
+
+
+def _without_nodes(tree: Mapping[str, Any], primitives: Mapping[_Part, Any], data: bytes) -> bytes:
+    """Return the GLB file with a mesh for each part, under a name of ours, and without nodes."""
+    meshes = [{"name": _name(part), "primitives": [each]} for part, each in primitives.items()]
+    plain = {**tree, "meshes": meshes, "nodes": [], "scenes": [{"nodes": []}], "scene": 0}
+    document = json.dumps(plain).encode()
+    document += b" " * (-len(document) % 4)
+    binary = memoryview(data)[_HEADER + _CHUNK_HEADER + _json_length(data) :]
+    size = _HEADER + _CHUNK_HEADER + len(document) + len(binary)
+    sizes = struct.pack("<II", size, len(document))
+    return b"".join([data[:8], sizes, data[16:20], document, binary])
+
+
+def _name(part: _Part) -> str:
+    return f"{part[0]}.{part[1]}"
+
+
+def _json_length(data: bytes) -> int:
+    return int.from_bytes(data[12:16], "little")
 
 
 def _read_document(data: bytes) -> dict[str, Any]:
     """Return the glTF document, whose lengths and counts the bytes bear out.
 
-    trimesh reads all of it right: what it would misread is refused.
+    trimesh reads the geometry right: what it would misread is refused.
     """
     if data[:4] != b"glTF" or len(data) < _HEADER + _CHUNK_HEADER:
         raise InvalidMesh("the GLB file does not begin with a glTF header")
     length = int.from_bytes(data[8:12], "little")
     if length != len(data):
         raise InvalidMesh(f"the GLB header declares {length} bytes, but the file has {len(data)}")
-    json_length = int.from_bytes(data[12:16], "little")
+    json_length = _json_length(data)
     start = _HEADER + _CHUNK_HEADER
     if json_length > len(data) - start:
         raise InvalidMesh(
             f"the GLB file's first chunk declares {json_length} bytes, but {len(data) - start} "
             f"follow"
+        )
+    if json_length > _LARGEST_DOCUMENT:
+        raise InvalidMesh(
+            f"the GLB file's glTF document has {json_length} bytes, where at most "
+            f"{_LARGEST_DOCUMENT} can be read; put its data into the binary chunk"
         )
     tree: dict[str, Any] = json.loads(data[start : start + json_length])
     for number, buffer in enumerate(tree.get("buffers", [])):
@@ -81,13 +144,23 @@ def _read_document(data: bytes) -> dict[str, Any]:
                 f"embed it"
             )
     _check_accessors(tree, len(data))
-    scenes = tree.get("scenes", [])
-    children = list(scenes[tree.get("scene", 0)].get("nodes", [])) if scenes else []
-    for node in tree.get("nodes", []):
-        children += node.get("children", [])
-    if len(set(children)) < len(children):
-        raise InvalidMesh("the GLB file's nodes form no tree: one has two parents")
     return tree
+
+
+def _check_vertex_count(
+    tree: Mapping[str, Any], shown: Sequence[Mapping[str, Any]], max_faces: int | None
+) -> None:
+    """Refuse more vertices than faces can have, since parts may share any number of them."""
+    counts = [
+        tree["accessors"][each["attributes"]["POSITION"]]["count"]
+        for each in shown
+        if each.get("mode", _TRIANGLES) in (_TRIANGLES, _TRIANGLE_STRIP)
+    ]
+    if max_faces is not None and sum(counts) > 3 * max_faces:
+        raise InvalidMesh(
+            f"the GLB file's scene shows {sum(counts)} vertices, where {max_faces} faces have at "
+            f"most {3 * max_faces}"
+        )
 
 
 def _check_accessors(tree: dict[str, Any], file_bytes: int) -> None:

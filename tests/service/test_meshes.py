@@ -1,3 +1,4 @@
+import gzip
 from io import BytesIO
 from pathlib import Path
 from typing import get_args
@@ -24,6 +25,7 @@ OFF = "OFF\n4 4 0\n" + "".join(
     for row in [*TETRAHEDRON["vertices"], *([3, *face] for face in TETRAHEDRON["faces"])]
 )
 TYPE_OBJ = {"Content-Type": "model/obj"}
+GZIPPED = {**TYPE_OBJ, "Content-Encoding": "gzip"}
 
 
 def test_upload_answers_with_a_report(client: TestClient) -> None:
@@ -49,6 +51,13 @@ def test_upload_answers_with_a_report(client: TestClient) -> None:
         {"content": OFF, "params": {"format": "off"}},
         {"content": OFF, "params": {"format": "off"}, "headers": TYPE_OBJ},
         {"content": iter([OBJ.encode()]), "headers": TYPE_OBJ},
+        {"content": gzip.compress(OBJ.encode()), "headers": GZIPPED},
+        {"content": iter([gzip.compress(OBJ.encode(), 1)]), "headers": GZIPPED},
+        {
+            "content": gzip.compress(OBJ[:50].encode()) + gzip.compress(OBJ[50:].encode()),
+            "headers": {**TYPE_OBJ, "Content-Encoding": "GZIP"},
+        },
+        {"content": OBJ, "headers": {**TYPE_OBJ, "Content-Encoding": "identity"}},
         {"files": {"file": ("tetrahedron.OBJ", OBJ)}},
         {"files": {"mesh": ("tetrahedron", OBJ, "model/obj")}},
         {"files": {"mesh": ("tetrahedron", OBJ)}, "params": {"format": "obj"}},
@@ -236,6 +245,38 @@ def test_nothing_is_left_of_a_refused_upload(client: TestClient) -> None:
             415,
             "unsupported_media_type",
         ),
+        ({"content": OBJ, "headers": GZIPPED}, 400, "malformed_body"),
+        (
+            {"content": gzip.compress(OBJ.encode())[:-1], "headers": GZIPPED},
+            400,
+            "malformed_body",
+        ),
+        (
+            {"content": gzip.compress(OBJ.encode())[:-8] + bytes(8), "headers": GZIPPED},
+            400,
+            "malformed_body",
+        ),
+        (
+            {"content": gzip.compress(OBJ.encode()) + b"more", "headers": GZIPPED},
+            400,
+            "malformed_body",
+        ),
+        ({"content": gzip.compress(b""), "headers": GZIPPED}, 422, "invalid_mesh"),
+        (
+            {"content": OBJ, "headers": {**TYPE_OBJ, "Content-Encoding": "zstd"}},
+            415,
+            "unsupported_media_type",
+        ),
+        (
+            {"content": OBJ, "headers": {**TYPE_OBJ, "Content-Encoding": "gzip, gzip"}},
+            415,
+            "unsupported_media_type",
+        ),
+        (
+            {"files": {"file": ("a.obj", OBJ)}, "headers": {"Content-Encoding": "gzip"}},
+            415,
+            "unsupported_media_type",
+        ),
         ({"files": {"file": ("mesh.xyz", b"x")}}, 415, "unsupported_media_type"),
         ({"data": {"a": "b"}}, 415, "unsupported_media_type"),
         (
@@ -262,6 +303,22 @@ def test_nothing_is_left_of_a_refused_upload(client: TestClient) -> None:
 )
 def test_refused_uploads(client: TestClient, upload: dict, status: int, code: str) -> None:
     check_problem(client.post("/v1/meshes", **upload), status, code)
+
+
+@pytest.mark.parametrize("excess", [0, 1])
+def test_a_compressed_body_is_bounded_by_what_it_holds(tmp_path: Path, excess: int) -> None:
+    """A megabyte can hold a gigabyte; no more than the limit is ever written."""
+    limit = 3 * 2**20
+    content = OBJ.encode().ljust(limit + excess, b"\n")
+    with serving(tmp_path, max_upload_bytes=limit, max_query_bytes=100) as client:
+        response = client.post("/v1/meshes", content=gzip.compress(content), headers=GZIPPED)
+        if not excess:
+            assert response.status_code == 201
+            return
+        problem = check_problem(response, 413, "upload_too_large")
+        assert problem["limit"] == limit
+        assert problem["setting"] == "GEODESIC_MAX_UPLOAD_BYTES"
+        assert client.get("/v1/meshes").json()["meshes"] == []
 
 
 def test_limits_of_uploads(tmp_path: Path) -> None:

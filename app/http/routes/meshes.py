@@ -109,8 +109,9 @@ async def create_mesh(
     """Read, check and store a mesh; the id is a hash of its content.
 
     The body is the file itself (with its format in `Content-Type` or `?format=`), a form with one
-    file, or JSON. Vertices and triangles keep the order they have in the file; polygons become
-    triangles in their place, and `face_map` leads back to them.
+    file, or JSON. It may be compressed (`Content-Encoding: gzip`), but for a form. Vertices and
+    triangles keep the order they have in the file; polygons become triangles in their place, and
+    `face_map` leads back to them.
     """
     if parameters.sample is None:
         stored = await _add_upload(service, parameters, request, context)
@@ -216,7 +217,8 @@ async def _add_upload(
         service.time_limit(context.deadline_s),
     ):
         path = folder / "upload"
-        file_format = await spool(request, path, parameters.format)
+        limit = service.settings.max_upload_bytes
+        file_format = await spool(request, path, parameters.format, limit)
         mesh_input = MeshFromFile(path, file_format, parameters.merge, context.caller.owner)
         return await while_connected(request, service.add_mesh(mesh_input, context))
 

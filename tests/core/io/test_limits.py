@@ -172,3 +172,46 @@ def test_lack_of_memory_is_no_fault_of_the_file(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("geodesic_core.io.glb.count_faces", run_out)
     with pytest.raises(MemoryError):
         load_mesh(glb(VERTICES, FACES), "glb", max_faces=1)
+
+
+def glb_with(**members: Any) -> bytes:
+    tree, binary = glb_tree(np.tile(VERTICES[:4], (10, 1)), FACES[:2])
+    return glb_of(tree | members, binary)
+
+
+PART = {"attributes": {"POSITION": 0}, "indices": 1}
+LINE = {"attributes": {"POSITION": 0}, "mode": 1}
+COUNTED = {
+    "nodes": glb_with(nodes=[{"mesh": 0}, *[{}] * 100_000]),
+    "a chain of nodes": glb_with(
+        nodes=[*({"children": [i + 1]} for i in range(100_000)), {"mesh": 0}],
+    ),
+    "children": glb_with(nodes=[{"mesh": 0, "children": list(range(1, 100_002))}]),
+    "roots": glb_with(scenes=[{"nodes": [0] * 100_001}]),
+    "parts of a mesh": glb_with(meshes=[{"primitives": [PART] * 10_001}]),
+    "parts of meshes": glb_with(meshes=[{"primitives": [LINE]}] * 10_001),
+    "a long document": glb_with(extras=" " * 2**25),
+}
+
+
+@pytest.mark.parametrize("name", COUNTED)
+def test_glb_scenes_are_counted_before_they_are_walked(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    walked: list[int] = []
+    monkeypatch.setattr("trimesh.load_scene", lambda *_, **__: walked.append(1))
+    monkeypatch.setattr("geodesic_core.io.glb_nodes._transform", lambda _: walked.append(1))
+    with pytest.raises(InvalidMesh, match="at most"):
+        load_mesh(COUNTED[name], "glb")
+    assert not walked
+
+
+def test_glb_vertices_that_parts_share_are_counted_before_they_are_copied(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    copied: list[int] = []
+    monkeypatch.setattr("trimesh.load_scene", lambda *_, **__: copied.append(1))
+    often = glb_with(nodes=[{"mesh": 0}] * 100, scenes=[{"nodes": list(range(100))}])
+    with pytest.raises(InvalidMesh, match="4000 vertices, where 200 faces have at most 600"):
+        load_mesh(often, "glb", max_faces=200)
+    assert not copied

@@ -462,6 +462,33 @@ def test_glb_mirrored_nodes_keep_their_outside_out() -> None:
     assert mirrored.faces.tolist() == [[2, 1, 0], [3, 2, 0]]
 
 
+def test_glb_nodes_of_any_depth_place_their_meshes() -> None:
+    depth = 5000
+    nodes = [{"mesh": 0, "translation": [1, 0, 0], "children": [i + 1]} for i in range(depth - 1)]
+    nodes.append({"mesh": 0, "translation": [1, 0, 0]})
+    mesh = load_mesh(glb_scene(nodes, [0]), "glb")
+    expected = [VERTICES[:4] + np.array([1.0 + i, 0, 0]) for i in reversed(range(depth))]
+    np.testing.assert_array_equal(mesh.vertices, np.vstack(expected))
+
+
+def test_a_glb_node_with_a_camera_places_what_is_below_it() -> None:
+    camera = {"type": "perspective", "perspective": {"znear": 1, "yfov": 1, "aspectRatio": 1}}
+    tree, binary = glb_tree(VERTICES[:4], FACES[:2])
+    tree |= {"cameras": [camera], "scenes": [{"nodes": [0]}]}
+    tree["nodes"] = [{"camera": 0, "translation": [5, 0, 0], "children": [1]}, {"mesh": 0}]
+    mesh = load_mesh(glb_of(tree, binary), "glb")
+    np.testing.assert_array_equal(mesh.vertices, VERTICES[:4] + np.array([5, 0, 0]))
+
+
+def test_no_glb_part_is_lost_among_many() -> None:
+    tree, binary = glb_tree(VERTICES[:4], FACES[:2])
+    tree["meshes"] = [{"name": "same", "primitives": tree["meshes"][0]["primitives"] * 5000}] * 2
+    tree["nodes"] = [{"mesh": 0, "name": "same"}, {"mesh": 1, "name": "same"}]
+    tree["scenes"] = [{"nodes": [0, 1]}]
+    mesh = load_mesh(glb_of(tree, binary), "glb")
+    np.testing.assert_array_equal(mesh.vertices, np.tile(VERTICES[:4], (10_000, 1)))
+
+
 def test_glb_meshes_come_in_the_order_of_the_file() -> None:
     tree, binary = glb_tree(VERTICES[:4], FACES[:2])
     tree["meshes"] = [{"name": name, **tree["meshes"][0]} for name in "zyx"]
