@@ -93,6 +93,8 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
             operation["responses"] = dict(_responses(operation, added))
             if not is_open(template):
                 operation["security"] = [{"apiKey": []}, {}]
+            for parameter in operation.get("parameters", []):
+                _leave_out_null(parameter["schema"])
             for status, parameter in (("206", _RANGE), ("304", _CONDITION)):
                 if status in operation["responses"]:
                     operation.setdefault("parameters", []).append(dict(parameter))
@@ -104,6 +106,13 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
     components["securitySchemes"] = {"apiKey": _SECURITY_SCHEME}
     components["headers"] = _HEADERS
     return document
+
+
+def _leave_out_null(schema: dict[str, Any]) -> None:
+    """Leave `null` out of the schema of a parameter: in an address and in headers there is none."""
+    if "anyOf" in schema:
+        kinds = [kind for kind in schema.pop("anyOf") if kind != {"type": "null"}]
+        schema.update(kinds[0] if len(kinds) == 1 else {"anyOf": kinds})
 
 
 def _responses(
@@ -138,7 +147,6 @@ def _responses(
         for content in response.get("content", {}).values():
             if "itemSchema" in content:  # belongs to OpenAPI 3.2, and the document to 3.1
                 content.clear()
-                content["schema"] = _TEXT
         yield status, response
 
 

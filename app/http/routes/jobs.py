@@ -143,7 +143,7 @@ async def get_job_results(
     response_class=EventSourceResponse,
     responses={
         200: {"description": "Events, the data of each of which is a `JobDocument`"},
-        **problems("job_not_found"),
+        **problems("job_not_found", "invalid_request"),
     },
 )
 async def watch_job(
@@ -169,7 +169,7 @@ def _version(event_id: str | None) -> int:
 
 
 def _number(cursor: str | None) -> int | None:
-    if cursor is None:
+    if not cursor:
         return None
     if not _NUMBER.fullmatch(cursor):
         detail = f"{cursor[:20]!r} is no next_cursor of a list of jobs"

@@ -38,6 +38,8 @@ _BODIES = {
             "multipart/form-data": {
                 "schema": {
                     "type": "object",
+                    "additionalProperties": False,
+                    "required": ["file"],
                     "properties": {"file": {"type": "string", "format": "binary"}},
                 }
             },

@@ -54,7 +54,7 @@ _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *
 def _answers(model: type, description: str, *others: str) -> dict[int | str, dict[str, Any]]:
     """Return an answer for OpenAPI: in JSON, and in ``others``, which hold only a part of it."""
     description += ". In formats other than JSON the rest comes as `Geodesic-…` headers"
-    content = {name: {"schema": _TEXT if name in TEXTS else _BINARY} for name in others}
+    content = {name: {"schema": _schema(name)} for name in others}
     described = documented("Vary", "Server-Timing", *FILE_HEADERS)
     accepted = documented("Location", "Preference-Applied", "Cache-Control")
     if any(name in ARRAYS for name in others):
@@ -81,8 +81,15 @@ def _answers(model: type, description: str, *others: str) -> dict[int | str, dic
 
 _TEXT = {"type": "string"}
 _BINARY = {"type": "string", "format": "binary"}
+_OBJECT = {"type": "object"}
 _LINES = OBJ, CSV, SVG, GEOJSON
 _PATH = "The path; its points in binary"
+
+
+def _schema(media_type: str) -> dict[str, str]:
+    if media_type == GEOJSON:
+        return _OBJECT
+    return _TEXT if media_type in TEXTS else _BINARY
 
 
 def _posted(name: str, summary: str, answers: Mapping[int | str, Any]) -> dict[str, Any]:
