@@ -19,6 +19,8 @@ TEXTS = {
     "cancel_grace_s": ("0.25", 0.25),
     "store_evict": ("lru", "lru"),
     "auth": ("on", "on"),
+    "log_format": ("json", "json"),
+    "log_probes": ("on", "on"),
     "api_keys": ("", ()),
     "cors_origins": ("https://a.org, http://b:80", ("https://a.org", "http://b:80")),
 }
@@ -172,6 +174,8 @@ def test_variables_that_the_library_reads_are_no_mistakes(monkeypatch: pytest.Mo
         ("rate_limit", "0"),
         ("max_concurrent", "-3"),
         ("store_evict", "on"),
+        ("log_format", "logfmt"),
+        ("log_probes", "yes"),
         ("auth", "no"),
         ("api_keys", "secret"),
         ("cors_origins", "example.org"),

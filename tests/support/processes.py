@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import httpx2
@@ -20,18 +20,32 @@ COMMAND_LINE = [sys.executable, "-c", "from app.cli import main; main()"]
 
 
 class Server:
-    """A service that listens, with one worker and the one for small work; settings are text."""
+    """A service that listens, with one worker and the one for small work; settings are text.
 
-    def __init__(self, store: Path, *, waits_for_workers: bool = True, **settings: str) -> None:
+    Its log goes to where that of the tests goes, or to the file ``log``.
+    """
+
+    def __init__(
+        self,
+        store: Path,
+        *,
+        waits_for_workers: bool = True,
+        log: Path | None = None,
+        **settings: str,
+    ) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
         self.store = store
         own = {"GEODESIC_STORE": str(store), "GEODESIC_WORKERS": "1"}
         own |= {"GEODESIC_DEADLINE_S": str(LONG_S)} | settings
-        self.process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
-            [*COMMAND_LINE, "serve", "--port", str(port)], env=os.environ | own, cwd=ROOT
-        )
+        with nullcontext() if log is None else log.open("wb") as stderr:
+            self.process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
+                [*COMMAND_LINE, "serve", "--port", str(port)],
+                env=os.environ | own,
+                cwd=ROOT,
+                stderr=stderr,
+            )
         self.address = ("127.0.0.1", port)
         self.url = f"http://127.0.0.1:{port}"
         self.client = httpx2.Client(base_url=self.url, timeout=LONG_S)

@@ -17,6 +17,7 @@ from app.schemas.points import VertexPoint
 from app.schemas.requests import PathRequest
 from app.store.fields import field_files
 from geodesic_core import TriangleMesh, exact_distance, samples
+from tests.support.logs import Log
 from tests.support.service import store_mesh
 from tests.support.waiting import wait_until
 from tests.support.workers import (
@@ -226,7 +227,7 @@ def test_the_clock_measures_each_phase(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_defect_is_logged_and_becomes_a_problem(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: Log
 ) -> None:
     monkeypatch.setitem(samples.SAMPLES, "plane", lambda _: 1 / 0)
 
@@ -236,7 +237,7 @@ def test_a_defect_is_logged_and_becomes_a_problem(
 
     assert isinstance(outcome, Problem)
     assert outcome.code == "internal_error"
-    assert "ZeroDivisionError" in caplog.text
+    assert [(line["event"], line["work"]) for line in log] == [("work failed", "StoreMesh")]
 
 
 @pytest.mark.parametrize("accuracy", [{}, {"method": "approximate", "relative_error": 0.01}])
