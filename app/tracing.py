@@ -37,8 +37,8 @@ def record_span(
     **attributes: int,
 ) -> None:
     """Record a span below the present one, and a span below it for each of its ``parts``."""
-    if not trace.get_current_span().is_recording():
-        return
+    if not trace.get_current_span().get_span_context().is_valid:
+        return  # of a job the span of its request has ended: it is valid, but not recording
     span = _TRACER.start_span(name, start_time=period.start, attributes=attributes)
     if failed:
         span.set_status(StatusCode.ERROR)

@@ -6,7 +6,7 @@ import socket
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
@@ -79,12 +79,18 @@ class Server:
         wait_until(lambda: len(self.workers()) == 2)
         return self.workers()
 
-    def connect(self, path: str, body: bytes, *, leave_out: int = 0) -> socket.socket:
+    def connect(
+        self,
+        path: str,
+        body: bytes,
+        *,
+        leave_out: int = 0,
+        headers: Mapping[str, str] | None = None,
+    ) -> socket.socket:
         """Post a JSON body on a connection of its own, but for the last bytes; await no answer."""
-        head = (
-            f"POST {path} HTTP/1.1\r\nHost: x\r\n"
-            f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
-        )
+        own = {"Host": "x", "Content-Type": "application/json", "Content-Length": str(len(body))}
+        lines = [f"{name}: {value}\r\n" for name, value in {**own, **(headers or {})}.items()]
+        head = f"POST {path} HTTP/1.1\r\n{''.join(lines)}\r\n"
         connection = socket.create_connection(self.address)
         connection.sendall(head.encode() + body[: len(body) - leave_out])
         return connection
