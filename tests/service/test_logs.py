@@ -1,5 +1,6 @@
 """The log of a service as a process of its own, workers included."""
 
+import re
 import socket
 from collections.abc import Iterator
 from contextlib import closing
@@ -9,6 +10,7 @@ from typing import Any
 import orjson
 import pytest
 
+from tests.support.paths import ROOT
 from tests.support.processes import Server
 from tests.support.service import NPY, SLOW_FACES, distances, upload_sample
 from tests.support.waiting import wait_until
@@ -58,6 +60,17 @@ def test_a_query_is_logged_as_it_was_answered(server: LoggedServer) -> None:
     assert line["queue_seconds"] + line["compute_seconds"] < line["seconds"]
     (upload,) = server.lines(operation="createMesh", mesh_id=mesh_id)
     assert upload["path"] == "/v1/meshes"
+
+
+def test_the_fields_are_those_of_the_documentation(server: LoggedServer) -> None:
+    assert server.client.get("/v1").status_code == 200
+    wait_until(lambda: server.lines(operation="getAbout"))
+
+    text = (ROOT / "docs/operations.md").read_text().partition("## Log\n")[2].partition("\n## ")[0]
+    rows = [row.split("|")[1] for row in text.splitlines() if row.startswith("| `")]
+    documented = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    sometimes = {"trace_id", "exception"}
+    assert set(server.lines(operation="getAbout")[0]) | sometimes == documented
 
 
 def test_every_line_is_an_object_and_the_server_has_no_lines_of_its_own(

@@ -212,6 +212,23 @@ def test_stored_fields_are_bounded(tmp_path: Path) -> None:
     assert sum(field_files(tmp_path).values()) <= 2 * size
 
 
+@pytest.mark.usefixtures("every_field_is_slow")
+def test_evictions_are_counted_by_all_workers_of_a_slot_together(tmp_path: Path) -> None:
+    mesh_id = store_mesh(tmp_path, *planes(200))
+    signals = Signals()
+    for vertex in (0, 2):  # a worker, and the one that replaces it
+        config = worker_config(tmp_path, worker_field_bytes=1, fields_bytes=5000)
+        worker = Worker(config, signals)
+        for each in (vertex, vertex + 1):
+            assert code_of(worker, distances_query(mesh_id, vertex=each)) is None
+            wait_until(lambda: not worker.fields.has_unwritten)  # noqa: B023
+    sizes = field_files(tmp_path)
+
+    assert signals.field_evictions == 4, "each goes as soon as it has been used"
+    wait_until(lambda: signals.stored_field_evictions == 4 - len(field_files(tmp_path)))
+    assert len(sizes) < 4
+
+
 # Its work
 
 
