@@ -10,7 +10,8 @@ No line shows the values of local variables, headers or query strings: they may 
 
 import logging
 import sys
-from collections.abc import MutableMapping
+from collections.abc import Mapping, MutableMapping
+from contextlib import suppress
 from typing import Any, Literal, TextIO
 
 import orjson
@@ -45,19 +46,36 @@ def install(log_format: LogFormat | None, stream: TextIO = sys.stderr) -> None:
             *(_for_people(colors=is_terminal) if is_text else _AS_JSON),
         ],
         wrapper_class=structlog.make_filtering_bound_logger(_LEVEL),
-        logger_factory=structlog.BytesLoggerFactory(stream.buffer),
+        logger_factory=lambda *_names: _Lines(stream.buffer),
         cache_logger_on_first_use=True,
     )
     logging.basicConfig(handlers=[_Forward()], level=_LEVEL, force=True)
     logging.captureWarnings(capture=True)
 
 
-def _to_json(event: Any, **_options: Any) -> bytes:
-    return orjson.dumps(event, default=_text_of)
+class _Lines(structlog.BytesLogger):
+    """A writer of lines; those that cannot be written are lost, and the service goes on."""
+
+    def msg(self, message: bytes) -> None:
+        """Write a line, unless the disk is full or the reader is gone."""
+        with suppress(OSError):
+            super().msg(message)
+
+    info = warning = error = critical = msg
+
+
+def _to_json(event: Mapping[str, Any], **_options: Any) -> bytes:
+    try:
+        return orjson.dumps(event, default=_text_of)
+    except TypeError:  # some text is none, such as the name of a file
+        texts = {
+            n: _text_of(value) if isinstance(value, str) else value for n, value in event.items()
+        }
+        return orjson.dumps(texts, default=_text_of)
 
 
 def _text_of(value: object) -> str:
-    """Return a path or an exception as text; a path may have bytes that are no text."""
+    """Return anything as text that can be encoded; file names may have bytes that are no text."""
     return str(value).encode(errors="replace").decode()
 
 

@@ -109,7 +109,20 @@ warnings.warn("old")
 
 
 def test_what_is_no_text_does_not_break_the_line() -> None:
-    script = "log.info('e', path=Path(os.fsdecode(b'a\\xff')), error=ValueError('no'))"
+    script = "name = os.fsdecode(b'a\\xff')\n"
+    script += "log.info('e', path=Path(name), name=name, error=ValueError('no'), pid=7)"
     (line,) = objects_in(written_by(script))
 
-    assert (line["path"], line["error"]) == ("a?", "no")
+    assert (line["path"], line["name"], line["error"], line["pid"]) == ("a?", "a?", "no", 7)
+
+
+@pytest.mark.parametrize("log_format", ["json", "text"])
+def test_a_log_that_cannot_be_written_stops_nothing(log_format: str) -> None:
+    script = f"""
+logs.install({log_format!r}, open("/dev/full", "w"))
+log.warning("lost")
+logging.getLogger("library").warning("lost")
+os.write(2, b"goes on")
+os._exit(0)
+"""
+    assert written_by(script) == "goes on"
