@@ -17,7 +17,6 @@ from pydantic import (
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 from app.access import ApiKey, parse_keys
-from app.logs import LogFormat
 
 PREFIX = "GEODESIC_"
 LIBRARY_VARIABLES = {"GEODESIC_CPU_LEVEL", "GEODESIC_QUIET"}
@@ -168,7 +167,7 @@ class Settings(BaseSettings):
     """Requests of a caller that may run at the same time."""
     cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
     """Origins whose pages may use the service, separated by commas, or `*`."""
-    log_format: LogFormat | None = None
+    log_format: Literal["json", "text"] | None = None
     """`json` or `text`; text on a terminal and JSON elsewhere, unless set."""
     log_probes: Literal["on", "off"] = "off"
     """`on` logs requests for `/livez` and `/readyz` too."""
