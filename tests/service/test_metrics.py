@@ -264,9 +264,9 @@ def test_evictions_from_each_store_and_cache(tmp_path: Path) -> None:
 
     evicted = lambda cache: value(values, "evictions_total", cache=cache)  # noqa: E731
     assert evicted("meshes") == 3 - len(held) > 0
-    assert evicted("results") == 1, "that of the job, which finds no room"
+    assert evicted("results") > 0, "at least that of the job, which finds no room"
     assert evicted("results_memory") > 0
-    assert evicted("worker_meshes") >= 2
+    assert evicted("worker_meshes") > 0
     assert evicted("worker_fields") > 0
     assert evicted("fields") == 0
 
