@@ -64,11 +64,13 @@ def test_a_terminal_gets_text() -> None:
 
 
 def test_text_obeys_no_client_and_leaves_out_what_is_not_there() -> None:
-    text = written_by("log.info('request', path='/a\\n/b\\x1b[2J', mesh_id=None)", "text")
+    script = "log.info('request', path='/a\\x1b[2J', why='b\\nc', mesh_id=None)\n"
+    script += "logging.getLogger('library').info('d\\n\\x1b[2J')"
+    text = written_by(script, "text")
 
-    assert text.count("\n") == 1
+    assert text.count("\n") == 2
     assert "\x1b" not in text
-    assert "path=/a\\n/b\\x1b[2J" in text
+    assert "path=/a\\x1b[2J why=b\\nc" in text
     assert "mesh_id" not in text
 
 
