@@ -10,10 +10,13 @@ from starlette.middleware.cors import CORSMiddleware
 
 from app import __version__
 from app.http import exception_handlers, page
-from app.http.metrics import Metrics, MetricsMiddleware
+from app.http.event_loop import measuring_lag
+from app.http.metrics import Metrics
 from app.http.middleware.admission import AdmissionMiddleware
 from app.http.middleware.body_timeout import BodyTimeoutMiddleware
 from app.http.middleware.cross_site import CrossSiteMiddleware
+from app.http.middleware.observation import ObservationMiddleware
+from app.http.middleware.probes import PROBES
 from app.http.middleware.request_id import RequestIdMiddleware
 from app.http.openapi import complete
 from app.http.routes import about, jobs, meshes, queries
@@ -27,9 +30,10 @@ def create_app(settings: Settings) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
-        async with service.running():
+        async with service.running(), measuring_lag(metrics.note_lag):
             yield
 
+    metrics = Metrics(service)
     app = _Application(
         title="Geodesic",
         version=__version__,
@@ -37,16 +41,22 @@ def create_app(settings: Settings) -> FastAPI:
         lifespan=lifespan,
         docs_url=None,  # FastAPI's page loads scripts from elsewhere
         redoc_url=None,
+        telemetry={
+            "auto_configure": True,  # from the variables OTEL_…
+            "operation_spans": False,
+            "metrics": False,  # those of Prometheus are more
+            "logs": False,
+            "exclude": lambda scope: scope.get("path") in PROBES,
+        },
     )
     app.state.service = service
-    app.state.metrics = metrics = Metrics(service)
+    app.state.metrics = metrics
     app.state.large_bodies = CapacityLimiter(1)
     # The last one added is the outermost.
     app.add_middleware(BodyTimeoutMiddleware, settings=settings)
     app.add_middleware(AdmissionMiddleware, settings=settings)
     app.add_middleware(CrossSiteMiddleware, settings=settings)
     app.add_middleware(RequestIdMiddleware, settings=settings)
-    app.add_middleware(MetricsMiddleware, metrics=metrics)
     if settings.cors_origins:
         app.add_middleware(
             CORSMiddleware,
@@ -55,6 +65,7 @@ def create_app(settings: Settings) -> FastAPI:
             allow_headers=["*"],
             expose_headers=["*"],
         )
+    app.add_middleware(ObservationMiddleware, metrics=metrics, settings=settings)
     exception_handlers.install(app, settings)
     # Routes are tried in order: the most frequent go first.
     app.include_router(queries.router, prefix="/v1", max_body_size=settings.max_query_bytes)

@@ -184,6 +184,10 @@ class Settings(BaseSettings):
     """Names that `Host` may have, separated by commas; `*.example.org` stands for all below it."""
     cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
     """Origins whose pages may use the service, separated by commas, or `*`."""
+    log_format: Literal["json", "text"] | None = None
+    """`json` or `text`; text on a terminal and JSON elsewhere, unless set."""
+    log_probes: Literal["on", "off"] = "off"
+    """`on` logs requests for `/livez` and `/readyz` too."""
 
     @field_validator("cors_origins")
     @classmethod

@@ -12,7 +12,7 @@ from hypothesis import settings
 
 import geodesic_core as gc
 
-pytest_plugins = ["tests.support.service"]
+pytest_plugins = ["tests.support.logs", "tests.support.service"]
 
 WITHOUT_JIT = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 

@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+import os
 from functools import partial
 from signal import SIGHUP, SIGTERM, raise_signal, signal
 from types import FrameType
@@ -19,11 +20,13 @@ def serve(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.")] = 8000,
 ) -> None:
     """Serve geodesics over HTTP until interrupted; settings are GEODESIC_… variables."""
+    os.environ["GEODESIC_QUIET"] = "1"  # the log says that kernels are being compiled
     fork_server.start()  # imports for the workers while this process imports for itself
 
     import uvicorn
     from pydantic import ValidationError
 
+    from app import logs
     from app.http.connections import Connections
     from app.http.protocol import BoundedHttpProtocol
     from app.main import create_app
@@ -44,6 +47,7 @@ def serve(
             f"anybody who reaches {host} could use the service: set GEODESIC_API_KEYS, or "
             f"GEODESIC_AUTH=off where something before it asks for keys"
         )
+    logs.install(settings.log_format)
     app = create_app(settings)
     try:
         with app.state.service.owning_store():
@@ -73,11 +77,16 @@ def serve(
             app.state.service.drain()
             super().handle_exit(sig, frame)
 
-    # uvicorn takes whole seconds.
-    grace = math.ceil(settings.drain_s)
     protocol: Any = partial(BoundedHttpProtocol, connections=Connections(settings))
     config = uvicorn.Config(
-        app, host, port, http=protocol, ws="none", timeout_graceful_shutdown=grace
+        app,
+        host,
+        port,
+        http=protocol,
+        ws="none",
+        timeout_graceful_shutdown=math.ceil(settings.drain_s),  # uvicorn takes whole seconds
+        log_config=None,
+        access_log=False,  # the application has its own
     )
     server = Server(config)
     # A closed terminal ends the service in the same order.

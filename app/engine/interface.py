@@ -1,6 +1,6 @@
 """The interface between the service and whatever computes its answers."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -26,10 +26,19 @@ class Load:
     """Workers so far that died or were killed"""
     cancelled: int
     """Tasks so far that were stopped because nobody waited for them any longer"""
+    evictions: Mapping[str, int]
+    """Values that workers have dropped so far to make room, by cache"""
+    pids: Collection[int]
+    """Ids of the worker processes"""
 
 
 class Engine(Protocol):
     """Runs tasks outside the process that serves requests."""
+
+    on_wait: Callable[[float], None]
+    """Receives the seconds that a task has waited for a worker, whether it got one or gave up"""
+    on_work: Callable[[str, float], None]
+    """Receives the client of a task and the seconds that a worker was busy with it"""
 
     @property
     def load(self) -> Load:

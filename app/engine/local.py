@@ -1,14 +1,17 @@
 """The engine of one machine: a queue, and slots that are kept supplied with worker processes."""
 
 import asyncio
-import logging
 import threading
-from collections.abc import Coroutine, Sequence
+from collections import Counter
+from collections.abc import Callable, Coroutine, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, time_ns
 from typing import Any
+
+import structlog
 
 import geodesic_core as gc
 from app.engine import worker
@@ -19,11 +22,14 @@ from app.engine.work import Outcome, Task, TaskResult, Work
 from app.engine.worker import WorkerConfig
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.settings import Settings
+from app.tracing import Period, record_span
 
-logger = logging.getLogger(__name__)
+logger = structlog.get_logger(module=__name__)
 
 _FIRST_PAUSE_S, _LONGEST_PAUSE_S = 0.5, 30.0
 """Between attempts to start a worker"""
+_LONG_COMPILATION_S = 1.0
+"""Seconds after which the log says that kernels are being compiled"""
 _RETRY_AFTER = {"Retry-After": "1"}
 _PROGRESS_PERIOD_S = 0.1
 _SMALL_S = 0.5
@@ -60,6 +66,8 @@ class LocalEngine:
         self._is_failing = False
         self.is_draining = False
         self._is_stopping = threading.Event()
+        self.on_wait: Callable[[float], None] = lambda _seconds: None
+        self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
         self._background: set[asyncio.Task[None]] = set()
 
     @property
@@ -73,7 +81,19 @@ class LocalEngine:
         idle = sum(slot.is_alive for slot in self._idle)
         busy = sum(slot.is_alive for slot in self._open) - idle
         missing = len(self._slots) - idle - busy
-        return Load(len(self._waiting), idle, busy, missing, self._lost, self._cancelled)
+        evictions: Counter[str] = Counter()
+        for slot in self._slots:
+            evictions.update(slot.evictions)
+        return Load(
+            waiting=len(self._waiting),
+            idle=idle,
+            busy=busy,
+            missing=missing,
+            lost=self._lost,
+            cancelled=self._cancelled,
+            evictions=evictions,
+            pids={slot.pid for slot in self._slots if slot.pid is not None},
+        )
 
     async def start(self) -> None:
         """Compile the first kernels, then start the workers; in the background."""
@@ -122,6 +142,20 @@ class LocalEngine:
             return replace(outcome, seconds={"queue": queued, **outcome.seconds})
 
     async def _run_in(self, slot: Slot, task: Task, on_progress: ProgressCallback) -> Outcome:
+        start, start_ns, pid = perf_counter(), time_ns(), slot.pid or 0
+        parts: Mapping[str, Period] = {}
+        failed = True
+        try:
+            outcome = await self._hand_over(slot, task, on_progress)
+            failed = isinstance(outcome, Problem) and outcome.status >= 500
+            parts = outcome.periods if isinstance(outcome, TaskResult) else {}
+            return outcome
+        finally:
+            self.on_work(task.client, perf_counter() - start)
+            period = Period(start_ns, time_ns())
+            record_span("worker", period, parts, failed=failed, **{"process.pid": pid})
+
+    async def _hand_over(self, slot: Slot, task: Task, on_progress: ProgressCallback) -> Outcome:
         outcome = slot.begin(task.work, is_small=task.is_small)
         start = perf_counter()
         on_progress(0.0)
@@ -162,13 +196,19 @@ class LocalEngine:
         """Compile kernels in processes of their own; where that fails, workers compile them."""
         compile_kernels = partial(gc.compile_kernels, workloads, cancel=self._is_stopping.is_set)
         compiling = asyncio.ensure_future(asyncio.to_thread(compile_kernels))
+        start = perf_counter()
         try:
+            done, _ = await asyncio.wait({compiling}, timeout=_LONG_COMPILATION_S)
+            if not done:
+                logger.info("compiling kernels for this machine, once", workloads=workloads)
             await asyncio.shield(compiling)
+            if not done:
+                logger.info("kernels compiled", seconds=round(perf_counter() - start, 1))
         except asyncio.CancelledError:
             await asyncio.gather(compiling, return_exceptions=True)  # until its processes are gone
             raise
         except (gc.errors.InternalError, OSError):
-            logger.exception("kernels could not be compiled ahead")
+            logger.exception("kernels not compiled ahead")
         except gc.errors.Cancelled:
             pass
 
@@ -180,7 +220,7 @@ class LocalEngine:
                 await slot.open()
             except WorkerLostError:
                 if not self.is_draining:  # an interrupt reaches a starting worker as well
-                    logger.exception("a worker could not be started; next try in %g s", pause)
+                    logger.exception("worker not started", next_try_seconds=pause)
                 self._fail_if_none_is_open()
                 await slot.close()
                 await asyncio.sleep(pause)
@@ -192,7 +232,7 @@ class LocalEngine:
             self._release(slot)
             await slot.wait_until_retired()
             self._lost += 1
-            logger.warning("a worker is gone and will be replaced")
+            logger.warning("worker lost, to be replaced")
             self._open.discard(slot)
             if slot in self._idle:
                 self._idle.remove(slot)
@@ -204,12 +244,15 @@ class LocalEngine:
         """Wait for a free slot, preferably one whose worker has cached what the task needs."""
         self._idle = [slot for slot in self._idle if slot.is_alive]
         suitable = [slot for slot in self._idle if self._takes(slot, task.is_small)]
-        if suitable:
-            slot = max(suitable, key=lambda slot: self._affinity(slot, task))
-            self._idle.remove(slot)
-            self._note_acquired(slot, task)
-        else:
-            slot = await self._wait(task)
+        if not suitable:
+            self._refuse_to_wait(task.client)
+        with self._measured_wait():
+            if suitable:
+                slot = max(suitable, key=lambda slot: self._affinity(slot, task))
+                self._idle.remove(slot)
+                self._note_acquired(slot, task)
+            else:
+                slot = await self._wait(task)
         slot.affinity_keys.extend(
             key for key in task.affinity_keys if key not in slot.affinity_keys
         )
@@ -234,8 +277,17 @@ class LocalEngine:
         if task.is_small:
             self._doing_small.add(slot)
 
+    @contextmanager
+    def _measured_wait(self) -> Iterator[None]:
+        start, start_ns, failed = perf_counter(), time_ns(), True
+        try:
+            yield
+            failed = False
+        finally:
+            self.on_wait(perf_counter() - start)
+            record_span("queue", Period(start_ns, time_ns()), failed=failed)
+
     async def _wait(self, task: Task) -> Slot:
-        self._refuse_to_wait(task.client)
         waiter = _Waiter(task, asyncio.get_running_loop().create_future())
         self._waiting.put(task.client, waiter)
         try:
@@ -298,7 +350,7 @@ class LocalEngine:
     def _forget(self, background: asyncio.Task[None]) -> None:
         self._background.discard(background)
         if not background.cancelled() and background.exception() is not None:
-            logger.error("a task of the engine failed", exc_info=background.exception())
+            logger.error("task of the engine failed", exc_info=background.exception())
 
 
 def _unavailable() -> ProblemError:

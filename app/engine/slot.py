@@ -7,6 +7,8 @@ from collections import deque
 from contextlib import suppress
 from multiprocessing.context import ForkServerProcess
 
+from structlog.contextvars import get_contextvars
+
 from app.engine import worker
 from app.engine.fork_server import CONTEXT
 from app.engine.work import Outcome, Work
@@ -84,6 +86,21 @@ class Slot:
         """Share of the present work that is done."""
         return float(self._signals.progress)
 
+    @property
+    def pid(self) -> int | None:
+        """Id of the worker process, where there is one."""
+        return None if self._process is None else self._process.pid
+
+    @property
+    def evictions(self) -> dict[str, int]:
+        """Values that the workers of this slot have dropped to make room, by cache."""
+        signals = self._signals
+        return {
+            "worker_meshes": signals.mesh_evictions,
+            "worker_fields": signals.field_evictions,
+            "fields": signals.stored_field_evictions,
+        }
+
     async def wait_until_retired(self) -> None:
         """Wait until the worker is dead or retired."""
         await self._retired.wait()
@@ -95,14 +112,16 @@ class Slot:
     def begin(self, work: Work, *, is_small: bool) -> "asyncio.Future[Outcome]":
         """Hand ``work`` to the worker; its future fails with ``WorkerLostError`` if that dies.
 
-        Work that is not small runs at a lower priority.
+        Work that is not small runs at a lower priority. What the worker logs meanwhile has the
+        fields that are bound here, such as the id of the request.
         """
         self._number += 1
         self._signals.progress = 0.0
         self._outcome = asyncio.get_running_loop().create_future()
         if self.is_alive:
             assert self._writer is not None, "a living worker is connected"  # noqa: S101
-            self._writer.write(pickle.dumps((self._number, work, is_small)))
+            message = self._number, work, is_small, get_contextvars()
+            self._writer.write(pickle.dumps(message))
         else:
             self._lose_outcome()
         return self._outcome

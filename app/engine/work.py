@@ -1,7 +1,7 @@
 """The work of worker processes, and its results: small values that pass through a socket."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,6 +11,7 @@ from app.queries import Estimate, Query
 from app.schemas.meshes import Merge
 from app.store.meshes import WrittenMesh
 from app.store.results import Result
+from app.tracing import Period
 
 
 @dataclass(frozen=True)
@@ -86,9 +87,12 @@ class Task:
 
 @dataclass(frozen=True)
 class TaskResult:
-    """The report of a worker: seconds of each phase, and one result, of the kind of the work."""
+    """The report of a worker: its phases, and one result, of the kind of the work."""
 
     seconds: Mapping[str, float]
+    """Seconds of each phase"""
+    periods: Mapping[str, Period] = field(default_factory=dict)
+    """Begin and end of each phase, for traces"""
     mesh: WrittenMesh | None = None
     result: Result | None = None
     estimate: Estimate | None = None

@@ -1,6 +1,5 @@
 """The worker process: it does one piece of work at a time, with meshes and fields cached."""
 
-import logging
 import os
 import pickle
 import select
@@ -10,19 +9,24 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from contextvars import copy_context
 from ctypes import Structure, c_double, c_longlong
 from dataclasses import dataclass, replace
+from functools import partial
 from gc import freeze
 from io import BufferedRWPair
 from pathlib import Path
-from time import perf_counter
+from time import perf_counter, time_ns
 from typing import Any
 
 import numpy as np
+import structlog
 from numpy.typing import NDArray
 from setproctitle import setproctitle
+from structlog.contextvars import bound_contextvars
 
 import geodesic_core as gc
+from app import logs
 from app.encoding import JSON, encode
 from app.engine.memory import limit_memory, refuse_beyond_limit
 from app.engine.mesh_json import read_json_mesh
@@ -45,8 +49,9 @@ from app.store.fields import FieldStore
 from app.store.lru_cache import LRUCache
 from app.store.meshes import MeshStore, OpenMesh
 from app.store.results import write_result
+from app.tracing import Period
 
-logger = logging.getLogger(__name__)
+logger = structlog.get_logger(module=__name__)
 
 TITLE = "geodesic-worker"
 SIZE_BYTES = 8
@@ -71,6 +76,10 @@ class Signals(Structure):
         ("stop_number", c_longlong),  # of the work to stop; earlier work has ended
         ("begun_number", c_longlong),  # of the work that was begun last
         ("progress", c_double),  # share of that work that is done
+        # Totals of this worker and those before it in its slot:
+        ("mesh_evictions", c_longlong),  # open meshes closed to make room
+        ("field_evictions", c_longlong),  # cached fields dropped to make room
+        ("stored_field_evictions", c_longlong),  # fields removed from the store to make room
     )
 
 
@@ -87,9 +96,10 @@ class Worker:
         self.meshes: LRUCache[tuple[str, bytes], OpenMesh]
         """Open meshes by id and barriers"""
         self.meshes = LRUCache(self.settings.worker_mesh_bytes, lambda opened: opened.nbytes)
-        store = FieldStore(self.settings.store, self.settings.fields_bytes)
-        self.fields = FieldCache(self.settings.worker_field_bytes, store, code_version())
+        self._stored = FieldStore(self.settings.store, self.settings.fields_bytes)
+        self.fields = FieldCache(self.settings.worker_field_bytes, self._stored, code_version())
         self._writer = _low_priority_thread()
+        self._before = Signals.from_buffer_copy(self.signals)  # what former workers have counted
 
     def do(self, number: int, work: Work) -> Outcome:
         """Do ``work``; an error becomes a value, since not every exception can be pickled."""
@@ -104,8 +114,12 @@ class Worker:
         except Exception as error:
             problem = problem_of(error)
             if problem.code == "internal_error":
-                logger.exception("a worker failed at %s", work)
+                logger.exception("work failed", work=type(work).__name__)
             return problem
+
+        finally:
+            self.signals.mesh_evictions = self._before.mesh_evictions + self.meshes.evictions
+            self.signals.field_evictions = self._before.field_evictions + self.fields.evictions
 
     def _do(self, number: int, work: Work) -> TaskResult:
         """Do ``work`` until the number of the work to stop reaches ``number``."""
@@ -122,7 +136,7 @@ class Worker:
                     return self._answer(work, clock, is_cancelled)
                 finally:
                     if self.fields.has_unwritten:
-                        self._writer.submit(self.fields.write)  # while the answer is sent
+                        self._writer.submit(self._write_fields)  # while the answer is sent
             case EstimateQuery():
                 return self._estimate(work, clock, is_cancelled)
 
@@ -131,7 +145,7 @@ class Worker:
             mesh = _make_mesh(work.mesh_input, self.settings.max_faces)
         with clock.phase("store"):
             written = self.store.write_aside(mesh, work.folder, work.mesh_input.owner)
-        return TaskResult(clock.seconds, mesh=written)
+        return TaskResult(clock.seconds, clock.periods, mesh=written)
 
     def _answer(self, work: RunQuery, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
         settings = self.settings
@@ -159,7 +173,7 @@ class Worker:
                 code_version(),
                 is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
             )
-        return TaskResult(clock.seconds, result=result)
+        return TaskResult(clock.seconds, clock.periods, result=result)
 
     def _estimate(
         self, work: EstimateQuery, clock: "Clock", cancel: Callable[[], bool]
@@ -168,7 +182,12 @@ class Worker:
             opened = self._open(work.query)
         with clock.phase("compute"):
             estimated = estimate(work.query, work.representation, opened, cancel)
-        return TaskResult(clock.seconds, estimate=estimated)
+        return TaskResult(clock.seconds, clock.periods, estimate=estimated)
+
+    def _write_fields(self) -> None:
+        self.fields.write()
+        removed = self._before.stored_field_evictions + self._stored.evictions
+        self.signals.stored_field_evictions = removed
 
     def _report(self, share: float) -> None:
         self.signals.progress = share
@@ -202,13 +221,15 @@ class Clock:
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
+        self.periods: dict[str, Period] = {}
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:
         """Measure the block as a phase."""
-        start = perf_counter()
+        start, start_ns = perf_counter(), time_ns()
         yield
         self.seconds[name] = perf_counter() - start
+        self.periods[name] = Period(start_ns, time_ns())
 
 
 def _make_mesh(mesh_input: MeshInput, max_faces: int) -> gc.TriangleMesh:
@@ -236,6 +257,7 @@ def run(config: WorkerConfig, signals: Signals, connection: socket.socket) -> No
     """Run a worker process: do the work that arrives on ``connection``, until that closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the service, which ends its workers
     setproctitle(TITLE)
+    logs.install(config.settings.log_format)
     threading.Thread(target=_die_with, args=(connection,), daemon=True).start()
     worker = Worker(config, signals)
     low_priority = _low_priority_thread()
@@ -243,12 +265,11 @@ def run(config: WorkerConfig, signals: Signals, connection: socket.socket) -> No
     with connection.makefile("rwb") as messages, suppress(EOFError, BrokenPipeError):
         _send(messages, None)
         while True:
-            number, work, is_small = pickle.load(messages)  # noqa: S301 - from our own service
+            number, work, is_small, log_fields = pickle.load(messages)  # noqa: S301 - our own service
             signals.begun_number = number
-            if is_small:
-                outcome = worker.do(number, work)
-            else:
-                outcome = low_priority.submit(worker.do, number, work).result()
+            with bound_contextvars(**log_fields):
+                do = partial(copy_context().run, worker.do, number, work)
+                outcome = do() if is_small else low_priority.submit(do).result()
             _send(messages, outcome)
 
 

@@ -1,14 +1,15 @@
 """Connections: the number that may be open, of all callers and of each."""
 
-import logging
 from collections import Counter
 from time import monotonic
+
+import structlog
 
 from app.access import Caller
 from app.errors import Problem, over_limit
 from app.settings import Settings
 
-logger = logging.getLogger(__name__)
+logger = structlog.get_logger(module=__name__)
 
 LINGERING = 100
 """Refused connections that stay open until their refusal is read"""
@@ -48,7 +49,7 @@ class Connections:
             return None
         if monotonic() >= self._warn_after:
             self._warn_after = monotonic() + _WARN_EVERY_S
-            logger.warning("connections are refused: %s (latest: %s)", refusal, caller.name)
+            logger.warning("connections refused", reason=str(refusal), caller=caller.name)
         return refusal.problem
 
     def close(self, caller: Caller) -> None:

@@ -19,7 +19,7 @@ from app.encoding import Representation, negotiate, negotiate_coding
 from app.encoding.representation import ARRAYS, TEXTS
 from app.errors import Fault, problem
 from app.schemas.requests import AnswerParameters
-from app.service.service import RequestContext, Service
+from app.service.service import PhaseSeconds, RequestContext, Service
 
 T = TypeVar("T")
 
@@ -68,6 +68,11 @@ def context_of(request: Request, headers: TimeoutHeader) -> RequestContext:
     limit_ms, own_ms = service_of(request).settings.deadline_s * 1000, headers.x_timeout_ms
     deadline_s = (limit_ms if own_ms is None else min(limit_ms, own_ms)) / 1000
     return RequestContext(caller_of(request), deadline_s, request.state.request_id)
+
+
+def note_work(request: Request, mesh_id: str, seconds: PhaseSeconds) -> None:
+    """Note the mesh of a request, and the seconds of each phase of its work, for the log."""
+    request.state.mesh_id, request.state.work_seconds = mesh_id, seconds
 
 
 async def get_context(

@@ -1,22 +1,22 @@
-"""Metrics for operators: requests are counted, and the service's state is read when scraped."""
+"""Metrics for operators: events are counted, and the service's state is read when scraped."""
 
 from collections.abc import Iterator, Mapping
-from time import perf_counter
 from typing import get_args
 
+from anyio import to_thread
 from prometheus_client import CollectorRegistry, Counter, Histogram, Info
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.exposition import choose_encoder
 from prometheus_client.registry import Collector
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app import __version__
+from app.access import Caller
 from app.schemas.service import JobStatus
+from app.service.resources import Resources, measure
 from app.service.service import Service
 
-_NONE = "none"
-"""Operation of a request that reached none"""
 _BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120)
+_LAG_BUCKETS = _BUCKETS[: _BUCKETS.index(5) + 1]
 
 
 class Metrics(Collector):
@@ -25,6 +25,7 @@ class Metrics(Collector):
     def __init__(self, service: Service) -> None:
         self._service = service
         self._jobs: Mapping[str, int] = {}
+        self._resources: Resources | None = None
         self._registry = CollectorRegistry()
         self._requests = Counter(
             "geodesic_requests",
@@ -39,19 +40,62 @@ class Metrics(Collector):
             buckets=_BUCKETS,
             registry=self._registry,
         )
+        self._lag = Histogram(
+            "geodesic_event_loop_lag_seconds",
+            "How much later than asked for the event loop wakes a coroutine",
+            buckets=_LAG_BUCKETS,
+            registry=self._registry,
+        )
+        waits = Histogram(
+            "geodesic_queue_wait_seconds",
+            "Wait of a request or job for a worker, until it has one or gives up",
+            buckets=_BUCKETS,
+            registry=self._registry,
+        )
+        service.engine.on_wait = waits.observe
+        self._caller_requests = Counter(
+            "geodesic_caller_requests",
+            "Requests that were answered, by the name of the API key",
+            ["caller"],
+            registry=self._registry,
+        )
+        self._caller_seconds = Counter(
+            "geodesic_caller_worker_seconds",
+            "Seconds that workers were busy with requests and jobs, by the name of the API key",
+            ["caller"],
+            registry=self._registry,
+        )
+        self._callers = {key.name for key in service.settings.api_keys}
+        for name in self._callers:  # from 0 on: Prometheus sees no growth in a first value
+            self._caller_requests.labels(name)
+            self._caller_seconds.labels(name)
+        service.engine.on_work = self._note_work
         Info("geodesic_build", "Version of the service", registry=self._registry).info(
             {"version": __version__}
         )
         self._registry.register(self)
 
-    def note(self, operation: str, status: int, seconds: float) -> None:
+    def note(self, operation: str, status: int, seconds: float, caller: Caller) -> None:
         """Count a request, and its seconds."""
         self._requests.labels(operation, str(status)).inc()
         self._seconds.labels(operation).observe(seconds)
+        if caller.has_key:
+            self._caller_requests.labels(caller.name).inc()
+
+    def note_lag(self, seconds: float) -> None:
+        """Count a measurement of the event loop's lag."""
+        self._lag.observe(seconds)
+
+    def _note_work(self, client: str, seconds: float) -> None:
+        if client in self._callers:  # without keys, clients are addresses: any number of them
+            self._caller_seconds.labels(client).inc(seconds)
 
     async def exposition(self, accept: str) -> tuple[bytes, str]:
         """Return all metrics in the text format that ``accept`` asks for, and its media type."""
-        self._jobs = await self._service.jobs.count()
+        service = self._service
+        self._jobs = await service.jobs.count()
+        pids, store = service.engine.load.pids, service.settings.store
+        self._resources = await to_thread.run_sync(measure, pids, store)
         write, media_type = choose_encoder(accept)
         return write(self._registry), media_type
 
@@ -80,34 +124,26 @@ class Metrics(Collector):
         yield _gauge("geodesic_meshes_bytes", "Size of the meshes in the store", catalog.total)
         jobs = {status: self._jobs.get(status, 0) for status in get_args(JobStatus)}
         yield _gauges("geodesic_jobs", "Jobs that have not been removed", "status", jobs)
+        evictions = {
+            "meshes": catalog.evictions,
+            "results": service.results.evictions,
+            "results_memory": service.results.memory_evictions,
+            **load.evictions,
+        }
+        evicted = "What was removed to make room, by store or cache"
+        yield _counters("geodesic_evictions", evicted, "cache", evictions)
+        if self._resources is not None:
+            yield from _of_resources(self._resources)
 
 
-class MetricsMiddleware:
-    """Middleware that counts requests, and measures their time."""
-
-    def __init__(self, app: ASGIApp, metrics: Metrics) -> None:
-        self.app = app
-        self.metrics = metrics
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Serve one request."""
-        if scope["type"] != "http":
-            await self.app(scope, receive, send)
-            return
-        start = perf_counter()
-        status = 500
-
-        async def send_noted(message: Message) -> None:
-            nonlocal status
-            if message["type"] == "http.response.start":
-                status = message["status"]
-            await send(message)
-
-        try:
-            await self.app(scope, receive, send_noted)
-        finally:
-            operation = getattr(scope.get("route"), "operation_id", None) or _NONE
-            self.metrics.note(operation, status, perf_counter() - start)
+def _of_resources(resources: Resources) -> Iterator[Metric]:
+    resident = "Resident memory, by kind of process; shared pages count in each"
+    yield _gauges("geodesic_resident_memory_bytes", resident, "process", resources.memory)
+    is_open, most = "Open file descriptors of the API process", "Most descriptors it may have"
+    yield _gauge("geodesic_open_fds", is_open, resources.open_fds)
+    yield _gauge("geodesic_max_fds", most, resources.max_fds)
+    free = "Bytes that can still be written to the disk of the store"
+    yield _gauge("geodesic_store_free_bytes", free, resources.free_bytes)
 
 
 def _gauge(name: str, meaning: str, value: float) -> Metric:

@@ -1,12 +1,13 @@
 """The life of jobs: accepted, run, finished or dismissed, and removed after a while."""
 
 import asyncio
-import logging
 import sqlite3
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime, timedelta
+
+import structlog
 
 from app.engine.interface import ProgressCallback
 from app.errors import Fault, Problem, problem, problem_of
@@ -15,7 +16,7 @@ from app.jobs.repository import JobRepository
 from app.settings import variable_of
 from app.store.results import Result, ResultStore
 
-logger = logging.getLogger(__name__)
+logger = structlog.get_logger(module=__name__)
 
 Solve = Callable[[ProgressCallback], Awaitable[Result]]
 """The computation of a job, which reports its progress"""
@@ -204,7 +205,7 @@ class JobManager:
         except Exception as error:
             problem = problem_of(error)
             if problem.code == "internal_error":
-                logger.exception("job %s failed", live.job.id)
+                logger.exception("job failed", job_id=live.job.id)
             await self._finish(live, live.job.failed(problem))
             return
         if self._results.can_pin(result.name):
@@ -232,7 +233,7 @@ class JobManager:
                 for job in await self._repository.finished_before(datetime.now(UTC) - self._ttl):
                     await self._remove(job)
             except sqlite3.Error:  # such as a full disk: there may be room the next time
-                logger.exception("expired jobs could not be removed")
+                logger.exception("expired jobs not removed")
             await asyncio.sleep(min(_EXPIRY_PERIOD_S, self._ttl.total_seconds()))
 
     async def _remove(self, job: Job) -> None:

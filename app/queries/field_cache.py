@@ -50,6 +50,11 @@ class FieldCache:
         return field
 
     @property
+    def evictions(self) -> int:
+        """Fields dropped so far to make room for others."""
+        return self._fields.evictions
+
+    @property
     def has_unwritten(self) -> bool:
         """Whether there is something to `write`."""
         return bool(self._unwritten)

@@ -4,7 +4,6 @@
 code that solved it. There is no index: workers write, and each removes files beyond the bound.
 """
 
-import logging
 import shutil
 import struct
 import zlib
@@ -19,8 +18,6 @@ from numpy.typing import NDArray
 
 from app.store.atomic import atomic_write, remove_partial
 from app.store.layout import FIELDS
-
-logger = logging.getLogger(__name__)
 
 _DAMAGED = (BadZipFile, EOFError, KeyError, RuntimeError, ValueError, struct.error, zlib.error)
 _CODE = "code"
@@ -38,6 +35,8 @@ class FieldStore:
         self._root = root
         self.folder = root / FIELDS
         self._capacity = capacity
+        self.evictions = 0
+        """Fields that this process removed so far to make room"""
 
     def prepare(self, meshes: Collection[str]) -> None:
         """Remove unfinished files, and the fields of meshes that are gone."""
@@ -55,9 +54,7 @@ class FieldStore:
         except FileNotFoundError:
             return None
         except (*_DAMAGED, OSError) as error:
-            logger.warning(
-                "a stored field cannot be read, and is solved again: %s: %s", path, error
-            )
+            _warn("stored field unreadable, solved again", path=path, error=repr(error))
             path.unlink(missing_ok=True)
             return None
         return arrays
@@ -71,7 +68,7 @@ class FieldStore:
                 np.savez(file, allow_pickle=False, **arrays, **{_CODE: np.array(code)})
             self._evict()
         except (OSError, MemoryError) as error:
-            logger.warning("a field cannot be stored: %s/%s: %s", mesh_id, key, error)
+            _warn("field not stored", mesh_id=mesh_id, key=key, error=repr(error))
 
     def forget_mesh(self, mesh_id: str) -> None:
         """Remove the fields of a mesh; one that is being written may be left to `prepare`."""
@@ -85,9 +82,16 @@ class FieldStore:
                 return
             path.unlink(missing_ok=True)
             total -= size
+            self.evictions += 1
 
     def _path(self, mesh_id: str, key: str) -> Path:
         return self.folder / mesh_id / f"{key}.npz"
+
+
+def _warn(event: str, **fields: object) -> None:
+    import structlog  # a tenth of the start of the command line, which has no log
+
+    structlog.get_logger(module=__name__).warning(event, **fields)
 
 
 def field_files(root: Path) -> dict[Path, int]:

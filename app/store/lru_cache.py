@@ -21,6 +21,8 @@ class LRUCache(Generic[K, V]):
         self._values: OrderedDict[K, V] = OrderedDict()
         self._sizes: dict[K, int] = {}
         self._total = 0
+        self.evictions = 0
+        """Values dropped so far to make room"""
 
     def __iter__(self) -> Iterator[K]:
         """Yield the keys, the most recently used last."""
@@ -47,6 +49,7 @@ class LRUCache(Generic[K, V]):
         while self._total > self._capacity and len(self._values) > spare:
             evicted.append(next(iter(self._values)))
             self.drop(evicted[-1])
+        self.evictions += len(evicted)
         return evicted
 
     def drop(self, key: K) -> None:

@@ -44,6 +44,8 @@ class MeshCatalog:
         self._evicts = evicts
         self._sizes: OrderedDict[str, int] = OrderedDict()  # the least recently used first
         self._pins: Counter[str] = Counter()
+        self.evictions = 0
+        """Meshes removed so far to make room"""
 
     def prepare(self) -> None:
         """Remove what a former service left unfinished, and measure the meshes."""
@@ -105,6 +107,7 @@ class MeshCatalog:
             raise
         finally:
             await asyncio.to_thread(_remove, *gone)
+        self.evictions += len(evicted)
         return CatalogChange(is_new=True, evicted=evicted)
 
     async def delete(self, mesh_id: str) -> None:

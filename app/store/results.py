@@ -136,6 +136,10 @@ class ResultStore:
         self._total = 0
         self._in_use: Counter[str] = Counter()
         self._pins: Counter[str] = Counter()
+        self.evictions = 0
+        """Results removed so far to make room on the disk"""
+        self.memory_evictions = 0
+        """Results dropped so far to make room in memory"""
 
     def prepare(self) -> None:
         """Index the results of a former service, the oldest first, and remove incomplete ones."""
@@ -255,6 +259,7 @@ class ResultStore:
         for name in list(self._sizes):
             if self._is_free(name):
                 self._remove(name)
+                self.evictions += 1
             if self._total <= self._capacity:
                 return
 
@@ -268,6 +273,7 @@ class ResultStore:
         self._small_total += _ENTRY + result.manifest.size
         while self._small_total > self._memory:
             self._drop_small(next(iter(self._small)))
+            self.memory_evictions += 1
 
     def _drop_small(self, name: str) -> None:
         if name in self._small:

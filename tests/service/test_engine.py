@@ -26,6 +26,7 @@ from app.queries import DistancesQuery
 from app.settings import Settings
 from tests.support.clocks import Clock
 from tests.support.dying import die
+from tests.support.logs import Log
 from tests.support.processes import are_gone, processor_time, stopped
 from tests.support.service import (
     SLOW_FACES,
@@ -504,7 +505,7 @@ def test_a_start_that_is_called_off_leaves_nothing(tmp_path: Path) -> None:
 
 
 def test_an_interrupt_while_workers_start_is_no_failure(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: Log
 ) -> None:
     closed, close = threading.Event(), Slot.close
 
@@ -519,4 +520,4 @@ def test_an_interrupt_while_workers_start_is_no_failure(
     with TestClient(app):
         assert closed.wait(LONG_S), "as is done when a worker has not started"
 
-    assert "could not be started" not in caplog.text
+    assert "worker not started" not in {line["event"] for line in log}

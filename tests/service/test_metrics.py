@@ -1,7 +1,10 @@
 """Metrics as Prometheus reads them, against what was done."""
 
 import os
+import resource
+import shutil
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from time import perf_counter
@@ -13,7 +16,7 @@ from prometheus_client.parser import text_string_to_metric_families as parse
 from starlette.testclient import TestClient
 
 from app.main import create_app
-from app.settings import Settings
+from app.settings import MIB, Settings
 from tests.support.processes import stopped
 from tests.support.service import (
     ServiceClient,
@@ -175,6 +178,130 @@ def test_workers_that_are_lost(watched: ServiceClient) -> None:
     wait_until(lambda: grown(before, scrape(watched), "workers_lost_total") == 1)
     wait_until(lambda: value(scrape(watched), "workers", state="idle") == 2)
     assert grown(before, scrape(watched), "workers_lost_total") == 1
+
+
+# Resources
+
+
+def resident_bytes(pid: int) -> int:
+    """Return what the system says of a process."""
+    lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+    return 1024 * int(next(line for line in lines if line.startswith("VmRSS:")).split()[1])
+
+
+def test_memory_by_kind_of_process(watched: ServiceClient) -> None:
+    with stopped(watched.workers()):
+        values = scrape(watched)
+        workers = sum(map(resident_bytes, watched.workers()))
+
+    kinds = ("api", "worker", "other")
+    memory = {kind: value(values, "resident_memory_bytes", process=kind) for kind in kinds}
+    assert memory["worker"] == pytest.approx(workers, rel=0.01)
+    assert memory["api"] == pytest.approx(resident_bytes(os.getpid()), rel=0.2)
+    assert memory["other"] > 10 * MIB, "the process that workers are forked from"
+
+
+def test_open_descriptors_and_their_limit(watched: ServiceClient) -> None:
+    before = scrape(watched)
+    pipes = [end for _ in range(50) for end in os.pipe()]
+    after = scrape(watched)
+    for end in pipes:
+        os.close(end)
+
+    assert grown(before, after, "open_fds") == pytest.approx(len(pipes), abs=20)
+    assert value(after, "max_fds") == resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+
+
+def test_room_on_the_disk(watched: ServiceClient) -> None:
+    free = shutil.disk_usage(watched.app.state.service.settings.store).free
+
+    assert value(scrape(watched), "store_free_bytes") == pytest.approx(free, rel=0.2)
+
+
+def test_a_blocked_event_loop_lags(watched: ServiceClient) -> None:
+    assert watched.portal is not None
+    name = "event_loop_lag_seconds"
+
+    def late(values: Values) -> float:
+        return value(values, f"{name}_count") - value(values, f"{name}_bucket", le="0.25")
+
+    before = scrape(watched)
+    watched.portal.call(time.sleep, 0.6)  # a quarter of it may be over before it is noticed
+
+    wait_until(lambda: late(scrape(watched)) > late(before))
+
+
+def test_the_wait_for_a_worker(watched: ServiceClient) -> None:
+    large = upload_sample(watched, "sphere", 80_000)
+    before = scrape(watched)
+    with stopped(watched.workers()):
+        first, second = submit(watched, large, 7), submit(watched, large, 8)
+        wait_until(lambda: value(scrape(watched), "queue_length") == 1)
+        time.sleep(0.3)
+        watched.delete(second)  # it gives up
+        watched.delete(first)
+    wait_until(lambda: value(scrape(watched), "workers", state="idle") == 2)
+    after = scrape(watched)
+
+    assert grown(before, after, "queue_wait_seconds_count") == 2
+    assert grown(before, after, "queue_wait_seconds_bucket", le="0.25") == 1
+    assert grown(before, after, "queue_wait_seconds_sum") > 0.3
+
+
+def test_evictions_from_each_store_and_cache(tmp_path: Path) -> None:
+    small = {"store_evict": "lru", "store_bytes": 300_000, "results_memory_bytes": 20_000}
+    small |= {"worker_mesh_bytes": 1, "worker_field_bytes": 1, "results_bytes": 1}
+    with serving(tmp_path, **small) as client:
+        for faces in (200, 300, 400):
+            mesh_id = upload_sample(client, "plane", faces)
+            for vertex in range(3):
+                sources = [{"vertex": vertex}]
+                assert distances(client, mesh_id, sources=sources).status_code == 200
+        held = client.get("/v1/meshes").json()["meshes"]
+        job = submit(client, mesh_id, 0)
+        wait_until(lambda: client.get(job).json()["status"] not in ("accepted", "running"))
+        values = scrape(client)
+
+    evicted = lambda cache: value(values, "evictions_total", cache=cache)  # noqa: E731
+    assert evicted("meshes") == 3 - len(held) > 0
+    assert evicted("results") > 0, "at least that of the job, which finds no room"
+    assert evicted("results_memory") > 0
+    assert evicted("worker_meshes") > 0
+    assert evicted("worker_fields") > 0
+    assert evicted("fields") == 0
+
+
+# Callers
+
+
+def test_use_is_counted_by_the_name_of_the_key(tmp_path: Path) -> None:
+    keys = {"alice": "alice-0123456789", "bob": "bob-0123456789ab"}
+    listed = ",".join(f"{name}:{secret}" for name, secret in keys.items())
+    with serving(tmp_path, api_keys=listed) as client:
+        assert client.get("/v1").status_code == 401
+        client.headers["Authorization"] = f"Bearer {keys['alice']}"
+        before = scrape(client)
+        mesh_id = upload_sample(client, "plane", 200)
+        check_problem(distances(client, mesh_id, sources=[]), 422, "invalid_request")
+        assert distances(client, mesh_id).status_code == 200
+        middle = scrape(client)
+        assert distances(client, mesh_id).status_code == 200
+        after = scrape(client)
+
+    assert grown(before, middle, "caller_requests_total", caller="alice") == 4, "a scrape is one"
+    assert grown(middle, after, "caller_requests_total", caller="alice") == 2
+    assert grown(middle, after, "caller_worker_seconds_total", caller="alice") == 0, "it was stored"
+    assert grown(before, middle, "caller_worker_seconds_total", caller="alice") > 0
+    for name in ("caller_requests_total", "caller_worker_seconds_total"):
+        callers = {dict(labels)["caller"] for each, labels in after if each == f"geodesic_{name}"}
+        assert callers == {"alice", "bob"}
+        assert value(after, name, caller="bob") == 0
+
+
+def test_without_keys_callers_are_not_counted(watched: ServiceClient) -> None:
+    assert upload_sample(watched, "plane", 200)
+
+    assert not [name for name, _ in scrape(watched) if name.startswith("geodesic_caller_")]
 
 
 def test_two_services_in_one_process_count_apart(watched: TestClient, tmp_path: Path) -> None:

@@ -6,8 +6,8 @@ import socket
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import httpx2
@@ -20,18 +20,32 @@ COMMAND_LINE = [sys.executable, "-c", "from app.cli import main; main()"]
 
 
 class Server:
-    """A service that listens, with one worker and the one for small work; settings are text."""
+    """A service that listens, with one worker and the one for small work; settings are text.
 
-    def __init__(self, store: Path, *, waits_for_workers: bool = True, **settings: str) -> None:
+    Its log goes to where that of the tests goes, or to the file ``log``.
+    """
+
+    def __init__(
+        self,
+        store: Path,
+        *,
+        waits_for_workers: bool = True,
+        log: Path | None = None,
+        **settings: str,
+    ) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             port = probe.getsockname()[1]
         self.store = store
         own = {"GEODESIC_STORE": str(store), "GEODESIC_WORKERS": "1"}
         own |= {"GEODESIC_DEADLINE_S": str(LONG_S)} | settings
-        self.process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
-            [*COMMAND_LINE, "serve", "--port", str(port)], env=os.environ | own, cwd=ROOT
-        )
+        with nullcontext() if log is None else log.open("wb") as stderr:
+            self.process = subprocess.Popen(  # noqa: S603 - this Python, and the text above
+                [*COMMAND_LINE, "serve", "--port", str(port)],
+                env=os.environ | own,
+                cwd=ROOT,
+                stderr=stderr,
+            )
         self.address = ("127.0.0.1", port)
         self.url = f"http://127.0.0.1:{port}"
         self.client = httpx2.Client(base_url=self.url, timeout=LONG_S)
@@ -65,12 +79,22 @@ class Server:
         wait_until(lambda: len(self.workers()) == 2)
         return self.workers()
 
-    def connect(self, path: str, body: bytes, *, leave_out: int = 0) -> socket.socket:
+    def connect(
+        self,
+        path: str,
+        body: bytes,
+        *,
+        leave_out: int = 0,
+        headers: Mapping[str, str] | None = None,
+    ) -> socket.socket:
         """Post a JSON body on a connection of its own, but for the last bytes; await no answer."""
-        head = (
-            f"POST {path} HTTP/1.1\r\nHost: localhost\r\n"
-            f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
-        )
+        own = {
+            "Host": "localhost",
+            "Content-Type": "application/json",
+            "Content-Length": str(len(body)),
+        }
+        lines = [f"{name}: {value}\r\n" for name, value in {**own, **(headers or {})}.items()]
+        head = f"POST {path} HTTP/1.1\r\n{''.join(lines)}\r\n"
         connection = socket.create_connection(self.address)
         connection.sendall(head.encode() + body[: len(body) - leave_out])
         return connection

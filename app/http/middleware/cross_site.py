@@ -8,10 +8,9 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.access import is_loopback
 from app.errors import ProblemError, problem
+from app.http.middleware.probes import PROBES
 from app.settings import Settings, variable_of
 
-_PROBES = frozenset({"/livez", "/readyz"})
-"""Paths that reveal nothing, and that health checks ask for under any name"""
 _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
@@ -31,7 +30,8 @@ class CrossSiteMiddleware:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Serve one request."""
-        if scope["type"] == "http" and scope["path"] not in _PROBES:
+        # Probes reveal nothing, and are asked for under any name.
+        if scope["type"] == "http" and scope["path"] not in PROBES:
             self._check_host(scope)
             if scope["method"] not in _SAFE:
                 self._check_origin(scope)

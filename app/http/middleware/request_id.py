@@ -1,13 +1,14 @@
 """Request ids, and the guarantee that each error is answered with a problem."""
 
 import asyncio
-import logging
 import re
 from uuid import uuid4
 
+import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.middleware.body_limit import MAX_BODY_SIZE_SCOPE_KEY
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from structlog.contextvars import bound_contextvars
 
 from app.errors import (
     PROBLEM_JSON,
@@ -19,8 +20,9 @@ from app.errors import (
 )
 from app.http.responses import common_headers, problem_response
 from app.settings import Settings, variable_of
+from app.tracing import trace_fields
 
-logger = logging.getLogger(__name__)
+logger = structlog.get_logger(module=__name__)
 
 _SANE_ID = re.compile(r"[\w.:-]{1,128}")
 
@@ -59,20 +61,21 @@ class RequestIdMiddleware:
             if not is_replaced:
                 await send(message)
 
-        try:
-            await self.app(scope, receive, send_checked)
-        except asyncio.CancelledError:
-            task = asyncio.current_task()
-            if has_started or task is None or not task.cancelling():
-                raise
-            # The server cancelled this request: the service stops, and has waited long enough.
-            await answer(draining().problem)
-        except Exception as error:
-            if not isinstance(error, ProblemError):
-                logger.exception("request %s failed", request_id)
-            if has_started:
-                raise  # too late for a problem: the server cuts the connection
-            await answer(problem_of(error))
+        with bound_contextvars(request_id=request_id, **trace_fields()):
+            try:
+                await self.app(scope, receive, send_checked)
+            except asyncio.CancelledError:
+                task = asyncio.current_task()
+                if has_started or task is None or not task.cancelling():
+                    raise
+                # The server cancelled this request: the service stops, and has waited long enough.
+                await answer(draining().problem)
+            except Exception as error:
+                if not isinstance(error, ProblemError):
+                    logger.exception("request failed")
+                if has_started:
+                    raise  # too late for a problem: the server cuts the connection
+                await answer(problem_of(error))
 
     def _framework_problem(self, status: int, headers: Headers, scope: Scope) -> Problem:
         """Return the problem for a plain-text error of Starlette: a body or range too large."""

@@ -9,7 +9,7 @@ from app.access import Caller
 from app.encoding import NPY
 from app.engine.work import MeshFromFile, MeshFromSample
 from app.errors import Fault, over_limit, problem
-from app.http.dependencies import CallerDep, ContextDep, ServiceDep, while_connected
+from app.http.dependencies import CallerDep, ContextDep, ServiceDep, note_work, while_connected
 from app.http.responses import (
     FILE_HEADERS,
     IMMUTABLE,
@@ -120,6 +120,7 @@ async def create_mesh(
     else:
         making = service.add_mesh(_sample(service, parameters, context.caller), context)
         stored = await while_connected(request, making)
+    note_work(request, stored.manifest["id"], stored.seconds)
     response.status_code = 201 if stored.is_new else 200
     response.headers.update(server_timing(stored.seconds))
     response.headers["Location"] = f"/v1/meshes/{stored.manifest['id']}"

@@ -18,6 +18,7 @@ from app.http.dependencies import (
     TimeoutHeader,
     context_of,
     negotiated,
+    note_work,
     prefers_async,
     service_of,
     while_connected,
@@ -91,6 +92,7 @@ class QueryRequest:
         if parameters.estimate:
             estimating = service.estimate(query, size, representation, context)
             estimate, seconds = await while_connected(request, estimating)
+            note_work(request, self.mesh_id, seconds)
             return estimate_response(self.mesh_id, estimate, media_type, seconds)
         if self.is_async:
             key = self.idempotency_key
@@ -107,6 +109,7 @@ class QueryRequest:
         as_file = "range" in request.headers
         answering = service.answer(query, size, representation, context, as_file=as_file)
         result, seconds = await while_connected(request, answering)
+        note_work(request, self.mesh_id, seconds)
         return result_response(request, result, seconds, media_type, service.results, headers)
 
 

@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
+from structlog.testing import capture_logs
 
 from app.http import connections, protocol
 from app.http.protocol import MOST_HEAD_BYTES, MOST_PIPELINED
@@ -257,15 +258,19 @@ def test_refusals_do_not_use_up_all_descriptors(
 
 
 def test_the_log_says_once_that_connections_are_refused(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+    tmp_path: Path,
 ) -> None:
     few = Settings(store=tmp_path, max_connections=1, max_caller_connections=1)
-    with listening(few) as listener, listener.connect(WHOLE) as first:
+    with (
+        capture_logs() as lines,
+        listening(few) as listener,
+        listener.connect(WHOLE) as first,
+    ):
         assert read_answer(first).text == "answer"
         assert [listener.send(WHOLE).status_code for _ in range(3)] == [503] * 3
-    lines = [record.message for record in caplog.records if "refused" in record.message]
-    assert len(lines) == 1
-    assert "where at most 1 are allowed" in lines[0]
+    (line,) = [line for line in lines if line["event"] == "connections refused"]
+    assert "where at most 1 are allowed" in line["reason"]
+    assert line["caller"] == "127.0.0.1"
 
 
 # Broken requests

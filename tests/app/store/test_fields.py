@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from app.store.fields import FieldStore, code_of_field, field_files
+from tests.support.logs import Log
 from tests.support.service import distances, serving, upload_sample, wait_until
 
 MESH, OTHER = "a" * 32, "b" * 32
@@ -39,7 +40,7 @@ def test_a_field_comes_back_as_it_was(store: FieldStore) -> None:
 
 
 @pytest.mark.slow
-def test_a_damaged_one_is_not_there(store: FieldStore, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_damaged_one_is_not_there(store: FieldStore, log: Log) -> None:
     """Whatever byte has changed: arrays come as they were written, or not at all."""
     store.write(MESH, "k", ARRAYS, "code")
     (path,) = field_files(store.folder.parent)
@@ -59,7 +60,7 @@ def test_a_damaged_one_is_not_there(store: FieldStore, caplog: pytest.LogCapture
             for name, array in ARRAYS.items():
                 np.testing.assert_array_equal(found[name], array)
     assert refused > len(whole) // 2, "the rest is dates and the like"
-    assert caplog.text.count("is solved again") == refused
+    assert [line["event"] for line in log] == ["stored field unreadable, solved again"] * refused
 
 
 @pytest.mark.parametrize("size", [0, 1, 100])
@@ -93,13 +94,14 @@ def test_those_used_least_recently_go(tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_written_is_logged(
-    store: FieldStore, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+    store: FieldStore, log: Log, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(np, "savez", _no_space)
     store.write(MESH, "k", ARRAYS, "code")
 
-    assert "a field cannot be stored" in caplog.text
-    assert "No space left" in caplog.text
+    (line,) = log
+    assert (line["event"], line["mesh_id"]) == ("field not stored", MESH)
+    assert "No space left" in line["error"]
     assert list((store.folder / MESH).iterdir()) == []
 
 

@@ -1,0 +1,3 @@
+"""Probes: paths by which orchestrators and load balancers ask whether the service is well."""
+
+PROBES = frozenset({"/livez", "/readyz"})

@@ -1,0 +1,74 @@
+"""The line that each request has in the log."""
+
+from pathlib import Path
+
+import pytest
+from starlette.testclient import TestClient
+
+from tests.support.logs import Log
+from tests.support.service import ServiceClient
+
+
+def test_a_request_has_one_line(client: TestClient, log: Log) -> None:
+    answer = client.get("/v1?secret=0123456789abcdef", headers={"X-Request-ID": "mine"})
+
+    (line,) = log
+    seconds = line.pop("seconds")
+    assert seconds > 0
+    assert line == {
+        "event": "request",
+        "log_level": "info",
+        "module": "app.http",
+        "request_id": "mine",
+        "method": "GET",
+        "path": "/v1",
+        "operation": "getAbout",
+        "status": 200,
+        "caller": "unknown",  # the test client has no address
+        "mesh_id": None,
+        "queue_seconds": None,
+        "compute_seconds": None,
+        "bytes": int(answer.headers["content-length"]),
+    }
+
+
+def test_refusals_have_lines_as_well(client: TestClient, log: Log) -> None:
+    client.get("/nowhere")
+    client.delete("/v1/meshes/abc")
+    client.request("PUT", "/v1")
+
+    assert [(line["operation"], line["status"], line["mesh_id"]) for line in log] == [
+        ("none", 404, None),
+        ("deleteMesh", 404, "abc"),
+        ("getAbout", 405, None),
+    ]
+
+
+def test_the_questions_of_browsers_before_a_request_have_lines(tmp_path: Path, log: Log) -> None:
+    client = ServiceClient(tmp_path, cors_origins="https://a.org")
+    asked = {"Origin": "https://a.org", "Access-Control-Request-Method": "POST"}
+    client.options("/v1/meshes", headers=asked)
+
+    assert [(line["method"], line["status"]) for line in log] == [("OPTIONS", 200)]
+
+
+@pytest.mark.parametrize(("log_probes", "lines"), [("off", 0), ("on", 2)])
+def test_probes_have_lines_where_they_are_asked_for(
+    tmp_path: Path, log: Log, log_probes: str, lines: int
+) -> None:
+    client = ServiceClient(tmp_path, log_probes=log_probes)
+    client.get("/livez")
+    client.get("/readyz")
+
+    assert len(log) == lines
+
+
+def test_a_failure_has_its_traceback_and_its_line(
+    client: TestClient, log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.http.routes.about.FORMATS", None)
+    answer = client.get("/v1")
+
+    failure, line = log
+    assert (failure["event"], failure["exc_info"]) == ("request failed", True)
+    assert (line["status"], line["request_id"]) == (500, answer.json()["request_id"])
