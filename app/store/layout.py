@@ -9,6 +9,7 @@
         results/        see ``app.store.results``
         fields/         see ``app.store.fields``
         jobs.sqlite3    see ``app.jobs.repository``
+        jobs.reserve    see ``app.store.reserve``
         tmp/            meshes that are being written
 """
 
@@ -26,7 +27,8 @@ LAYOUT = 5
 """Number of the layout that this code reads and writes. Raise it with every change of any file,
 including the tables of jobs."""
 
-JOB_DATABASE, MESHES, RESULTS, FIELDS = "jobs.sqlite3", "meshes", "results", "fields"
+JOB_DATABASE, JOB_RESERVE = "jobs.sqlite3", "jobs.reserve"
+MESHES, RESULTS, FIELDS = "meshes", "results", "fields"
 TEMPORARY = "tmp"
 
 _READABLE = (4, LAYOUT)
