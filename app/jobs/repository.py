@@ -6,7 +6,7 @@ for changes of jobs that exist: on a full disk they can still end and be removed
 
 import sqlite3
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -35,8 +35,8 @@ CREATE INDEX IF NOT EXISTS jobs_by_end ON jobs (finished);
 """
 
 
-_RESERVED = 2**18
-"""Bytes of the reserve: a change writes some pages of 4 kB"""
+_RESERVED = 2**20
+"""Bytes of the reserve: a change takes some pages of 4 kB, and clearing SQLite's log perhaps 40"""
 
 
 class JobRepository:
@@ -142,8 +142,8 @@ class JobRepository:
                 raise
             await to_thread.run_sync(self._reserve.give_up)
             await self._run(statement, *values)
-            # Moves the change from the log into the database, where it needs no more room.
-            await self._run("PRAGMA wal_checkpoint(TRUNCATE)")
+            with suppress(sqlite3.OperationalError):  # the change is made, and the log only longer
+                await self._run("PRAGMA wal_checkpoint(TRUNCATE)")
             await to_thread.run_sync(self._reserve.restore)
 
     @property

@@ -1,4 +1,4 @@
-"""The records of jobs on a disk that is full: a real one, of two megabytes in memory."""
+"""The records of jobs on a disk that is full: a real one, of 16 megabytes in memory."""
 
 import shutil
 import sqlite3
@@ -49,6 +49,8 @@ async def use(repository: JobRepository, folder: Path) -> None:
     jobs = [new_job() for _ in range(100)]
     for job in jobs:
         await repository.add(job)
+    await repository.close()  # empties SQLite's log
+    await repository.open()
     fill(folder / "others")
 
     with pytest.raises(sqlite3.OperationalError, match="disk is full"):
@@ -70,8 +72,8 @@ async def use(repository: JobRepository, folder: Path) -> None:
 
 
 def run_on_own_disk(command: str) -> subprocess.CompletedProcess[str]:
-    """Run a command where ``/mnt`` is a disk of two megabytes, which no one else sees."""
-    script = f"mount -t tmpfs -o size=2m none /mnt && {command}"
+    """Run a command where ``/mnt`` is a disk of 16 megabytes, which no one else sees."""
+    script = f"mount -t tmpfs -o size=16m none /mnt && {command}"
     words = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", script]
     return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S603 - our own command
 
