@@ -73,6 +73,10 @@ class FieldStore:
         except (OSError, MemoryError) as error:
             logger.warning("a field cannot be stored: %s/%s: %s", mesh_id, key, error)
 
+    def discard(self, name: str) -> None:
+        """Remove the field of this name, mesh id and key."""
+        self._path(*name.split("/")).unlink(missing_ok=True)
+
     def forget_mesh(self, mesh_id: str) -> None:
         """Remove the fields of a mesh; one that is being written may be left to `prepare`."""
         shutil.rmtree(self.folder / mesh_id, ignore_errors=True)

@@ -12,8 +12,9 @@ import pytest
 
 import geodesic_core as gc
 from app.settings import MIB
-from app.store.layout import StoreError, owned
+from app.store.layout import StoreError
 from app.store.meshes import MeshStore
+from app.store.ownership import owned
 from tests.support.meshes import named_mesh, real_mesh
 from tests.support.processes import (
     Server,
