@@ -108,6 +108,7 @@ class MeshCatalog:
             else:
                 _replace_files(place, written.folder)
             self._sizes[mesh_id] = written.size
+            self.use(mesh_id)
             await asyncio.to_thread(sync, self._store.folder if is_new else place)
         except OSError:
             if is_new and mesh_id in self._sizes:
