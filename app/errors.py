@@ -83,7 +83,9 @@ CODES: Mapping[str, Code] = {
         500, "Worker died", "The process that computed the answer died; it has been replaced."
     ),
     "mesh_damaged": Code(
-        500, "Mesh damaged", "The stored files of this mesh are not as they were written."
+        500,
+        "Mesh damaged",
+        "The stored files of this mesh are not as they were written; upload it again.",
     ),
     "queue_full": Code(
         503, "Queue full", "Too many requests wait for a worker; see `Retry-After`."

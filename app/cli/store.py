@@ -72,10 +72,10 @@ def ls(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
 @store.command()
 def check(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
     """Read everything and verify checksums; the exit code is 1 if anything is damaged."""
-    from app.service.maintenance import damage
+    from app.service.maintenance import inspect
 
     with _store_at(root), showing("Reading"):
-        found = list(damage(root))
+        found = [damage.detail for damage in inspect(root) if damage is not None]
     if as_json:
         _print_json({"damaged": found})
     else:
@@ -100,7 +100,7 @@ def prune(
     """
     from app.queries import code_version
     from app.service.maintenance import leftovers, remove
-    from app.store.layout import owned
+    from app.store.ownership import owned
 
     with _store_at(root), owned(root), showing("Reading"):
         going = [(leftover, leftover.bytes) for leftover in leftovers(root, code_version())]

@@ -6,7 +6,7 @@ import select
 import signal
 import socket
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from contextvars import copy_context
@@ -41,14 +41,22 @@ from app.engine.work import (
     TaskResult,
     Work,
 )
-from app.errors import problem_of
-from app.queries import SMALL_SECONDS, ExecutionContext, FieldCache, Query, code_version, estimate
+from app.errors import ProblemError, problem_of
+from app.queries import (
+    SMALL_SECONDS,
+    ExecutionContext,
+    FieldCache,
+    Query,
+    Unwritten,
+    code_version,
+    estimate,
+)
 from app.queries.validation import check_json_size
 from app.settings import Settings, variable_of
 from app.store.fields import FieldStore
 from app.store.lru_cache import LRUCache
 from app.store.meshes import MeshStore, OpenMesh
-from app.store.results import write_result
+from app.store.results import Buffer, write_result
 from app.tracing import Period
 
 logger = structlog.get_logger(module=__name__)
@@ -135,8 +143,9 @@ class Worker:
                 try:
                     return self._answer(work, clock, is_cancelled)
                 finally:
-                    if self.fields.has_unwritten:
-                        self._writer.submit(self._write_fields)  # while the answer is sent
+                    fields = self.fields.take_unwritten()
+                    if fields:
+                        self._writer.submit(self._write_fields, fields)  # while the answer is sent
             case EstimateQuery():
                 return self._estimate(work, clock, is_cancelled)
 
@@ -159,7 +168,7 @@ class Worker:
         )
         with clock.phase("load"):
             opened = self._open(work.query)
-        with clock.phase("compute"):
+        with clock.phase("compute"), self._verifying(opened):
             answer = work.query.answer(opened, context)
         if work.representation.media_type == JSON:
             check_json_size(answer.values, settings.max_json_values, work.query.hint)
@@ -168,7 +177,7 @@ class Worker:
             result = write_result(
                 self.config.results,
                 work.result_name,
-                encoded.parts,
+                self._verified_parts(encoded.parts, opened),
                 encoded.headers,
                 code_version(),
                 is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
@@ -184,10 +193,27 @@ class Worker:
             estimated = estimate(work.query, work.representation, opened, cancel)
         return TaskResult(clock.seconds, clock.periods, estimate=estimated)
 
-    def _write_fields(self) -> None:
-        self.fields.write()
+    def _write_fields(self, fields: Sequence[Unwritten]) -> None:
+        self.fields.write(fields)
         removed = self._before.stored_field_evictions + self._stored.evictions
         self.signals.stored_field_evictions = removed
+
+    @contextmanager
+    def _verifying(self, opened: OpenMesh) -> Iterator[None]:
+        """Raise at the end of the block, however it ends, where the mesh was damaged meanwhile."""
+        try:
+            yield
+        finally:
+            try:
+                self.store.verify_mapped(opened)
+            except ProblemError:
+                self.fields.take_unwritten()  # they may be wrong
+                raise
+
+    def _verified_parts(self, parts: Iterable[Buffer], opened: OpenMesh) -> Iterator[Buffer]:
+        """Yield the parts of a body, and raise at its end where the mesh was damaged meanwhile."""
+        yield from parts
+        self.store.verify_mapped(opened)
 
     def _report(self, share: float) -> None:
         self.signals.progress = share
@@ -205,15 +231,21 @@ class Worker:
 
     def _cached(self, name: tuple[str, bytes], open_mesh: Callable[[], OpenMesh]) -> OpenMesh:
         opened = self.meshes.find(name, open_mesh)
+        if not self.store.is_current(opened):
+            self._close(name)
+            opened = self.meshes.find(name, open_mesh)
         for evicted in self.meshes.evict(spare=1):
             self.fields.forget(evicted)
         return opened
 
+    def _close(self, name: tuple[str, bytes]) -> None:
+        self.fields.forget(name)
+        self.meshes.drop(name)
+
     def _forget_all(self) -> None:
         """Empty all caches."""
         for name in list(self.meshes):
-            self.fields.forget(name)
-            self.meshes.drop(name)
+            self._close(name)
 
 
 class Clock:

@@ -78,7 +78,7 @@ class JobManager:
         """Open the repository, and remove expired jobs, inside the block."""
         await self._repository.open()
         for job in await self._repository.unfinished():
-            await self._repository.write(job.failed(_STOPPED))
+            await self._repository.update(job.failed(_STOPPED))
         for job in await self._repository.with_results():
             assert job.result is not None, "successful jobs have one"  # noqa: S101
             self._results.pin(job.result)
@@ -113,7 +113,7 @@ class JobManager:
             if known is not None:
                 return known
             live = _LiveJob(Job(spec=spec))
-            await self._repository.write(live.job)
+            await self._repository.add(live.job)
             self._live[live.job.id] = live
             live.task = asyncio.create_task(self._run(live, solve), name=f"job {live.job.id}")
             return live.job
@@ -224,7 +224,7 @@ class JobManager:
         assert live.task is not None, "a job starts before it ends"  # noqa: S101
         if live.task is not asyncio.current_task():
             live.task.cancel()
-        await self._repository.write(last)
+        await self._repository.update(last)
         self._live.pop(last.id, None)
 
     async def _remove_expired(self) -> None:

@@ -1,16 +1,22 @@
-"""The database of jobs, in SQLite: records outlive the process that wrote them."""
+"""The database of jobs, in SQLite: records outlive the process that wrote them.
+
+SQLite needs room on the disk for every change, even to remove a record. So some is held in reserve
+for changes of jobs that exist: on a full disk they can still end and be removed.
+"""
 
 import sqlite3
 from collections.abc import Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 import aiosqlite
+from anyio import to_thread
 
 from app.jobs.job import Job
-from app.store.layout import StoreError
+from app.store.layout import JOB_RESERVE, StoreError
+from app.store.reserve import Reserve
 
 _SCHEMA = """
 CREATE TABLE IF NOT EXISTS jobs (
@@ -29,12 +35,17 @@ CREATE INDEX IF NOT EXISTS jobs_by_end ON jobs (finished);
 """
 
 
+_RESERVED = 2**20
+"""Bytes of the reserve: a change takes some pages of 4 kB, and clearing SQLite's log perhaps 40"""
+
+
 class JobRepository:
     """The rows of jobs, one for each; lists begin with the newest."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._database: aiosqlite.Connection | None = None
+        self._reserve = Reserve(path.with_name(JOB_RESERVE), _RESERVED)
 
     async def open(self) -> None:
         """Open the database, which is created if missing."""
@@ -42,6 +53,7 @@ class JobRepository:
         await self._database.execute("PRAGMA journal_mode = WAL")
         await self._database.execute("PRAGMA synchronous = NORMAL")
         await self._database.executescript(_SCHEMA)
+        await to_thread.run_sync(self._reserve.restore)
 
     async def close(self) -> None:
         """Close the database."""
@@ -49,17 +61,19 @@ class JobRepository:
             await self._database.close()
             self._database = None
 
-    async def write(self, job: Job) -> None:
-        """Insert or replace the record of a job."""
-        await self._run(
-            "INSERT INTO jobs (record) VALUES (?) "
-            "ON CONFLICT (id) DO UPDATE SET record = excluded.record",
-            job.model_dump_json(),
-        )
+    async def add(self, job: Job) -> None:
+        """Insert the record of a new job."""
+        await self._run("INSERT INTO jobs (record) VALUES (?)", job.model_dump_json())
+        await to_thread.run_sync(self._reserve.restore)  # now there is room
+
+    async def update(self, job: Job) -> None:
+        """Replace the record of a job; this works on a full disk as well."""
+        statement = "UPDATE jobs SET record = ? WHERE id = ?"
+        await self._run_on_reserve(statement, job.model_dump_json(), job.id)
 
     async def remove(self, job_id: str) -> None:
-        """Remove the record of a job."""
-        await self._run("DELETE FROM jobs WHERE id = ?", job_id)
+        """Remove the record of a job; this works on a full disk as well."""
+        await self._run_on_reserve("DELETE FROM jobs WHERE id = ?", job_id)
 
     async def find(self, owner: str | None, job_id: str) -> Job | None:
         """Return the job of an owner with this id; None where there is none."""
@@ -118,6 +132,19 @@ class JobRepository:
     async def _run(self, statement: str, *values: Any) -> None:
         async with self._connection.execute(statement, values):
             pass
+
+    async def _run_on_reserve(self, statement: str, *values: Any) -> None:
+        """Run a statement; where the disk has no room for it, in that of the reserve."""
+        try:
+            await self._run(statement, *values)
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_FULL:
+                raise
+            await to_thread.run_sync(self._reserve.give_up)
+            await self._run(statement, *values)
+            with suppress(sqlite3.OperationalError):  # the change is made, and the log only longer
+                await self._run("PRAGMA wal_checkpoint(TRUNCATE)")
+            await to_thread.run_sync(self._reserve.restore)
 
     @property
     def _connection(self) -> aiosqlite.Connection:

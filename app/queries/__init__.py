@@ -17,7 +17,7 @@ from app.queries.base import (
 )
 from app.queries.distances import DistancesQuery
 from app.queries.estimate import Estimate, estimate
-from app.queries.field_cache import FieldCache
+from app.queries.field_cache import FieldCache, Unwritten
 from app.queries.isolines import IsolinesQuery
 from app.queries.locate import LocateQuery
 from app.queries.matrix import MatrixQuery
@@ -55,6 +55,7 @@ __all__ = [
     "PathQuery",
     "PathsQuery",
     "Query",
+    "Unwritten",
     "code_version",
     "estimate",
     "fingerprint",

@@ -1,7 +1,7 @@
 """Solved fields, cached by question, so that the next query finds them."""
 
 import hashlib
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from time import perf_counter
@@ -54,15 +54,14 @@ class FieldCache:
         """Fields dropped so far to make room for others."""
         return self._fields.evictions
 
-    @property
-    def has_unwritten(self) -> bool:
-        """Whether there is something to `write`."""
-        return bool(self._unwritten)
+    def take_unwritten(self) -> Sequence[Unwritten]:
+        """Return the fields that took long to solve since the last call, to `write` or to drop."""
+        taken, self._unwritten = self._unwritten, []
+        return taken
 
-    def write(self) -> None:
-        """Write into the store the fields that took long to solve since the last time."""
-        while self._unwritten:
-            new = self._unwritten.pop()
+    def write(self, fields: Sequence[Unwritten]) -> None:
+        """Write fields into the store."""
+        for new in fields:
             self._store.write(new.mesh_id, new.key, new.field.arrays(), self._code)
 
     def forget(self, mesh: Hashable) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from app.errors import ProblemError
 from app.jobs import Job, read_jobs, require_intact
 from app.store.fields import code_of_field, field_files, name_of_field
-from app.store.layout import FIELDS, JOB_DATABASE, RESULTS, TEMPORARY, StoreError
+from app.store.layout import FIELDS, JOB_DATABASE, MESHES, RESULTS, TEMPORARY, StoreError
 from app.store.meshes import MeshStore
 from app.store.results import complete_results, read_manifest
 
@@ -38,6 +38,17 @@ class Contents:
     fields: int
     field_bytes: int
     jobs: list[Job]
+
+
+@dataclass(frozen=True)
+class Damage:
+    """Damage of a mesh, a result, a field, or the records of jobs."""
+
+    folder: str
+    """Where in the store it is, see `app.store.layout`"""
+    name: str
+    detail: str
+    """A sentence that says what is wrong"""
 
 
 @dataclass(frozen=True)
@@ -79,24 +90,32 @@ def contents(root: Path) -> Contents:
     return Contents(entries, len(results), result_bytes, len(fields), sum(fields), jobs)
 
 
-def damage(root: Path) -> Iterator[str]:
-    """Yield a sentence for each damage; reads the whole store, and a service may run on it."""
+def inspect(root: Path) -> Iterator[Damage | None]:
+    """Read a store file by file, and yield the damage of each; None for each that is intact.
+
+    A service may run on the store.
+    """
     store = MeshStore(root)
     for mesh_id in store.sizes():
         with suppress(ProblemError):  # deleted meanwhile
-            yield from map(str, store.damage(mesh_id))
+            for error in store.inspect(mesh_id):
+                yield None if error is None else Damage(MESHES, mesh_id, str(error))
     for name, files in complete_results(root / RESULTS).items():
-        if (
-            read_manifest(root / RESULTS, name) is None and files[0].exists()
-        ):  # else evicted meanwhile
-            yield f"result {name} is damaged: it is not what was written"
+        is_intact = read_manifest(root / RESULTS, name) is not None
+        if is_intact or not files[0].exists():  # evicted meanwhile
+            yield None
+        else:
+            yield Damage(RESULTS, name, f"result {name} is damaged: it is not what was written")
     for path in field_files(root):
-        if code_of_field(path) is None and path.exists():
-            yield f"field {name_of_field(path)} is damaged: it is not what was written"
+        if code_of_field(path) is not None or not path.exists():
+            yield None
+        else:
+            name = name_of_field(path)
+            yield Damage(FIELDS, name, f"field {name} is damaged: it is not what was written")
     try:
         require_intact(root / JOB_DATABASE)
     except StoreError as error:
-        yield str(error)
+        yield Damage(JOB_DATABASE, JOB_DATABASE, str(error))
 
 
 def leftovers(root: Path, code: str) -> Iterator[Leftover]:

@@ -36,12 +36,15 @@ from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task,
 from app.errors import ProblemError, problem
 from app.jobs import Job, JobManager, JobRepository, JobSpec, require_intact
 from app.queries import Estimate, MeshSize, Query, fingerprint, result_key
+from app.service.maintenance import Damage
+from app.service.scrub import scrubbing
 from app.service.single_flight import SingleFlight
 from app.settings import Settings, variable_of
+from app.store import layout
 from app.store.fields import FieldStore
-from app.store.layout import JOB_DATABASE, RESULTS, owned
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
+from app.store.ownership import owned
 from app.store.results import Result, ResultStore, result_name
 
 Manifest = Mapping[str, Any]
@@ -72,7 +75,7 @@ class Service:
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
-        results = settings.store / RESULTS
+        results = settings.store / layout.RESULTS
         self.meshes = MeshStore(settings.store)
         self.mesh_catalog = MeshCatalog(
             settings.store,
@@ -83,7 +86,7 @@ class Service:
         self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
         self.fields = FieldStore(settings.store, settings.fields_bytes)
         self.engine: Engine = LocalEngine(settings, results)
-        self._job_database = settings.store / JOB_DATABASE
+        self._job_database = settings.store / layout.JOB_DATABASE
         self.jobs = JobManager(JobRepository(self._job_database), self.results, settings.job_ttl)
         self.is_leaving = False
         """Whether the service is about to stop: it is not ready, whatever it still answers"""
@@ -107,7 +110,7 @@ class Service:
             collect()
             freeze()
             try:
-                async with self.jobs.running():
+                async with self.jobs.running(), scrubbing(self.settings.store, self._repair):
                     yield
             finally:
                 await self.engine.stop()
@@ -141,6 +144,8 @@ class Service:
             change = await self.mesh_catalog.add(done.mesh)
         for mesh_id in change.evicted:
             await self._forget(mesh_id)
+        if change.is_healed:
+            await self._forget(done.mesh.mesh_id)
         return StoredMesh(done.mesh.manifest, change.is_new, done.seconds)
 
     def manifest(self, mesh_id: str) -> Manifest:
@@ -148,10 +153,10 @@ class Service:
         self.mesh_catalog.use(mesh_id)
         return self.meshes.manifest(mesh_id)
 
-    def array_file(self, mesh_id: str, name: str) -> Path:
+    async def array_file(self, mesh_id: str, name: str) -> Path:
         """Return the file of an array that clients may read, and mark the mesh as used."""
         self.mesh_catalog.use(mesh_id)
-        return self.meshes.array_file(mesh_id, name)
+        return await to_thread.run_sync(self.meshes.array_file, mesh_id, name)
 
     def size(self, mesh_id: str) -> MeshSize:
         """Return the counts of a mesh that checks and estimates need."""
@@ -179,9 +184,24 @@ class Service:
         await self._forget(mesh_id)
 
     async def _forget(self, mesh_id: str) -> None:
-        """Remove results and fields of a mesh that is gone."""
+        """Remove results and fields of a mesh that is gone, or that was damaged.
+
+        A disk may damage a mapped file without a trace in its status. Then nobody knows which
+        answers came before.
+        """
         self.results.forget_mesh(mesh_id)
         await to_thread.run_sync(self.fields.forget_mesh, mesh_id)
+
+    async def _repair(self, damage: Damage) -> None:
+        """Make sure that nothing damaged is used, though its file's status looks as before."""
+        match damage.folder:
+            case layout.MESHES:
+                await to_thread.run_sync(self.meshes.distrust, damage.name)
+                await self._forget(damage.name)
+            case layout.RESULTS:
+                self.results.discard(damage.name)
+            case layout.FIELDS:
+                await to_thread.run_sync(self.fields.discard, damage.name)
 
     async def answer(
         self,

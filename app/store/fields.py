@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from app.store.atomic import atomic_write, remove_partial
 from app.store.layout import FIELDS
+from app.store.log import warn
 
 _DAMAGED = (BadZipFile, EOFError, KeyError, RuntimeError, ValueError, struct.error, zlib.error)
 _CODE = "code"
@@ -54,7 +55,7 @@ class FieldStore:
         except FileNotFoundError:
             return None
         except (*_DAMAGED, OSError) as error:
-            _warn("stored field unreadable, solved again", path=path, error=repr(error))
+            warn("stored field unreadable, solved again", path=path, error=repr(error))
             path.unlink(missing_ok=True)
             return None
         return arrays
@@ -68,7 +69,11 @@ class FieldStore:
                 np.savez(file, allow_pickle=False, **arrays, **{_CODE: np.array(code)})
             self._evict()
         except (OSError, MemoryError) as error:
-            _warn("field not stored", mesh_id=mesh_id, key=key, error=repr(error))
+            warn("field not stored", mesh_id=mesh_id, key=key, error=repr(error))
+
+    def discard(self, name: str) -> None:
+        """Remove the field of this name, mesh id and key."""
+        self._path(*name.split("/")).unlink(missing_ok=True)
 
     def forget_mesh(self, mesh_id: str) -> None:
         """Remove the fields of a mesh; one that is being written may be left to `prepare`."""
@@ -86,12 +91,6 @@ class FieldStore:
 
     def _path(self, mesh_id: str, key: str) -> Path:
         return self.folder / mesh_id / f"{key}.npz"
-
-
-def _warn(event: str, **fields: object) -> None:
-    import structlog  # a tenth of the start of the command line, which has no log
-
-    structlog.get_logger(module=__name__).warning(event, **fields)
 
 
 def field_files(root: Path) -> dict[Path, int]:

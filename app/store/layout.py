@@ -1,4 +1,4 @@
-"""Layout and ownership of the store: one folder, which belongs to one process at a time.
+"""Layout of the store: one folder, and the number that tells what is in it.
 
 ::
 
@@ -9,74 +9,56 @@
         results/        see ``app.store.results``
         fields/         see ``app.store.fields``
         jobs.sqlite3    see ``app.jobs.repository``
+        jobs.reserve    see ``app.store.reserve``
         tmp/            meshes that are being written
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import orjson
-from filelock import FileLock, Timeout
 
-from app.settings import variable_of
-from app.store.atomic import sync
-
-LAYOUT = 5
+LAYOUT = 6
 """Number of the layout that this code reads and writes. Raise it with every change of any file,
 including the tables of jobs."""
 
-JOB_DATABASE, MESHES, RESULTS, FIELDS = "jobs.sqlite3", "meshes", "results", "fields"
+JOB_DATABASE, JOB_RESERVE = "jobs.sqlite3", "jobs.reserve"
+MESHES, RESULTS, FIELDS = "meshes", "results", "fields"
 TEMPORARY = "tmp"
 
-_READABLE = (4, LAYOUT)
-"""Layouts that differ only in this number: up to 4, each mesh's manifest had it."""
+CONVERTIBLE = (4, 5)
+"""Older layouts, which `app.store.conversion` makes current; in 4, each manifest had the number."""
 
 
 class StoreError(Exception):
     """An unusable store; the message says why, and what to do."""
 
 
-@contextmanager
-def owned(root: Path) -> Iterator[None]:
-    """Own the store in the folder ``root`` inside the block; the folder is created if missing.
-
-    The lock ends with the process, however that ends.
+def layout_of(root: Path) -> int:
+    """Return the layout of the store in ``root``: the present one, or one that can be converted.
 
     Raises
     ------
     StoreError
-        Another process owns the store, its layout is not readable by this code, or its folder is
-        not writable.
+        It has another layout.
     """
-    # The soft fallback is a mere file, which would outlive the process.
-    lock = FileLock(root / "lock", timeout=0, thread_local=False, fallback_to_soft=False)
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-        lock.acquire()
-    except Timeout:
-        setting = variable_of("store")
-        raise StoreError(
-            f"the store {root} is in use by another process, which must end first; "
-            f"a second service needs a store of its own, see {setting}"
-        ) from None
-    except OSError as error:
-        raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
-    try:
-        require_layout(root)
-        _write_layout(root)
-        yield
-    finally:
-        lock.release()
+    found = _layout(root)
+    if found is None:
+        return LAYOUT
+    if found == LAYOUT or found in CONVERTIBLE:
+        return int(found)
+    raise StoreError(
+        f"the store {root} has layout {found}, and this release reads {LAYOUT}: "
+        f"use the release that wrote it, or move it away and upload its meshes again"
+    )
 
 
 def require_layout(root: Path) -> None:
-    """Raise ``StoreError`` where the store in ``root`` has a layout that this code cannot read."""
-    found = _layout(root)
-    if found is not None and found not in _READABLE:
+    """Raise ``StoreError`` where the store in ``root`` does not have the present layout."""
+    found = layout_of(root)
+    if found != LAYOUT:
         raise StoreError(
             f"the store {root} has layout {found}, and this release reads {LAYOUT}: "
-            f"use the release that wrote it, or move it away and upload its meshes again"
+            f"start the service on it once, which converts it"
         )
 
 
@@ -100,21 +82,5 @@ def _layout_of_manifests(root: Path) -> int | str | None:
             version: int | str = orjson.loads(path.read_bytes())["version"]
         except (ValueError, TypeError, KeyError):
             continue  # damaged: reported when the mesh is read
-        if version not in _READABLE:
-            return version
+        return version
     return None
-
-
-def _write_layout(root: Path) -> None:
-    if _layout_is_written(root):
-        return
-    aside = root / "VERSION.new"
-    aside.write_text(f"{LAYOUT}\n")
-    sync(aside)
-    aside.replace(root / "VERSION")
-    sync(root)
-
-
-def _layout_is_written(root: Path) -> bool:
-    path = root / "VERSION"
-    return path.is_file() and path.read_text().strip() == str(LAYOUT)

@@ -2,7 +2,8 @@
 
 The directory is the source of truth. Each change is one rename, made together with its entry here:
 a crash leaves a mesh either there or not, and the next start counts anew. Workers write new meshes
-into a scratch folder, which is removed with everything left in it.
+into a scratch folder, which is removed with everything left in it. The files of a damaged mesh are
+replaced one by one: until the last one is there, it is still damaged.
 """
 
 import asyncio
@@ -18,6 +19,7 @@ from uuid import uuid4
 from app.errors import over_limit
 from app.store.atomic import sync, sync_all
 from app.store.layout import TEMPORARY
+from app.store.manifests import MANIFEST
 from app.store.meshes import MeshStore, WrittenMesh, mesh_not_found
 
 
@@ -26,6 +28,8 @@ class CatalogChange:
     """The effect of adding a mesh."""
 
     is_new: bool
+    is_healed: bool = False
+    """Whether the mesh was there, but damaged"""
     evicted: Sequence[str] = ()
     """Ids of the meshes that were removed to make room"""
 
@@ -82,33 +86,40 @@ class MeshCatalog:
     async def add(self, written: WrittenMesh) -> CatalogChange:
         """Move a mesh from its scratch folder into the store; if it is there, mark it as used.
 
+        The files of one that is there and damaged are replaced.
+
         Raises
         ------
         ProblemError
             There is no room.
         """
         mesh_id = written.mesh_id
-        if written.folder is None or mesh_id in self._sizes:
+        if written.folder is None:
             self.use(mesh_id)
             return CatalogChange(is_new=False)
         await asyncio.to_thread(sync_all, written.folder)
-        if mesh_id in self._sizes:  # another upload was faster
+        if await asyncio.to_thread(self._store.is_intact, mesh_id):  # another upload was faster
             return CatalogChange(is_new=False)
-        evicted = self._choose_evicted(written.size)
+        is_new, place = mesh_id not in self._sizes, self._store.folder / mesh_id
+        evicted = self._choose_evicted(mesh_id, written.size)
         gone: list[Path] = []
         try:
             gone.extend(self._move_out(old) for old in evicted)
-            written.folder.rename(self._store.folder / mesh_id)
+            if is_new:
+                written.folder.rename(place)
+            else:
+                _replace_files(place, written.folder)
             self._sizes[mesh_id] = written.size
-            await asyncio.to_thread(sync, self._store.folder)
+            self.use(mesh_id)
+            await asyncio.to_thread(sync, self._store.folder if is_new else place)
         except OSError:
-            if mesh_id in self._sizes:
+            if is_new and mesh_id in self._sizes:
                 gone.append(self._move_out(mesh_id))  # a power cut might lose it: fail now
             raise
         finally:
             await asyncio.to_thread(_remove, *gone)
         self.evictions += len(evicted)
-        return CatalogChange(is_new=True, evicted=evicted)
+        return CatalogChange(is_new, is_healed=not is_new, evicted=evicted)
 
     async def delete(self, mesh_id: str) -> None:
         """Remove a mesh at once; processes that have it open can go on reading it."""
@@ -135,11 +146,11 @@ class MeshCatalog:
             if not self._pins[mesh_id]:
                 del self._pins[mesh_id]
 
-    def _choose_evicted(self, size: int) -> list[str]:
-        """Return the meshes to evict for ``size`` bytes more; raise where that is not enough."""
-        free = [mesh_id for mesh_id in self._sizes if mesh_id not in self._pins]
+    def _choose_evicted(self, mesh_id: str, size: int) -> list[str]:
+        """Return the meshes to evict for one of ``size`` bytes; raise where that is not enough."""
+        free = [old for old in self._sizes if old not in self._pins and old != mesh_id]
         evicted: list[str] = []
-        total = self.total + size
+        total = self.total + size - self._sizes.get(mesh_id, 0)
         if self._evicts and size <= self._capacity:
             while total > self._capacity and len(evicted) < len(free):
                 evicted.append(free[len(evicted)])
@@ -159,6 +170,12 @@ class MeshCatalog:
 
     def _new_name(self) -> Path:
         return self._temporary / f"{uuid4().hex}.gone"
+
+
+def _replace_files(folder: Path, new: Path) -> None:
+    """Move the files of a mesh over those in ``folder``, the manifest last."""
+    for path in sorted(new.iterdir(), key=lambda path: path.name == MANIFEST):
+        path.replace(folder / path.name)
 
 
 def _remove(*entries: Path) -> None:

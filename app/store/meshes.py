@@ -2,13 +2,16 @@
 
 ::
 
-    meshes/{id}/manifest.json      report, warnings, owner, and the checksum of each array
+    meshes/{id}/manifest.json      report, warnings, owner, and the checksum of each array's file
     meshes/{id}/{array}.npy        one file for each array of ``TriangleMesh.arrays()``
 
 The id is a hash of the canonical arrays (vertices, faces, both maps), not of the uploaded bytes. So
 the same mesh as PLY, as JSON or as a sample is one entry with one set of results. A later reader
 that gets other arrays from the same file gets another id, so that no stored result is ever taken
 for that of another mesh.
+
+No file is changed once it is written. One that is damaged is noticed before it is sent or mapped,
+and before the next use where it is mapped already. Writing the mesh again replaces it.
 """
 
 import hashlib
@@ -16,19 +19,21 @@ import os
 import re
 import zlib
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import orjson
 from numpy.typing import NDArray
 
 from app.errors import ProblemError, problem
 from app.store.layout import MESHES
+from app.store.manifests import MANIFEST, encode_manifest, manifest_of, read_manifest
+from app.store.verified import FileVersion, checksum_of, read_checksum, version_of
 from geodesic_core import Solver, TriangleMesh
 
 PUBLIC_ARRAYS = {
@@ -53,6 +58,8 @@ class OpenMesh:
     """Mesh id, and barriers as bytes"""
     solver: Solver
     warnings: Sequence[str]
+    files: Mapping[str, FileVersion | None] = field(default_factory=dict)
+    """Versions of the mapped files, by array; none for a mesh in memory"""
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> "OpenMesh":
@@ -67,7 +74,7 @@ class OpenMesh:
     def with_barriers(self, faces: NDArray[np.int64]) -> "OpenMesh":
         """Return the mesh with some faces blocked; see `TriangleMesh.with_barriers`."""
         name = self.name[0], faces.tobytes()
-        return OpenMesh(name, Solver(self.mesh.with_barriers(faces)), self.warnings)
+        return OpenMesh(name, Solver(self.mesh.with_barriers(faces)), self.warnings, self.files)
 
     @property
     def nbytes(self) -> int:
@@ -77,11 +84,11 @@ class OpenMesh:
 
 @dataclass(frozen=True)
 class WrittenMesh:
-    """A mesh in a scratch folder, or one that is in the store already."""
+    """A mesh in a scratch folder, or one that is intact in the store already."""
 
     manifest: Mapping[str, Any]
     folder: Path | None
-    """The scratch folder; None for a mesh that is in the store already"""
+    """The scratch folder; None for a mesh that is intact in the store already"""
     size: int = 0
     """Bytes on disk"""
 
@@ -98,46 +105,52 @@ class MeshStore:
         self.folder = root / MESHES
 
     def write_aside(self, mesh: TriangleMesh, folder: Path, owner: str | None) -> WrittenMesh:
-        """Write ``mesh`` into a new scratch ``folder``, unless it is in the store.
+        """Write ``mesh`` into a new scratch ``folder``, unless it is intact in the store.
 
-        A mesh in the store belongs to the ``owner`` that stored it first.
+        A mesh in the store belongs to the ``owner`` that stored it first, as far as its manifest
+        still tells.
         """
         arrays = mesh.arrays()
         mesh_id = content_hash(arrays)
-        if (self.folder / mesh_id).is_dir():
+        if self.is_intact(mesh_id):
             return WrittenMesh(self.manifest(mesh_id), folder=None)
+        folder.mkdir()
         manifest = {
             "id": mesh_id,
             "owner": owner,
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             "report": mesh.report.as_dict(),
             "warnings": list(mesh.warnings),
-            "crc32": {name: _checksum(array) for name, array in arrays.items()},
+            "crc32": {
+                name: _write_array(folder / f"{name}.npy", array) for name, array in arrays.items()
+            },
         }
-        folder.mkdir()
-        for name, array in arrays.items():
-            _write_array(folder / f"{name}.npy", array)
-        (folder / "manifest.json").write_bytes(orjson.dumps(manifest))
+        with suppress(ProblemError):  # there is no such mesh, or its manifest is damaged
+            stored = self.manifest(mesh_id)
+            manifest |= {name: stored[name] for name in ("owner", "created")}
+        (folder / MANIFEST).write_bytes(encode_manifest(manifest))
         return WrittenMesh(manifest, folder, _bytes_in(folder))
 
     def manifest(self, mesh_id: str) -> Mapping[str, Any]:
-        """Return the manifest of a mesh; its arrays are not opened."""
-        path = f"{self._path(mesh_id)}/manifest.json"
+        """Return the manifest of a mesh; its arrays are not read."""
+        return self._manifest(mesh_id, manifest_of)
+
+    def _manifest(
+        self, mesh_id: str, read: Callable[[str], Mapping[str, Any]]
+    ) -> Mapping[str, Any]:
         try:
-            changed = os.stat(path).st_mtime_ns  # noqa: PTH116 - see _path
-            manifest = _read_manifest(path, changed)
-            is_its_own = manifest["id"] == mesh_id
-        except (OSError, ValueError, TypeError, KeyError) as error:
+            manifest = read(f"{self._path(mesh_id)}/{MANIFEST}")
+        except (OSError, ValueError) as error:
             self._folder(mesh_id)  # raises where there is no such mesh
-            raise _damaged(mesh_id, "its manifest cannot be read") from error
-        if not is_its_own:
+            raise _damaged(mesh_id, "its manifest is not what was written") from error
+        if manifest["id"] != mesh_id:
             raise _damaged(mesh_id, "its manifest is that of another mesh")
         return manifest
 
     def owner(self, mesh_id: str) -> str | None:
-        """Return the owner of a mesh; None where it has none, or its manifest cannot be read."""
+        """Return the owner of a mesh; None where it has none, or its manifest is damaged."""
         try:
-            owner: str | None = self.manifest(mesh_id).get("owner")
+            owner: str | None = self.manifest(mesh_id)["owner"]
         except ProblemError as error:
             if error.problem.code != "mesh_damaged":
                 raise
@@ -145,53 +158,92 @@ class MeshStore:
         return owner
 
     def open(self, mesh_id: str) -> OpenMesh:
-        """Return a mesh over memory-mapped arrays, after a check of their checksums."""
-        manifest = self.manifest(mesh_id)
-        arrays = {name: self._array(mesh_id, name) for name in manifest["crc32"]}
+        """Return a mesh over memory-mapped arrays, whose files are verified first."""
+        manifest, folder = self.manifest(mesh_id), self._path(mesh_id)
+        files = {name: version_of(f"{folder}/{name}.npy") for name in manifest["crc32"]}
+        arrays = {name: _open_array(self._verified(mesh_id, name)) for name in files}
         solver = Solver(TriangleMesh.from_arrays(arrays))
-        return OpenMesh((mesh_id, b""), solver, manifest["warnings"])
+        return OpenMesh((mesh_id, b""), solver, manifest["warnings"], files)
 
-    def damage(self, mesh_id: str) -> Iterator[ProblemError]:
-        """Yield each damage of a mesh; raises ``ProblemError`` where there is no such mesh."""
+    def is_current(self, opened: OpenMesh) -> bool:
+        """Tell whether the files of an open mesh are still those that were verified."""
+        folder = self._path(opened.name[0])
+        return all(
+            version_of(f"{folder}/{name}.npy") == version for name, version in opened.files.items()
+        )
+
+    def verify_mapped(self, opened: OpenMesh) -> None:
+        """Raise ``ProblemError`` where a mapped array of an open mesh is damaged by now.
+
+        A file that was replaced or removed is still mapped as it was.
+        """
+        mesh_id = opened.name[0]
+        folder = self._path(mesh_id)
+        for name, version in opened.files.items():
+            now = version_of(f"{folder}/{name}.npy")
+            if now and version and now.inode == version.inode and now != version:
+                self._verified(mesh_id, name)
+
+    def inspect(self, mesh_id: str) -> Iterator[ProblemError | None]:
+        """Read each file of a mesh as it is now, and yield its damage; None where it is intact.
+
+        Raises ``ProblemError`` where there is no such mesh.
+        """
         try:
-            names = self.manifest(mesh_id)["crc32"]
+            checksums = self._manifest(mesh_id, read_manifest)["crc32"]
         except ProblemError as error:
             if error.problem.code != "mesh_damaged":
                 raise
             yield error
             return
-        arrays = {}
-        for name in names:
-            try:
-                arrays[name] = self._array(mesh_id, name)
-            except ProblemError as error:
-                yield error
-        if len(arrays) == len(names) and content_hash(arrays) != mesh_id:
-            yield _damaged(mesh_id, "its name is not that of its content")
+        folder, is_intact = self._folder(mesh_id), True
+        for name, checksum in checksums.items():
+            if read_checksum(f"{folder}/{name}.npy") == checksum:
+                yield None
+            else:
+                is_intact = False
+                yield _damaged(mesh_id, f"its array {name} is not what was written")
+        if is_intact:
+            arrays = {name: _open_array(folder / f"{name}.npy") for name in checksums}
+            is_named = content_hash(arrays) == mesh_id
+            yield None if is_named else _damaged(mesh_id, "its name is not that of its content")
 
-    def _array(self, mesh_id: str, name: str) -> NDArray[Any]:
+    def is_intact(self, mesh_id: str) -> bool:
+        """Read the files of a mesh; tell whether it is in the store and all are as written."""
         try:
-            array = _open_array(self._folder(mesh_id) / f"{name}.npy")
-        except (OSError, ValueError) as error:
-            raise _damaged(mesh_id, f"its array {name} cannot be read") from error
-        if _checksum(array) != self.manifest(mesh_id)["crc32"][name]:
+            return (self.folder / mesh_id).is_dir() and not any(self.inspect(mesh_id))
+        except ProblemError:  # deleted meanwhile
+            return False
+
+    def distrust(self, mesh_id: str) -> None:
+        """Have each process verify the files of a mesh again before it uses them.
+
+        Meant for damage that changed no file's status, as a disk may do it.
+        """
+        with suppress(FileNotFoundError):  # deleted meanwhile
+            for path in Path(self._path(mesh_id)).iterdir():
+                os.utime(path)
+
+    def _verified(self, mesh_id: str, name: str) -> Path:
+        """Return the file of an array; raise where it is not what was written."""
+        path = self._folder(mesh_id) / f"{name}.npy"
+        if checksum_of(str(path)) != self.manifest(mesh_id)["crc32"][name]:
             raise _damaged(mesh_id, f"its array {name} is not what was written")
-        return array
+        return path
 
     def array_file(self, mesh_id: str, name: str) -> Path:
-        """Return the file of an array that clients may read."""
-        folder = self._folder(mesh_id)
+        """Return the file of an array that clients may read, after verifying it."""
+        self._folder(mesh_id)  # raises where there is no such mesh
         if name not in PUBLIC_ARRAYS:
             raise problem(
                 "not_found", f"there is no array {name!r}, but {', '.join(PUBLIC_ARRAYS)}"
             )
-        path = folder / f"{PUBLIC_ARRAYS[name]}.npy"
-        if not path.is_file():
+        if PUBLIC_ARRAYS[name] not in self.manifest(mesh_id)["crc32"]:
             # TriangleMesh has no map where it is the identity.
             unchanged = "vertices" if name == "vertex_map" else "faces"
             detail = f"the mesh has no {name}: it keeps the {unchanged} of its file"
             raise problem("not_found", detail)
-        return path
+        return self._verified(mesh_id, PUBLIC_ARRAYS[name])
 
     def page(self, after: str, limit: int) -> tuple[list[str], bool]:
         """Return the next ``limit`` ids after ``after``, in order, and whether more follow."""
@@ -229,12 +281,6 @@ class MeshStore:
         return f"{self.folder}/{mesh_id}"
 
 
-@lru_cache(maxsize=256)
-def _read_manifest(path: str, _changed: int) -> Mapping[str, Any]:
-    manifest: dict[str, Any] = orjson.loads(Path(path).read_bytes())
-    return manifest
-
-
 def content_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
     """Return the id of a mesh with these arrays."""
     digest = hashlib.blake2b(digest_size=_ID_BYTES)
@@ -246,16 +292,18 @@ def content_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
     return digest.hexdigest()
 
 
-def _checksum(array: NDArray[Any]) -> int:
-    return zlib.crc32(np.ascontiguousarray(array).data) if array.size else 0
-
-
-def _write_array(path: Path, array: NDArray[Any]) -> None:
-    # Like np.save, whose OSError does not tell that the disk is full.
+def _write_array(path: Path, array: NDArray[Any]) -> int:
+    """Write an array as `numpy.save` does, and return the CRC-32 of the file."""
+    # The OSError of np.save does not tell that the disk is full.
     array = np.ascontiguousarray(array)
+    header = BytesIO()
+    np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(array))
+    checksum = 0
     with path.open("wb") as file:
-        np.lib.format.write_array_header_1_0(file, np.lib.format.header_data_from_array_1_0(array))
-        file.write(array.data)
+        for part in (header.getvalue(), array.data.cast("B") if array.size else b""):
+            file.write(part)
+            checksum = zlib.crc32(part, checksum)
+    return checksum
 
 
 def _bytes_in(folder: Path) -> int:
@@ -273,5 +321,5 @@ def mesh_not_found(mesh_id: str) -> ProblemError:
 
 
 def _damaged(mesh_id: str, reason: str) -> ProblemError:
-    hint = "delete the mesh and upload it again"
+    hint = "upload it again: that replaces the damaged files"
     return problem("mesh_damaged", f"mesh {mesh_id} is damaged: {reason}", hint=hint)

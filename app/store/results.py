@@ -231,12 +231,16 @@ class ResultStore:
         self._pins -= Counter([name])
         self._evict()
 
+    def discard(self, name: str) -> None:
+        """Remove a result, unless it is pinned or in use."""
+        if self._is_free(name):
+            self._remove(name)
+
     def forget_mesh(self, mesh_id: str) -> None:
         """Remove the results of a mesh, except those that are pinned or in use."""
         names = {*self._sizes, *self._small}
         for name in [name for name in names if name.startswith(f"{mesh_id}/")]:
-            if self._is_free(name):
-                self._remove(name)
+            self.discard(name)
 
     def _acquire(self, result: Result) -> Result:
         if result.has_files:

@@ -12,9 +12,10 @@ import pytest
 
 from app.queries import code_version
 from app.store.fields import FieldStore
-from app.store.layout import owned
+from app.store.ownership import owned
 from app.store.results import ResultManifest
 from tests.support.commands import Run, error_line
+from tests.support.faults import edit_counts
 from tests.support.service import serving, upload_sample, wait_until
 
 pytestmark = pytest.mark.service  # a store is left by a service that has run
@@ -140,7 +141,7 @@ def test_check_names_what_is_damaged(run: Run, left: Left) -> None:
 
     for name in ("faces", "component"):
         damage(left.root / "meshes" / left.ids[0] / f"{name}.npy")
-    (left.root / "meshes" / left.ids[1] / "manifest.json").write_bytes(b"[]")
+    edit_counts(left.root / "meshes" / left.ids[1] / "manifest.json")
     damage(left.results(0)[1])
     left.results(0)[2].with_suffix(".json").write_bytes(b"{")
     left.fields()[1].write_bytes(b"PK")
@@ -152,7 +153,7 @@ def test_check_names_what_is_damaged(run: Run, left: Left) -> None:
     for part in (
         f"mesh {left.ids[0]} is damaged: its array faces is not what was written",
         f"mesh {left.ids[0]} is damaged: its array component is not what was written",
-        f"mesh {left.ids[1]} is damaged: its manifest cannot be read",
+        f"mesh {left.ids[1]} is damaged: its manifest is not what was written",
         f"result {left.ids[0]}/{left.results(0)[1].stem} is damaged",
         f"result {left.ids[0]}/{left.results(0)[2].stem} is damaged",
         f"field {left.ids[0]}/2 is damaged",
@@ -246,10 +247,18 @@ def test_what_is_no_store_is_refused(run: Run, tmp_path: Path, command: str) -> 
         assert f"there is no store in {tmp_path / name}" in error_line(ran)
     assert list((tmp_path / "photos").iterdir()) == []
 
-    (tmp_path / "photos" / "VERSION").write_text("6\n")
+    (tmp_path / "photos" / "VERSION").write_text("7\n")
     ran = run("store", command, tmp_path / "photos")
     assert ran.code == 1
-    assert "has layout 6, and this release reads 5" in error_line(ran)
+    assert "has layout 7, and this release reads 6" in error_line(ran)
+
+
+@pytest.mark.parametrize("command", ["ls", "check", "prune"])
+def test_an_older_store_is_for_the_service_to_convert(run: Run, left: Left, command: str) -> None:
+    (left.root / "VERSION").write_text("5\n")
+    ran = run("store", command, left.root)
+    assert ran.code == 1
+    assert "has layout 5, and this release reads 6: start the service on it" in error_line(ran)
 
 
 def test_serve_refuses_a_store_that_it_cannot_have(

@@ -2,7 +2,7 @@
 
 import json
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta, tzinfo
 from itertools import count
@@ -342,6 +342,48 @@ def test_jobs_are_forgotten_although_the_disk_was_full(
         job = job_of(submit(client, upload_sample(client, "plane", 50)))
         wait_until(lambda: client.get(job).status_code == 404)
     assert len(refused) == 2
+
+
+@pytest.fixture
+def full_disk(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
+    """Fill the disk of a store, as its records of jobs see it, up to their reserve."""
+    run = JobRepository._run
+
+    def fill(store: Path) -> None:
+        async def run_if_there_is_room(repository: JobRepository, sql: str, *values: Any) -> None:
+            if not sql.startswith("PRAGMA") and (store / "jobs.reserve").exists():
+                error = sqlite3.OperationalError("database or disk is full")
+                error.sqlite_errorcode = sqlite3.SQLITE_FULL
+                raise error
+            await run(repository, sql, *values)
+
+        monkeypatch.setattr(JobRepository, "_run", run_if_there_is_room)
+
+    return fill
+
+
+def test_jobs_are_dismissed_although_the_disk_is_full(
+    tmp_path: Path, full_disk: Callable[[Path], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with serving(tmp_path, cancel_grace_s=LONG_S) as client:
+        mesh_id = upload_sample(client, "plane", 50)
+        finished = [job_of(submit(client, mesh_id)) for _ in range(3)]
+        for job in finished:
+            wait_for(client, job, "successful")
+        with stopped(client.workers()):
+            running = job_of(submit(client, mesh_id))
+            full_disk(tmp_path)
+
+            for job in finished:
+                assert client.delete(job).status_code == 200
+                check_problem(client.get(job), 404, "job_not_found")
+            assert client.delete(running).json()["status"] == "dismissed"
+            check_problem(submit(client, mesh_id), 507, "storage_full")
+    monkeypatch.undo()
+    with serving(tmp_path) as client:
+        (left,) = client.get("/v1/jobs").json()["jobs"]
+        assert f"/v1/jobs/{left['id']}" == running
+        assert left["status"] == "dismissed"
 
 
 class Calendar:

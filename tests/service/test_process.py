@@ -12,8 +12,9 @@ import pytest
 
 import geodesic_core as gc
 from app.settings import MIB
-from app.store.layout import StoreError, owned
+from app.store.layout import StoreError
 from app.store.meshes import MeshStore
+from app.store.ownership import owned
 from tests.support.meshes import named_mesh, real_mesh
 from tests.support.processes import (
     Server,
@@ -182,7 +183,7 @@ def test_a_body_that_arrived_when_the_service_was_killed_is_removed(restart: Res
     assert list((store / "tmp").iterdir()) == []
     assert restart.server.client.get("/v1/meshes").json() == restart.meshes
     for mesh in restart.meshes["meshes"]:
-        assert list(MeshStore(store).damage(mesh["id"])) == []
+        assert not any(MeshStore(store).inspect(mesh["id"]))
 
 
 def test_a_job_that_had_finished_has_its_answer_after_a_restart(restart: Restart) -> None:

@@ -18,9 +18,9 @@ from app.main import create_app
 from app.queries import ExecutionContext, FieldCache
 from app.settings import Settings
 from app.store.fields import FieldStore
-from app.store.layout import owned
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
+from app.store.ownership import owned
 from geodesic_core.fields import repeatable_sweep
 from tests.support.processes import workers_of
 from tests.support.waiting import LONG_S, wait_until

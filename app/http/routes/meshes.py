@@ -195,14 +195,14 @@ async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> N
             "headers": documented("Content-Range", *FILE_HEADERS),
         },
         304: {"description": "The array has not changed", "headers": documented("ETag")},
-        **problems("mesh_not_found", "not_found", "range_not_satisfiable"),
+        **problems("mesh_not_found", "not_found", "range_not_satisfiable", "mesh_damaged"),
     },
 )
 async def get_mesh_array(
     mesh_id: str, name: str, request: Request, service: ServiceDep
 ) -> Response:
     """Send `vertices`, `faces`, `vertex_map`, `face_map` or `components`; ranges are served."""
-    path = service.array_file(mesh_id, name)
+    path = await service.array_file(mesh_id, name)
     etag = etag_of(f"{mesh_id}-{name}")
     return not_modified(request, etag, IMMUTABLE) or StoredFileResponse(
         path, headers={"ETag": etag, **IMMUTABLE}, media_type=NPY

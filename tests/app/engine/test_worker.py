@@ -16,6 +16,7 @@ from app.queries import DistancesQuery, PathQuery
 from app.schemas.points import VertexPoint
 from app.schemas.requests import PathRequest
 from app.store.fields import field_files
+from app.store.meshes import MeshStore, OpenMesh
 from geodesic_core import TriangleMesh, exact_distance, samples
 from tests.support.logs import Log
 from tests.support.service import store_mesh
@@ -39,37 +40,45 @@ def path_query(mesh_id: str, target: int, **members: Any) -> PathQuery:
     return PathQuery(mesh_id, PathRequest(**ends, **members))
 
 
-def remove_arrays(store: Path) -> None:
-    """Remove what is needed to open a mesh; one that is open stays usable."""
-    for path in store.glob("meshes/*/vertices.npy"):
-        path.unlink()
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Ids of the meshes that were opened, in order."""
+    open_mesh, ids = MeshStore.open, []
+
+    def open_noted(store: MeshStore, mesh_id: str) -> OpenMesh:
+        ids.append(mesh_id)
+        return open_mesh(store, mesh_id)
+
+    monkeypatch.setattr(MeshStore, "open", open_noted)
+    return ids
 
 
-def test_meshes_that_do_not_fit_are_closed(tmp_path: Path) -> None:
+def test_meshes_that_do_not_fit_are_closed(tmp_path: Path, opened: list[str]) -> None:
     meshes = planes(100, 200, 300)
     ids = [store_mesh(tmp_path, mesh) for mesh in meshes]
     worker = new_worker(tmp_path, worker_mesh_bytes=meshes[1].nbytes + meshes[2].nbytes)
     assert [code_of(worker, distances_query(mesh_id)) for mesh_id in ids] == [None] * 3
+    assert opened == ids
 
-    remove_arrays(tmp_path)
+    for mesh_id in (ids[2], ids[1], ids[0]):
+        assert code_of(worker, distances_query(mesh_id)) is None
 
-    codes = [code_of(worker, distances_query(mesh_id)) for mesh_id in ids]
-    assert codes == ["mesh_damaged", None, None]
+    assert opened[3:] == [ids[0]]
 
 
-def test_what_paths_need_counts_as_part_of_an_open_mesh(tmp_path: Path) -> None:
+def test_what_paths_need_counts_as_part_of_an_open_mesh(tmp_path: Path, opened: list[str]) -> None:
     meshes = planes(200, 300)
     ids = [store_mesh(tmp_path, mesh) for mesh in meshes]
     worker = new_worker(tmp_path, worker_mesh_bytes=sum(mesh.nbytes for mesh in meshes) + 100)
     queries = [distances_query(mesh_id) for mesh_id in ids]
-    assert [code_of(worker, query) for query in queries] == [None, None]
-    remove_arrays(tmp_path)
-    assert [code_of(worker, query) for query in queries] == [None, None]
+    for _ in range(2):
+        assert [code_of(worker, query) for query in queries] == [None, None]
+    assert opened == ids
 
     assert code_of(worker, path_query(ids[1], 60)) is None
-    assert code_of(worker, queries[1]) is None
+    assert [code_of(worker, query) for query in (queries[1], queries[0])] == [None, None]
 
-    assert [code_of(worker, query) for query in queries] == ["mesh_damaged", None]
+    assert opened[2:] == [ids[0]]
 
 
 def test_meshes_with_barriers_are_kept_as_others_are(
@@ -142,7 +151,7 @@ def test_fields_go_with_their_mesh(tmp_path: Path) -> None:
 
 
 def test_caches_are_emptied_where_memory_runs_out(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, opened: list[str]
 ) -> None:
     mesh_id = store_mesh(tmp_path, *planes(200))
     worker = new_worker(tmp_path)
@@ -159,8 +168,9 @@ def test_caches_are_emptied_where_memory_runs_out(
     assert isinstance(problem, Problem)
     assert (problem.code, problem.setting) == ("memory_limit", "GEODESIC_WORKER_MEMORY_BYTES")
     assert worker.fields.nbytes == 0
-    remove_arrays(tmp_path)
-    assert code_of(worker, distances_query(mesh_id)) == "mesh_damaged"
+    assert opened == [mesh_id]
+    assert code_of(worker, distances_query(mesh_id)) is None
+    assert opened == [mesh_id, mesh_id]
 
 
 # Fields in the store

@@ -8,6 +8,7 @@ import sqlite3
 import subprocess
 import sys
 import threading
+import zlib
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import anyio
+import numpy as np
 import orjson
 import pytest
 from anyio import to_thread
@@ -24,10 +26,11 @@ from app.engine.interface import ProgressCallback
 from app.engine.work import RunQuery, Task, TaskResult
 from app.errors import ProblemError
 from app.jobs import require_intact
-from app.store import mesh_catalog
-from app.store.layout import LAYOUT, StoreError, owned
+from app.store import mesh_catalog, ownership
+from app.store.layout import LAYOUT, StoreError, require_layout
 from app.store.mesh_catalog import CatalogChange, MeshCatalog
 from app.store.meshes import MeshStore
+from app.store.ownership import owned
 from tests.support.disks import fill_disk
 from tests.support.paths import ROOT
 from tests.support.service import (
@@ -61,7 +64,7 @@ def test_a_store_belongs_to_one_at_a_time(tmp_path: Path) -> None:
 
 
 def test_the_lock_goes_with_its_process_however_that_ends(tmp_path: Path) -> None:
-    script = "import sys; from pathlib import Path; from app.store.layout import owned\n"
+    script = "import sys; from pathlib import Path; from app.store.ownership import owned\n"
     script += "with owned(Path(sys.argv[1])): print('owned', flush=True); sys.stdin.read()"
     owner = subprocess.Popen(  # noqa: S603 - this Python, and the text above
         [sys.executable, "-c", script, str(tmp_path)],
@@ -104,34 +107,85 @@ def test_a_new_store_has_the_number_of_its_layout(tmp_path: Path) -> None:
     assert files_in(tmp_path) == {"VERSION", "lock"}
 
 
-@pytest.mark.parametrize("written", ["3", "6", "5.1", "", "five", "-5"])
+@pytest.mark.parametrize("written", ["3", "7", "6.1", "", "five", "-5"])
 def test_another_layout_is_refused(tmp_path: Path, written: str) -> None:
     (tmp_path / "VERSION").write_text(written)
 
-    with pytest.raises(StoreError, match=rf"has layout '?{written}'?, and this release reads 5:"):
+    with pytest.raises(StoreError, match=rf"has layout '?{written}'?, and this release reads 6:"):
         owned(tmp_path).__enter__()
     assert (tmp_path / "VERSION").read_text() == written
 
 
-def make_older(root: Path, version: int) -> str:
-    """Make a store look like one of before layout 5, with one mesh that is damaged."""
-    mesh_id = store_mesh(root, plane())
-    damaged = store_mesh(root, plane(18))
-    manifest = root / "meshes" / mesh_id / "manifest.json"
-    manifest.write_bytes(orjson.dumps({"version": version, **orjson.loads(manifest.read_bytes())}))
-    (root / "meshes" / damaged / "manifest.json").write_bytes(b"{")
+def make_older(root: Path, layout: int) -> tuple[str, str]:
+    """Make a store look like one of an older layout; return its two meshes, the second damaged."""
+    ids = store_mesh(root, plane(), "alice"), store_mesh(root, plane(18))
+    for mesh_id in ids:
+        folder = root / "meshes" / mesh_id
+        manifest = orjson.loads((folder / "manifest.json").read_bytes())
+        del manifest["checksum"]
+        for name in manifest["crc32"]:
+            content = np.load(folder / f"{name}.npy").tobytes()
+            manifest["crc32"][name] = zlib.crc32(content)
+        manifest |= {"version": layout} if layout < 5 else {}
+        (folder / "manifest.json").write_bytes(orjson.dumps(manifest))
+    flip_bytes(folder / "component.npy")
     (root / "VERSION").unlink()
-    return mesh_id
+    if layout >= 5:
+        (root / "VERSION").write_text(f"{layout}\n")
+    return ids
 
 
-def test_a_store_of_layout_4_is_taken_over(tmp_path: Path) -> None:
-    mesh_id = make_older(tmp_path, 4)
+def flip_bytes(path: Path) -> None:
+    content = path.read_bytes()
+    path.write_bytes(content[:-8] + bytes(byte ^ 255 for byte in content[-8:]))
+
+
+@pytest.mark.parametrize("layout", [4, 5])
+@pytest.mark.parametrize("was_interrupted", [False, True])
+def test_an_older_store_is_converted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, layout: int, was_interrupted: bool
+) -> None:
+    whole, damaged = make_older(tmp_path, layout)
+    expected = plane()
+    with pytest.raises(StoreError, match=rf"has layout {layout}.*start the service on it once"):
+        require_layout(tmp_path)
+    if was_interrupted:
+        with monkeypatch.context() as patch:
+            patch.setattr(ownership, "_write_layout", failing)
+            with pytest.raises(Crash):
+                owned(tmp_path).__enter__()
+        (tmp_path / "meshes" / whole / "tmp123").touch()
 
     with owned(tmp_path):
         pass
 
     assert (tmp_path / "VERSION").read_text() == f"{LAYOUT}\n"
-    assert MeshStore(tmp_path).open(mesh_id).mesh.report.faces == 50
+    require_layout(tmp_path)
+    store = MeshStore(tmp_path)
+    assert not any(store.inspect(whole))
+    manifest = store.manifest(whole)
+    assert manifest["owner"] == "alice"
+    assert manifest["report"] == orjson.loads(orjson.dumps(expected.report.as_dict()))
+    arrays = store.open(whole).mesh.arrays()
+    for name, array in expected.arrays().items():
+        np.testing.assert_array_equal(arrays[name], array)
+    assert any(store.inspect(damaged))
+    assert not list((tmp_path / "meshes").glob("*/tmp*"))
+
+
+def failing(*_: object) -> None:
+    raise Crash
+
+
+def test_counts_that_were_edited_before_are_not_taken_over(tmp_path: Path) -> None:
+    whole, _ = make_older(tmp_path, 5)
+    path = tmp_path / "meshes" / whole / "manifest.json"
+    path.write_bytes(path.read_bytes().replace(b'"faces":50', b'"faces":51'))
+
+    with owned(tmp_path):
+        pass
+
+    assert MeshStore(tmp_path).manifest(whole)["report"]["faces"] == 50
 
 
 def test_an_older_store_is_refused(tmp_path: Path) -> None:
@@ -376,6 +430,7 @@ STEPS = [
     (mesh_catalog, "sync"),
     (Path, "write_bytes"),
     (Path, "rename"),
+    (Path, "replace"),
     (Path, "mkdir"),
 ]
 
@@ -421,13 +476,49 @@ def test_a_crash_at_any_step_leaves_a_mesh_whole_or_not_there(tmp_path: Path) ->
             assert store[1].total == sum(store[0].sizes().values())
             assert files_in(root / "tmp") == set()
         for mesh_id in (kept, *there):
-            assert list(store[0].damage(mesh_id)) == []
+            assert not any(store[0].inspect(mesh_id))
         assert there or files_in(root) == before
         seen.add((has_crashed, bool(there)))
         if not has_crashed:
             break
 
     assert step > 15
+    assert seen == {(True, False), (True, True), (False, True)}
+
+
+def test_a_crash_while_a_mesh_is_healed_leaves_it_damaged_or_whole(tmp_path: Path) -> None:
+    mesh_id = store_mesh(tmp_path / "before", plane(), "alice")
+    folder = Path("meshes", mesh_id)
+    expected = {path.name: path.read_bytes() for path in (tmp_path / "before" / folder).iterdir()}
+    (tmp_path / "before" / folder / "faces.npy").write_bytes(b"")
+    (tmp_path / "before" / folder / "vertices.npy").unlink()
+    seen = set()
+    for step in range(1, 100):
+        root = tmp_path / str(step)
+        shutil.copytree(tmp_path / "before", root)
+        with pytest.MonkeyPatch.context() as patch, opened(root) as store:
+            (root / "tmp" / "crashed").mkdir()
+            count_down(patch, step, Crash())
+            try:
+                written = store[0].write_aside(plane(), root / "tmp" / "crashed" / "mesh", "bob")
+                change = anyio.run(store[1].add, written)
+            except Crash:
+                has_crashed = True
+            else:
+                has_crashed = False
+                assert change == CatalogChange(is_new=False, is_healed=True, evicted=[])
+        with opened(root) as store:
+            assert list(store[0].sizes()) == [mesh_id]
+            assert store[1].total == sum(store[0].sizes().values())
+            is_whole = store[0].is_intact(mesh_id)
+            found = {path.name: path.read_bytes() for path in (root / folder).iterdir()}
+            assert is_whole == (found == expected)
+            assert is_whole or any(store[0].inspect(mesh_id))
+        seen.add((has_crashed, is_whole))
+        if not has_crashed:
+            break
+
+    assert step > 30
     assert seen == {(True, False), (True, True), (False, True)}
 
 

@@ -1,4 +1,5 @@
 import os
+import shutil
 import tracemalloc
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 
 import geodesic_core as gc
 from app.errors import ProblemError
+from app.store.manifests import encode_manifest, read_manifest
 from app.store.meshes import MeshStore
 from app.store.results import Result, ResultStore, write_result
 from tests.support.service import store_mesh
@@ -27,6 +29,10 @@ def damage(path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[-1] ^= 1
     path.write_bytes(content)
+
+
+def damage_of(meshes: MeshStore, mesh_id: str) -> list[str]:
+    return [str(error) for error in meshes.inspect(mesh_id) if error is not None]
 
 
 def code_of(call) -> str:
@@ -83,8 +89,8 @@ def test_a_changed_array_is_noticed(meshes: MeshStore, tmp_path: Path, file: str
     damage(tmp_path / "meshes" / mesh_id / file)
 
     assert code_of(lambda: meshes.open(mesh_id)) == "mesh_damaged"
-    (found,) = meshes.damage(mesh_id)
-    assert f"its array {file.removesuffix('.npy')} is not what was written" in str(found)
+    (found,) = damage_of(meshes, mesh_id)
+    assert f"its array {file.removesuffix('.npy')} is not what was written" in found
 
 
 @pytest.mark.parametrize("content", [b"", b"[]", b"{}", b'{"id": "of another"}'])
@@ -93,8 +99,8 @@ def test_a_broken_manifest_is_noticed(meshes: MeshStore, tmp_path: Path, content
     (tmp_path / "meshes" / mesh_id / "manifest.json").write_bytes(content)
 
     assert code_of(lambda: meshes.manifest(mesh_id)) == "mesh_damaged"
-    (found,) = meshes.damage(mesh_id)
-    assert "its manifest" in str(found)
+    (found,) = damage_of(meshes, mesh_id)
+    assert "its manifest" in found
 
 
 def test_a_missing_array_is_noticed(meshes: MeshStore, tmp_path: Path) -> None:
@@ -108,14 +114,16 @@ def test_a_mesh_under_the_name_of_another_is_noticed(meshes: MeshStore, tmp_path
     """Checksums are right, but what results are named by is not."""
     vertices, faces = SQUARE
     ids = [store_mesh(tmp_path, gc.TriangleMesh(vertices * scale, faces)) for scale in (1, 2)]
-    assert [list(meshes.damage(mesh_id)) for mesh_id in ids] == [[], []]
-    manifests = [tmp_path / "meshes" / mesh_id / "manifest.json" for mesh_id in ids]
-    manifests[0].write_bytes(manifests[1].read_bytes().replace(ids[1].encode(), ids[0].encode()))
-    for array in manifests[0].parent.glob("*.npy"):
-        array.write_bytes((manifests[1].parent / array.name).read_bytes())
+    assert [damage_of(meshes, mesh_id) for mesh_id in ids] == [[], []]
+    first, second = (tmp_path / "meshes" / mesh_id for mesh_id in ids)
+    for path in second.iterdir():
+        shutil.copy(path, first)
+    assert "its manifest is that of another mesh" in damage_of(meshes, ids[0])[0]
+    renamed = {**read_manifest(str(first / "manifest.json")), "id": ids[0]}
+    (first / "manifest.json").write_bytes(encode_manifest(renamed))
 
-    (found,) = meshes.damage(ids[0])
-    assert "its name is not that of its content" in str(found)
+    (found,) = damage_of(meshes, ids[0])
+    assert "its name is not that of its content" in found
 
 
 @pytest.mark.parametrize("mesh_id", ["", "..", "0" * 32, "../meshes", "G" * 32])

@@ -1,0 +1,70 @@
+"""The scrub: every file of a store is verified again and again, slowly, in the background.
+
+Disks lose bits in silence. The scrub finds that before a client does, while the mesh may still be
+at hand elsewhere.
+"""
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from time import perf_counter
+
+import structlog
+from anyio import to_thread
+
+from app.service.maintenance import Damage, inspect
+
+logger = structlog.get_logger(module=__name__)
+
+_DELAY_S = 60.0
+"""Seconds before the first round, since a start has other work to do"""
+_PERIOD_S = 86_400.0
+"""Seconds between the end of a round and the next one"""
+_REST = 20.0
+"""Pause after a file, as a multiple of the time that it took"""
+_SHORTEST_REST_S = 0.1
+
+OnDamage = Callable[[Damage], Awaitable[None]]
+
+
+@asynccontextmanager
+async def scrubbing(root: Path, on_damage: OnDamage) -> AsyncIterator[None]:
+    """Scrub the store ``root`` while the block runs; report each damage to ``on_damage``."""
+    scrub = asyncio.create_task(_scrub(root, on_damage))
+    try:
+        yield
+    finally:
+        scrub.cancel()
+        await asyncio.wait({scrub})
+
+
+async def _scrub(root: Path, on_damage: OnDamage) -> None:
+    await asyncio.sleep(_DELAY_S)
+    while True:
+        try:
+            await _scrub_once(root, on_damage)
+        except OSError:  # such as too many open files: the next round may be luckier
+            logger.exception("store not verified to its end")
+        await asyncio.sleep(_PERIOD_S)
+
+
+async def _scrub_once(root: Path, on_damage: OnDamage) -> None:
+    files = inspect(root)
+    while True:
+        start = perf_counter()
+        is_last, damage = await to_thread.run_sync(_next, files)
+        if is_last:
+            return
+        rest = _REST * (perf_counter() - start)
+        if damage is not None:
+            logger.error("store damaged", detail=damage.detail)
+            await on_damage(damage)
+        await asyncio.sleep(max(_SHORTEST_REST_S, rest))
+
+
+def _next(files: Iterator[Damage | None]) -> tuple[bool, Damage | None]:
+    """Verify the next file; tell whether there was none any more, and its damage."""
+    for damage in files:
+        return False, damage
+    return True, None
