@@ -265,12 +265,12 @@ def test_path_writes_a_polyline_and_json(run: Run, plane: Path) -> None:
 def test_a_georeferenced_mesh_is_answered_where_it_lies(run: Run) -> None:
     """A path goes by way of its own points, given by the positions that it was told with."""
     vertices, faces = gc.samples.terrain(800)
-    moved = 0.02 * vertices + (500000.0, 5000000.0, 100.0)
+    moved = 0.005 * vertices + (3e6, 6.4e6, 100.0)
     rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in moved.tolist()]
     rows += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
     Path("geo.obj").write_text("\n".join(rows))
     ends = ["--source", 0, "--target", len(vertices) - 1]
-    rounding = np.spacing(5e6)
+    rounding = np.spacing(6.4e6)
 
     assert run("info", "geo.obj").figure("bounds") == (
         f"{tuple(moved.min(axis=0).tolist())} to {tuple(moved.max(axis=0).tolist())}"
