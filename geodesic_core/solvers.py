@@ -558,7 +558,7 @@ def _shortest_through(
 ) -> GeodesicPath:
     """Search for leg after leg, each no longer than the others leave of the limit."""
     legs: list[GeodesicPath] = []
-    positions = np.array([search.mesh.position(stop) for stop in stops])
+    positions = np.array([search.mesh.position_from_origin(stop) for stop in stops])
     left = limit * (1.0 + AT_LIMIT)
     for here, there in pairwise(stops):
         leg_control = control.for_part(len(legs), len(stops) - 1)

@@ -110,10 +110,10 @@ PATH_LENGTH = 1e-9
 Measured: 1e-12 and less. A path that is not the one the field promises is never handed out.
 """
 
-FOOT = 1e-14
+ROUNDED_POSITION = 1e-14
 """Share of the bounding box's diagonal by which such a length may differ anyway: rounding.
 
-The foot of a perpendicular on a curve is rounded as a position, however near it is to the target.
+Points on edges and in faces are rounded as positions, however near they are to each other.
 """
 
 LOCAL_SHARE = 0.05
@@ -205,6 +205,12 @@ One spelling of a point differs from another by rounding: by 1e-16 of the edge a
 
 SNAP = 1e-12
 """Share of the bounding box's diagonal within which a position counts as on a vertex or an edge."""
+
+ROUNDED_COORDINATE = 2.0**-50
+"""Share of the largest coordinate within which it counts as such as well: a few roundings.
+
+The positions of a georeferenced mesh round by more than `SNAP`: at 5e6 from the origin, by 1e-9.
+"""
 
 FAN = 1e-9
 """Share of a polygon's area that each triangle of a fan must have for the fan to be taken.

@@ -21,7 +21,7 @@ from geodesic_core.fields.isolines import (
     resolve_chord_error,
     spaced_levels,
 )
-from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, traced_path
+from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, rounding_of, traced_path
 from geodesic_core.fields.point_query import (
     Arrival,
     NearestSource,
@@ -42,7 +42,7 @@ from geodesic_core.mesh.curve import (
 )
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import FOOT, LEVEL, PATH_LENGTH
+from geodesic_core.tolerances import LEVEL
 
 
 @dataclass(frozen=True)
@@ -549,8 +549,7 @@ class DistanceField:
         start = self.sources[winners.nearest[node]].start_distance
         excess = start + path.length - distance
         exact = self.error_bound == EXACT
-        rounding = FOOT * self.mesh.diagonal
-        most = PATH_LENGTH * distance + rounding
+        most = rounding_of(self.mesh, distance)
         if excess < -most or (exact and excess > most):
             raise InternalError(
                 f"the path to {target} has length {path.length}, but the field says "
@@ -558,7 +557,7 @@ class DistanceField:
             )
         if exact:
             return path
-        share = max(excess, 0.0) / distance if distance > rounding else 0.0
+        share = max(excess, 0.0) / distance if distance > most else 0.0
         return replace(path, error_bound=ErrorBound("relative", share, "guaranteed"))
 
     def _node(self, location: SurfacePoint) -> int | None:

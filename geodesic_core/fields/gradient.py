@@ -3,13 +3,13 @@
 import numpy as np
 
 from geodesic_core.arrays import Flags, Floats
-from geodesic_core.fields.path import EXACT, traced_path
+from geodesic_core.fields.path import located_path
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.mesh.half_edges import APEX, COS_LEFT, HEAD, LENGTH_LEFT, SIN_LEFT, TAIL
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep.state import ENTRY_EDGE, NODE, PREDECESSOR
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import FOOT, SAME_PLACE
+from geodesic_core.tolerances import ROUNDED_POSITION, SAME_PLACE
 
 
 def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> Floats:
@@ -36,8 +36,8 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
     across = _unit(across - np.einsum("ij,ij->i", across, along)[:, None] * along)
     gradient[reached] = _unit(away[:, :1] * along + away[:, 1:] * across)
     for v in reached[np.isnan(gradient[reached, 0])]:
-        points = traced_path(mesh, winners, nodes, v, EXACT).points
-        away = points[-1] - points
+        located, _ = located_path(mesh, winners, nodes, v)
+        away = located.points[-1] - located.points
         elsewhere = np.linalg.norm(away, axis=1) > SAME_PLACE * winners.distance[v]
         gradient[v] = _unit(away[elsewhere][-1:])
     return gradient[topology.inner_vertex]
@@ -57,7 +57,7 @@ def _lies_on_curve(mesh: TriangleMesh, winners: Winners, is_parallel: Flags) -> 
     nodes = np.flatnonzero(is_parallel & np.isfinite(winners.distance))
     segments = winners.winner_ints[nodes, PREDECESSOR]
     away = winners.distance[nodes] - winners.distance[segments]
-    lies[nodes] = away <= FOOT * mesh.diagonal
+    lies[nodes] = away <= ROUNDED_POSITION * mesh.diagonal
     return lies
 
 

@@ -295,7 +295,7 @@ def _lines(
     bounds = zip(first[:-1].tolist(), first[1:].tolist(), closed.tolist(), strict=True)
     return [
         Isoline(
-            points=points[lo:hi].copy(),
+            points=points[lo:hi] + mesh.origin,
             closed=bool(is_closed),
             faces=mesh.topology.outer_face[faces[lo : hi if is_closed else hi - 1]],
         )

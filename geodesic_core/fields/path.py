@@ -17,6 +17,7 @@ from geodesic_core.kernels.paths.locations import Locations
 from geodesic_core.mesh.curve import foot_on
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.tolerances import PATH_LENGTH, ROUNDED_POSITION
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +95,7 @@ class GeodesicPath:
     faces: Ints
     """(K - 1,) int32: the face between each point and the next."""
     length: float
-    """Sum of the distances between neighbouring points, mesh units."""
+    """Sum of the distances between neighbouring points before those were rounded, mesh units."""
     error_bound: ErrorBound
     steps: tuple[SearchStep, ...] | None
     """Steps of the search between two points, leg by leg; None unless they were to be explained."""
@@ -139,6 +140,23 @@ def traced_path(
     mesh: TriangleMesh, winners: Winners, nodes_of_sweep: Nodes, v: int, bound: ErrorBound
 ) -> GeodesicPath:
     """Return the path from its source to node v; O(faces crossed)."""
+    located, faces = located_path(mesh, winners, nodes_of_sweep, v)
+    return GeodesicPath(
+        points=located.points + mesh.origin,
+        faces=faces,
+        length=length_of(located.points),
+        error_bound=bound,
+        steps=None,
+        _location_faces=located.faces,
+        _location_weights=located.weights,
+        _location_vertices=located.vertices,
+    )
+
+
+def located_path(
+    mesh: TriangleMesh, winners: Winners, nodes_of_sweep: Nodes, v: int
+) -> tuple[Locations, Ints]:
+    """Return the points of the path from its source to node v, and the faces between them."""
     nodes, parameters, crossed = trace(mesh, winners, v)
     count = len(nodes)
     faces, vertices = np.empty(count, np.int32), np.empty(count, np.int64)
@@ -155,23 +173,19 @@ def traced_path(
             point, points[i] = nodes_of_sweep.site(node)
         else:
             point = foot_on(mesh, segment, points[1])
-            points[i] = mesh.position(point)
+            points[i] = mesh.position_from_origin(point)
         faces[i], weights[i] = point.face_index, point.barycentric
         vertices[i] = -1 if point.vertex_index is None else point.vertex_index
     is_new = np.empty(count, np.uint8)
     locations.flag_new(faces, weights, is_new)
     where = np.flatnonzero(is_new)
-    points = points[where]
-    return GeodesicPath(
-        points=points,
-        faces=mesh.topology.outer_face[crossed[::-1][where[1:] - 1]],
-        length=length_of(points),
-        error_bound=bound,
-        steps=None,
-        _location_faces=faces[where],
-        _location_weights=weights[where],
-        _location_vertices=vertices[where],
-    )
+    between = mesh.topology.outer_face[crossed[::-1][where[1:] - 1]]
+    return Locations(faces[where], weights[where], vertices[where], points[where]), between
+
+
+def rounding_of(mesh: TriangleMesh, distance: float) -> float:
+    """Return how much the length of a path may differ from a distance by rounding, mesh units."""
+    return PATH_LENGTH * distance + ROUNDED_POSITION * mesh.diagonal
 
 
 def length_of(points: Floats) -> float:

@@ -80,7 +80,7 @@ def with_target(
         replace(
             nodes,
             points=(*nodes.points, point),
-            positions=np.vstack([nodes.positions, mesh.position(point)]),
+            positions=np.vstack([nodes.positions, mesh.position_from_origin(point)]),
         ),
         node,
     )
@@ -150,10 +150,10 @@ def _within_face(
     mesh: TriangleMesh, sources: Sequence[SurfacePoint], starts: Floats, point: SurfacePoint
 ) -> float:
     """Return the length of the straight path to the nearest source in the face of a point."""
-    position = mesh.position(point)
+    position = mesh.position_from_origin(point)
     return min(
         (
-            start + float(np.linalg.norm(mesh.position(source) - position))
+            start + float(np.linalg.norm(mesh.position_from_origin(source) - position))
             for source, start in zip(sources, starts.tolist(), strict=True)
             if source.face_index == point.face_index
         ),

@@ -67,7 +67,7 @@ class Nodes:
     points: tuple[SurfacePoint, ...]
     """Points that became sites, in the order of their nodes"""
     positions: Floats
-    """(sites, 3), mesh units"""
+    """(sites, 3), mesh units from the mesh's origin"""
     segments: tuple[SegmentInFace, ...]
     """Segments of curves, in the order of their nodes, each in one of its faces"""
     first_segment: int
@@ -203,7 +203,7 @@ def nodes_of(
         ),
         first_target=first_target,
         points=tuple(sited),
-        positions=np.array([mesh.position(point) for point in sited]).reshape(-1, 3),
+        positions=np.array([mesh.position_from_origin(p) for p in sited]).reshape(-1, 3),
         segments=tuple(parts[0] for _, parts in segments),
         first_segment=first_segment,
         components=tuple({component_of(mesh, line[0]) for line in sources}),
@@ -290,6 +290,6 @@ def corners_of(mesh: TriangleMesh, point: SurfacePoint) -> tuple[Ints, Floats]:
     inner = mesh.topology.inner_vertex
     if point.vertex_index is not None:
         return inner[[point.vertex_index]], np.zeros(1)
-    corners = mesh.faces[point.face_index]
-    away = mesh.vertices[corners] - mesh.position(point)
-    return inner[corners], np.linalg.norm(away, axis=1)
+    corners = inner[mesh.faces[point.face_index]]
+    away = mesh.topology.positions[corners] - mesh.position_from_origin(point)
+    return corners, np.linalg.norm(away, axis=1)

@@ -118,7 +118,8 @@ def segments_of(mesh: TriangleMesh, polyline: Polyline) -> list[list[SegmentInFa
     """
     segments = []
     for start, end in pairwise(polyline):
-        if not np.array_equal(mesh.position(start), mesh.position(end)):
+        places = mesh.position_from_origin(start), mesh.position_from_origin(end)
+        if not np.array_equal(*places):
             at_start, at_end = weights_by_face(mesh, start), weights_by_face(mesh, end)
             shared = [face for face in at_start if face in at_end]
             segments.append([SegmentInFace(face, at_start[face], at_end[face]) for face in shared])
@@ -147,7 +148,7 @@ def weights_by_face(mesh: TriangleMesh, point: SurfacePoint) -> dict[int, Weight
 
 
 def foot_on(mesh: TriangleMesh, segment: SegmentInFace, position: Floats) -> SurfacePoint:
-    """Return the canonical point of a segment that is nearest to a position."""
+    """Return the canonical point of a segment that is nearest to a position, from the origin."""
     inner = mesh.topology.links[3 * segment.face : 3 * segment.face + 3, TAIL]
     start, end = (
         (np.array(weights)[:, None] * mesh.topology.positions[inner]).sum(axis=0)

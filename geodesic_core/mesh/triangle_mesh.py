@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 from geodesic_core.kernels.mesh import build
-from geodesic_core.kernels.mesh.half_edges import Topology
+from geodesic_core.kernels.mesh.half_edges import TAIL, Topology
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.mesh import canonical
 from geodesic_core.mesh.closest_point import NearestFace
@@ -30,7 +30,13 @@ from geodesic_core.mesh.validation import (
     check_corners,
     check_vertices,
 )
-from geodesic_core.tolerances import LARGEST_COORDINATE, SHORTEST_EDGE, SNAP, WEIGHT_ERROR
+from geodesic_core.tolerances import (
+    LARGEST_COORDINATE,
+    ROUNDED_COORDINATE,
+    SHORTEST_EDGE,
+    SNAP,
+    WEIGHT_ERROR,
+)
 from geodesic_core.validation import as_barriers, as_limit, is_number
 
 Merge = Literal["none", "exact"]
@@ -148,7 +154,7 @@ class TriangleMesh:
         elif merge != "none":
             raise InvalidArgument(f"merge is {merge!r}; it must be 'none' or 'exact'")
         faces = triangles.astype(np.int32)
-        topology = _prepare(points, faces, np.arange(len(faces)))
+        topology = _prepare(points - _origin_of(points, faces), faces, np.arange(len(faces)))
         self._hold(points, faces, vertex_map, face_map, topology, notes)
 
     def _hold(
@@ -270,8 +276,7 @@ class TriangleMesh:
         if (self.inner_face[free] < 0).all():
             raise InvalidArgument("the barriers block every face: there is no surface left")
         mesh = TriangleMesh.__new__(TriangleMesh)
-        # A copy of the vertices: kernels that prepare are compiled for arrays that can be written.
-        topology = _prepare(np.array(self.vertices), self.faces, free)
+        topology = _prepare(self.vertices - self.origin, self.faces, free)
         mesh._hold(self.vertices, self.faces, self.vertex_map, self.face_map, topology, self._notes)
         return mesh
 
@@ -303,13 +308,21 @@ class TriangleMesh:
         return inner
 
     @cached_property
+    def origin(self) -> Floats:
+        """(3,) mesh units: what the topology's positions are measured from, see `_origin_of`."""
+        v = self.topology.links[0, TAIL]  # a vertex of the surface: both differences are exact
+        origin: Floats = self.vertices[self.topology.outer_vertex[v]] - self.topology.positions[v]
+        return origin
+
+    @cached_property
     def diagonal(self) -> float:
         """Length of the bounding box's diagonal, mesh units."""
-        return float(np.linalg.norm(self.vertices.max(axis=0) - self.vertices.min(axis=0)))
+        return float(np.linalg.norm([axis.max() - axis.min() for axis in self.vertices.T]))
 
     @cached_property
     def _nearest_face(self) -> NearestFace:
-        return NearestFace(self.vertices, self.faces, np.flatnonzero(self.inner_face >= 0))
+        surface = np.flatnonzero(self.inner_face >= 0)
+        return NearestFace(self.vertices - self.origin, self.faces, surface)
 
     def locate(self, position: ArrayLike, max_distance: float | None = None) -> SurfacePoint:
         """Return the point of the surface nearest to a position.
@@ -358,13 +371,16 @@ class TriangleMesh:
                 f"{LARGEST_COORDINATE:g} in size"
             )
         limit = as_limit(max_distance)
-        face, point, distance = self._nearest_face(wanted)
+        face, point, distance = self._nearest_face(wanted - self.origin)
         if distance > limit:
             raise InvalidPoint(
                 f"the nearest point of the surface is {distance:g} away from {wanted.tolist()}, "
                 f"which is more than max_distance = {limit:g}"
             )
-        weights = canonical.weights_of(point, self.vertices[self.faces[face]], SNAP * self.diagonal)
+        corners = self.vertices[self.faces[face]] - self.origin
+        largest = float(np.abs(point + self.origin).max())
+        snap = max(SNAP * self.diagonal, ROUNDED_COORDINATE * largest)
+        weights = canonical.weights_of(point, corners, snap)
         return self._point_in_face(face, weights, "position")
 
     def point(self, point: int | SurfacePoint, name: str = "point") -> SurfacePoint:
@@ -488,16 +504,41 @@ class TriangleMesh:
         if isinstance(point, SurfacePoint) and point.vertex_index is None:
             point = self.point(point)
             if point.vertex_index is None:
-                return self._position_in_face(point)
+                return self.origin + self.position_from_origin(point)
         vertex: Any = point.vertex_index if isinstance(point, SurfacePoint) else point
         canonical.check_index(vertex, len(self.vertices), "vertex", "point")
         position: Floats = self.vertices[vertex]
         return position
 
-    def _position_in_face(self, point: SurfacePoint) -> Floats:
+    def position_from_origin(self, point: SurfacePoint) -> Floats:
+        """Return the position of a canonical point less `origin`.
+
+        Parameters
+        ----------
+        point
+            As `point` and `locate` return it.
+
+        Returns
+        -------
+        numpy.ndarray
+            (3,) float64, mesh units.
+
+        Examples
+        --------
+        >>> corners = [[5e6, 0.0, 0.0], [5e6 + 1.0, 0.0, 0.0], [5e6, 1.0, 0.0]]
+        >>> mesh = gc.TriangleMesh(corners, [[0, 1, 2]])
+
+        >>> mesh.position_from_origin(mesh.point_on_edge(0, 1, 0.25)).tolist()
+        [0.25, 0.0, 0.0]
+        """
+        position: Floats
+        if point.vertex_index is not None:
+            position = self.vertices[point.vertex_index] - self.origin
+            return position
         # Not a matrix product, whose last bit depends on where its arrays lie in memory.
         weights = np.array(point.barycentric)[:, None]
-        position: Floats = (weights * self.vertices[self.faces[point.face_index]]).sum(axis=0)
+        corners = self.vertices[self.faces[point.face_index]] - self.origin
+        position = (weights * corners).sum(axis=0)
         return position
 
     @cached_property
@@ -533,8 +574,25 @@ def _frozen(array: NDArray[Any]) -> NDArray[Any]:
     return frozen
 
 
+def _origin_of(vertices: Floats, faces: Ints) -> Floats:
+    """Return (3,) what to measure positions from, so that they round by the size of the mesh.
+
+    Coordinates of a georeferenced mesh are many times larger than the mesh, and what is computed
+    from them rounds by their size. Where those of the faces differ by a factor of two at most, the
+    least can be subtracted from all: such differences are exact (Sterbenz's lemma). Elsewhere the
+    origin is 0, as no coordinate is larger than twice the mesh.
+    """
+    used = np.zeros(len(vertices), np.bool_)
+    used[faces] = True
+    # Axis by axis: numpy's own reduction of an (V, 3) array takes ten times as long.
+    low = np.array([axis.min(where=used, initial=np.inf) for axis in vertices.T])
+    high = np.array([axis.max(where=used, initial=-np.inf) for axis in vertices.T])
+    origin: Floats = np.where((high <= 2.0 * low) | (low >= 2.0 * high), low, 0.0)
+    return origin
+
+
 def _prepare(vertices: Floats, faces: Ints, free: Longs) -> Topology:
-    """Return the topology of the faces that are not blocked."""
+    """Return the topology of the faces that are not blocked; ``vertices`` less the origin."""
     topology, outcome, bad = _built(vertices, faces, free)
     if outcome == Outcome.TOO_SHORT:
         joined = lowest_joined(len(vertices), edges_of_no_length(vertices, faces[free]))

@@ -29,7 +29,14 @@ from geodesic_core.errors import (
     NoPath,
     NotConverged,
 )
-from geodesic_core.fields.path import EXACT, GeodesicPath, SearchStep, StepName, traced_path
+from geodesic_core.fields.path import (
+    EXACT,
+    GeodesicPath,
+    SearchStep,
+    StepName,
+    rounding_of,
+    traced_path,
+)
 from geodesic_core.fields.sources import Nodes, corners_of, nodes_of
 from geodesic_core.fields.sweep import sweep_nodes, winners_of
 from geodesic_core.kernels.mesh.half_edges import LENGTH
@@ -55,7 +62,7 @@ from geodesic_core.kernels.sweep.state import (
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.landmarks import Landmarks
-from geodesic_core.tolerances import PATH_LENGTH, SEARCH_SLACK, STRAIGHT
+from geodesic_core.tolerances import SEARCH_SLACK, STRAIGHT
 
 GUIDE_ERROR = 1e-3
 """Relative error of the sweep that guides the exact one (the paper's)."""
@@ -218,7 +225,7 @@ class PathSearch:
             raise leg.missed("by the exact sweep", upper)
         leg.log.add("exact", distance, wave)
         path = traced_path(self.mesh, winners_of(wave, self._nearest), nodes, node, EXACT)
-        if abs(path.length - distance) > PATH_LENGTH * distance:
+        if abs(path.length - distance) > rounding_of(self.mesh, distance):
             raise leg.lost(f"by backtracing, at {path.length} for {distance},")
         leg.log.add("path", distance)
         return path
@@ -239,7 +246,7 @@ class _End:
 
     def __init__(self, mesh: TriangleMesh, point: SurfacePoint) -> None:
         self.point = point
-        self.position: Floats = np.array(mesh.position(point))
+        self.position: Floats = mesh.position_from_origin(point)
         self.corners, self.reaches = corners_of(mesh, point)
 
     @property

@@ -262,6 +262,32 @@ def test_path_writes_a_polyline_and_json(run: Run, plane: Path) -> None:
     assert len(answer["locations"]) == len(points)
 
 
+def test_a_georeferenced_mesh_is_answered_where_it_lies(run: Run) -> None:
+    """A path goes by way of its own points, given by the positions that it was told with."""
+    vertices, faces = gc.samples.terrain(800)
+    moved = 0.005 * vertices + (3e6, 6.4e6, 100.0)
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in moved.tolist()]
+    rows += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+    Path("geo.obj").write_text("\n".join(rows))
+    ends = ["--source", 0, "--target", len(vertices) - 1]
+    rounding = np.spacing(6.4e6)
+
+    assert run("info", "geo.obj").figure("bounds") == (
+        f"{tuple(moved.min(axis=0).tolist())} to {tuple(moved.max(axis=0).tolist())}"
+    )
+    assert run("path", "geo.obj", *ends, "--out", "p.json").code == 0
+    path = json.loads(Path("p.json").read_text())
+    assert path["points"][0] == moved[0].tolist()
+    assert path["points"][-1] == moved[-1].tolist()
+    middle = ",".join(map(repr, path["points"][len(path["points"]) // 2]))
+    assert run("path", "geo.obj", *ends, "--via", f"p{middle}", "--out", "via.json").code == 0
+    by_way = json.loads(Path("via.json").read_text())
+    assert by_way["length"] == pytest.approx(path["length"], abs=4 * rounding)
+    assert by_way["waypoints"][0]["barycentric"].count(0.0) == 1  # an edge, not beside it
+    located = run("locate", "geo.obj", "--at", middle)
+    assert float(located.figure("distance")) <= 2 * rounding
+
+
 def test_a_path_by_way_of_others_tells_its_steps(run: Run, plane: Path) -> None:
     ends = ["--source", 0, "--target", 115]
     expected = gc.shortest_path(gc.load_mesh(plane), 0, 115, [60, 7], explain=True)

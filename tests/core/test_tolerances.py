@@ -64,7 +64,6 @@ from geodesic_core.tolerances import (
     EDGE_STEPS,
     FALSE_POSITION_STEPS,
     FLAT,
-    FOOT,
     FORKS,
     GAP,
     GRAZING,
@@ -79,6 +78,8 @@ from geodesic_core.tolerances import (
     OVERLAP,
     PASSES,
     PATH_LENGTH,
+    ROUNDED_COORDINATE,
+    ROUNDED_POSITION,
     RUNS,
     SADDLE_EXCESS,
     SAME_PLACE,
@@ -460,14 +461,14 @@ def test_path_length_is_the_most_that_a_path_may_differ_from_its_field(scale, si
 
 
 @SCALES
-def test_foot_is_all_that_a_path_from_a_curve_may_be_off(scale):
+def test_rounded_position_is_all_that_a_path_from_a_curve_may_be_off(scale):
     places = scale * np.array([[2.0, 0.0, 0.0], [1.0, 2.0, 2.0], [1.0, 1.0, 1.0], [0.0, 2.0, 2.0]])
     mesh = gc.TriangleMesh(places, [[0, 2, 3], [3, 1, 2]])  # vertex 2 lies on the edge of 0 and 3
     field, node = gc.exact_distance(mesh, gc.Curve([3, 0])), mesh.topology.inner_vertex[2]
-    assert field.path_to(2).length <= FOOT * mesh.diagonal
-    field._result.distance[node] = 0.5 * FOOT * mesh.diagonal
+    assert field.path_to(2).length <= ROUNDED_POSITION * mesh.diagonal
+    field._result.distance[node] = 0.5 * ROUNDED_POSITION * mesh.diagonal
     field.path_to(2)
-    field._result.distance[node] = 2.0 * FOOT * mesh.diagonal
+    field._result.distance[node] = 2.0 * ROUNDED_POSITION * mesh.diagonal
     with pytest.raises(gc.errors.InternalError, match="the field says"):
         field.path_to(2)
 
@@ -788,6 +789,18 @@ def test_snap_is_how_near_a_position_must_be(scale, share, snaps):
     away = share * SNAP * mesh.diagonal
     inward = away * (c - 0.5 * (a + b)) / np.linalg.norm(c - 0.5 * (a + b))
     assert carrier(mesh, mesh.locate(0.6 * a + 0.4 * b + inward)) == (2 if snaps else 3)
+    along = away * (b - a) / np.linalg.norm(b - a)
+    assert carrier(mesh, mesh.locate(a + along)) == (1 if snaps else 2)
+
+
+@SCALES
+@pytest.mark.parametrize(("share", "snaps"), [(0.5, True), (3.0, False)])
+def test_rounded_coordinate_is_how_near_a_position_far_from_zero_must_be(scale, share, snaps):
+    mesh = gc.TriangleMesh(scale * (np.eye(3)[[2, 0, 1]] + 5e6), [[0, 1, 2]])
+    a, b, c = mesh.vertices
+    away = share * ROUNDED_COORDINATE * np.abs(mesh.vertices).max()
+    inward = away * (c - 0.5 * (a + b)) / np.linalg.norm(c - 0.5 * (a + b))
+    assert carrier(mesh, mesh.locate(0.5 * a + 0.5 * b + inward)) == (2 if snaps else 3)
     along = away * (b - a) / np.linalg.norm(b - a)
     assert carrier(mesh, mesh.locate(a + along)) == (1 if snaps else 2)
 

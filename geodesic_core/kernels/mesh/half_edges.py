@@ -66,7 +66,7 @@ class Topology(NamedTuple):
     """Connectivity and flat geometry of a mesh, in inner numbering; read-only once built."""
 
     positions: Floats
-    """(V, 3): the vertices, mesh units"""
+    """(V, 3): the vertices, mesh units from the mesh's origin"""
     geometry: Floats
     """(3F, 8): LENGTH … APEX_ANGLE"""
     links: Ints

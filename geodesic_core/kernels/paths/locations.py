@@ -17,7 +17,7 @@ class Locations(NamedTuple):
     vertices: Longs
     """(N,): the vertex, or -1"""
     points: Floats
-    """(N, 3): positions, mesh units"""
+    """(N, 3): positions, mesh units from the mesh's origin"""
 
 
 @kernel
