@@ -4,8 +4,6 @@ import math
 import time
 from collections.abc import Callable
 
-import numpy as np
-
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import SLICE_SECONDS, Control
 from geodesic_core.fields.sources import Nodes

@@ -544,7 +544,8 @@ def test_runs_are_more_than_winding_about_a_tip_takes():
     assert 1.5 * 2 * math.pi / SHARP < RUNS < counted
 
 
-def test_a_sweep_whose_runs_are_used_up_begins_anew_exactly(worn_out):
+@pytest.mark.usefixtures("worn_out")
+def test_a_sweep_whose_runs_are_used_up_begins_anew_exactly():
     """With all that was asked for: paths, windows, targets, curves; progress does not go back."""
     mesh = gc.TriangleMesh(*gc.samples.knot(500))
     sources = [3, gc.SurfacePoint.face(50, (0.2, 0.3, 0.5)), gc.Curve(mesh.faces[100, :2].tolist())]
@@ -562,12 +563,14 @@ def test_a_sweep_whose_runs_are_used_up_begins_anew_exactly(worn_out):
         path, expected = found.path_to(end), exact.path_to(end)
         np.testing.assert_array_equal(path.points, expected.points)
         assert path.error_bound.value < 1e-12
-    for levels in zip(found.isolines(found.levels(3)), exact.isolines(exact.levels(3)), strict=True):
-        for line, expected in zip(*levels, strict=True):
-            np.testing.assert_array_equal(line.points, expected.points)
+    levels = exact.levels(3)
+    for lines, others in zip(found.isolines(levels), exact.isolines(levels), strict=True):
+        for line, other in zip(lines, others, strict=True):
+            np.testing.assert_array_equal(line.points, other.points)
 
 
-def test_searches_whose_runs_are_used_up_find_the_shortest_path(worn_out):
+@pytest.mark.usefixtures("worn_out")
+def test_searches_whose_runs_are_used_up_find_the_shortest_path():
     mesh = gc.TriangleMesh(*gc.samples.knot(500))
     exact = gc.exact_distance(mesh, 3)
     solver = gc.Solver(mesh)

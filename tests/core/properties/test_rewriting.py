@@ -1,6 +1,5 @@
 """However a surface is written, the distances on it are the same: of vertices and of points."""
 
-
 import numpy as np
 import pytest
 from hypothesis import given
