@@ -222,11 +222,6 @@ def _over_memory(error: core.MemoryLimitExceeded) -> Problem:
     return over_limit("memory_limit", what, error.needed, limit, "query_memory_bytes").problem
 
 
-def _not_converged(error: core.NotConverged) -> Problem:
-    hint = "ask for a smaller relative_error or absolute_error, or for method exact"
-    return Problem("limit_exceeded", str(error), hint=hint)
-
-
 def _system_error(error: OSError) -> Problem:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return _DISK_FULL
@@ -261,7 +256,6 @@ EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (core.InvalidArgument, lambda error: Problem("invalid_request", str(error))),
     (core.DeadlineExceeded, lambda error: Problem("deadline_exceeded", str(error))),
     (core.MemoryLimitExceeded, _over_memory),
-    (core.NotConverged, _not_converged),
     (core.InternalError, lambda error: Problem("internal_error", str(error))),
     (MemoryError, lambda _: Problem("memory_limit", "the worker ran out of memory")),
     (OSError, _system_error),

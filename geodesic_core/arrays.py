@@ -10,6 +10,7 @@ Singles: TypeAlias = NDArray[np.float32]
 Ints: TypeAlias = NDArray[np.int32]
 Longs: TypeAlias = NDArray[np.int64]
 Flags: TypeAlias = NDArray[np.uint8]
+Counts: TypeAlias = NDArray[np.uint16]
 
 CACHE_LINE = 64  # bytes
 

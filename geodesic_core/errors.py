@@ -11,7 +11,6 @@ They form a tree::
     ├── Cancelled               the caller asked the sweep to stop
     ├── DeadlineExceeded        the time the caller granted is over
     ├── MemoryLimitExceeded     the memory the caller granted does not suffice
-    ├── NotConverged            an approximate sweep went in circles
     ├── MissingExtra            a package is not installed that few calls need; an ImportError too
     └── InternalError           a broken invariant: a defect of this library, please report it
 """
@@ -186,16 +185,6 @@ class MemoryLimitExceeded(GeodesicError):  # noqa: N818
         super().__init__(f"the call needs {needed} bytes or more; memory_limit is {memory_limit}")
         self.needed = needed
         self.memory_limit = memory_limit
-
-
-class NotConverged(GeodesicError):  # noqa: N818
-    """An approximate sweep that propagated the windows of one edge too often, and gave up.
-
-    Examples
-    --------
-    >>> issubclass(gc.errors.NotConverged, gc.GeodesicError)
-    True
-    """
 
 
 class MissingExtra(GeodesicError, ImportError):  # noqa: N818

@@ -155,8 +155,6 @@ def approximate_distance(
 
     Raises
     ------
-    NotConverged
-        The windows of an edge came up too often; not seen yet. A smaller error would help.
     InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `exact_distance`.
 
@@ -369,8 +367,7 @@ class Solver:
 
         Raises
         ------
-        NotConverged, InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded,
-        MemoryLimitExceeded
+        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As in the function.
 
         Examples

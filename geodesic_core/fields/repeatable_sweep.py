@@ -163,7 +163,7 @@ class RepeatableSweep:
 
         Raises
         ------
-        Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As in `run_sweep`; the memory of `face_windows_of` counts as well.
         """
         mesh, limit, merges = self.mesh, self.bounds.max_distance, bool(self.bounds.merging)

@@ -4,20 +4,15 @@ import math
 import time
 from collections.abc import Callable
 
-import numpy as np
-
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import SLICE_SECONDS, Control
-from geodesic_core.errors import NotConverged
 from geodesic_core.fields.sources import Nodes
-from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep import continuous_dijkstra, state, surface_points
-from geodesic_core.kernels.sweep.bounds import Bounds
-from geodesic_core.kernels.sweep.state import Wavefront
+from geodesic_core.kernels.sweep import continuous_dijkstra, pruning, state, surface_points
+from geodesic_core.kernels.sweep.bounds import Bounds, without_merging
+from geodesic_core.kernels.sweep.state import PREDECESSOR, Wavefront
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import RUNS
 
 _FIRST_BUDGET = 1_000_000
 
@@ -48,20 +43,37 @@ def sweep_nodes(
 ) -> Wavefront:
     """Start a sweep at the sources of ``nodes``, run it to its end, and reach its targets.
 
+    A merging sweep in which a list comes up more than `RUNS` times begins anew and merges nothing:
+    exact distances are within every error, and an exact sweep always ends.
+
     Raises
     ------
-    Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `run_sweep`.
     """
-    topology = mesh.topology
-    continuous_dijkstra.start_sweep(
-        topology, wave, nodes.sources, nodes.source_indices, start_distances, bounds
-    )
-    if not nodes.has_site_targets:
-        return run_sweep(mesh, wave, bounds, control, share_done, limit_of)
-    surface_points.watch_sites(wave.sites.ints, wave.pool.lists, nodes.first_target)
-    wave = run_sweep(mesh, wave, bounds, control, share_done, limit_of)
-    surface_points.reach_sites_inside(topology, wave, bounds, nodes.first_target)
+    topology, shown = mesh.topology, 0.0
+
+    def share(wave: Wavefront) -> float:
+        nonlocal shown
+        shown = max(shown, share_done(wave))
+        return shown
+
+    def sweep(wave: Wavefront, bounds: Bounds) -> tuple[Wavefront, Outcome]:
+        continuous_dijkstra.start_sweep(
+            topology, wave, nodes.sources, nodes.source_indices, start_distances, bounds
+        )
+        if nodes.has_site_targets:
+            surface_points.watch_sites(wave.sites.ints, wave.pool.lists, nodes.first_target)
+        wave, outcome = run_sweep(mesh, wave, bounds, control, share, limit_of)
+        if nodes.has_site_targets and outcome == Outcome.FINISHED:
+            surface_points.reach_sites_inside(topology, wave, bounds, nodes.first_target)
+        return wave, outcome
+
+    wave, outcome = sweep(wave, bounds)
+    if outcome == Outcome.RUNAWAY:
+        pruning.forget(topology, wave)
+        wave, _ = sweep(wave, without_merging(bounds))
+        wave.vertices.reference[:] = -1 - wave.vertices.winner_ints[:, PREDECESSOR]
     return wave
 
 
@@ -72,8 +84,10 @@ def run_sweep(
     control: Control,
     share_done: Callable[[Wavefront], float],
     limit_of: Callable[[Wavefront], float] | None = None,
-) -> Wavefront:
+) -> tuple[Wavefront, Outcome]:
     """Run a sweep that has started to its end; return its state, which may have grown.
+
+    Return also whether it FINISHED or is a RUNAWAY, as only a merging sweep can be.
 
     ``share_done`` tells how much of the call is done. ``limit_of`` tells, from what is known so
     far, how far the sweep still has to look: never farther than ``bounds``. It is asked after fixed
@@ -83,19 +97,14 @@ def run_sweep(
     ------
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
-    NotConverged
-        The windows of an edge came up too often.
     """
     budget = _FIRST_BUDGET if limit_of is None else _FIRST_LIMITED_BUDGET
-    left, shown, outcome = budget, 0.0, Outcome.RUNNING
-    while outcome != Outcome.FINISHED:
-        shown = max(shown, share_done(wave))
-        control.checkpoint(shown)
+    left, outcome = budget, Outcome.RUNNING
+    while outcome not in (Outcome.FINISHED, Outcome.RUNAWAY):
+        control.checkpoint(share_done(wave))
         began = time.perf_counter()
         outcome = continuous_dijkstra.advance(mesh.topology, wave, bounds, left)
         took = time.perf_counter() - began
-        if outcome == Outcome.RUNAWAY:
-            raise _not_converged(mesh, wave)
         if outcome in _GROW:
             left -= int(wave.counters[state.WORK])  # slices do not depend on the room there was
             wave = _GROW[outcome](wave)
@@ -108,7 +117,7 @@ def run_sweep(
         elif outcome == Outcome.RUNNING:
             budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
         left = budget
-    return wave
+    return wave, Outcome(outcome)
 
 
 def winners_of(wave: Wavefront, nearest: Ints) -> Winners:
@@ -126,16 +135,6 @@ def winners_of(wave: Wavefront, nearest: Ints) -> Winners:
         site_weights=wave.sites.weights,
         piece_ints=wave.sites.segment_ints,
         piece_ends=wave.sites.segment_ends,
-    )
-
-
-def _not_converged(mesh: TriangleMesh, wave: Wavefront) -> NotConverged:
-    half_edge = int(np.argmax(wave.pool.runs))
-    ends = mesh.topology.links[half_edge, [TAIL, HEAD]]
-    u, v = mesh.topology.outer_vertex[ends]
-    return NotConverged(
-        f"the windows of the edge between vertices {u} and {v} came up more than {RUNS} times; "
-        f"ask for a smaller error, or for exact distances"
     )
 
 

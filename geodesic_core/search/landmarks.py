@@ -9,8 +9,9 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Singles, aligned_rows
 from geodesic_core.control import Control
-from geodesic_core.fields.sweep import run_sweep
-from geodesic_core.kernels.sweep import continuous_dijkstra, state
+from geodesic_core.fields.sources import nodes_of
+from geodesic_core.fields.sweep import sweep_nodes
+from geodesic_core.kernels.sweep import state
 from geodesic_core.kernels.sweep.bounds import (
     LANDMARKS,
     PruningBounds,
@@ -70,11 +71,8 @@ class Landmarks:
         bounds = merging_bounds(math.inf, LANDMARK_ERROR, math.inf)
         wave = state.new_wavefront(topology, merges=True)
         control.check_memory(state.bytes_of(wave))
-        start = np.array([chosen], np.int32)
-        continuous_dijkstra.start_sweep(
-            topology, wave, start, np.zeros(1, np.int32), np.zeros(1), bounds
-        )
-        wave = run_sweep(mesh, wave, bounds, control, lambda _: 1.0)
+        nodes = nodes_of(mesh, [(mesh.point(int(topology.outer_vertex[chosen])),)], [])
+        wave = sweep_nodes(mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: 1.0)
         if self.count == 0:
             self.distances = aligned_rows(len(mesh.vertices), LANDMARKS, np.float32)
         self.distances[:, self.count] = _in_single_precision(wave.vertices.distance)

@@ -27,7 +27,6 @@ from geodesic_core.errors import (
     InternalError,
     MemoryLimitExceeded,
     NoPath,
-    NotConverged,
 )
 from geodesic_core.fields.path import (
     EXACT,
@@ -122,9 +121,9 @@ class PathSearch:
         ends = _End(self.mesh, source), _End(self.mesh, target)
         try:
             return self._search(_Leg(*ends, limit, SEARCH_SLACK, control, _Log(self, explain)))
-        except (InternalError, NotConverged):
+        except InternalError:
             # Rounding on slivers can exceed any slack; without bounds there is nothing to lose.
-            # Where many faces lie near each other, merging may go in circles, or its path be lost.
+            # Where many faces lie near each other, the path of the merging sweep may be lost.
             return self._search(_Leg(*ends, limit, math.inf, control, _Log(self, explain)))
 
     def _search(self, leg: "_Leg") -> GeodesicPath:
@@ -154,7 +153,7 @@ class PathSearch:
         count = self._landmarks.count
         due = self._touched >= (count + 1) * len(self.mesh.vertices)
         if due and count < LANDMARKS:
-            with suppress(Cancelled, DeadlineExceeded, MemoryLimitExceeded, NotConverged):
+            with suppress(Cancelled, DeadlineExceeded, MemoryLimitExceeded):
                 corners, _ = corners_of(self.mesh, beside)
                 self._landmarks.add(int(corners[0]), control.holding(self.nbytes))
 

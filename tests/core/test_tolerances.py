@@ -526,20 +526,65 @@ def test_lower_bound_is_all_that_a_merged_window_rises_by(s0x, s0y, s1x, s1y, jo
         assert (before - after <= xi + 1e-12).all()
 
 
-def test_runs_are_all_that_a_list_is_given(monkeypatch):
-    """One list that has used them up ends the sweep, and the error names its edge."""
-    points, faces = zoo.grid(4, 4)
-    mesh = gc.TriangleMesh(points, faces)
+@pytest.fixture
+def worn_out(monkeypatch):
+    """Every list of a merging sweep has used up its runs."""
 
-    def worn_out(*args, **kwargs):
+    def new_worn_out_wavefront(*args, **kwargs):
         wave = new_wavefront(*args, **kwargs)
         wave.pool.runs[:] = RUNS
         return wave
 
-    gc.approximate_distance(mesh, 0)
-    monkeypatch.setattr(state, "new_wavefront", worn_out)
-    with pytest.raises(gc.errors.NotConverged, match=r"edge between vertices \d+ and \d+"):
-        gc.approximate_distance(mesh, 0)
+    monkeypatch.setattr(state, "new_wavefront", new_worn_out_wavefront)
+
+
+def test_runs_are_more_than_winding_about_a_tip_takes():
+    """The sharpest tip without a crossing history: half as often again, and it can be counted."""
+    topology = topology_of(zoo.Case("flat", *zoo.grid(2, 2)))
+    counted = np.iinfo(new_wavefront(topology, merges=True).pool.runs.dtype).max
+    assert 1.5 * 2 * math.pi / SHARP < RUNS < counted
+
+
+@pytest.mark.usefixtures("worn_out")
+def test_a_sweep_whose_runs_are_used_up_begins_anew_exactly():
+    """With all that was asked for: paths, windows, targets, curves; progress does not go back."""
+    mesh = gc.TriangleMesh(*gc.samples.knot(500))
+    sources = [3, gc.SurfacePoint.face(50, (0.2, 0.3, 0.5)), gc.Curve(mesh.faces[100, :2].tolist())]
+    target = gc.SurfacePoint.face(200, (0.5, 0.25, 0.25))
+    shares = []
+    found = gc.approximate_distance(
+        mesh, sources, 1e-3, targets=[target], retain="windows", progress=shares.append
+    )
+    exact = gc.exact_distance(mesh, sources, targets=[target], retain="windows")
+    assert shares == sorted(shares)
+    assert found.distances.tobytes() == exact.distances.tobytes()
+    assert found.nearest_source.tobytes() == exact.nearest_source.tobytes()
+    assert found.distance_at(target) == exact.distance_at(target)
+    for end in (target, 17, 200):
+        path, expected = found.path_to(end), exact.path_to(end)
+        np.testing.assert_array_equal(path.points, expected.points)
+        assert path.error_bound.value < 1e-12
+    levels = exact.levels(3)
+    for lines, others in zip(found.isolines(levels), exact.isolines(levels), strict=True):
+        for line, other in zip(lines, others, strict=True):
+            np.testing.assert_array_equal(line.points, other.points)
+
+
+@pytest.mark.usefixtures("worn_out")
+def test_searches_whose_runs_are_used_up_find_the_shortest_path():
+    mesh = gc.TriangleMesh(*gc.samples.knot(500))
+    exact = gc.exact_distance(mesh, 3)
+    solver = gc.Solver(mesh)
+    for target in [*range(10, 250, 24), 10]:
+        assert solver.shortest_path(3, target).length == pytest.approx(
+            exact.distances[target], rel=1e-12
+        )
+    landmarks = Landmarks(mesh)
+    landmarks.add(0, Control())
+    stored = landmarks.distances[:, 0]
+    place = int(mesh.topology.outer_vertex[stored.argmin()])
+    expected = gc.exact_distance(mesh, place).distances[mesh.topology.outer_vertex]
+    np.testing.assert_allclose(stored, expected, rtol=1e-7)
 
 
 def test_widest_error_is_the_most_that_is_used():
@@ -609,7 +654,8 @@ def sought(mesh, source, target, exact, limit) -> float:
     continuous_dijkstra.start_sweep(
         topology, wave, np.array([start], np.int32), np.zeros(1, np.int32), np.zeros(1), bounds
     )
-    return float(run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0).vertices.distance[end])
+    wave, _ = run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0)
+    return float(wave.vertices.distance[end])
 
 
 SEARCHED = {

@@ -89,6 +89,11 @@ def merging_bounds(
     return Bounds(max_distance, relative_error, absolute_error, (1,), pruning, (), 0)
 
 
+def without_merging(bounds: Bounds) -> Bounds:
+    """Return the bounds of the same sweep, exactly."""
+    return bounds._replace(merging=())
+
+
 def with_parallel_windows(bounds: Bounds, first_segment: int) -> Bounds:
     """Return the bounds of the same sweep from curves whose segments are the nodes from there."""
     return bounds._replace(parallel=(1,), first_segment=first_segment)

@@ -11,6 +11,12 @@ Elsewhere no shortest path goes with it, into any face. Let p, an earlier one, b
 the faces beyond, p goes as well; into the face that it came from leads a straighter way than over
 x; and what bends at an end of the edge that end emits, for it emits all around.
 
+In a merging sweep distances fall short, by up to ξ. A window is dropped where earlier ones are as
+near at each of its points: a path that it follows goes on with one of them. Of any other window all
+is kept but what is surely longer, for between windows that share an edge there may be a wedge that
+neither lights (`trimming.leaves_gap`). With the second rule alone windows wound about a tip until
+they were longer by ξ, and doubled at every edge.
+
 A recorded window is in the frame that runs from the lower vertex of the edge to the higher.
 """
 
@@ -41,6 +47,18 @@ def trim_against_crossings(wave: Any, g: int, window: Window) -> tuple[bool, Win
 
     Return whether anything is left, and it. O(windows in the crossing history), mostly.
     """
+    passes, rest = nearest_part(wave, g, window, False)
+    if merging(wave) and passes:
+        passes, rest = nearest_part(wave, g, window, True)
+    return passes, rest
+
+
+@kernel
+def nearest_part(wave: Any, g: int, window: Window, surely: bool) -> tuple[bool, Window]:
+    """Return whether a window is nearest so far anywhere on the irregular edge of g, and that part.
+
+    With ``surely``, earlier windows count with the most that they may fall short by.
+    """
     mesh, vertices, pool = wave.mesh, wave.vertices, wave.pool
     length = mesh.geometry[ROW * g + LENGTH]
     tail, head = mesh.links[ROW * g + TAIL], mesh.links[ROW * g + HEAD]
@@ -59,7 +77,7 @@ def trim_against_crossings(wave: Any, g: int, window: Window) -> tuple[bool, Win
             earlier = load_window(wave, pool.windows, other)
             if tail < head:
                 earlier = reversed_window(earlier, length)
-            if merging(wave):
+            if merging(wave) and surely:
                 earlier = at_sigma(earlier, earlier.sigma + earlier.xi)
             window = cut_by(wave, window, earlier)
             other = as_ints(pool.windows)[INTS * other + NEXT]

@@ -25,6 +25,7 @@ from geodesic_core.kernels.sweep.state import (
     MARKS,
     NODE,
     PREDECESSOR,
+    RETAINED,
     SENT_AT,
     SENT_FROM,
     SENT_TO,
@@ -129,6 +130,8 @@ def may_pass(wave: Any, v: int) -> bool:
 def forget(topology: Any, wavefront: Any) -> None:
     """Reset the wavefront to its first state, in time proportional to the vertices touched.
 
+    What it is to retain stays marked.
+
     Modifies the wavefront.
     """
     pool, vertices, sites = wavefront.pool, wavefront.vertices, wavefront.sites
@@ -149,7 +152,8 @@ def forget(topology: Any, wavefront: Any) -> None:
             # Windows lie only on faces of vertices that were touched.
             face = topology.corners[c] // 3
             for h in range(3 * face, 3 * face + 3):
-                pool.lists[h, SIZE] = pool.lists[h, MARKS] = 0
+                pool.lists[h, SIZE] = 0
+                pool.lists[h, MARKS] &= RETAINED
                 if topology.flags[v] & (SEAM | PINCHED):
                     pool.crossings[h] = -1
                 if merges:
@@ -161,7 +165,11 @@ def forget(topology: Any, wavefront: Any) -> None:
         if merges:
             vertices.reference[node] = -1
         for h in range(3 * face, 3 * face + 3):
-            pool.lists[h, MARKS] = 0
+            pool.lists[h, MARKS] &= RETAINED
+    for k in range(len(sites.segment_ints)):
+        node = sites.segment_ints[k, NODE]
+        vertices.distance[node] = math.inf
+        vertices.winner_ints[node, ENTRY_EDGE] = vertices.winner_ints[node, PREDECESSOR] = -1
     for i in range(COUNTERS):
         wavefront.counters[i] = 0
     wavefront.counters[FREE_FIRST] = -1

@@ -69,7 +69,6 @@ def database_error(code: int) -> sqlite3.OperationalError:
         (core.InvalidArgument("bad"), "invalid_request"),
         (core.DeadlineExceeded("late"), "deadline_exceeded"),
         (core.MemoryLimitExceeded(9, 7), "memory_limit"),
-        (core.NotConverged("in circles"), "limit_exceeded"),
         (MemoryError(), "memory_limit"),
         (OSError(errno.ENOSPC, "full"), "storage_full"),
         (OSError(errno.EDQUOT, "no more for you"), "storage_full"),
@@ -108,13 +107,6 @@ def test_limits_are_named(error: Exception, setting: str) -> None:
     problem = problem_of(error)
 
     assert (problem.limit, problem.actual, problem.setting) == (7, 9, setting)
-
-
-def test_what_does_not_converge_says_what_to_do_about_it() -> None:
-    problem = problem_of(core.NotConverged("in circles"))
-
-    assert (problem.status, problem.detail) == (422, "in circles")
-    assert "smaller" in str(problem.hint)
 
 
 def test_problems_survive_the_pipe_of_a_worker() -> None:

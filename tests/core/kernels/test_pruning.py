@@ -135,7 +135,7 @@ def test_what_an_earlier_sweep_knows_bounds_the_rest(case, count):
                 np.zeros(1),
                 bounds,
             )
-            wave = run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0)
+            wave, _ = run_sweep(mesh, wave, bounds, Control(), lambda _: 0.0)
             view = view_toward(mesh, landmarks, start, known=wave.vertices.distance, ceiling=limit)
             rest = np.array([lower_bound_to_target(view, v) for v in range(len(exact))])
             assert (rest <= exact * (1 + ROUNDING)).all()
