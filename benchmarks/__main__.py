@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from benchmarks import approximate, exact, load, matrix, page, path, service, topology
+from benchmarks import approximate, attacks, exact, load, matrix, page, path, service, topology
 from benchmarks.inputs import Inputs
 from benchmarks.tables import write
 
@@ -19,6 +19,7 @@ BENCHMARKS = {
     "matrix": matrix.run,
     "service": service.run,
     "load": load.run,
+    "attacks": attacks.run,
     "large-answers": service.run_large,
     "page": page.run,
 }

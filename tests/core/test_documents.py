@@ -25,7 +25,7 @@ OBJECTS = ("field", "path", "solver", "mesh")
 """Whose attributes are named like functions of a module."""
 BUILT = ("app/web/dist",)
 """Folders that a build makes."""
-VARIABLES = ("NUMBA_", "GEODESIC_", "FORWARDED_", "HATCH_", "XDG_")
+VARIABLES = ("NUMBA_", "GEODESIC_", "OTEL_", "FORWARDED_", "HATCH_", "XDG_")
 """Beginnings of environment variables."""
 COLUMNS = ("ENTRY_EDGE",)
 """Of the state, which are no tolerances."""
@@ -51,6 +51,14 @@ def test_files_that_documents_name_are_there(document: str, name: str) -> None:
     if document != "CHANGELOG.md" and name not in BUILT:
         places = [ROOT / name, ROOT / "geodesic_core" / name]
         assert any(place.exists() or place.with_suffix(".py").exists() for place in places)
+
+
+def test_tests_that_documents_name_are_there() -> None:
+    sources = (path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
+    tests = {name for source in sources for name in re.findall(r"(?m)^def (test_\w+)", source)}
+    named = {name for _, name in texts(r"^test_\w+$")}
+    assert len(named) > 20
+    assert named <= tests
 
 
 @pytest.mark.parametrize(
