@@ -8,7 +8,10 @@ it at its first query, and have a copy of its own, which counts against its memo
 import multiprocessing
 from multiprocessing import forkserver
 
-LATE = "igl", "manifold3d", "scipy.sparse", "scipy.spatial", "trimesh.exchange.stl"
+LATE = (
+    *("filelock", "igl", "manifold3d", "scipy.sparse", "scipy.spatial"),
+    "trimesh.exchange.stl",
+)
 
 CONTEXT = multiprocessing.get_context("forkserver")
 CONTEXT.set_forkserver_preload(["app.engine.worker", *LATE])

@@ -41,7 +41,7 @@ def _header(meaning: str, schema: Mapping[str, Any] = _TEXT) -> dict[str, Any]:
 
 
 _HEADERS = {
-    "Accept-Ranges": _header("`bytes`: ranges of the answer can be requested"),
+    "Accept-Ranges": _header("`bytes` where ranges of the answer can be requested, else `none`"),
     "Cache-Control": _header("Caching of the answer: where, and for how long"),
     "ETag": _header("Names the content of the answer, in its format and coding"),
     "Last-Modified": _header("When the file of the answer was written"),

@@ -158,7 +158,9 @@ class StoredFileResponse(FileResponse):
             headers = [(name, value) for name, value in scope["headers"] if name != b"range"]
             # Beyond any file; Python reads no numbers of thousands of digits.
             ranges = re.sub("[0-9]{19,}", "9" * 18, ranges)
-            if _is_valid(ranges):  # RFC 9110 says to ignore others, where Starlette answers 400
+            # RFC 9110 says to ignore others, where Starlette answers 400. A part of a compressed
+            # body cannot be decoded.
+            if _is_valid(ranges) and "content-encoding" not in self.headers:
                 headers.append((b"range", ranges.encode()))
             scope = {**scope, "headers": headers}
         await super().__call__(scope, receive, send)
@@ -190,7 +192,8 @@ def result_response(
         Further headers, such as those of caching.
     """
     own = {"ETag": etag_of(result.key), **server_timing(seconds)}
-    headers = {"Accept-Ranges": "bytes", **result.manifest.headers, **own, **headers}
+    accepted = "none" if "Content-Encoding" in result.manifest.headers else "bytes"
+    headers = {"Accept-Ranges": accepted, **result.manifest.headers, **own, **headers}
     if result.body is None or "range" in request.headers:
         return _ResultFileResponse(result, media_type, store, headers)
     store.release(result)

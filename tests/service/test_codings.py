@@ -10,6 +10,7 @@ from starlette.testclient import TestClient
 from app.encoding import negotiate_coding
 from app.encoding.codings import zstd
 from tests.support.service import upload_sample
+from tests.support.waiting import wait_until
 
 
 @pytest.fixture(scope="module")
@@ -108,6 +109,20 @@ def test_ranges_are_those_of_the_plain_body(client: TestClient, link: str) -> No
     assert (whole.status_code, body) == (200, expected), "a part of another body is of no use"
     beyond, _ = get(client, link, "gzip", Range=f"bytes={len(expected)}-")
     assert beyond.status_code == 416
+
+
+def test_no_part_of_a_compressed_answer_of_a_job_is_sent(client: TestClient, knot: str) -> None:
+    """It could not be decoded; the coding was chosen when the job was submitted."""
+    sent = {"Accept-Encoding": "gzip", "Prefer": "respond-async"}
+    body = {"sources": [{"vertex": 3}]}
+    job = client.post(f"/v1/meshes/{knot}/distances", json=body, headers=sent).json()
+    wait_until(lambda: client.get(job["links"]["self"]).json()["status"] == "successful")
+    whole, expected = get(client, job["links"]["results"], "gzip")
+    assert whole.headers["content-encoding"] == "gzip"
+    response, same = get(client, job["links"]["results"], "gzip", Range="bytes=10-29")
+    assert (response.status_code, same) == (200, expected)
+    assert response.headers["accept-ranges"] == "none"
+    assert len(json.loads(gzip.decompress(same))["distances"]) > 0
 
 
 def test_estimates_are_of_the_plain_body(client: TestClient, link: str) -> None:

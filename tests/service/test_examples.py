@@ -170,7 +170,7 @@ def replay(client: TestClient, operation_id: str, name: str, job_id: str) -> Non
         return
     assert response.headers["content-type"].partition(";")[0] == media_type
     answer = read(response, media_type)
-    check_schema(described["content"][media_type]["schema"], answer)
+    check_schema(described["content"][media_type].get("schema", {}), answer)
     if operation_id == "watchJob":
         answer, expected = (events_of(text) for text in (answer, expected))
         for event in answer:
@@ -192,7 +192,7 @@ def check_headers(response: Any, described: Mapping[str, Any], *, is_estimate: b
 
 
 def read(response: Any, media_type: str) -> Any:
-    if media_type.endswith(("/json", "+json")) and media_type != "application/geo+json":
+    if media_type.endswith(("/json", "+json")):
         return response.json()
     if media_type in ("application/x-npy", "application/octet-stream"):
         return response.content.decode("latin-1")

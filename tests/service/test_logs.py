@@ -97,7 +97,7 @@ def test_a_worker_logs_with_the_id_of_the_request(server: LoggedServer) -> None:
     # Another form of the answer: another result, and the same field.
     headers = NPY | {"X-Request-ID": "of-a-damaged-field"}
     assert distances(server.client, mesh_id, headers).status_code == 200
-    (line,) = server.lines(module="app.store.fields")
+    (line,) = server.lines(module="app.store")
     assert line["request_id"] == "of-a-damaged-field"
     assert (line["level"], line["path"]) == ("warning", str(field))
 

@@ -50,7 +50,7 @@ def value_of(response: Any, media_type: str, job_id: str) -> Any:
     if media_type in ("application/x-npy", "application/octet-stream"):
         return b64encode(response.content).decode()
     text = response.text.replace(job_id, JOB)
-    if media_type not in ("application/json", "application/problem+json"):
+    if not media_type.endswith(("/json", "+json")):
         return text
     value = json.loads(text)
     if response.status_code == 202:

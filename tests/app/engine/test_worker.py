@@ -231,12 +231,10 @@ def test_evictions_are_counted_by_all_workers_of_a_slot_together(tmp_path: Path)
         worker = Worker(config, signals)
         for each in (vertex, vertex + 1):
             assert code_of(worker, distances_query(mesh_id, vertex=each)) is None
-            wait_until(lambda: not worker.fields.has_unwritten)  # noqa: B023
-    sizes = field_files(tmp_path)
 
     assert signals.field_evictions == 4, "each goes as soon as it has been used"
     wait_until(lambda: signals.stored_field_evictions == 4 - len(field_files(tmp_path)))
-    assert len(sizes) < 4
+    assert signals.stored_field_evictions > 0
 
 
 # Its work
