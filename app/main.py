@@ -1,10 +1,11 @@
 """The application: settings, service, middleware and routes put together."""
 
+import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
-from anyio import CapacityLimiter
+from anyio import CapacityLimiter, to_thread
 from fastapi import FastAPI
 from starlette.middleware.cors import CORSMiddleware
 
@@ -31,7 +32,10 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         async with service.running(), measuring_lag(metrics.note_lag):
+            # The document takes a quarter of a second: no request should wait for it.
+            describing = asyncio.create_task(to_thread.run_sync(app.openapi))
             yield
+            await asyncio.wait({describing})
 
     metrics = Metrics(service)
     app = _Application(

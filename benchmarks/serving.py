@@ -38,10 +38,12 @@ def serving(**settings: str) -> Iterator[int]:
 
 
 class Client:
-    """A persistent connection."""
+    """A persistent connection, from a loopback address."""
 
-    def __init__(self, port: int) -> None:
-        self._connection = http.client.HTTPConnection("127.0.0.1", port, timeout=300)
+    def __init__(self, port: int, address: str = "127.0.0.1") -> None:
+        self._connection = http.client.HTTPConnection(
+            "127.0.0.1", port, timeout=300, source_address=(address, 0)
+        )
 
     def ask(
         self, path: str, body: Any = None, headers: Mapping[str, str] = {}, method: str = ""

@@ -18,6 +18,9 @@ MOST_PIPELINED = 16
 """Requests of one connection that may wait for the answer to the one before."""
 HEAD_S = 10.0
 """Seconds until a head must be complete."""
+LEAST_CHUNK = 8
+"""Least mean size of a body's chunks, once there are `FREE_CHUNKS`: each takes as long to parse."""
+FREE_CHUNKS = 1000
 STALLED_S = 60.0
 """Seconds that a client may leave its answer unread."""
 LINGER_S = 1.0
@@ -38,6 +41,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         self._is_in_head = False
         self._head_bytes = 0
         self._unparsed_bytes = 0  # received since the parser reported an element
+        self._chunks = self._body_bytes = 0
         self._head_timer: TimerHandle | None = None
         self._stall_timer: TimerHandle | None = None
 
@@ -91,7 +95,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
 
     def on_message_begin(self) -> None:
         """Begin a head."""
-        self._head_bytes = 0
+        self._head_bytes = self._chunks = self._body_bytes = 0
         self._is_in_head = True
         if len(self.pipeline) >= MOST_PIPELINED:
             raise ValueError("too many requests at once on one connection")
@@ -117,7 +121,16 @@ class BoundedHttpProtocol(HttpToolsProtocol):
     def on_body(self, body: bytes) -> None:
         """Pass on a part of the body."""
         self._unparsed_bytes = 0
+        self._body_bytes += len(body)
         super().on_body(body)
+
+    def on_chunk_header(self) -> None:
+        """Begin a chunk of the body, unless those before it were too small."""
+        if self._chunks > FREE_CHUNKS and self._body_bytes < LEAST_CHUNK * self._chunks:
+            detail = f"the chunks of the body have fewer than {LEAST_CHUNK} bytes each"
+            self._refusal = Problem("malformed_request", detail, limit=LEAST_CHUNK)
+            raise ValueError(detail)
+        self._chunks += 1
 
     def _count(self, size: int) -> None:
         self._unparsed_bytes = 0

@@ -10,7 +10,7 @@ import pytest
 from structlog.testing import capture_logs
 
 from app.http import connections, protocol
-from app.http.protocol import MOST_HEAD_BYTES, MOST_PIPELINED
+from app.http.protocol import FREE_CHUNKS, LEAST_CHUNK, MOST_HEAD_BYTES, MOST_PIPELINED
 from app.settings import Settings
 from tests.support.listening import Listener, listening, read_answer
 from tests.support.service import check_problem
@@ -118,9 +118,21 @@ def test_bodies_do_not_count(listener: Listener) -> None:
     head = b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: " + length + b"\r\n\r\n"
     assert listener.send(head + body).status_code == 200
     assert listener.bodies[-1] == body
-    chunks = b"".join(b"1\r\n%c\r\n" % byte for byte in body)
+    chunks = b"8\r\nxxxxxxxx\r\n" * (len(body) // 8)
     assert listener.send(CHUNKED + chunks + b"0\r\n\r\n").status_code == 200
     assert listener.bodies[-1] == body
+
+
+@pytest.mark.parametrize("excess", [0, 1])
+def test_chunks_of_a_few_bytes_are_refused_where_there_are_many(
+    listener: Listener, excess: int
+) -> None:
+    chunks = b"1\r\na\r\n" * (FREE_CHUNKS + excess)
+    response = listener.send(CHUNKED + chunks + b"0\r\n\r\n")
+    if excess:
+        assert check_problem(response, 400, "malformed_request")["limit"] == LEAST_CHUNK
+    else:
+        assert (response.status_code, listener.bodies[-1]) == (200, b"a" * FREE_CHUNKS)
 
 
 # Time
