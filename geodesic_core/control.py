@@ -1,8 +1,10 @@
 """Control of a call by its caller: progress, cancelling, a deadline and a memory limit."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import count
+from typing import TypeVar
 
 from geodesic_core.errors import (
     Cancelled,
@@ -17,6 +19,12 @@ SLICE_SECONDS = 0.05
 
 _FIRST_ITEMS = 256
 
+WATCHED_ITEMS = 100
+"""Items that a call prepares between two questions whether it is to stop. The slowest, points of
+curves, take 0.1 ms each."""
+
+T = TypeVar("T")
+
 
 @dataclass(frozen=True)
 class Control:
@@ -30,7 +38,8 @@ class Control:
     progress
         Called about every 50 ms with the share that is done, from 0 to 1, never decreasing.
     cancel
-        Called about every 50 ms; the call stops with `Cancelled` once it returns true.
+        Called about every 50 ms, and more often while points are prepared; the call stops with
+        `Cancelled` once it returns true.
     deadline_s
         Seconds granted from the start of the call, above 0; then it stops with `DeadlineExceeded`.
     memory_limit
@@ -65,6 +74,10 @@ class Control:
     memory_limit: int | None = None
     bytes_beside: int = 0
     began: float = field(default_factory=time.perf_counter)
+    _watched: Iterator[int] = field(
+        default_factory=lambda: count(1), init=False, repr=False, compare=False
+    )
+    """Numbers of the items that the call watches, from 1"""
 
     def __post_init__(self) -> None:
         for name in ("deadline_s", "memory_limit"):
@@ -92,6 +105,42 @@ class Control:
         """
         if self.progress is not None:
             self.progress(share)
+        self._stop_if_due(share)
+
+    def watched(self, items: Iterable[T]) -> Iterator[T]:
+        """Yield what a call prepares, and stop the call if it is to stop.
+
+        Asks before every hundredth of all the items that the call watches, so that many short
+        curves are watched as one long curve is.
+
+        Parameters
+        ----------
+        items
+            Points or the like, each of which takes little time.
+
+        Returns
+        -------
+        Iterator
+            Over the same.
+
+        Raises
+        ------
+        Cancelled, DeadlineExceeded
+            The call is to stop.
+
+        Examples
+        --------
+        >>> sum(gc.Control(cancel=lambda: True).watched(range(1000)))
+        Traceback (most recent call last):
+            ...
+        geodesic_core.errors.Cancelled: cancelled with 0% done
+        """
+        for item in items:
+            if next(self._watched) % WATCHED_ITEMS == 0:
+                self._stop_if_due(0.0)
+            yield item
+
+    def _stop_if_due(self, share: float) -> None:
         if self.cancel is not None and self.cancel():
             raise Cancelled(f"cancelled with {share:.0%} done")
         if self.deadline_s is not None and time.perf_counter() - self.began > self.deadline_s:

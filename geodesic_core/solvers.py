@@ -246,7 +246,7 @@ def shortest_path(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     limit = as_limit(max_distance)
-    stops = _as_stops(mesh, source, target, waypoints)
+    stops = _as_stops(mesh, source, target, waypoints, control)
     return _shortest_through(PathSearch(mesh), stops, limit, control, explain=explain)
 
 
@@ -434,7 +434,7 @@ class Solver:
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
         limit = as_limit(max_distance)
-        stops = _as_stops(self.mesh, source, target, waypoints)
+        stops = _as_stops(self.mesh, source, target, waypoints, control)
         with self._lock.held(control):
             search = self._shared_search()
             path = _shortest_through(search, stops, limit, control, explain=explain)
@@ -555,7 +555,9 @@ def _shortest_through(
 ) -> GeodesicPath:
     """Search for leg after leg, each no longer than the others leave of the limit."""
     legs: list[GeodesicPath] = []
-    positions = np.array([search.mesh.position_from_origin(stop) for stop in stops])
+    positions = np.array(
+        [search.mesh.position_from_origin(stop) for stop in control.watched(stops)]
+    )
     left = limit * (1.0 + AT_LIMIT)
     for here, there in pairwise(stops):
         leg_control = control.for_part(len(legs), len(stops) - 1)
@@ -601,6 +603,7 @@ def _with_barriers(
         return mesh, control
     control = control.holding(sum(array.nbytes for array in mesh.topology))
     control.check_memory(0)
+    control.checkpoint(0.0)
     return mesh.with_barriers(faces), control
 
 
@@ -616,10 +619,12 @@ def _solve(
     """Check the arguments, sweep, and return the field with what it is to retain."""
     check_choice("retain", retain, get_args(Retain))
     paths, windows = retain != "distances", retain == "windows"
-    starts, polylines = as_sources(mesh, sources)
-    ends = tuple(mesh.point(point, f"target {i}") for i, point in enumerate(targets))
+    starts, polylines = as_sources(mesh, sources, control)
+    ends = tuple(
+        mesh.point(point, f"target {i}") for i, point in enumerate(control.watched(targets))
+    )
     distances = np.array([start.start_distance for start in starts])
-    sweep = RepeatableSweep.between(mesh, polylines, distances, ends, bounds)
+    sweep = RepeatableSweep.between(mesh, polylines, distances, ends, bounds, control)
     wave = sweep.run(control, paths=paths, windows=sweep.all_faces if windows else None)
     result = sweep.result_of(wave, paths=paths, windows=windows)
     stats = stats_of(mesh, wave, time.perf_counter() - control.began)
@@ -627,13 +632,19 @@ def _solve(
 
 
 def _as_stops(
-    mesh: TriangleMesh, source: Point, target: Point, waypoints: Sequence[Point]
+    mesh: TriangleMesh,
+    source: Point,
+    target: Point,
+    waypoints: Sequence[Point],
+    control: Control,
 ) -> list[SurfacePoint]:
     """Return the stops of a path, which must be connected."""
     stops = [mesh.point(source, "source")]
-    stops += [mesh.point(point, f"waypoint {i}") for i, point in enumerate(waypoints)]
+    stops += [
+        mesh.point(point, f"waypoint {i}") for i, point in enumerate(control.watched(waypoints))
+    ]
     stops.append(mesh.point(target, "target"))
-    for here, there in pairwise(stops):
+    for here, there in control.watched(pairwise(stops)):
         if component_of(mesh, here) != component_of(mesh, there):
             message = f"{here} and {there} are in different connected components"
             raise disconnected(mesh, message, here, there)

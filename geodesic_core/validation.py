@@ -63,12 +63,13 @@ def as_barriers(barriers: Any, face_count: int) -> Longs:
         faces = barriers
     else:
         faces = np.array([None, *barriers], dtype=object)[1:]  # rows stay rows
-        for i, face in enumerate(faces):
-            if not is_index(face):
-                raise InvalidArgument(
-                    f"barrier {i} is {face!r}; it must be a face id, an integer (of a mask, "
-                    f"numpy.flatnonzero makes these)"
-                )
+        one_of_each_type = {type(face): face for face in faces}
+        if not all(map(is_index, one_of_each_type.values())):
+            i = next(i for i, face in enumerate(faces) if not is_index(face))
+            raise InvalidArgument(
+                f"barrier {i} is {faces[i]!r}; it must be a face id, an integer (of a mask, "
+                f"numpy.flatnonzero makes these)"
+            )
     bad = np.flatnonzero((faces < 0) | (faces >= face_count))
     if len(bad):
         raise InvalidArgument(

@@ -124,7 +124,7 @@ class DistanceField:
             sources,
             polylines,
             targets,
-            RepeatableSweep.between(mesh, polylines, starts, targets, bounds),
+            RepeatableSweep.between(mesh, polylines, starts, targets, bounds, Control()),
             ErrorBound(of_type, float(arrays["promised"]), kind),
             SweepResult.from_arrays(arrays),
             SweepStats.of(mesh, created, kept, peak, peak_bytes, seconds),

@@ -115,11 +115,13 @@ def find_nearest_source(
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `run_sweep`.
     """
-    nodes = nodes_of(mesh, [(point,)], sources)
+    nodes = nodes_of(mesh, [(point,)], sources, control)
     corners, reaches = corners_of(mesh, point)
     least = known[: len(mesh.vertices)]
     upper = float((_most(least[corners], bounds) + reaches).min())
-    upper = min(upper, _within_face(mesh, sources, start_distances, point), bounds.max_distance)
+    upper = min(
+        upper, _within_face(mesh, sources, start_distances, point, control), bounds.max_distance
+    )
     if math.isinf(upper):
         return NearestSource(-1, math.inf, None)
     # A vertex beyond the limit of the field is at least as far as that.
@@ -147,14 +149,18 @@ def _most(least: Floats, bounds: Bounds) -> Floats:
 
 
 def _within_face(
-    mesh: TriangleMesh, sources: Sequence[SurfacePoint], starts: Floats, point: SurfacePoint
+    mesh: TriangleMesh,
+    sources: Sequence[SurfacePoint],
+    starts: Floats,
+    point: SurfacePoint,
+    control: Control,
 ) -> float:
     """Return the length of the straight path to the nearest source in the face of a point."""
     position = mesh.position_from_origin(point)
     return min(
         (
             start + float(np.linalg.norm(mesh.position_from_origin(source) - position))
-            for source, start in zip(sources, starts.tolist(), strict=True)
+            for source, start in control.watched(zip(sources, starts.tolist(), strict=True))
             if source.face_index == point.face_index
         ),
         default=math.inf,

@@ -144,9 +144,16 @@ class RepeatableSweep:
         start_distances: Floats,
         targets: Sequence[SurfacePoint],
         bounds: Bounds,
+        control: Control,
     ) -> "RepeatableSweep":
-        """Return the sweep from canonical points and curves that also reaches some targets."""
-        nodes = nodes_of(mesh, sources, targets)
+        """Return the sweep from canonical points and curves that also reaches some targets.
+
+        Raises
+        ------
+        Cancelled, DeadlineExceeded
+            As the control says.
+        """
+        nodes = nodes_of(mesh, sources, targets, control)
         if nodes.segments:
             bounds = with_parallel_windows(bounds, nodes.first_segment)
         return cls(mesh, nodes, start_distances, bounds)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.kernels.sweep.state import NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.mesh.canonical import half_edges_around
@@ -137,28 +138,46 @@ class Ends:
 
 
 def ends_of(
-    mesh: TriangleMesh, sources: Sequence[SurfacePoint], targets: Sequence[SurfacePoint]
+    mesh: TriangleMesh,
+    sources: Sequence[SurfacePoint],
+    targets: Sequence[SurfacePoint],
+    control: Control,
 ) -> Ends:
-    """Return the ends of sweeps from canonical points to canonical points."""
+    """Return the ends of sweeps from canonical points to canonical points.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded
+        As the control says.
+    """
     corners, reaches = np.empty((len(targets), 3), np.int32), np.empty((len(targets), 3))
-    for i, target in enumerate(targets):
+    for i, target in enumerate(control.watched(targets)):
         corners[i], reaches[i] = corners_of(mesh, target)
     return Ends(
         sources=tuple(sources),
         targets=tuple(targets),
-        source_components=np.array([component_of(mesh, point) for point in sources], np.int32),
-        target_components=np.array([component_of(mesh, point) for point in targets], np.int32),
+        source_components=components_of(mesh, sources, control),
+        target_components=components_of(mesh, targets, control),
         corners=corners,
         reaches=reaches,
-        nodes=nodes_of(mesh, [(source,) for source in sources], targets),
+        nodes=nodes_of(mesh, [(source,) for source in sources], targets, control),
     )
 
 
 def nodes_of(
-    mesh: TriangleMesh, sources: Sequence[Polyline], targets: Sequence[SurfacePoint]
+    mesh: TriangleMesh,
+    sources: Sequence[Polyline],
+    targets: Sequence[SurfacePoint],
+    control: Control,
 ) -> Nodes:
-    """Return the nodes of sources, each given by its canonical points, and of targets."""
-    vertices = len(mesh.vertices)
+    """Return the nodes of sources, each given by its canonical points, and of targets.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded
+        As the control says.
+    """
+    vertices, watched = len(mesh.vertices), control.watched
     sited: list[SurfacePoint] = []
     rows: list[tuple[int, int, int]] = []
     weights: list[tuple[float, ...]] = []
@@ -174,11 +193,15 @@ def nodes_of(
         return node
 
     starts = [
-        (node_of(point), i) for i, line in enumerate(sources) for point in dict.fromkeys(line)
+        (node_of(point), i)
+        for i, line in enumerate(sources)
+        for point in watched(dict.fromkeys(line))
     ]
     first_target = len(rows)
-    ends = [node_of(point) for point in targets]
-    segments = [(i, parts) for i, line in enumerate(sources) for parts in segments_of(mesh, line)]
+    ends = [node_of(point) for point in watched(targets)]
+    segments = [
+        (i, parts) for i, line in enumerate(sources) for parts in segments_of(mesh, watched(line))
+    ]
     first_segment = vertices + len(sited)
     starts += [(first_segment + k, i) for k, (i, _) in enumerate(segments)]
     in_faces = [
@@ -193,7 +216,7 @@ def nodes_of(
             nodes=len(sited) + len(segments),
             ints=np.array(rows, np.int32).reshape(-1, SITE),
             weights=np.array(weights).reshape(-1, 3),
-            windows=sum(_edge_faces(mesh, face) for face in faces),
+            windows=sum(_edge_faces(mesh, face) for face in watched(faces)),
             segment_ints=np.array([(k, part.face) for k, part in in_faces], np.int32).reshape(
                 -1, SEGMENT
             ),
@@ -203,10 +226,10 @@ def nodes_of(
         ),
         first_target=first_target,
         points=tuple(sited),
-        positions=np.array([mesh.position_from_origin(p) for p in sited]).reshape(-1, 3),
+        positions=np.array([mesh.position_from_origin(p) for p in watched(sited)]).reshape(-1, 3),
         segments=tuple(parts[0] for _, parts in segments),
         first_segment=first_segment,
-        components=tuple({component_of(mesh, line[0]) for line in sources}),
+        components=tuple({component_of(mesh, line[0]) for line in watched(sources)}),
     )
 
 
@@ -216,23 +239,27 @@ def _edge_faces(mesh: TriangleMesh, face: int) -> int:
     return sum(len(list(half_edges_around(links, h))) for h in range(3 * face, 3 * face + 3))
 
 
-def as_sources(mesh: TriangleMesh, sources: Any) -> tuple[tuple[Source, ...], tuple[Polyline, ...]]:
+def as_sources(
+    mesh: TriangleMesh, sources: Any, control: Control
+) -> tuple[tuple[Source, ...], tuple[Polyline, ...]]:
     """Return the sources as records, and the canonical points of each.
 
     Raises
     ------
     InvalidPoint, InvalidArgument
         There are none, one is not on the mesh, or a start distance is out of its domain.
+    Cancelled, DeadlineExceeded
+        As the control says.
     """
     if isinstance(sources, str | bytes):
         raise InvalidPoint(f"the source is {sources!r}; it must be a vertex index or a Source")
     if isinstance(sources, Source | SurfacePoint | Curve) or not isinstance(sources, Iterable):
         sources = [sources]
     checked, polylines = [], []
-    for i, item in enumerate(sources):
+    for i, item in enumerate(control.watched(sources)):
         source = item if isinstance(item, Source) else Source(item)
         if isinstance(source.point, Curve):
-            polylines.append(polyline_of(mesh, source.point, f"source {i}"))
+            polylines.append(polyline_of(mesh, source.point, f"source {i}", control))
         else:
             polylines.append((mesh.point(source.point, f"source {i}"),))
         start = source.start_distance
@@ -247,7 +274,7 @@ def as_sources(mesh: TriangleMesh, sources: Any) -> tuple[tuple[Source, ...], tu
 
 
 def as_points(
-    mesh: TriangleMesh, points: Iterable[int | SurfacePoint], name: str
+    mesh: TriangleMesh, points: Iterable[int | SurfacePoint], name: str, control: Control
 ) -> list[SurfacePoint]:
     """Return canonical points; ``name`` is how messages call one of them.
 
@@ -257,10 +284,14 @@ def as_points(
         There are none.
     InvalidPoint
         One is not a point of the mesh.
+    Cancelled, DeadlineExceeded
+        As the control says.
     """
     if isinstance(points, str | bytes) or not isinstance(points, Iterable):
         raise InvalidArgument(f"{name}s is {points!r}; it must be a sequence of points")
-    canonical = [mesh.point(point, f"{name} {i}") for i, point in enumerate(points)]
+    canonical = [
+        mesh.point(point, f"{name} {i}") for i, point in enumerate(control.watched(points))
+    ]
     if not canonical:
         raise InvalidArgument(f"there are no {name}s: give at least one")
     return canonical
@@ -272,6 +303,17 @@ def component_of(mesh: TriangleMesh, point: SurfacePoint) -> int:
     if vertex is None:
         vertex = int(mesh.faces[point.face_index, 0])
     return int(mesh.components[vertex])
+
+
+def components_of(mesh: TriangleMesh, points: Sequence[SurfacePoint], control: Control) -> Ints:
+    """Return the connected components of canonical points, (N,).
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded
+        As the control says.
+    """
+    return np.array([component_of(mesh, point) for point in control.watched(points)], np.int32)
 
 
 def disconnected(mesh: TriangleMesh, message: str, *points: SurfacePoint) -> NoPath:

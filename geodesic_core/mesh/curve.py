@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats
+from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.kernels.mesh.half_edges import APEX, TAIL
 from geodesic_core.mesh.canonical import half_edges_around
@@ -56,7 +57,7 @@ class SegmentInFace(NamedTuple):
     """Weights of its end there"""
 
 
-def polyline_of(mesh: TriangleMesh, curve: Curve, name: str) -> Polyline:
+def polyline_of(mesh: TriangleMesh, curve: Curve, name: str, control: Control) -> Polyline:
     """Return the canonical points of a curve; ``name`` is how messages call it.
 
     Raises
@@ -65,15 +66,18 @@ def polyline_of(mesh: TriangleMesh, curve: Curve, name: str) -> Polyline:
         It has no points.
     InvalidPoint
         One is not a point of the mesh, or shares no face with the next.
+    Cancelled, DeadlineExceeded
+        As the control says.
     """
     if isinstance(curve.points, str | bytes) or not isinstance(curve.points, Iterable):
         raise InvalidArgument(f"the points of {name} are {curve.points!r}; give a sequence of them")
     points = tuple(
-        mesh.point(point, f"point {i} of {name}") for i, point in enumerate(curve.points)
+        mesh.point(point, f"point {i} of {name}")
+        for i, point in enumerate(control.watched(curve.points))
     )
     if not points:
         raise InvalidArgument(f"{name} is a curve without points; give at least one")
-    for i, (start, end) in enumerate(pairwise(points)):
+    for i, (start, end) in enumerate(control.watched(pairwise(points))):
         if not share_a_face(mesh, start, end):
             raise InvalidPoint(
                 f"the points {i} and {i + 1} of {name}, {start} and {end}, have no face in common; "
@@ -111,7 +115,7 @@ def share_a_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> 
     return bool(weights_by_face(mesh, start).keys() & weights_by_face(mesh, end))
 
 
-def segments_of(mesh: TriangleMesh, polyline: Polyline) -> list[list[SegmentInFace]]:
+def segments_of(mesh: TriangleMesh, polyline: Iterable[SurfacePoint]) -> list[list[SegmentInFace]]:
     """Return the segments of a polyline, each in all faces that hold it.
 
     Segments of no length are left out.

@@ -71,7 +71,7 @@ class Landmarks:
         bounds = merging_bounds(math.inf, LANDMARK_ERROR, math.inf)
         wave = state.new_wavefront(topology, merges=True)
         control.check_memory(state.bytes_of(wave))
-        nodes = nodes_of(mesh, [(mesh.point(int(topology.outer_vertex[chosen])),)], [])
+        nodes = nodes_of(mesh, [(mesh.point(int(topology.outer_vertex[chosen])),)], [], control)
         wave = sweep_nodes(mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: 1.0)
         if self.count == 0:
             self.distances = aligned_rows(len(mesh.vertices), LANDMARKS, np.float32)

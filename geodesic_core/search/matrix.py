@@ -1,7 +1,7 @@
 """Matrices of distances: sweeps from one side, in threads; searches where pairs are few."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -121,16 +121,17 @@ def find_matrix(
     check_choice("layout", layout, get_args(Layout))
     if threads is not None and not (is_index(threads) and threads >= 1):
         raise InvalidArgument(f"threads is {threads!r}; it must be an integer, 1 or more, or None")
-    starts, stops = as_points(mesh, sources, "source"), as_points(mesh, targets, "target")
+    starts = as_points(mesh, sources, "source", control)
+    stops = as_points(mesh, targets, "target", control)
     cores = threads or available_cores()
     if layout == "pairs":
         return _find_pairs(mesh, target_sweep, search, starts, stops, limit, cores, control)
     table: _Dense | _Sparse
     if layout == "dense":
         control.check_memory(8 * len(starts) * len(stops))
-        table = _Dense(mesh, starts, stops)
+        table = _Dense(mesh, starts, stops, control)
     else:
-        table = _Sparse(mesh, starts, stops)
+        table = _Sparse(mesh, starts, stops, control)
     _sweep_all(mesh, target_sweep(), table, limit, cores, control)
     if control.progress is not None:
         control.progress(1.0)
@@ -153,7 +154,7 @@ def _find_pairs(
             f"there are {len(sources)} sources and {len(targets)} targets; pairs need as many of "
             f"both"
         )
-    table = _Pairs(mesh, sources, targets)
+    table = _Pairs(mesh, sources, targets, control)
     few, parts = len(table.searched), len(table.searched) + len(table.groups)
     if few > 0:
         finder = search()
@@ -219,12 +220,17 @@ class _Grid:
     """A matrix in the making, swept from the smaller side; half of it where both sides are one."""
 
     def __init__(
-        self, mesh: TriangleMesh, sources: Sequence[SurfacePoint], targets: Sequence[SurfacePoint]
+        self,
+        mesh: TriangleMesh,
+        sources: Sequence[SurfacePoint],
+        targets: Sequence[SurfacePoint],
+        control: Control,
     ) -> None:
         self.shape = len(sources), len(targets)
         self.flipped = len(targets) < len(sources)
         self.symmetric = sources == targets
-        self.ends = ends_of(mesh, *((targets, sources) if self.flipped else (sources, targets)))
+        sides = (targets, sources) if self.flipped else (sources, targets)
+        self.ends = ends_of(mesh, *sides, control)
         self.sweeps = min(self.shape)
 
     def wanted(self, source: int) -> Ints:
@@ -290,9 +296,13 @@ class _Pairs:
     """Distances of pairs in the making; points that are in many of them are swept from."""
 
     def __init__(
-        self, mesh: TriangleMesh, sources: Sequence[SurfacePoint], targets: Sequence[SurfacePoint]
+        self,
+        mesh: TriangleMesh,
+        sources: Sequence[SurfacePoint],
+        targets: Sequence[SurfacePoint],
+        control: Control,
     ) -> None:
-        by_source, by_target = _grouped(sources), _grouped(targets)
+        by_source, by_target = (_grouped(control.watched(side)) for side in (sources, targets))
         if _cost(by_target) < _cost(by_source):
             groups, others = by_target, sources
         else:
@@ -300,7 +310,7 @@ class _Pairs:
         many = {hub: pairs for hub, pairs in groups.items() if len(pairs) >= SWEEP_FROM}
         self.groups = [np.array(pairs, np.int32) for pairs in many.values()]
         self.searched = np.setdiff1d(np.arange(len(sources)), np.concatenate([[], *self.groups]))
-        self.ends = ends_of(mesh, list(many), others)
+        self.ends = ends_of(mesh, list(many), others, control)
         self.sweeps = len(many)
         self.values = np.full(len(sources), math.inf)
         self.nbytes = self.values.nbytes
@@ -314,7 +324,7 @@ class _Pairs:
         self.values[targets] = distances
 
 
-def _grouped(points: Sequence[SurfacePoint]) -> dict[SurfacePoint, list[int]]:
+def _grouped(points: Iterable[SurfacePoint]) -> dict[SurfacePoint, list[int]]:
     """Return the indices of each point."""
     groups: dict[SurfacePoint, list[int]] = {}
     for i, point in enumerate(points):

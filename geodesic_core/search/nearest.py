@@ -104,12 +104,12 @@ def find_nearest(
     """Do as `nearest` does, with a `TargetSweep` made once the arguments are in order."""
     limit = as_limit(max_distance)
     start = mesh.point(source, "source")
-    points = as_points(mesh, candidates, "candidate")
+    points = as_points(mesh, candidates, "candidate", control)
     if not is_index(k) or not 1 <= k <= len(points):
         raise InvalidArgument(
             f"k is {k!r}; it must be an integer from 1 to the number of candidates, {len(points)}"
         )
-    ends = ends_of(mesh, [start], points)
+    ends = ends_of(mesh, [start], points, control)
     connected = ends.targets_connected_to(0)
     indices, distances = connected[:0], np.empty(0)
     if len(connected) > 0:

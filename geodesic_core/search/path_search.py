@@ -192,7 +192,7 @@ class PathSearch:
         bounds = merging_bounds(
             math.inf, GUIDE_ERROR, math.inf, pruning_bounds._replace(limit=limit)
         )
-        nodes = nodes_of(self.mesh, [(leg.end.point,)], [leg.start.point])
+        nodes = nodes_of(self.mesh, [(leg.end.point,)], [leg.start.point], leg.control)
         self._toward = with_sites(self._toward, nodes.sites)
         wave = self._toward = self._run(self._toward, nodes, bounds, leg.control, _AFTER_EDGES)
         node = int(nodes.targets[0])
@@ -213,7 +213,7 @@ class PathSearch:
     ) -> GeodesicPath:
         """Return the path (steps 4 and 5)."""
         bounds = exact_bounds(math.inf, pruning_bounds)
-        nodes = nodes_of(self.mesh, [(leg.start.point,)], [leg.end.point])
+        nodes = nodes_of(self.mesh, [(leg.start.point,)], [leg.end.point], leg.control)
         self._outward = with_sites(self._outward, nodes.sites)
         wave = self._outward = self._run(
             self._outward, nodes, bounds, leg.control, _AFTER_APPROXIMATE

@@ -861,7 +861,7 @@ def test_slant_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope,
         scale * np.array(place) for place in ((0.5, 1, 0), (0.5 + slope * SLANT * 0.2, 1.2, 0))
     )
     line = tuple(mesh.locate(place) for place in (foot, head))
-    nodes = nodes_of(mesh, [line], [])
+    nodes = nodes_of(mesh, [line], [], gc.Control())
     wave = new_wavefront(mesh.topology, nodes.sites)
     bounds = with_parallel_windows(exact_bounds(math.inf), int(nodes.sources[-1]))
     continuous_dijkstra.start_sweep(
