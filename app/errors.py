@@ -1,7 +1,6 @@
 """Problems: every error that the service answers with, and the table of exceptions."""
 
 import errno
-import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -19,6 +18,13 @@ class Code:
     status: int
     title: str
     meaning: str
+    other_statuses: Sequence[int] = ()
+    """Further statuses; ``meaning`` says when"""
+
+    @property
+    def statuses(self) -> Sequence[int]:
+        """All statuses that the code may have."""
+        return (self.status, *self.other_statuses)
 
 
 CODES: Mapping[str, Code] = {
@@ -73,6 +79,13 @@ CODES: Mapping[str, Code] = {
         422, "Memory limit", "The query needs more memory than the service grants to one query."
     ),
     "rate_limited": Code(429, "Rate limited", "Too many requests; see `Retry-After`."),
+    "quota_exceeded": Code(
+        429,
+        "Quota exceeded",
+        "The caller has as much as `setting` allows: 429 for jobs, and for uploads at the same "
+        "time, see `Retry-After`; 507 for stored meshes, see `hint`.",
+        other_statuses=(507,),
+    ),
     "header_too_large": Code(
         431, "Header too large", "The request line and the headers are too large."
     ),
@@ -124,11 +137,13 @@ class Problem:
     setting: str | None = None
     hint: str | None = None
     headers: Mapping[str, str] = field(default_factory=dict)
+    other_status: int | None = None
+    """One of the code's ``other_statuses``, where it applies"""
 
     @property
     def status(self) -> int:
-        """The HTTP status of the code."""
-        return CODES[self.code].status
+        """The HTTP status."""
+        return self.other_status or CODES[self.code].status
 
     def document(self, instance: str, request_id: str) -> dict[str, Any]:
         """Return the body of the response (RFC 9457), without members that have no value."""
@@ -230,11 +245,6 @@ def _system_error(error: OSError) -> Problem:
     )
 
 
-def _database_error(error: sqlite3.OperationalError) -> Problem:
-    is_full = error.sqlite_errorcode == sqlite3.SQLITE_FULL
-    return _DISK_FULL if is_full else _internal_error(error)
-
-
 _DISK_FULL = Problem("storage_full", "the store has no room left on its disk")
 _NO_DESCRIPTORS = Problem(
     "too_many_connections",
@@ -259,7 +269,6 @@ EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (core.InternalError, lambda error: Problem("internal_error", str(error))),
     (MemoryError, lambda _: Problem("memory_limit", "the worker ran out of memory")),
     (OSError, _system_error),
-    (sqlite3.OperationalError, _database_error),
     (BaseException, _internal_error),
 )
 

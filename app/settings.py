@@ -176,6 +176,12 @@ class Settings(BaseSettings):
     """Requests a minute that a caller may make; as many may come at once."""
     max_concurrent: PositiveInt | None = None
     """Requests of a caller that may run at the same time."""
+    quota_bytes: PositiveInt | None = None
+    """Size of the stored meshes that a caller stored first; without keys, of all such meshes."""
+    quota_jobs: PositiveInt | None = None
+    """Jobs of a caller, until they are removed; without keys, of all callers together."""
+    quota_uploads: PositiveInt | None = None
+    """Uploads of a caller that may run at the same time, samples included."""
     max_connections: PositiveInt = Field(default_factory=_connections)
     """Connections that may be open; 1000, or half of the process's descriptors if fewer."""
     max_caller_connections: PositiveInt = Field(default_factory=_caller_connections)

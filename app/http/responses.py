@@ -58,11 +58,21 @@ def problem_response(problem: Problem, instance: str, request_id: str) -> Respon
     return Response(body, problem.status, headers, PROBLEM_JSON)
 
 
-def problems(*codes: str) -> dict[int | str, dict[str, Any]]:
-    """Return the problems that an operation can answer with, for OpenAPI."""
+def problems(*codes: str, **other_statuses: int) -> dict[int | str, dict[str, Any]]:
+    """Return the problems that an operation can answer with, for OpenAPI.
+
+    Parameters
+    ----------
+    codes
+        Codes, with the first of their statuses.
+    other_statuses
+        Further statuses, by code.
+    """
     by_status: dict[int | str, list[str]] = {}
     for code in codes:
         by_status.setdefault(CODES[code].status, []).append(code)
+    for code, status in other_statuses.items():
+        by_status.setdefault(status, []).append(code)
     return {
         status: {"model": ProblemDocument, "description": ", ".join(names)}
         for status, names in by_status.items()

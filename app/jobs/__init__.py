@@ -2,6 +2,15 @@
 
 from app.jobs.job import Job, JobSpec
 from app.jobs.manager import JobManager
-from app.jobs.repository import JobRepository, read_jobs, require_intact
+from app.jobs.repository import JobRepository
+from app.jobs.sqlite_repository import SqliteJobRepository, read_jobs, require_intact
 
-__all__ = ["Job", "JobManager", "JobRepository", "JobSpec", "read_jobs", "require_intact"]
+__all__ = [
+    "Job",
+    "JobManager",
+    "JobRepository",
+    "JobSpec",
+    "SqliteJobRepository",
+    "read_jobs",
+    "require_intact",
+]

@@ -1,16 +1,16 @@
 """The life of jobs: accepted, run, finished or dismissed, and removed after a while."""
 
 import asyncio
-import sqlite3
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime, timedelta
+from math import ceil
 
 import structlog
 
 from app.engine.interface import ProgressCallback
-from app.errors import Fault, Problem, problem, problem_of
+from app.errors import Fault, Problem, over_limit, problem, problem_of
 from app.jobs.job import Job, JobSpec
 from app.jobs.repository import JobRepository
 from app.settings import variable_of
@@ -63,12 +63,22 @@ class _LiveJob:
 
 
 class JobManager:
-    """The jobs of a service. Each pins its answer in ``results`` until it is removed."""
+    """The jobs of a service. Each pins its answer in ``results`` until it is removed.
 
-    def __init__(self, repository: JobRepository, results: ResultStore, ttl_s: float) -> None:
+    An owner has at most ``quota`` jobs, finished ones included; None stands for no quota.
+    """
+
+    def __init__(
+        self,
+        repository: JobRepository,
+        results: ResultStore,
+        ttl_s: float,
+        quota: int | None,
+    ) -> None:
         self._repository = repository
         self._results = results
         self._ttl = timedelta(seconds=ttl_s)
+        self._quota = quota
         self._live: dict[str, _LiveJob] = {}
         self._submitting = asyncio.Lock()
         self._is_stopping = False
@@ -106,12 +116,13 @@ class JobManager:
         Raises
         ------
         ProblemError
-            The key belongs to another question.
+            The key belongs to another question, or the owner has as many jobs as it may.
         """
         async with self._submitting:  # two requests with one key at the same time are one job, too
             known = await self._find_by_key(spec)
             if known is not None:
                 return known
+            await self._refuse_over_quota(spec.owner)
             live = _LiveJob(Job(spec=spec))
             await self._repository.add(live.job)
             self._live[live.job.id] = live
@@ -199,6 +210,25 @@ class JobManager:
             raise problem("invalid_request", message, errors=(fault,))
         return self._live[job.id].job if job.id in self._live else job
 
+    async def _refuse_over_quota(self, owner: str | None) -> None:
+        if self._quota is None:
+            return
+        count, first_end = await self._repository.usage(owner)
+        if count < self._quota:
+            return
+        wait_s = 1
+        if first_end is not None:  # that job goes first
+            wait_s = max(1, ceil((first_end + self._ttl - datetime.now(UTC)).total_seconds()))
+        raise over_limit(
+            "quota_exceeded",
+            "jobs of one owner",
+            count + 1,
+            self._quota,
+            "quota_jobs",
+            hint="delete jobs that are not needed any more, and those whose answers you have",
+            headers={"Retry-After": str(wait_s)},
+        )
+
     async def _run(self, live: _LiveJob, solve: Solve) -> None:
         try:
             result = await self._results.with_files(await solve(live.on_progress))
@@ -232,7 +262,7 @@ class JobManager:
             try:
                 for job in await self._repository.finished_before(datetime.now(UTC) - self._ttl):
                     await self._remove(job)
-            except sqlite3.Error:  # such as a full disk: there may be room the next time
+            except OSError:  # such as a full disk: there may be room the next time
                 logger.exception("expired jobs not removed")
             await asyncio.sleep(min(_EXPIRY_PERIOD_S, self._ttl.total_seconds()))
 

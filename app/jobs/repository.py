@@ -1,180 +1,55 @@
-"""The database of jobs, in SQLite: records outlive the process that wrote them.
+"""The interface to the database of jobs: records outlive the process that wrote them."""
 
-SQLite needs room on the disk for every change, even to remove a record. So some is held in reserve
-for changes of jobs that exist: on a full disk they can still end and be removed.
-"""
-
-import sqlite3
-from collections.abc import Sequence
-from contextlib import closing, suppress
 from datetime import datetime
-from pathlib import Path
-from typing import Any
-
-import aiosqlite
-from anyio import to_thread
+from typing import Protocol
 
 from app.jobs.job import Job
-from app.store.layout import JOB_RESERVE, StoreError
-from app.store.reserve import Reserve
-
-_SCHEMA = """
-CREATE TABLE IF NOT EXISTS jobs (
-    number INTEGER PRIMARY KEY AUTOINCREMENT,
-    record TEXT NOT NULL,
-    id TEXT UNIQUE AS (record ->> '$.id'),
-    owner TEXT AS (record ->> '$.errand.owner'),
-    idempotency_key TEXT AS (record ->> '$.errand.idempotency_key'),
-    status TEXT AS (record ->> '$.status'),
-    finished TEXT AS (record ->> '$.finished')
-);
-CREATE INDEX IF NOT EXISTS jobs_by_owner ON jobs (owner, number);
-CREATE INDEX IF NOT EXISTS jobs_by_key ON jobs (owner, idempotency_key)
-    WHERE idempotency_key IS NOT NULL;
-CREATE INDEX IF NOT EXISTS jobs_by_end ON jobs (finished);
-"""
 
 
-_RESERVED = 2**20
-"""Bytes of the reserve: a change takes some pages of 4 kB, and clearing SQLite's log perhaps 40"""
+class JobRepository(Protocol):
+    """The records of jobs; lists begin with the newest.
 
-
-class JobRepository:
-    """The rows of jobs, one for each; lists begin with the newest."""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-        self._database: aiosqlite.Connection | None = None
-        self._reserve = Reserve(path.with_name(JOB_RESERVE), _RESERVED)
+    Every method raises ``OSError`` where the database cannot be read or written, with ``ENOSPC``
+    where its disk is full. ``update`` and ``remove`` work on a full disk as well.
+    """
 
     async def open(self) -> None:
         """Open the database, which is created if missing."""
-        self._database = await aiosqlite.connect(self._path, isolation_level=None)
-        await self._database.execute("PRAGMA journal_mode = WAL")
-        await self._database.execute("PRAGMA synchronous = NORMAL")
-        await self._database.executescript(_SCHEMA)
-        await to_thread.run_sync(self._reserve.restore)
 
     async def close(self) -> None:
         """Close the database."""
-        if self._database is not None:
-            await self._database.close()
-            self._database = None
 
     async def add(self, job: Job) -> None:
         """Insert the record of a new job."""
-        await self._run("INSERT INTO jobs (record) VALUES (?)", job.model_dump_json())
-        await to_thread.run_sync(self._reserve.restore)  # now there is room
 
     async def update(self, job: Job) -> None:
-        """Replace the record of a job; this works on a full disk as well."""
-        statement = "UPDATE jobs SET record = ? WHERE id = ?"
-        await self._run_on_reserve(statement, job.model_dump_json(), job.id)
+        """Replace the record of a job."""
 
     async def remove(self, job_id: str) -> None:
-        """Remove the record of a job; this works on a full disk as well."""
-        await self._run_on_reserve("DELETE FROM jobs WHERE id = ?", job_id)
+        """Remove the record of a job."""
 
     async def find(self, owner: str | None, job_id: str) -> Job | None:
         """Return the job of an owner with this id; None where there is none."""
-        jobs = await self._jobs("WHERE owner IS ? AND id = ?", owner, job_id)
-        return jobs[0] if jobs else None
 
     async def find_by_key(self, owner: str | None, key: str) -> Job | None:
         """Return the newest job of an owner with this idempotency key; None where there is none."""
-        jobs = await self._jobs(
-            "WHERE owner IS ? AND idempotency_key = ? ORDER BY number DESC LIMIT 1", owner, key
-        )
-        return jobs[0] if jobs else None
 
     async def page(
         self, owner: str | None, limit: int, before: int | None
     ) -> tuple[list[Job], int | None]:
         """Return ``limit`` jobs of an owner, and the number to go on before; None at the end."""
-        rows = await self._rows(
-            "SELECT number, record FROM jobs WHERE owner IS ? AND number < ? "
-            "ORDER BY number DESC LIMIT ?",
-            owner,
-            2**62 if before is None else before,
-            limit + 1,
-        )
-        jobs = [Job.model_validate_json(record) for _, record in rows[:limit]]
-        return jobs, rows[limit - 1][0] if len(rows) > limit else None
+
+    async def usage(self, owner: str | None) -> tuple[int, datetime | None]:
+        """Return the number of an owner's jobs, and the end of the first one that has finished."""
 
     async def count_finished(self) -> dict[str, int]:
         """Return the number of finished jobs by status."""
-        statement = "SELECT status, COUNT(*) FROM jobs WHERE finished IS NOT NULL GROUP BY status"
-        return dict(await self._rows(statement))
 
     async def unfinished(self) -> list[Job]:
         """Return the jobs that have not finished."""
-        return await self._jobs("WHERE finished IS NULL")
 
     async def with_results(self) -> list[Job]:
         """Return the jobs that have a result."""
-        return await self._jobs("WHERE status = 'successful'")
 
     async def finished_before(self, moment: datetime) -> list[Job]:
         """Return the jobs that finished before a moment."""
-        return [
-            job
-            for job in await self._jobs("WHERE finished IS NOT NULL")
-            if job.finished is not None and job.finished < moment
-        ]
-
-    async def _jobs(self, condition: str, *values: Any) -> list[Job]:
-        rows = await self._rows(f"SELECT record FROM jobs {condition}", *values)  # noqa: S608
-        return [Job.model_validate_json(record) for (record,) in rows]
-
-    async def _rows(self, statement: str, *values: Any) -> Sequence[Any]:
-        return list(await self._connection.execute_fetchall(statement, values))
-
-    async def _run(self, statement: str, *values: Any) -> None:
-        async with self._connection.execute(statement, values):
-            pass
-
-    async def _run_on_reserve(self, statement: str, *values: Any) -> None:
-        """Run a statement; where the disk has no room for it, in that of the reserve."""
-        try:
-            await self._run(statement, *values)
-        except sqlite3.OperationalError as error:
-            if error.sqlite_errorcode != sqlite3.SQLITE_FULL:
-                raise
-            await to_thread.run_sync(self._reserve.give_up)
-            await self._run(statement, *values)
-            with suppress(sqlite3.OperationalError):  # the change is made, and the log only longer
-                await self._run("PRAGMA wal_checkpoint(TRUNCATE)")
-            await to_thread.run_sync(self._reserve.restore)
-
-    @property
-    def _connection(self) -> aiosqlite.Connection:
-        assert self._database is not None, "the database is open while the service runs"  # noqa: S101
-        return self._database
-
-
-def read_jobs(path: Path) -> list[Job]:
-    """Return the jobs in the database at ``path``, the oldest first; none where it is missing."""
-    rows = _read(path, "SELECT record FROM jobs ORDER BY number")
-    return [Job.model_validate_json(record) for (record,) in rows]
-
-
-def require_intact(path: Path) -> None:
-    """Raise ``StoreError`` where the database at ``path`` is damaged."""
-    rows = _read(path, "PRAGMA quick_check(1)")
-    if rows not in ([], [("ok",)]):
-        raise _damaged(path, rows[0][0])
-
-
-def _read(path: Path, statement: str) -> list[Any]:
-    if not path.is_file():
-        return []
-    try:
-        with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
-            return database.execute(statement).fetchall()
-    except sqlite3.DatabaseError as error:
-        raise _damaged(path, error) from error
-
-
-def _damaged(path: Path, reason: object) -> StoreError:
-    line = " ".join(str(reason).split())
-    return StoreError(f"{path} is damaged ({line}): move it away, and jobs begin anew")

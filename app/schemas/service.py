@@ -86,5 +86,6 @@ class ProblemCode(BaseModel):
 
     code: str
     status: int
+    other_statuses: list[int] = Field(description="Further statuses; `meaning` says when")
     title: str
     meaning: str

@@ -34,8 +34,9 @@ from app.engine.interface import Engine, ProgressCallback
 from app.engine.local import LocalEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, problem
-from app.jobs import Job, JobManager, JobRepository, JobSpec, require_intact
+from app.jobs import Job, JobManager, JobSpec, SqliteJobRepository, require_intact
 from app.queries import Estimate, MeshSize, Query, fingerprint, result_key
+from app.service.concurrency import ConcurrencyLimit
 from app.service.maintenance import Damage
 from app.service.scrub import scrubbing
 from app.service.single_flight import SingleFlight
@@ -82,12 +83,22 @@ class Service:
             self.meshes,
             settings.store_bytes,
             evicts=settings.store_evict == "lru",
+            quota=settings.quota_bytes,
         )
         self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
         self.fields = FieldStore(settings.store, settings.fields_bytes)
         self.engine: Engine = LocalEngine(settings, results)
         self._job_database = settings.store / layout.JOB_DATABASE
-        self.jobs = JobManager(JobRepository(self._job_database), self.results, settings.job_ttl)
+        self.jobs = JobManager(
+            SqliteJobRepository(self._job_database),
+            self.results,
+            settings.job_ttl,
+            settings.quota_jobs,
+        )
+        self.uploads = ConcurrencyLimit(
+            settings.quota_uploads, "quota_exceeded", "uploads", "quota_uploads"
+        )
+        """Uploads that each caller has under way"""
         self.is_leaving = False
         """Whether the service is about to stop: it is not ready, whatever it still answers"""
         self.lookups = {"hit": 0, "miss": 0}

@@ -8,7 +8,7 @@
         meshes/         see ``app.store.meshes``
         results/        see ``app.store.results``
         fields/         see ``app.store.fields``
-        jobs.sqlite3    see ``app.jobs.repository``
+        jobs.sqlite3    see ``app.jobs.sqlite_repository``
         jobs.reserve    see ``app.store.reserve``
         tmp/            meshes that are being written
 """

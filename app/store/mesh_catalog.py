@@ -1,4 +1,4 @@
-"""The catalog of stored meshes: sizes and order of use, known to one process.
+"""The catalog of stored meshes: sizes, owners and order of use, known to one process.
 
 The directory is the source of truth. Each change is one rename, made together with its entry here:
 a crash leaves a mesh either there or not, and the next start counts anew. Workers write new meshes
@@ -14,9 +14,10 @@ from collections.abc import AsyncIterator, Collection, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 from uuid import uuid4
 
-from app.errors import over_limit
+from app.errors import ProblemError, over_limit
 from app.store.atomic import sync, sync_all
 from app.store.layout import TEMPORARY
 from app.store.manifests import MANIFEST
@@ -34,19 +35,36 @@ class CatalogChange:
     """Ids of the meshes that were removed to make room"""
 
 
+class _Entry(NamedTuple):
+    """A mesh in the catalog."""
+
+    size: int
+    """Bytes on disk"""
+    owner: str | None
+
+
 class MeshCatalog:
-    """The meshes of a store, at most ``capacity`` bytes.
+    """The meshes of a store, at most ``capacity`` bytes, and of one owner at most ``quota``.
 
     A mesh that finds no room is refused. With ``evicts``, the least recently used meshes are
-    removed instead, but none that is pinned.
+    removed instead, but none that is pinned. None is removed to make room in a quota.
     """
 
-    def __init__(self, root: Path, store: MeshStore, capacity: int, *, evicts: bool) -> None:
+    def __init__(
+        self,
+        root: Path,
+        store: MeshStore,
+        capacity: int,
+        *,
+        evicts: bool,
+        quota: int | None = None,
+    ) -> None:
         self._store = store
         self._temporary = root / TEMPORARY
         self._capacity = capacity
         self._evicts = evicts
-        self._sizes: OrderedDict[str, int] = OrderedDict()  # the least recently used first
+        self._quota = quota
+        self._entries: OrderedDict[str, _Entry] = OrderedDict()  # the least recently used first
         self._pins: Counter[str] = Counter()
         self.evictions = 0
         """Meshes removed so far to make room"""
@@ -56,17 +74,26 @@ class MeshCatalog:
         self._store.folder.mkdir(exist_ok=True)
         self._temporary.mkdir(exist_ok=True)
         _remove(*self._temporary.iterdir())
-        self._sizes = OrderedDict(self._store.sizes())
+        sizes = self._store.sizes().items()
+        self._entries = OrderedDict(
+            (mesh_id, _Entry(size, self._owner(mesh_id))) for mesh_id, size in sizes
+        )
+
+    def _owner(self, mesh_id: str) -> str | None:
+        try:
+            return self._store.owner(mesh_id)
+        except ProblemError:  # a folder that is no mesh
+            return None
 
     @property
     def ids(self) -> Collection[str]:
         """Ids of all meshes."""
-        return self._sizes.keys()
+        return self._entries.keys()
 
     @property
     def total(self) -> int:
         """Bytes of all meshes."""
-        return sum(self._sizes.values())
+        return sum(entry.size for entry in self._entries.values())
 
     @asynccontextmanager
     async def scratch_folder(self) -> AsyncIterator[Path]:
@@ -91,7 +118,7 @@ class MeshCatalog:
         Raises
         ------
         ProblemError
-            There is no room.
+            There is no room, or none in the owner's quota.
         """
         mesh_id = written.mesh_id
         if written.folder is None:
@@ -100,8 +127,11 @@ class MeshCatalog:
         await asyncio.to_thread(sync_all, written.folder)
         if await asyncio.to_thread(self._store.is_intact, mesh_id):  # another upload was faster
             return CatalogChange(is_new=False)
-        is_new, place = mesh_id not in self._sizes, self._store.folder / mesh_id
-        evicted = self._choose_evicted(mesh_id, written.size)
+        is_new, place = mesh_id not in self._entries, self._store.folder / mesh_id
+        entry = _Entry(written.size, written.manifest["owner"])
+        if is_new:  # one that is healed has its room already
+            self._refuse_over_quota(entry)
+        evicted = self._choose_evicted(mesh_id, entry.size)
         gone: list[Path] = []
         try:
             gone.extend(self._move_out(old) for old in evicted)
@@ -109,11 +139,11 @@ class MeshCatalog:
                 written.folder.rename(place)
             else:
                 _replace_files(place, written.folder)
-            self._sizes[mesh_id] = written.size
+            self._entries[mesh_id] = entry
             self.use(mesh_id)
             await asyncio.to_thread(sync, self._store.folder if is_new else place)
         except OSError:
-            if is_new and mesh_id in self._sizes:
+            if is_new and mesh_id in self._entries:
                 gone.append(self._move_out(mesh_id))  # a power cut might lose it: fail now
             raise
         finally:
@@ -123,15 +153,15 @@ class MeshCatalog:
 
     async def delete(self, mesh_id: str) -> None:
         """Remove a mesh at once; processes that have it open can go on reading it."""
-        if mesh_id not in self._sizes:
+        if mesh_id not in self._entries:
             raise mesh_not_found(mesh_id)
         gone = self._move_out(mesh_id)
         await asyncio.to_thread(_remove, gone)
 
     def use(self, mesh_id: str) -> None:
         """Mark a mesh as the most recently used, if it is there."""
-        if mesh_id in self._sizes:
-            self._sizes.move_to_end(mesh_id)
+        if mesh_id in self._entries:
+            self._entries.move_to_end(mesh_id)
             self._store.note_use(mesh_id)
 
     @contextmanager
@@ -146,15 +176,34 @@ class MeshCatalog:
             if not self._pins[mesh_id]:
                 del self._pins[mesh_id]
 
+    def _refuse_over_quota(self, new: _Entry) -> None:
+        """Raise where its owner's quota has no room for a new mesh."""
+        if self._quota is None:
+            return
+        own = [entry.size for entry in self._entries.values() if entry.owner == new.owner]
+        total = sum(own) + new.size
+        if total > self._quota:
+            raise over_limit(
+                "quota_exceeded",
+                "bytes of meshes of one owner",
+                total,
+                self._quota,
+                "quota_bytes",
+                hint="delete meshes of yours that are not needed any more",
+                other_status=507,
+            )
+
     def _choose_evicted(self, mesh_id: str, size: int) -> list[str]:
         """Return the meshes to evict for one of ``size`` bytes; raise where that is not enough."""
-        free = [old for old in self._sizes if old not in self._pins and old != mesh_id]
+        free = [old for old in self._entries if old not in self._pins and old != mesh_id]
         evicted: list[str] = []
-        total = self.total + size - self._sizes.get(mesh_id, 0)
+        total = self.total + size
+        if mesh_id in self._entries:
+            total -= self._entries[mesh_id].size
         if self._evicts and size <= self._capacity:
             while total > self._capacity and len(evicted) < len(free):
                 evicted.append(free[len(evicted)])
-                total -= self._sizes[evicted[-1]]
+                total -= self._entries[evicted[-1]].size
         if total > self._capacity:
             hint = "delete meshes that are not needed any more"
             raise over_limit(
@@ -165,7 +214,7 @@ class MeshCatalog:
     def _move_out(self, mesh_id: str) -> Path:
         gone = self._new_name()
         (self._store.folder / mesh_id).rename(gone)
-        del self._sizes[mesh_id]
+        del self._entries[mesh_id]
         return gone
 
     def _new_name(self) -> Path:

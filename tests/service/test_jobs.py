@@ -1,7 +1,7 @@
 """Queries that are answered whether their client waits or not."""
 
+import errno
 import json
-import sqlite3
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta, tzinfo
@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from app.jobs.repository import JobRepository
+from app.jobs.sqlite_repository import SqliteJobRepository
 from tests.support.processes import stopped
 from tests.support.service import (
     SLOW_FACES,
@@ -329,15 +329,15 @@ def test_jobs_are_forgotten_after_a_while(tmp_path: Path, monkeypatch: pytest.Mo
 def test_jobs_are_forgotten_although_the_disk_was_full(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    remove, refused = JobRepository.remove, []
+    remove, refused = SqliteJobRepository.remove, []
 
-    async def remove_later(repository: JobRepository, job_id: str) -> None:
+    async def remove_later(repository: SqliteJobRepository, job_id: str) -> None:
         if len(refused) < 2:
             refused.append(job_id)
-            raise sqlite3.OperationalError("database or disk is full")
+            raise OSError(errno.ENOSPC, "database or disk is full")
         await remove(repository, job_id)
 
-    monkeypatch.setattr(JobRepository, "remove", remove_later)
+    monkeypatch.setattr(SqliteJobRepository, "remove", remove_later)
     with serving(tmp_path, job_ttl=0.1) as client:
         job = job_of(submit(client, upload_sample(client, "plane", 50)))
         wait_until(lambda: client.get(job).status_code == 404)
@@ -347,17 +347,17 @@ def test_jobs_are_forgotten_although_the_disk_was_full(
 @pytest.fixture
 def full_disk(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
     """Fill the disk of a store, as its records of jobs see it, up to their reserve."""
-    run = JobRepository._run
+    run = SqliteJobRepository._run
 
     def fill(store: Path) -> None:
-        async def run_if_there_is_room(repository: JobRepository, sql: str, *values: Any) -> None:
+        async def run_if_there_is_room(
+            repository: SqliteJobRepository, sql: str, *values: Any
+        ) -> None:
             if not sql.startswith("PRAGMA") and (store / "jobs.reserve").exists():
-                error = sqlite3.OperationalError("database or disk is full")
-                error.sqlite_errorcode = sqlite3.SQLITE_FULL
-                raise error
+                raise OSError(errno.ENOSPC, "database or disk is full")
             await run(repository, sql, *values)
 
-        monkeypatch.setattr(JobRepository, "_run", run_if_there_is_room)
+        monkeypatch.setattr(SqliteJobRepository, "_run", run_if_there_is_room)
 
     return fill
 

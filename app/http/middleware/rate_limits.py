@@ -1,6 +1,6 @@
 """Rate limits of each caller: requests a minute, and concurrent requests."""
 
-from collections import Counter, OrderedDict
+from collections import OrderedDict
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import ceil
@@ -10,6 +10,7 @@ from pyrate_limiter import GCRA, Duration, Rate
 
 from app.access import Caller
 from app.errors import over_limit
+from app.service.concurrency import ConcurrencyLimit
 
 _REMEMBERED = 10_000
 """Callers whose rates are remembered, in some 200 bytes each.
@@ -46,28 +47,14 @@ class RateLimits:
 
     def __init__(self, a_minute: int | None, at_once: int | None) -> None:
         self._rate = MinuteRate(a_minute) if a_minute else None
-        self._at_once = at_once
-        self._running: Counter[str] = Counter()
+        self._at_once = ConcurrencyLimit(at_once, "rate_limited", "requests", "max_concurrent")
 
     @contextmanager
     def counting(self, caller: Caller) -> Iterator[None]:
         """Count the block as one request, or refuse it with ``rate_limited``."""
-        self._refuse_concurrent(caller.name)
-        self._refuse_rate(caller.name)
-        self._running[caller.name] += 1
-        try:
+        with self._at_once.counting(caller):
+            self._refuse_rate(caller.name)
             yield
-        finally:
-            self._running[caller.name] -= 1
-            if not self._running[caller.name]:
-                del self._running[caller.name]
-
-    def _refuse_concurrent(self, name: str) -> None:
-        running = self._running[name] + 1
-        if self._at_once is not None and running > self._at_once:
-            what, headers = "requests at the same time", {"Retry-After": "1"}
-            setting = "max_concurrent"
-            raise over_limit("rate_limited", what, running, self._at_once, setting, headers=headers)
 
     def _refuse_rate(self, name: str) -> None:
         if self._rate is None:

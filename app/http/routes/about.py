@@ -38,6 +38,9 @@ _LIMITS = (
     "job_ttl",
     "rate_limit",
     "max_concurrent",
+    "quota_bytes",
+    "quota_jobs",
+    "quota_uploads",
 )
 
 

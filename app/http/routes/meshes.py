@@ -96,7 +96,9 @@ _BODIES = {
             "upload_too_large",
             "unsupported_media_type",
             "invalid_mesh",
+            "quota_exceeded",
             *WORK_PROBLEMS,
+            quota_exceeded=507,
         ),
     },
     openapi_extra=_BODIES,
@@ -115,11 +117,12 @@ async def create_mesh(
     triangles keep the order they have in the file; polygons become triangles in their place, and
     `face_map` leads back to them.
     """
-    if parameters.sample is None:
-        stored = await _add_upload(service, parameters, request, context)
-    else:
-        making = service.add_mesh(_sample(service, parameters, context.caller), context)
-        stored = await while_connected(request, making)
+    with service.uploads.counting(context.caller):
+        if parameters.sample is None:
+            stored = await _add_upload(service, parameters, request, context)
+        else:
+            making = service.add_mesh(_sample(service, parameters, context.caller), context)
+            stored = await while_connected(request, making)
     note_work(request, stored.manifest["id"], stored.seconds)
     response.status_code = 201 if stored.is_new else 200
     response.headers.update(server_timing(stored.seconds))

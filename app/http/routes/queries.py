@@ -47,7 +47,7 @@ from app.schemas.service import JobDocument
 
 router = APIRouter(prefix="/meshes/{mesh_id}", tags=["queries"], route_class=QueryRoute)
 
-_CODES = ("not_acceptable", *QUERY_PROBLEMS, "range_not_satisfiable")
+_CODES = ("not_acceptable", *QUERY_PROBLEMS, "quota_exceeded", "range_not_satisfiable")
 _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *_CODES)
 
 

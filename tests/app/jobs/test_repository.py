@@ -1,17 +1,19 @@
-"""The records of jobs on a disk that is full: a real one, of 16 megabytes in memory."""
+"""The records of jobs: counted by owner, and on a disk that is full, of 16 megabytes in memory."""
 
+import errno
 import shutil
-import sqlite3
 import subprocess
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import anyio
 import pytest
 
 from app.jobs.job import Job, JobSpec
-from app.jobs.repository import JobRepository
+from app.jobs.sqlite_repository import SqliteJobRepository
 from tests.support.paths import ROOT
 
 SPEC = JobSpec(
@@ -25,8 +27,50 @@ SPEC = JobSpec(
 )
 
 
-def new_job() -> Job:
-    return Job(spec=SPEC)
+def new_job(owner: str | None = None) -> Job:
+    return Job(spec=SPEC.model_copy(update={"owner": owner}))
+
+
+def test_usage_counts_the_jobs_of_one_owner_in_every_state(tmp_path: Path) -> None:
+    anyio.run(count_usage, tmp_path / "jobs.sqlite3")
+
+
+async def count_usage(path: Path) -> None:
+    repository = SqliteJobRepository(path)
+    await repository.open()
+    mine = [new_job("alice") for _ in range(4)]
+    for job in (*mine, new_job("bob"), new_job()):
+        await repository.add(job)
+    assert await repository.usage("alice") == (4, None)
+
+    noon = datetime(2005, 7, 1, 12, tzinfo=UTC)
+    ends = [noon + timedelta(microseconds=offset) for offset in (2_000_000, 500_000, 1_500_000)]
+    for job, end in zip(mine, ends, strict=False):
+        await repository.update(job.dismissed().model_copy(update={"finished": end}))
+    assert await repository.usage("alice") == (4, min(ends))
+    await repository.close()
+    await repository.open()
+    assert await repository.usage("alice") == (4, min(ends))
+    await repository.remove(mine[1].id)
+    assert await repository.usage("alice") == (3, ends[2])
+    assert await repository.usage("bob") == await repository.usage(None) == (1, None)
+    assert await repository.usage("carol") == (0, None)
+    await repository.close()
+
+
+def test_a_database_that_cannot_be_read_is_an_os_error(tmp_path: Path) -> None:
+    (tmp_path / "jobs.sqlite3").write_bytes(b"no database" * 1000)
+
+    with pytest.raises(OSError, match="not a database") as refusal:
+        anyio.run(SqliteJobRepository(tmp_path / "jobs.sqlite3").open)
+    assert refusal.value.errno == errno.EIO
+
+
+@contextmanager
+def refused_for_want_of_room() -> Iterator[None]:
+    with pytest.raises(OSError, match="disk is full") as refusal:
+        yield
+    assert refusal.value.errno == errno.ENOSPC
 
 
 def fill(path: Path) -> None:
@@ -37,7 +81,7 @@ def fill(path: Path) -> None:
 
 
 async def use_full_disk(folder: Path) -> None:
-    repository = JobRepository(folder / "jobs.sqlite3")
+    repository = SqliteJobRepository(folder / "jobs.sqlite3")
     await repository.open()
     try:
         await use(repository, folder)
@@ -45,7 +89,7 @@ async def use_full_disk(folder: Path) -> None:
         await repository.close()
 
 
-async def use(repository: JobRepository, folder: Path) -> None:
+async def use(repository: SqliteJobRepository, folder: Path) -> None:
     jobs = [new_job() for _ in range(100)]
     for job in jobs:
         await repository.add(job)
@@ -53,7 +97,7 @@ async def use(repository: JobRepository, folder: Path) -> None:
     await repository.open()
     fill(folder / "others")
 
-    with pytest.raises(sqlite3.OperationalError, match="disk is full"):
+    with refused_for_want_of_room():
         await repository.add(new_job())
     for job in jobs:
         await repository.update(job.dismissed())
@@ -61,7 +105,7 @@ async def use(repository: JobRepository, folder: Path) -> None:
     for job in jobs:
         await repository.remove(job.id)
     assert await repository.page(None, 1, None) == ([], None)
-    with pytest.raises(sqlite3.OperationalError, match="disk is full"):
+    with refused_for_want_of_room():
         await repository.add(new_job())
 
     (folder / "jobs.reserve").unlink()

@@ -218,20 +218,24 @@ Store = tuple[MeshStore, MeshCatalog]
 
 
 @contextmanager
-def opened(root: Path, capacity: int = 2**60, *, evicts: bool = False) -> Iterator[Store]:
+def opened(
+    root: Path, capacity: int = 2**60, *, evicts: bool = False, quota: int | None = None
+) -> Iterator[Store]:
     store = MeshStore(root)
-    catalog = MeshCatalog(root, store, capacity, evicts=evicts)
+    catalog = MeshCatalog(root, store, capacity, evicts=evicts, quota=quota)
     with owned(root):
         catalog.prepare()
         yield store, catalog
 
 
-def add(opened: Store, mesh: gc.TriangleMesh) -> tuple[str, CatalogChange]:
+def add(
+    opened: Store, mesh: gc.TriangleMesh, owner: str | None = None
+) -> tuple[str, CatalogChange]:
     store, catalog = opened
 
     async def run() -> tuple[str, CatalogChange]:
         async with catalog.scratch_folder() as folder:
-            written = store.write_aside(mesh, folder / "mesh", None)
+            written = store.write_aside(mesh, folder / "mesh", owner)
             return written.mesh_id, await catalog.add(written)
 
     return anyio.run(run)
@@ -269,6 +273,68 @@ def test_the_bound_holds_for_what_a_former_service_left(tmp_path: Path) -> None:
         assert store[1].total == size
         with pytest.raises(ProblemError):
             add(store, plane(18))
+
+
+@pytest.mark.parametrize("restarts", [False, True])
+@pytest.mark.parametrize("owner", ["alice", None])
+def test_the_quota_bounds_what_each_owner_stored_first(
+    tmp_path: Path, owner: str | None, restarts: bool
+) -> None:
+    root = tmp_path / "store"
+    with opened(tmp_path / "sizes") as sizing:
+        small, large = (
+            add(sizing, plane(faces), owner) and list(sizing[0].sizes().values())[-1]
+            for faces in (50, 200)
+        )
+    quota = small + large - 1
+    with opened(root, quota=quota) as store:
+        mesh_id, _ = add(store, plane(50), owner)
+        if not restarts:
+            check_quota(store, mesh_id, owner, small + large, quota)
+    if restarts:
+        (root / "meshes" / "no mesh").mkdir()
+        with opened(root, quota=quota) as store:
+            check_quota(store, mesh_id, owner, small + large, quota)
+
+
+def check_quota(store: Store, mesh_id: str, owner: str | None, wanted: int, quota: int) -> None:
+    """Check that an owner is refused ``plane(200)`` beside ``mesh_id``, and nobody else is."""
+    before = files_in(store[0].folder)
+    with pytest.raises(ProblemError) as caught:
+        add(store, plane(200), owner)
+    problem = caught.value.problem
+    assert (problem.code, problem.status) == ("quota_exceeded", 507)
+    assert (problem.limit, problem.actual) == (quota, wanted)
+    assert problem.setting == "GEODESIC_QUOTA_BYTES"
+    assert files_in(store[0].folder) == before
+
+    assert add(store, plane(50), owner) == (mesh_id, CatalogChange(is_new=False))
+    other, change = add(store, plane(200), "bob")
+    assert change.is_new
+    assert not add(store, plane(200), owner)[1].is_new, "it is Bob's, and counts for him"
+    anyio.run(store[1].delete, other)
+    anyio.run(store[1].delete, mesh_id)
+    assert add(store, plane(200), owner)[1].is_new
+
+
+def test_a_mesh_is_healed_although_the_quota_is_less_by_now(tmp_path: Path) -> None:
+    with opened(tmp_path / "store") as store:
+        mesh_id, _ = add(store, plane(50), "alice")
+    (tmp_path / "store" / "meshes" / mesh_id / "faces.npy").write_bytes(b"")
+
+    with opened(tmp_path / "store", quota=1) as store:
+        assert add(store, plane(50), "alice")[1].is_healed
+        with pytest.raises(ProblemError):
+            add(store, plane(18), "alice")
+
+
+def test_nothing_is_evicted_to_make_room_in_a_quota(tmp_path: Path) -> None:
+    (size,) = sizes(tmp_path, 50)
+    with opened(tmp_path / "store", evicts=True, quota=size + 100) as store:
+        mesh_id, _ = add(store, plane(50), "alice")
+        with pytest.raises(ProblemError):
+            add(store, plane(72), "alice")
+        assert list(store[1].ids) == [mesh_id]
 
 
 @pytest.mark.parametrize("restarts", [False, True])

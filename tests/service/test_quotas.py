@@ -1,0 +1,173 @@
+"""Quotas: a caller that has as much as it may is refused, and the others are served."""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from datetime import datetime, timedelta, tzinfo
+from pathlib import Path
+from typing import Any
+
+import pytest
+from starlette.testclient import TestClient
+
+from tests.support.processes import stopped
+from tests.support.service import ServiceClient, check_problem, serving, upload_sample
+from tests.support.waiting import LONG_S, wait_until
+
+ALICE, BOB = ({"Authorization": f"Bearer {name}-0123456789abc"} for name in ("alice", "bob"))
+KEYS = "alice:alice-0123456789abc,bob:bob-0123456789abc"
+ASYNC = {"Prefer": "respond-async"}
+
+
+@contextmanager
+def keyed(store: Path, **settings: Any) -> Iterator[ServiceClient]:
+    with serving(store, api_keys=KEYS, cancel_grace_s=LONG_S, **settings) as client:
+        client.wait_until_idle()
+        yield client
+
+
+def upload(client: TestClient, caller: Any, faces: int) -> Any:
+    sample = {"sample": "plane", "faces": faces}
+    return client.post("/v1/meshes", params=sample, headers=caller)
+
+
+def limits_of(client: TestClient, caller: Any) -> Any:
+    return client.get("/v1", headers=caller).json()["limits"]
+
+
+def test_stored_meshes(tmp_path: Path) -> None:
+    quota = 120_000
+    with keyed(tmp_path, quota_bytes=quota) as client:
+        assert limits_of(client, ALICE)["GEODESIC_QUOTA_BYTES"] == quota
+        own = upload(client, ALICE, 200)
+        assert own.status_code == 201
+        refused = upload(client, ALICE, 242)
+        problem = check_problem(refused, 507, "quota_exceeded")
+        assert problem["limit"] == quota < problem["actual"]
+        assert problem["setting"] == "GEODESIC_QUOTA_BYTES"
+        assert problem["hint"]
+        assert "retry-after" not in refused.headers
+        assert upload(client, ALICE, 200).status_code == 200, "it is stored already"
+
+        of_bob = upload(client, BOB, 242)
+        assert of_bob.status_code == 201
+        assert upload(client, ALICE, 242).status_code == 200, "it is Bob's, and counts for him"
+        check_problem(upload(client, BOB, 288), 507, "quota_exceeded")
+
+    with keyed(tmp_path, quota_bytes=quota) as client:
+        check_problem(upload(client, ALICE, 288), 507, "quota_exceeded")
+        client.delete(own.headers["location"], headers=ALICE)
+        assert upload(client, ALICE, 288).status_code == 201
+
+
+def test_uploads_at_once(tmp_path: Path) -> None:
+    with keyed(tmp_path, quota_uploads=1) as client, ThreadPoolExecutor(2) as pool:
+        assert limits_of(client, ALICE)["GEODESIC_QUOTA_UPLOADS"] == 1
+        with stopped(client.workers()):
+            of_alice = pool.submit(upload, client, ALICE, 50)
+            wait_until(lambda: client.load.busy + client.load.waiting == 1)
+            for again in (
+                upload(client, ALICE, 72),
+                client.post("/v1/meshes", content=b"off", headers=ALICE),
+            ):
+                problem = check_problem(again, 429, "quota_exceeded")
+                assert (problem["limit"], problem["actual"]) == (1, 2)
+                assert problem["setting"] == "GEODESIC_QUOTA_UPLOADS"
+                assert again.headers["retry-after"] == "1"
+            assert client.get("/v1", headers=ALICE).status_code == 200
+            of_bob = pool.submit(upload, client, BOB, 98)
+            wait_until(lambda: client.load.busy + client.load.waiting == 2)
+
+        assert (of_alice.result().status_code, of_bob.result().status_code) == (201, 201)
+        assert upload(client, ALICE, 72).status_code == 201
+
+
+def test_without_keys_uploads_at_once_are_counted_by_address(tmp_path: Path) -> None:
+    with serving(tmp_path, quota_uploads=1) as client, ThreadPoolExecutor(2) as pool:
+        client.wait_until_idle()
+        other = TestClient(client.app, client=("10.0.0.2", 1))
+        other.portal = client.portal
+        with stopped(client.workers()):
+            first = pool.submit(upload, client, None, 50)
+            wait_until(lambda: client.load.busy + client.load.waiting == 1)
+            check_problem(upload(client, None, 72), 429, "quota_exceeded")
+            second = pool.submit(upload, other, None, 98)
+            wait_until(lambda: client.load.busy + client.load.waiting == 2)
+        assert (first.result().status_code, second.result().status_code) == (201, 201)
+
+
+class Asker:
+    """Submits jobs, each a question that was not asked before."""
+
+    def __init__(self, client: ServiceClient) -> None:
+        self.client = client
+        with_key = {"params": {"sample": "plane", "faces": 200}, "headers": ALICE}
+        self.link = client.post("/v1/meshes", **with_key).headers["location"]
+        self.asked = 0
+
+    def submit(self, caller: Any, key: str | None = None) -> Any:
+        self.asked += 1
+        headers = {**caller, **ASYNC, **({"Idempotency-Key": key} if key else {})}
+        start = 1.0 if key else float(self.asked)
+        body = {"sources": [{"vertex": 0, "start_distance": start}]}
+        return self.client.post(f"{self.link}/distances", json=body, headers=headers)
+
+    def wait_for_end(self, job: str, caller: Any) -> None:
+        get: Callable[[], Any] = lambda: self.client.get(job, headers=caller).json()  # noqa: E731
+        wait_until(lambda: get()["status"] == "successful")
+
+
+def test_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calendar = Calendar()
+    monkeypatch.setattr("app.jobs.manager.datetime", calendar)
+    with keyed(tmp_path, quota_jobs=2, job_ttl=86_400) as client:
+        assert limits_of(client, ALICE)["GEODESIC_QUOTA_JOBS"] == 2
+        asker = Asker(client)
+        with stopped(client.workers()):
+            first, second = asker.submit(ALICE, "first"), asker.submit(ALICE)
+            assert (first.status_code, second.status_code) == (202, 202)
+            refused = asker.submit(ALICE)
+            problem = check_problem(refused, 429, "quota_exceeded")
+            assert (problem["limit"], problem["actual"]) == (2, 3)
+            assert problem["setting"] == "GEODESIC_QUOTA_JOBS"
+            assert problem["hint"]
+            assert refused.headers["retry-after"] == "1"
+            again = asker.submit(ALICE, "first")
+            assert again.headers["location"] == first.headers["location"], "it is no other job"
+            of_bob = asker.submit(BOB)
+            assert of_bob.status_code == 202
+
+        for response, caller in ((first, ALICE), (second, ALICE), (of_bob, BOB)):
+            asker.wait_for_end(response.headers["location"], caller)
+        refused = asker.submit(ALICE)
+        check_problem(refused, 429, "quota_exceeded")
+        assert 0 < int(refused.headers["retry-after"]) <= 86_400
+        calendar.hours = 23
+        assert int(asker.submit(ALICE).headers["retry-after"]) <= 3600
+
+    with keyed(tmp_path, quota_jobs=2, job_ttl=86_400) as client:
+        asker = Asker(client)
+        check_problem(asker.submit(ALICE), 429, "quota_exceeded")
+        assert client.delete(second.headers["location"], headers=ALICE).status_code == 200
+        assert asker.submit(ALICE).status_code == 202
+
+
+class Calendar:
+    """Shows the time of some hours later."""
+
+    hours = 0
+
+    def now(self, zone: tzinfo) -> datetime:
+        return datetime.now(zone) + timedelta(hours=self.hours)
+
+
+def test_without_keys_all_that_is_stored_has_one_owner(tmp_path: Path) -> None:
+    with serving(tmp_path, quota_bytes=100_000, quota_jobs=1) as client:
+        mesh_id = upload_sample(client, "plane", 200)
+        other = TestClient(client.app, client=("10.0.0.2", 1))
+        other.portal = client.portal
+
+        check_problem(upload(other, None, 242), 507, "quota_exceeded")
+        body, link = {"sources": [{"vertex": 0}]}, f"/v1/meshes/{mesh_id}/distances"
+        assert client.post(link, json=body, headers=ASYNC).status_code == 202
+        check_problem(other.post(link, json=body, headers=ASYNC), 429, "quota_exceeded")
