@@ -492,7 +492,8 @@ def link_chains(
 
     The faces are those that follow each point; the last point of an open line has none, -1. The
     first points and the flags have a row for each line. Points nearer than ``shortest`` to the one
-    before are left out, and so are lines of too few points.
+    before are left out, and so are lines of too few points. Of an open line that crosses a strip so
+    narrow, from one edge to another, both ends are left.
     """
     count, partner = len(chains.ends), partners(links, crossings, chains)
     done, lines, total = np.zeros(count, np.uint8), 0, 0
@@ -503,11 +504,18 @@ def link_chains(
             is_open = chains.ends[start // 2, start % 2] >= 0 and partner[start] < 0
             if done[start // 2] or (turn < 2 and not is_open) or (turn != 1 and start % 2):
                 continue
-            begin, end = total, start
+            begin, end, last = total, start, start
             while end >= 0 and not done[end // 2]:
                 done[end // 2] = 1
                 total = append_chain(chains, end, shortest, points, faces, begin, total)
-                end = partner[end ^ 1]
+                last = end ^ 1
+                end = partner[last]
+            if is_open and total == begin + 1 and lead_across(crossings, chains, start, last):
+                for axis in range(3):
+                    points[total, axis] = points[begin, axis]
+                    points[begin, axis] = chains.points[row_at(chains, start), axis]
+                faces[begin] = chains.faces[start // 2, 0]
+                total += 1
             if not is_open and total > begin + 1:
                 total -= 1  # the first point again
             else:
@@ -539,6 +547,30 @@ def partners(links: Ints, crossings: Any, chains: Any) -> Ints:
         else:
             partner[end], partner[waiting[c]] = waiting[c], end
     return partner
+
+
+@inlined
+def row_at(chains: Any, end: int) -> int:
+    """Return the row of the point at an end of a chain."""
+    chain = end // 2
+    return chains.first[chain, 0] if end % 2 == 0 else chains.first[chain + 1, 0] - 1
+
+
+@inlined
+def lead_across(crossings: Any, chains: Any, start: int, last: int) -> bool:
+    """Tell whether a line whose ends these are leads from an edge to another, to another point.
+
+    From an edge back to itself it may be rounding: a gap between the spans of two windows.
+    """
+    c, d = chains.ends[start // 2, start % 2], chains.ends[last // 2, last % 2]
+    apart = 0.0
+    for axis in range(3):
+        begin, end = (
+            chains.points[row_at(chains, start), axis],
+            chains.points[row_at(chains, last), axis],
+        )
+        apart = max(apart, abs(end - begin))
+    return crossings.half_edges[c, 0] != crossings.half_edges[d, 0] and apart > 0.0
 
 
 @inlined

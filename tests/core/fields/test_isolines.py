@@ -7,7 +7,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.tolerances import CROSSING, LEVEL
+from geodesic_core.tolerances import CROSSING, LEVEL, PIECE
 from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_points import random_points
 from tests.support import zoo
@@ -114,6 +114,31 @@ def test_lines_through_vertices_are_one_and_whole(share):
         assert line.closed
         assert line.length == pytest.approx(2 * math.pi * level, rel=4 * FINE / level)
         check_pieces(mesh, line)
+
+
+@pytest.mark.parametrize("width", [1e-6, 1e-8, 1e-9, 1e-10, 1e-11])
+def test_a_strip_may_be_as_narrow_as_points_of_a_line_are_near(width):
+    """A level crosses it from side to side, once."""
+    points, faces = zoo.grid(20, 1)
+    field = gc.exact_distance(gc.TriangleMesh(points * (0.05, width, 1.0), faces), 0)
+    levels = [0.013, 0.1234, 0.5, 0.77, 0.987]
+    # Rounding across a face, from side to side, is as much larger along it as it is longer.
+    rounding = 4.0 * np.finfo(np.float64).eps * (1.0 + 0.05 / width)
+    for level, lines in zip(levels, field.isolines(levels), strict=True):
+        (line,) = lines
+        assert not line.closed
+        ends = sorted(line.points[[0, -1], 1])
+        np.testing.assert_allclose(ends, [0.0, width], rtol=0, atol=1e-12 * width)
+        np.testing.assert_allclose(np.linalg.norm(line.points, axis=1), level, rtol=rounding)
+
+
+@pytest.mark.parametrize(("radius", "count"), [(0.1, 0), (3.0, 1)])
+def test_a_tiny_line_from_an_edge_back_to_it_is_left_out(radius, count):
+    """Around a source on the boundary; nor is a circle so small drawn inside a face."""
+    mesh = gc.TriangleMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    source = gc.Source(gc.SurfacePoint.edge(0, 0, 0.4), 1.0)
+    (lines,) = gc.exact_distance(mesh, source).isolines([1.0 + radius * PIECE])
+    assert len(lines) == count
 
 
 @pytest.mark.parametrize(("share", "lines"), [(-1e4, 1), (-0.5, 0), (0.0, 0), (0.5, 0), (1e4, 0)])
