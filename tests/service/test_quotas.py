@@ -120,13 +120,16 @@ class Asker:
 def test_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calendar = Calendar()
     monkeypatch.setattr("app.jobs.manager.datetime", calendar)
-    with keyed(tmp_path, quota_jobs=2, job_ttl=86_400) as client:
+    with keyed(tmp_path, quota_jobs=2, job_ttl=86_400) as client, ThreadPoolExecutor(4) as pool:
         assert limits_of(client, ALICE)["GEODESIC_QUOTA_JOBS"] == 2
         asker = Asker(client)
         with stopped(client.workers()):
-            first, second = asker.submit(ALICE, "first"), asker.submit(ALICE)
-            assert (first.status_code, second.status_code) == (202, 202)
-            refused = asker.submit(ALICE)
+            first = asker.submit(ALICE, "first")
+            at_once = sorted(
+                pool.map(asker.submit, [ALICE] * 4), key=lambda response: response.status_code
+            )
+            assert [response.status_code for response in at_once] == [202, 429, 429, 429]
+            second, refused = at_once[:2]
             problem = check_problem(refused, 429, "quota_exceeded")
             assert (problem["limit"], problem["actual"]) == (2, 3)
             assert problem["setting"] == "GEODESIC_QUOTA_JOBS"

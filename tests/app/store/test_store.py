@@ -317,6 +317,32 @@ def check_quota(store: Store, mesh_id: str, owner: str | None, wanted: int, quot
     assert add(store, plane(200), owner)[1].is_new
 
 
+def test_of_two_uploads_at_the_same_time_the_quota_takes_one(tmp_path: Path) -> None:
+    quota = sum(sizes(tmp_path, 50, 72)) - 1
+    with opened(tmp_path / "store", quota=quota) as (store, catalog):
+        ends: list[str] = []
+
+        async def add_one(faces: int) -> None:
+            async with catalog.scratch_folder() as folder:
+                written = store.write_aside(plane(faces), folder / "mesh", "alice")
+                await anyio.sleep(0)  # both are written before either is added
+                try:
+                    await catalog.add(written)
+                    ends.append("added")
+                except ProblemError as error:
+                    ends.append(error.problem.code)
+
+        async def add_both() -> None:
+            async with anyio.create_task_group() as group:
+                group.start_soon(add_one, 50)
+                group.start_soon(add_one, 72)
+
+        anyio.run(add_both)
+        assert sorted(ends) == ["added", "quota_exceeded"]
+        assert len(catalog.ids) == 1
+        assert catalog.total <= quota
+
+
 def test_a_mesh_is_healed_although_the_quota_is_less_by_now(tmp_path: Path) -> None:
     with opened(tmp_path / "store") as store:
         mesh_id, _ = add(store, plane(50), "alice")
