@@ -166,8 +166,8 @@ def test_the_scrub_finds_what_is_damaged(tmp_path: Path) -> None:
         assert bodies[1].exists()
         name = f"{whole}/{bodies[0].stem}"
         assert f"result {name} is damaged: it is not what was written" in details(lines)
-        expected = f"mesh {damaged} is damaged: its array vertices is not what was written"
-        assert expected in details(lines)
+        # Of what, depends on the file that the scrub was at when the bytes were flipped.
+        assert any(detail.startswith(f"mesh {damaged} is damaged: ") for detail in details(lines))
         assert not any(detail.startswith(f"mesh {whole}") for detail in details(lines))
         check_problem(distances(client, damaged), 500, "mesh_damaged")
         upload_sample(client, "plane", 45_000)

@@ -286,7 +286,7 @@ def test_the_quota_bounds_what_each_owner_stored_first(
             add(sizing, plane(faces), owner) and list(sizing[0].sizes().values())[-1]
             for faces in (50, 200)
         )
-    quota = small + large - 1
+    quota = small + large - 100  # manifests of other owners differ by some bytes
     with opened(root, quota=quota) as store:
         mesh_id, _ = add(store, plane(50), owner)
         if not restarts:
