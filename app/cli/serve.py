@@ -3,6 +3,7 @@
 import asyncio
 import math
 import os
+import sys
 from functools import partial
 from signal import SIGHUP, SIGTERM, raise_signal, signal
 from types import FrameType
@@ -20,7 +21,8 @@ def serve(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.")] = 8000,
 ) -> None:
     """Serve geodesics over HTTP until interrupted; settings are GEODESIC_… variables."""
-    os.environ["GEODESIC_QUIET"] = "1"  # the log says that kernels are being compiled
+    if not sys.stderr.isatty():
+        os.environ["GEODESIC_QUIET"] = "1"  # lines are objects then; the log says that it compiles
     fork_server.start()  # imports for the workers while this process imports for itself
 
     import uvicorn
