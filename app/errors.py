@@ -35,7 +35,7 @@ CODES: Mapping[str, Code] = {
     "unauthorized": Code(401, "Unauthorized", "The request needs an API key, or has a wrong one."),
     "forbidden": Code(403, "Forbidden", "The API key does not allow this request."),
     "origin_not_allowed": Code(
-        403, "Origin not allowed", "A page elsewhere may change nothing here; see `hint`."
+        403, "Origin not allowed", "Pages of other sites may not change anything; see `hint`."
     ),
     "not_found": Code(404, "Not found", "There is nothing at this address."),
     "mesh_not_found": Code(404, "Mesh not found", "No mesh with this id is in the store."),

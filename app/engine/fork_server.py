@@ -9,7 +9,11 @@ import multiprocessing
 from multiprocessing import forkserver
 
 LATE = (
-    *("filelock", "igl", "manifold3d", "scipy.sparse", "scipy.spatial"),
+    "filelock",
+    "igl",
+    "manifold3d",
+    "scipy.sparse",
+    "scipy.spatial",
     "trimesh.exchange.stl",
 )
 

@@ -7,17 +7,19 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.access import Caller, caller_at, name_of_secret
 from app.errors import ProblemError, problem
+from app.http.middleware.probes import PROBES
 from app.http.middleware.rate_limits import MinuteRate, RateLimits
 from app.http.page import ASSETS
 from app.settings import Settings
 
-_OPEN = frozenset({"/", "/livez", "/readyz", "/openapi.json"})
+_OPEN = PROBES | {"/", "/openapi.json"}
 _OPEN_FOLDERS = ("/problems/", f"{ASSETS}/")
 _BEARER = re.compile(rb"bearer +([A-Za-z0-9._~+/-]+=*)", re.IGNORECASE)
 
 WRONG_KEYS_A_MINUTE = 10
-"""Wrong keys of one address that are refused at once; each further one holds its connection."""
+"""Wrong keys of one address that are refused at once"""
 WRONG_KEY_PAUSE_S = 1.0
+"""Seconds before each further one is refused"""
 
 
 def is_open(path: str) -> bool:

@@ -1,4 +1,4 @@
-"""Protection against pages elsewhere, which can make the browser of a user ask this service."""
+"""Protection against cross-site requests, which pages of other sites make a browser send."""
 
 from collections.abc import Iterable
 from urllib.parse import urlsplit
@@ -15,10 +15,10 @@ _SAFE = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class CrossSiteMiddleware:
-    """Middleware that refuses names which are not the service's, and writes by foreign pages.
+    """Middleware that refuses foreign names in `Host`, and changes by pages of other sites.
 
-    A page can give its own name the address of this service (DNS rebinding). Its requests then
-    count as its own for the browser, and only `Host` shows it. This matters where no keys protect
+    A site can point its own name at the address of this service (DNS rebinding). The browser then
+    takes the service for that site, and only `Host` shows it. This matters where no keys protect
     the service, above all on a loopback address, which other machines cannot reach otherwise.
     """
 
@@ -85,7 +85,7 @@ def _host_not_allowed(name: str) -> ProblemError:
 
 
 def _origin_not_allowed(origin: str) -> ProblemError:
-    detail = f"a page of {origin[:100]!r} may change nothing here"
+    detail = f"a page of {origin[:100]!r} may not change anything here"
     setting = variable_of("cors_origins")
     hint = (
         f"an operator can allow it by {setting}; a proxy must pass on `Host` as it came, or "

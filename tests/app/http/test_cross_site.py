@@ -1,4 +1,4 @@
-"""Requests that a page elsewhere makes a browser send, and names that are not the service's."""
+"""Requests that pages of other sites make a browser send, and foreign names in `Host`."""
 
 from pathlib import Path
 from typing import Any
