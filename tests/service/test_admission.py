@@ -148,8 +148,8 @@ def test_a_slowed_down_answer_waits(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         waited.append(seconds)
 
     monkeypatch.setattr(admission, "WRONG_KEYS_A_MINUTE", 1)
-    monkeypatch.setattr(admission.asyncio, "sleep", sleep)
-    client = limited(tmp_path, api_keys=f"alice:{ALICE}")  # not started: nothing else sleeps
+    monkeypatch.setattr(admission, "sleep", sleep)
+    client = limited(tmp_path, api_keys=f"alice:{ALICE}")
     assert client.get("/v1", headers=bearer("wrong")).status_code == 401
     assert waited == []
     assert client.get("/v1", headers=bearer("wrong")).status_code == 429

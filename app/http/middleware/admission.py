@@ -1,7 +1,7 @@
 """Admission: API keys, where they are set, and the rate limits of each caller."""
 
-import asyncio
 import re
+from asyncio import sleep
 
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -64,7 +64,7 @@ class AdmissionMiddleware:
         """Refuse an address that guesses keys; a right key from there is still admitted."""
         wait_s = self.wrong_keys.seconds_over(address.name)
         if wait_s:
-            await asyncio.sleep(WRONG_KEY_PAUSE_S)
+            await sleep(WRONG_KEY_PAUSE_S)
             headers = {"Retry-After": str(wait_s)}
             raise problem("rate_limited", "too many wrong API keys", headers=headers)
 
