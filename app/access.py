@@ -43,6 +43,7 @@ def caller_at(host: str | None) -> Caller:
     return Caller(str(address), has_key=False)
 
 
+@lru_cache(maxsize=1024)
 def is_loopback(host: str) -> bool:
     """Tell whether a name or address, such as ``localhost`` or ``[::1]``, is this machine's."""
     try:

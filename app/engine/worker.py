@@ -168,20 +168,21 @@ class Worker:
         )
         with clock.phase("load"):
             opened = self._open(work.query)
-        with clock.phase("compute"), self._verifying(opened):
-            answer = work.query.answer(opened, context)
-        if work.representation.media_type == JSON:
-            check_json_size(answer.values, settings.max_json_values, work.query.hint)
-        with clock.phase("encode"):
-            encoded = encode(answer, work.representation)
-            result = write_result(
-                self.config.results,
-                work.result_name,
-                self._verified_parts(encoded.parts, opened),
-                encoded.headers,
-                code_version(),
-                is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
-            )
+        with self._blaming_damage(opened):
+            with clock.phase("compute"):
+                answer = work.query.answer(opened, context)
+            if work.representation.media_type == JSON:
+                check_json_size(answer.values, settings.max_json_values, work.query.hint)
+            with clock.phase("encode"):
+                encoded = encode(answer, work.representation)
+                result = write_result(
+                    self.config.results,
+                    work.result_name,
+                    self._verified_parts(encoded.parts, opened),
+                    encoded.headers,
+                    code_version(),
+                    is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
+                )
         return TaskResult(clock.seconds, clock.periods, result=result)
 
     def _estimate(
@@ -199,21 +200,25 @@ class Worker:
         self.signals.stored_field_evictions = removed
 
     @contextmanager
-    def _verifying(self, opened: OpenMesh) -> Iterator[None]:
-        """Raise at the end of the block, however it ends, where the mesh was damaged meanwhile."""
+    def _blaming_damage(self, opened: OpenMesh) -> Iterator[None]:
+        """Replace an error by the damage of the mesh, where that may have caused it."""
         try:
             yield
-        finally:
-            try:
-                self.store.verify_mapped(opened)
-            except ProblemError:
-                self.fields.take_unwritten()  # they may be wrong
-                raise
+        except Exception:
+            self._verify(opened)
+            raise
 
     def _verified_parts(self, parts: Iterable[Buffer], opened: OpenMesh) -> Iterator[Buffer]:
         """Yield the parts of a body, and raise at its end where the mesh was damaged meanwhile."""
         yield from parts
-        self.store.verify_mapped(opened)
+        self._verify(opened)
+
+    def _verify(self, opened: OpenMesh) -> None:
+        try:
+            self.store.verify_mapped(opened)
+        except ProblemError:
+            self.fields.take_unwritten()  # they may be wrong
+            raise
 
     def _report(self, share: float) -> None:
         self.signals.progress = share

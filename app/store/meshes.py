@@ -59,7 +59,7 @@ class OpenMesh:
     solver: Solver
     warnings: Sequence[str]
     files: Mapping[str, FileVersion | None] = field(default_factory=dict)
-    """Versions of the mapped files, by array; none for a mesh in memory"""
+    """Versions of the mapped files, by path; none for a mesh in memory"""
 
     @classmethod
     def of(cls, mesh: TriangleMesh) -> "OpenMesh":
@@ -160,29 +160,25 @@ class MeshStore:
     def open(self, mesh_id: str) -> OpenMesh:
         """Return a mesh over memory-mapped arrays, whose files are verified first."""
         manifest, folder = self.manifest(mesh_id), self._path(mesh_id)
-        files = {name: version_of(f"{folder}/{name}.npy") for name in manifest["crc32"]}
-        arrays = {name: _open_array(self._verified(mesh_id, name)) for name in files}
+        names = manifest["crc32"]
+        files = {path: version_of(path) for path in (f"{folder}/{name}.npy" for name in names)}
+        arrays = {name: _open_array(self._verified(mesh_id, name)) for name in names}
         solver = Solver(TriangleMesh.from_arrays(arrays))
         return OpenMesh((mesh_id, b""), solver, manifest["warnings"], files)
 
     def is_current(self, opened: OpenMesh) -> bool:
         """Tell whether the files of an open mesh are still those that were verified."""
-        folder = self._path(opened.name[0])
-        return all(
-            version_of(f"{folder}/{name}.npy") == version for name, version in opened.files.items()
-        )
+        return all(version_of(path) == version for path, version in opened.files.items())
 
     def verify_mapped(self, opened: OpenMesh) -> None:
         """Raise ``ProblemError`` where a mapped array of an open mesh is damaged by now.
 
         A file that was replaced or removed is still mapped as it was.
         """
-        mesh_id = opened.name[0]
-        folder = self._path(mesh_id)
-        for name, version in opened.files.items():
-            now = version_of(f"{folder}/{name}.npy")
+        for path, version in opened.files.items():
+            now = version_of(path)
             if now and version and now.inode == version.inode and now != version:
-                self._verified(mesh_id, name)
+                self._verified(opened.name[0], Path(path).stem)
 
     def inspect(self, mesh_id: str) -> Iterator[ProblemError | None]:
         """Read each file of a mesh as it is now, and yield its damage; None where it is intact.

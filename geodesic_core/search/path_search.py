@@ -89,14 +89,14 @@ class PathSearch:
         self._outward = new_wavefront(topology, room, pruned=True)
         self._landmarks = Landmarks(mesh)
         self._nearest = np.zeros(len(mesh.vertices) + room.nodes, np.int32)
+        self._state_bytes = state.bytes_of(self._toward) + state.bytes_of(self._outward)
         self._margin = _MARGIN * float(topology.geometry[:, LENGTH].mean())
         self._touched = 0
 
     @property
     def nbytes(self) -> int:
         """Memory held, bytes, the mesh not counted."""
-        shared = self._landmarks.distances.nbytes + self._nearest.nbytes
-        return shared + state.bytes_of(self._toward) + state.bytes_of(self._outward)
+        return self._landmarks.distances.nbytes + self._nearest.nbytes + self._state_bytes
 
     def find(
         self,
@@ -232,8 +232,12 @@ class PathSearch:
     def _run(
         self, wave: Wavefront, nodes: Nodes, bounds: Bounds, control: Control, share: float
     ) -> Wavefront:
-        control = control.holding(self.nbytes - state.bytes_of(wave))
-        return sweep_nodes(self.mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: share)
+        before, size = wave.pool, state.bytes_of(wave)
+        control = control.holding(self.nbytes - size)
+        wave = sweep_nodes(self.mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: share)
+        if wave.pool is not before:  # it has grown
+            self._state_bytes += state.bytes_of(wave) - size
+        return wave
 
     def _forget(self) -> None:
         pruning.forget(self.mesh.topology, self._toward)
