@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack, suppress
+from functools import partial
 from itertools import count
 from multiprocessing import Manager
 from random import Random
@@ -139,7 +140,7 @@ CHUNKS = (
     + b"0\r\n\r\n"
 )
 PIPELINE = b"GET /livez HTTP/1.1\r\nHost: localhost\r\n\r\n" * 50_000
-ONES = b'{"sources":[' + b"1," * 2_000_000 + b"1]}"
+SOURCES = {n: b'{"sources":[' + b"1," * (n - 1) + b"1]}" for n in (599_000, 2_000_000)}
 BOMB = gzip.compress(bytes(600 * MIB), 9)
 
 
@@ -164,9 +165,9 @@ def _slow_readers(port: int) -> None:
         time.sleep(1.0)
 
 
-def _bad_query(port: int) -> None:
+def _bad_query(sources: int, port: int) -> None:
     headers = {"Content-Type": "application/json"}
-    Client(port).ask("/v1/meshes/0/distances", ONES, headers, "POST")
+    Client(port).ask("/v1/meshes/0/distances", SOURCES[sources], headers, "POST")
 
 
 def _bomb(port: int) -> None:
@@ -222,7 +223,8 @@ def _pipeline(port: int) -> None:
 
 
 ATTACKS: dict[str, Attack] = {
-    "two million wrong sources": _bad_query,
+    "two million wrong sources": partial(_bad_query, 2_000_000),
+    "as many as are read": partial(_bad_query, 599_000),
     "a header without end": _long_header,
     "short headers without end": _short_headers,
     "an address without end": _long_address,

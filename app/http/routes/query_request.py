@@ -13,7 +13,7 @@ from fastapi import Depends, Header, Request, Response
 from pydantic import Field
 from pydantic_core import from_json
 
-from app.errors import problem
+from app.errors import over_limit, problem
 from app.http.dependencies import (
     TimeoutHeader,
     context_of,
@@ -36,6 +36,7 @@ from app.http.responses import (
 from app.queries import Query, result_key
 from app.schemas.requests import AnswerParameters
 from app.service.service import RequestContext
+from app.settings import Settings
 
 LARGE = 2**16
 """Bytes of a body that is worth a thread: it takes some milliseconds."""
@@ -54,8 +55,19 @@ async def offload_if_large(request: Request, do: Callable[[], T]) -> T:
     return await to_thread.run_sync(do, limiter=request.app.state.large_bodies)
 
 
-def parse_json(body: bytes) -> Any:
-    """Return the value of a JSON body, or refuse the body."""
+_LEAST_BYTES_OF_VALUE = 7
+"""Bytes a value for a body that is full: indices of six digits. To parse denser ones takes long."""
+
+
+def parse_json(body: bytes, settings: Settings) -> Any:
+    """Return the value of a JSON body, or refuse the body.
+
+    The parser stops everything else, so that values are counted before, by their commas.
+    """
+    most = max(settings.max_query_bytes // _LEAST_BYTES_OF_VALUE, LARGE)
+    values = body.count(b",") + 1
+    if values > most:
+        raise over_limit("limit_exceeded", "values in the body", values, most, "max_query_bytes")
     try:
         return from_json(body)
     except ValueError as error:

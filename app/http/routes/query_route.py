@@ -13,13 +13,14 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError, create_model
 
-from app.http.dependencies import require_json
+from app.http.dependencies import require_json, service_of
 from app.http.routes.query_request import (
     QueryHeaders,
     get_query_request,
     offload_if_large,
     parse_json,
 )
+from app.settings import Settings
 
 
 class QueryRoute(APIRoute):
@@ -43,7 +44,8 @@ class QueryRoute(APIRoute):
                 require_json(request)
             head = {"header": _headers(request), "query": _parameters(request, lists)}
             body = await request.body() if takes_body else b""
-            whole = await offload_if_large(request, partial(read, model, head, body))
+            settings = service_of(request).settings
+            whole = await offload_if_large(request, partial(read, model, head, body, settings))
             mesh_id = request.path_params["mesh_id"]
             response: Response = await self.endpoint(
                 query_request=await get_query_request(mesh_id, request, whole.header),
@@ -55,18 +57,18 @@ class QueryRoute(APIRoute):
         return answer
 
 
-def read(model: type[BaseModel], head: dict[str, Any], body: bytes) -> Any:
+def read(model: type[BaseModel], head: dict[str, Any], body: bytes, settings: Settings) -> Any:
     """Return the model of a request, from the values of its head and its JSON body.
 
     Raises
     ------
     ProblemError
-        The body is not JSON.
+        The body is not JSON, or has too many values.
     RequestValidationError
         A value does not fit the model.
     """
     if body:
-        head = {**head, "body": parse_json(body)}
+        head = {**head, "body": parse_json(body, settings)}
     try:
         return model.model_validate(head)
     except ValidationError as error:

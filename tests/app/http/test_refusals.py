@@ -6,9 +6,12 @@ import pytest
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, TypeAdapter, ValidationError, create_model
 
+from app.errors import ProblemError
+from app.http.routes import query_request
 from app.http.routes.query_route import read
 from app.queries import KINDS
 from app.schemas.points import CurveSource, Polyline
+from app.settings import Settings
 
 MODELS = [query.model for query in KINDS.values()]
 LISTS = [
@@ -66,8 +69,33 @@ def test_many_unknown_members_of_a_point_are_one_error(model: type[BaseModel]) -
             assert error["msg"].startswith("A point has vertex, edge and t, ")
 
 
-def test_a_body_of_millions_is_refused_with_one_fault() -> None:
-    model = create_model("Request", body=(KINDS["distances"].model, ...))
+SETTINGS = Settings()
+MOST_VALUES = SETTINGS.max_query_bytes // 7
+DISTANCES: Any = create_model("Request", body=(KINDS["distances"].model, ...))
+
+
+def with_sources(count: int) -> bytes:
+    return b'{"sources":[' + b"1," * (count - 1) + b"1]}"
+
+
+def test_a_body_of_half_a_million_values_is_refused_with_one_fault() -> None:
     with pytest.raises(RequestValidationError) as refused:
-        read(model, {}, b'{"sources":[' + b"1," * 2_000_000 + b"1]}")
+        read(DISTANCES, {}, with_sources(MOST_VALUES), SETTINGS)
     assert [error["loc"] for error in refused.value.errors()] == [("body", "sources", 0)]
+
+
+@pytest.mark.parametrize("count", [MOST_VALUES + 1, 2_000_000])
+def test_a_body_of_more_values_is_not_parsed(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(query_request, "from_json", None)
+    with pytest.raises(ProblemError) as refused:
+        read(DISTANCES, {}, with_sources(count), SETTINGS)
+    problem = refused.value.problem
+    assert (problem.code, problem.actual, problem.limit) == ("limit_exceeded", count, MOST_VALUES)
+    assert problem.setting == "GEODESIC_MAX_QUERY_BYTES"
+
+
+@pytest.mark.parametrize("most_bytes", [1_000, 2**16, 2**18])
+def test_a_body_of_64_kib_may_hold_any_number_of_values(most_bytes: int) -> None:
+    settings = Settings(max_query_bytes=most_bytes)
+    body = b"[" + b"1," * (2**15 - 2) + b"1]"
+    assert len(query_request.parse_json(body, settings)) == 2**15 - 1
