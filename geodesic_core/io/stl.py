@@ -13,9 +13,8 @@ from geodesic_core.io.text import VERTEX_ROW, VERTEX_RULE, check_rows, number_ta
 
 _HEADER, _TRIANGLE = 84, 50
 _FACET = re.compile(rb"^[ \t]*facet\b", re.MULTILINE | re.IGNORECASE)
-_ROW = re.compile(
-    rb"^[ \t]*(facet|vertex|endfacet|endsolid)\b[ \t]*([^\r\n]*)", re.MULTILINE | re.IGNORECASE
-)
+_KEYWORD = re.compile(rb"^[ \t]*(facet|vertex|endfacet|endsolid)\b", re.MULTILINE | re.IGNORECASE)
+_VERTEX = re.compile(rb"^[ \t]*vertex\b[ \t]*([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
 _KEYWORDS = (b"facet", b"vertex", b"vertex", b"vertex", b"endfacet")
 """Those of one triangle; its loop and its normal are of no interest."""
 
@@ -61,11 +60,10 @@ def _read_ascii(data: bytes) -> Floats:
     trimesh (5.2) takes megabytes for a kilobyte of long numbers, and logs tracebacks for normals
     that it cannot read.
     """
-    rows = _ROW.findall(data)
-    if rows[-1][0].lower() != b"endsolid":
+    keywords = [keyword.lower() for keyword in _KEYWORD.findall(data)]
+    if keywords[-1] != b"endsolid":
         raise InvalidMesh("the STL file is cut short: its last solid has no end")
-    rows = [(keyword.lower(), row) for keyword, row in rows]
-    inside = [keyword for keyword, _ in rows if keyword != b"endsolid"]
+    inside = [keyword for keyword in keywords if keyword != b"endsolid"]
     wrong = next(
         (i for i, word in enumerate(inside) if word != _KEYWORDS[i % len(_KEYWORDS)]), len(inside)
     )
@@ -76,6 +74,6 @@ def _read_ascii(data: bytes) -> Floats:
             kind="face",
             elements=[facet],
         )
-    corners = [row for keyword, row in rows if keyword == b"vertex"]
+    corners = _VERTEX.findall(data)
     check_rows(corners, VERTEX_ROW, "vertex", VERTEX_RULE)
     return number_table(corners, 3)
