@@ -134,8 +134,8 @@ def _responses(
     }
     for status, refusal in problems(*added).items():
         described = answers.get(str(status), {"description": ""})["description"]
-        codes = ", ".join(filter(None, [described, refusal["description"]]))
-        answers[str(status)] = {"description": codes}
+        codes = [*described.split(", "), *refusal["description"].split(", ")]
+        answers[str(status)] = {"description": ", ".join(dict.fromkeys(filter(None, codes)))}
     for status in sorted(answers):
         names = ("X-Request-ID", *_HEADERS_OF_STATUS.get(status, ()))
         response = {

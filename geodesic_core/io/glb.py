@@ -1,5 +1,7 @@
 """GLB files: the parts of a binary glTF scene, placed by its nodes."""
 
+import base64
+import binascii
 import io
 import json
 import struct
@@ -13,9 +15,12 @@ from numpy.typing import NDArray
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.io.contents import FileContents, note_on_ignored
 from geodesic_core.io.glb_nodes import placements
+from geodesic_core.io.gltf_document import check_document
 from geodesic_core.io.limits import check_face_count
 
 _HEADER, _CHUNK_HEADER = 12, 8
+_WIDTHS = {5121: 1, 5123: 2, 5125: 4, 5126: 4}
+"""Bytes of the types of components that are read"""
 _FLOAT = 5126
 _TRIANGLES, _TRIANGLE_STRIP, _TRIANGLE_FAN = 4, 5, 6
 
@@ -53,12 +58,13 @@ def read_glb(data: bytes, max_faces: int | None) -> FileContents:
         )
     shown = _shown_parts(tree)
     _check_vertex_count(tree, [primitives[part] for part, _ in shown], max_faces)
-    scene = trimesh.load_scene(
-        io.BytesIO(_without_nodes(tree, primitives, data)),
-        file_type="glb",
-        process=False,
-        skip_materials=True,
-    )
+    with np.errstate(invalid="ignore"):  # the mesh refuses what is not finite
+        scene = trimesh.load_scene(
+            io.BytesIO(_plain(tree, primitives, data)),
+            file_type="glb",
+            process=False,
+            skip_materials=True,
+        )
     triangles = {
         name: (np.asarray(geometry.vertices), np.asarray(geometry.faces))
         for name, geometry in scene.geometry.items()
@@ -72,7 +78,7 @@ def read_glb(data: bytes, max_faces: int | None) -> FileContents:
         positions, corners = triangles[_name(part)]
         with np.errstate(invalid="ignore", over="ignore"):  # the mesh refuses what is not finite
             vertices.append(positions @ transform[:3, :3].T + transform[:3, 3])
-        mirrored = np.linalg.det(transform[:3, :3]) < 0.0
+            mirrored = np.linalg.det(transform[:3, :3]) < 0.0
         faces.append(corners[:, ::-1] + count if mirrored else corners + count)
         count += len(positions)
     if not faces:
@@ -94,16 +100,44 @@ def _shown_parts(tree: Mapping[str, Any]) -> list[tuple[_Part, NDArray[np.float6
     return sorted(shown, key=itemgetter(0))
 
 
-def _without_nodes(tree: Mapping[str, Any], primitives: Mapping[_Part, Any], data: bytes) -> bytes:
-    """Return the GLB file with a mesh for each part, under a name of ours, and without nodes."""
-    meshes = [{"name": _name(part), "primitives": [each]} for part, each in primitives.items()]
-    plain = {**tree, "meshes": meshes, "nodes": [], "scenes": [{"nodes": []}], "scene": 0}
+def _plain(tree: Mapping[str, Any], primitives: Mapping[_Part, Any], data: bytes) -> bytes:
+    """Return the GLB file with nothing but positions and corners, and a mesh for each part.
+
+    What is not read, such as normals, materials and nodes, can be no fault of the file.
+    """
+    numbers = sorted({number for part in primitives.values() for number in _accessors_of(part)})
+    place = {number: i for i, number in enumerate(numbers)}
+    plain = {
+        "asset": {"version": "2.0"},
+        "meshes": [
+            {
+                "name": _name(part),
+                "primitives": [
+                    {"attributes": {"POSITION": place[each["attributes"]["POSITION"]]}}
+                    | ({"indices": place[each["indices"]]} if "indices" in each else {})
+                    | {"mode": each.get("mode", _TRIANGLES)}
+                ],
+            }
+            for part, each in primitives.items()
+        ],
+        "accessors": [tree["accessors"][number] for number in numbers],
+        "bufferViews": tree.get("bufferViews", []),
+        "buffers": tree.get("buffers", []),
+        "scenes": [{"nodes": []}],
+        "scene": 0,
+    }
     document = json.dumps(plain).encode()
     document += b" " * (-len(document) % 4)
     binary = memoryview(data)[_HEADER + _CHUNK_HEADER + _json_length(data) :]
     size = _HEADER + _CHUNK_HEADER + len(document) + len(binary)
     sizes = struct.pack("<II", size, len(document))
     return b"".join([data[:8], sizes, data[16:20], document, binary])
+
+
+def _accessors_of(primitive: Mapping[str, Any]) -> set[int]:
+    """Return the numbers of the accessors of a part's positions and corners."""
+    position: int = primitive["attributes"]["POSITION"]
+    return {position, primitive.get("indices", position)}
 
 
 def _name(part: _Part) -> str:
@@ -136,15 +170,53 @@ def _read_document(data: bytes) -> dict[str, Any]:
             f"the GLB file's glTF document has {json_length} bytes, where at most "
             f"{_LARGEST_DOCUMENT} can be read; put its data into the binary chunk"
         )
-    tree: dict[str, Any] = json.loads(data[start : start + json_length])
-    for number, buffer in enumerate(tree.get("buffers", [])):
-        if not buffer.get("uri", "data:").startswith("data:"):
-            raise InvalidMesh(
-                f"buffer {number} of the GLB file lies in another file, {buffer['uri'][:60]!r}; "
-                f"embed it"
-            )
+    if data[4:8] != b"\2\0\0\0" or data[16:20] != b"JSON":
+        raise InvalidMesh("the GLB file's header is not that of glTF 2 and its first chunk, JSON")
+    try:
+        tree: dict[str, Any] = json.loads(data[start : start + json_length])
+    except (ValueError, RecursionError) as error:  # a number of too many digits is no JSON error
+        raise InvalidMesh(f"the GLB file's glTF document cannot be read: {error}") from error
+    check_document(tree)
+    _check_buffers(tree, data[start + json_length :])
     _check_accessors(tree, len(data))
     return tree
+
+
+def _check_buffers(tree: Mapping[str, Any], chunks: bytes) -> None:
+    """Refuse buffers and views of them that are not in the file, or not as long as they say."""
+    at, binary = 0, []
+    while at < len(chunks):
+        length, kind = int.from_bytes(chunks[at : at + 4], "little"), chunks[at + 4 : at + 8]
+        at += _CHUNK_HEADER + length
+        if at > len(chunks):
+            raise InvalidMesh(f"the GLB file ends within a chunk that declares {length} bytes")
+        if kind == b"BIN\0":
+            binary.append(length)
+    for number, buffer in enumerate(tree.get("buffers", [])):
+        uri = buffer.get("uri")
+        if uri is None:
+            held = binary.pop(0) if binary else 0
+        elif uri.startswith("data:"):
+            try:
+                held = len(base64.b64decode(uri.partition(";base64,")[2], validate=True))
+            except (binascii.Error, ValueError) as error:
+                raise InvalidMesh(f"buffer {number} of the GLB file is no base64") from error
+        else:
+            raise InvalidMesh(
+                f"buffer {number} of the GLB file lies in another file, {uri[:60]!r}; embed it"
+            )
+        if held < buffer["byteLength"]:
+            raise InvalidMesh(
+                f"buffer {number} of the GLB file declares {buffer['byteLength']} bytes, but has "
+                f"{held}"
+            )
+    for number, view in enumerate(tree.get("bufferViews", [])):
+        end = view.get("byteOffset", 0) + view["byteLength"]
+        length = tree["buffers"][view["buffer"]]["byteLength"]
+        if end > length:
+            raise InvalidMesh(
+                f"bufferView {number} of the GLB file ends at byte {end} of a buffer of {length}"
+            )
 
 
 def _check_vertex_count(
@@ -165,8 +237,7 @@ def _check_vertex_count(
 
 def _check_accessors(tree: dict[str, Any], file_bytes: int) -> None:
     """Refuse counts beyond the file, and positions that trimesh would misread."""
-    accessors, views = tree.get("accessors", []), tree.get("bufferViews", [])
-    for number, accessor in enumerate(accessors):
+    for number, accessor in enumerate(tree.get("accessors", [])):
         if not 0 < accessor["count"] <= file_bytes:
             raise InvalidMesh(
                 f"accessor {number} of the GLB file declares {accessor['count']} elements, but the "
@@ -174,23 +245,45 @@ def _check_accessors(tree: dict[str, Any], file_bytes: int) -> None:
             )
     for mesh in tree.get("meshes", []):
         for primitive in mesh["primitives"]:
-            if primitive.get("mode") == _TRIANGLE_FAN:
+            mode = primitive.get("mode", _TRIANGLES)
+            if mode == _TRIANGLE_FAN:
                 raise InvalidMesh("the GLB file has triangle fans; save it as triangles")
             position = primitive["attributes"]["POSITION"]
-            kind = accessors[position]["componentType"], accessors[position]["type"]
-            if kind != (_FLOAT, "VEC3"):
-                raise InvalidMesh(f"accessor {position} of the GLB file: positions must be floats")
-            for number in {position, primitive.get("indices", position)}:
-                accessor = accessors[number]
-                if (
-                    "sparse" in accessor
-                    or "bufferView" not in accessor
-                    or "EXT_meshopt_compression"
-                    in views[accessor["bufferView"]].get("extensions", ())
-                ):
-                    raise InvalidMesh(
-                        f"accessor {number} of the GLB file is sparse or compressed; save it plain"
-                    )
+            for number in _accessors_of(primitive):
+                _check_accessor(tree, number, is_position=number == position)
+            last = primitive.get("indices", position)
+            corners = tree["accessors"][last]["count"]
+            if mode == _TRIANGLES and corners % 3:
+                raise InvalidMesh(
+                    f"accessor {last} of the GLB file has {corners} corners, which are no triangles"
+                )
+
+
+def _check_accessor(tree: Mapping[str, Any], number: int, *, is_position: bool) -> None:
+    """Refuse an accessor of another type than positions or corners, or with no plain bytes."""
+    accessor = tree["accessors"][number]
+    kind, shape = accessor["componentType"], accessor["type"]
+    if is_position and (kind, shape) != (_FLOAT, "VEC3"):
+        raise InvalidMesh(f"accessor {number} of the GLB file: positions must be floats")
+    if not is_position and (kind not in _WIDTHS or kind == _FLOAT or shape != "SCALAR"):
+        raise InvalidMesh(f"accessor {number} of the GLB file: indices must be unsigned integers")
+    view = tree["bufferViews"][accessor["bufferView"]] if "bufferView" in accessor else None
+    if (
+        view is None
+        or "sparse" in accessor
+        or "EXT_meshopt_compression" in view.get("extensions", ())
+    ):
+        raise InvalidMesh(
+            f"accessor {number} of the GLB file is sparse or compressed; save it plain"
+        )
+    width = _WIDTHS[kind] * (3 if is_position else 1)
+    stride = view.get("byteStride", width)
+    end = accessor.get("byteOffset", 0) + stride * (accessor["count"] - 1) + width
+    if stride < width or end > view["byteLength"]:
+        raise InvalidMesh(
+            f"accessor {number} of the GLB file has {accessor['count']} elements of {width} bytes, "
+            f"{stride} apart, which its bufferView {accessor['bufferView']} does not hold"
+        )
 
 
 def count_faces(tree: Mapping[str, Any]) -> int:

@@ -59,7 +59,8 @@ def _walk(nodes: Any, roots: list[int]) -> Iterator[tuple[int, NDArray[np.float6
     while waiting:
         number, parent = waiting.pop()
         node = nodes[number]
-        place = parent @ _transform(node)
+        with np.errstate(invalid="ignore", over="ignore"):  # the mesh refuses what is not finite
+            place = parent @ _transform(node)
         if "mesh" in node:
             yield node["mesh"], place
         waiting += [(child, place) for child in node.get("children", [])]

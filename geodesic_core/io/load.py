@@ -2,9 +2,10 @@
 
 OBJ, OFF and PLY have readers of their own: that of trimesh (5.2) splits vertices at texture seams,
 groups faces by material or by their number of corners, refuses binary PLY files that mix these,
-drops what is too short and trusts the counts of a header. trimesh reads STL and GLB. The counts of
-such a file are checked first, and sparse or compressed glTF positions are refused, which it would
-read as zeros. It never sees a path, nor gets a resolver: a file cannot make it read another one.
+drops what is too short and trusts the counts of a header. trimesh reads binary STL and GLB. What
+such a file says of itself is checked first, so that a refusal names the place, and sparse or
+compressed glTF positions are refused, which it would read as zeros. It never sees a path, nor gets
+a resolver: a file cannot make it read another one.
 """
 
 import codecs

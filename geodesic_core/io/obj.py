@@ -21,7 +21,7 @@ from geodesic_core.io.text import (
 _CONTINUATION = re.compile(rb"\\[ \t]*\r?\n")
 _ROW = re.compile(rb"^[ \t]*(v|f|l|p|curv2?|surf)[ \t]+([^#\r\n]*)", re.MULTILINE)
 _FACE_ROW = re.compile(rb"^[ \t]*f[ \t]", re.MULTILINE)
-_CORNER = rb"-?0*[1-9]\d{0,17}(?:/-?\d*){0,2}"
+_CORNER = rb"-?0{0,99}[1-9]\d{0,17}(?:/-?\d*){0,2}"
 _FACE = re.compile(rb"[ \t]*" + _CORNER + rb"(?:[ \t]+" + _CORNER + rb")*[ \t]*")
 _NOT_POSITION = re.compile(rb"/\S*")
 _IGNORED = {b"l": "lines", b"p": "points", b"surf": "surfaces"}

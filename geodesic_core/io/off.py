@@ -16,7 +16,10 @@ from geodesic_core.io.text import (
     number_table,
 )
 
-_HEADER = re.compile(rb"\s*(?:ST)?C?N?OFF\b\s*(-?\d+)[ \t]+(-?\d+)(?:[ \t]+-?\d+)?[ \t\r]*\n")
+_COUNT = rb"(-?\d{1,100})"  # Python refuses to read thousands of digits
+_HEADER = re.compile(
+    rb"\s*(?:ST)?C?N?OFF\b\s*" + _COUNT + rb"[ \t]+" + _COUNT + rb"(?:[ \t]+-?\d+)?[ \t\r]*\n"
+)
 _LEAST_BYTES = {"vertex": len("0 0 0\n"), "face": len("1 0\n")}
 
 

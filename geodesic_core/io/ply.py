@@ -40,6 +40,8 @@ _TYPES = {
 """The types by name, as `struct` and numpy both write them."""
 _MOST_HEADER_LINES = 1000
 """Elements and properties of a PLY file: more than any has, and few enough to go through."""
+_MOST_DIGITS = 100
+"""Digits of a count; Python refuses to read thousands."""
 _CORNER_NAMES = (b"vertex_indices", b"vertex_index")
 
 
@@ -108,7 +110,7 @@ def _read_header(header: bytes) -> tuple[str, list[_Element]]:
         match line.split():
             case [b"format", form, _] if form in _ORDERS:
                 order = _ORDERS[form]
-            case [b"element", word, count] if count.isdigit():
+            case [b"element", word, count] if count.isdigit() and len(count) <= _MOST_DIGITS:
                 name = word.decode("ascii", "replace")
                 if name in [element.name for element in elements]:
                     raise InvalidMesh(f"the PLY header says {excerpt(line)} twice")
@@ -205,7 +207,8 @@ def _read_binary(elements: list[_Element], body: bytes, order: str) -> FileConte
         if element.name == "vertex":
             names = [part.name for part in element.properties]
             axes = [table[str(names.index(axis))] for axis in (b"x", b"y", b"z")]
-            vertices = np.stack(axes, axis=1).astype(np.float64)
+            with np.errstate(invalid="ignore"):  # the mesh refuses what is not finite
+                vertices = np.stack(axes, axis=1).astype(np.float64)
         elif element.name == "face":
             rows = table[str(_corner_list_index(element))]
             corners, sizes = rows.astype(np.int64).reshape(-1), np.full(len(rows), rows.shape[1])
@@ -220,7 +223,11 @@ def _uniform_records(element: _Element, body: bytes, start: int, order: str) -> 
     for i, part in enumerate(element.properties):
         if part.count_type:
             at = start + np.dtype(fields).itemsize
+            if at + np.dtype(part.count_type).itemsize > len(body):
+                return None
             count = int(np.frombuffer(body, order + part.count_type, 1, at)[0])
+            if not 0 <= count <= len(body):
+                return None
             fields += [(f"count{i}", order + part.count_type)]
             fields += [(str(i), order + part.type, (count,))]
         else:
@@ -239,18 +246,29 @@ def _walk_lists(element: _Element, body: bytes, at: int, order: str) -> tuple[Lo
     counters = [struct.Struct(order + part.count_type) for part in element.properties]
     widths = [np.dtype(part.type).itemsize for part in element.properties]
     chunks, sizes = [], []
-    for _ in range(element.size):
+    for number in range(element.size):
         for i, (counter, width) in enumerate(zip(counters, widths, strict=True)):
+            if at + counter.size > len(body):
+                raise _ends_within(element, number)
             count = counter.unpack_from(body, at)[0] if counter.size else 1
             if count < 0:
                 raise InvalidMesh(
-                    f"a list of the PLY file's {element.name} elements has {count} items"
+                    f"a list of {element.name} {number} of the PLY file has {count} items"
                 )
             at += counter.size
             if i == corner_list:
                 chunks.append(body[at : at + count * width])
                 sizes.append(count)
             at += count * width
+        if at > len(body):
+            raise _ends_within(element, number)
     item = order + element.properties[corner_list].type
     corners = np.frombuffer(b"".join(chunks), item).astype(np.int64)
     return corners, np.array(sizes, dtype=np.int64), at
+
+
+def _ends_within(element: _Element, number: int) -> InvalidMesh:
+    return InvalidMesh(
+        f"the PLY file ends within {element.name} {number}, where its header declares "
+        f"{counts_in_words({element.name: element.size})}"
+    )

@@ -11,6 +11,8 @@ from geodesic_core.io.limits import check_face_count, counts_in_words
 COMMENT = re.compile(rb"#.*")
 NUMBER = rb"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|(?i:nan|inf(?:inity)?))"
 VERTEX_ROW = re.compile(rb"[ \t]*" + NUMBER + rb"(?:[ \t]+" + NUMBER + rb"){2,}[ \t\r]*")
+INDEX_ROW = re.compile(rb"[ \t]*-?\d{1,18}(?:[ \t]+-?\d{1,18})*[ \t\r]*")
+_COUNT = re.compile(rb"\d{1,18}")
 VERTEX_RULE = "it must have three numbers"
 
 
@@ -73,13 +75,14 @@ def counted_polygons(rows: list[bytes], skipped: int = 0) -> list[bytes]:
     polygons = []
     for face, row in enumerate(rows):
         words = row.split()[skipped:]
-        if not words or not words[0].isdigit() or not 1 <= int(words[0]) < len(words):
+        if not words or not _COUNT.fullmatch(words[0]) or not 1 <= int(words[0]) < len(words):
             raise InvalidMesh(
                 f"face {face} reads {excerpt(row)}; it must have a count, then as many vertices",
                 kind="face",
                 elements=[face],
             )
         polygons.append(b" ".join(words[1 : int(words[0]) + 1]))
+    check_rows(polygons, INDEX_ROW, "face", "its vertices must be integers")
     return polygons
 
 

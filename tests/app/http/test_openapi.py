@@ -66,3 +66,11 @@ def test_both_codes_of_a_status_are_named(client) -> None:
     responses = paths["/v1/meshes/{mesh_id}/distances"]["post"]["responses"]
 
     assert responses["413"]["description"] == "upload_too_large, result_too_large"
+
+
+def test_no_code_of_a_status_is_named_twice(client) -> None:
+    for path in client.get("/openapi.json").json()["paths"].values():
+        for operation in path.values():
+            for status, response in operation["responses"].items():
+                codes = response["description"].split(", ")
+                assert status < "400" or len(set(codes)) == len(codes), codes

@@ -19,16 +19,11 @@ from tests.core.io.test_load import (
     VERTICES,
     Writer,
     every_writer,
-    glb,
-    glb_of,
     glb_scene,
-    glb_tree,
     name_of,
-    off,
-    ply,
-    ply_binary,
     refusal,
 )
+from tests.support.mesh_files import glb, glb_of, glb_tree, off, ply, ply_binary
 
 
 def too_many(data: bytes, kind: str, max_faces: int) -> TooManyFaces:
@@ -186,10 +181,11 @@ COUNTED = {
     "a chain of nodes": glb_with(
         nodes=[*({"children": [i + 1]} for i in range(100_000)), {"mesh": 0}],
     ),
-    "children": glb_with(nodes=[{"mesh": 0, "children": list(range(1, 100_002))}]),
+    "children": glb_with(nodes=[{"mesh": 0, "children": [1] * 100_001}, {}]),
     "roots": glb_with(scenes=[{"nodes": [0] * 100_001}]),
     "parts of a mesh": glb_with(meshes=[{"primitives": [PART] * 10_001}]),
     "parts of meshes": glb_with(meshes=[{"primitives": [LINE]}] * 10_001),
+    "values of a document": glb_with(scenes=[{"nodes": []}] * 500_000),
     "a long document": glb_with(extras=" " * 2**25),
 }
 

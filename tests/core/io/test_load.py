@@ -1,9 +1,8 @@
-"""Mesh files, good and bad; written here by hand, so that no reader is tested by its own writer."""
+"""Mesh files, good and bad."""
 
 import base64
 import builtins
 import io
-import json
 import re
 import socket
 import struct
@@ -21,6 +20,19 @@ from geodesic_core.io.load import load_mesh
 from geodesic_core.mesh.report import Sample
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.solvers import exact_distance
+from tests.support.mesh_files import (
+    glb,
+    glb_of,
+    glb_tree,
+    obj,
+    off,
+    ply,
+    ply_big_endian,
+    ply_binary,
+    ply_header,
+    stl,
+    stl_binary,
+)
 from tests.support.meshes import real_mesh
 
 KINDS = ["obj", "off", "ply", "stl", "glb"]
@@ -46,96 +58,6 @@ DENTED_VERTICES = np.array(
     float,
 )
 DENTED = [[0, 1, 2, 3, 4], [4, 3, 5, 6, 7, 0]]
-
-
-def obj(vertices: Any, polygons: Any) -> bytes:
-    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices).tolist()]
-    rows += ["f " + " ".join(str(i + 1) for i in polygon) for polygon in polygons]
-    return ("\n".join(rows) + "\n").encode()
-
-
-def off(vertices: Any, polygons: Any) -> bytes:
-    rows = ["OFF", f"{len(vertices)} {len(polygons)} 0"]
-    rows += [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices).tolist()]
-    rows += [f"{len(polygon)} " + " ".join(map(str, polygon)) for polygon in polygons]
-    return ("\n".join(rows) + "\n").encode()
-
-
-def ply_header(form: str, vertex_count: int, face_count: int) -> bytes:
-    return (
-        f"ply\nformat {form} 1.0\ncomment by hand\nelement vertex {vertex_count}\n"
-        "property double x\nproperty double y\nproperty double z\n"
-        f"element face {face_count}\nproperty list uchar int vertex_indices\nend_header\n"
-    ).encode()
-
-
-def ply(vertices: Any, polygons: Any) -> bytes:
-    rows = [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices).tolist()]
-    rows += [f"{len(polygon)} " + " ".join(map(str, polygon)) for polygon in polygons]
-    body = "\n".join(rows) + "\n"
-    return ply_header("ascii", len(vertices), len(polygons)) + body.encode()
-
-
-def ply_binary(vertices: Any, polygons: Any, order: str = "<") -> bytes:
-    body = b"".join(struct.pack(order + "3d", *vertex) for vertex in vertices)
-    for polygon in polygons:
-        body += struct.pack(f"{order}B{len(polygon)}i", len(polygon), *polygon)
-    name = "binary_little_endian" if order == "<" else "binary_big_endian"
-    return ply_header(name, len(vertices), len(polygons)) + body
-
-
-def ply_big_endian(vertices: Any, polygons: Any) -> bytes:
-    return ply_binary(vertices, polygons, ">")
-
-
-def stl(vertices: Any, faces: Any) -> bytes:
-    rows = ["solid part"]
-    for face in faces:
-        corners = [f"vertex {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices)[face].tolist()]
-        rows += ["facet normal 0 0 1", "outer loop", *corners, "endloop", "endfacet"]
-    return "\n".join([*rows, "endsolid part", ""]).encode()
-
-
-def stl_binary(vertices: Any, faces: Any) -> bytes:
-    body = bytes(80) + struct.pack("<I", len(faces))
-    for face in faces:
-        body += struct.pack("<12fH", 0, 0, 1, *np.asarray(vertices)[face].ravel(), 0)
-    return body
-
-
-def glb_of(tree: dict[str, Any], binary: bytes = b"") -> bytes:
-    text = json.dumps(tree).encode()
-    text += b" " * (-len(text) % 4)
-    binary += bytes(-len(binary) % 4)
-    body = struct.pack("<I4s", len(text), b"JSON") + text
-    body += struct.pack("<I4s", len(binary), b"BIN\0") + binary
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
-
-
-def glb_tree(vertices: Any, faces: Any) -> tuple[dict[str, Any], bytes]:
-    points = np.asarray(vertices, "<f4").tobytes()
-    indices = np.asarray(faces, "<u4").tobytes()
-    tree = {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
-        "buffers": [{"byteLength": len(points) + len(indices)}],
-        "bufferViews": [
-            {"buffer": 0, "byteOffset": 0, "byteLength": len(points)},
-            {"buffer": 0, "byteOffset": len(points), "byteLength": len(indices)},
-        ],
-        "accessors": [
-            {"bufferView": 0, "componentType": 5126, "count": len(vertices), "type": "VEC3"},
-            {"bufferView": 1, "componentType": 5125, "count": 3 * len(faces), "type": "SCALAR"},
-        ],
-    }
-    return tree, points + indices
-
-
-def glb(vertices: Any, faces: Any) -> bytes:
-    return glb_of(*glb_tree(vertices, faces))
 
 
 Writer = Callable[[Any, Any], bytes]
@@ -850,7 +772,9 @@ def test_ascii_ply_with_another_list_first_is_refused() -> None:
 
 def test_an_ascii_stl_that_loses_a_corner_is_refused() -> None:
     data = stl(VERTICES, FACES).replace(b"vertex 1.0 0.0 0.0\n", b"", 1)
-    assert "corners" in str(refusal(data, "stl"))
+    error = refusal(data, "stl")
+    assert "facet 0" in str(error)
+    assert (error.kind, error.elements) == ("face", (0,))
     refusal(stl(VERTICES, FACES).replace(b"vertex 1.0 0.0 0.0", b"vertex 1.0 0.0"), "stl")
 
 
@@ -866,6 +790,151 @@ def capped_memory() -> Any:
     resource.setrlimit(resource.RLIMIT_AS, (size + 2**30, before[1]))
     yield
     resource.setrlimit(resource.RLIMIT_AS, before)
+
+
+LONG = b"9" * 5000
+
+
+@pytest.mark.parametrize(
+    ("kind", "old", "new", "says"),
+    [
+        ("off", b"8 3 0", LONG + b" 3 0", "begin with OFF and its counts"),
+        ("off", b"3 0 2 3", b"3 0 2 " + LONG, "face 1 reads"),
+        ("off", b"3 0 2 3", b"3 0 2 " + b"9" * 25, "face 1 reads"),
+        ("off", b"3 0 2 3", LONG + b" 0 2 3", "face 1 reads"),
+        ("off", b"3 0 2 3", b"3 0 2 1.5", "face 1 reads"),
+        ("off", b"3 0 2 3", b"3 0 2 0_3", "face 1 reads"),
+        ("ply", b"vertex 8", b"vertex " + LONG, "unknown line"),
+        ("ply", b"3 0 2 3", b"3 0 2 " + LONG, "face 1 reads"),
+        ("ply", b"3 0 2 3", LONG + b" 0 2 3", "face 1 reads"),
+        ("ply", b"3 0 2 3", b"3 0 2 nan", "face 1 reads"),
+        ("obj", b"f 1 3 4", b"f 1 3 " + b"0" * 5000 + b"4", "face 1 reads"),
+    ],
+)
+def test_integers_that_are_none_or_too_long_name_their_row(
+    kind: str, old: bytes, new: bytes, says: str
+) -> None:
+    data = {"off": off, "ply": ply, "obj": obj}[kind](VERTICES, FACES)
+    assert data.count(old) == 1
+    assert says in str(refusal(data.replace(old, new), kind))
+
+
+@pytest.mark.parametrize("third", [[7, 5, 6], [7, 5, 6, 4]])
+def test_a_binary_ply_that_is_cut_short_names_the_face_where_it_ends(third: list[int]) -> None:
+    data = ply_binary(VERTICES, [[0, 1, 2], [0, 2, 3], third])
+    last = 1 + 4 * len(third)
+    for cut, face in ((1, 2), (last, 2), (last + 1, 1), (last + 13, 1)):
+        assert f"ends within face {face}" in str(refusal(data[:-cut], "ply"))
+
+
+def test_a_binary_ply_list_of_four_billion_corners_names_its_face() -> None:
+    data = ply_binary(VERTICES, []).replace(b"face 0", b"face 1")
+    data = data.replace(b"list uchar int", b"list uint int") + struct.pack(
+        "<I3i", 2**32 - 1, 0, 1, 2
+    )
+    assert "ends within face 0" in str(refusal(data, "ply"))
+
+
+SIGNALLING_NAN = bytes.fromhex("010080ff")
+"""A NaN whose conversion numpy warns of"""
+
+
+@pytest.mark.parametrize("kind", ["ply", "stl", "glb"])
+def test_coordinates_without_a_value_are_refused_without_a_warning(kind: str) -> None:
+    axis = np.array([1.0], "<f4").tobytes()
+    body = struct.pack("<9f", 0, 0, 0, 1, 0, 0, 0, 1, 0).replace(axis, SIGNALLING_NAN, 1)
+    header = ply_header("binary_little_endian", 3, 1).replace(b"double", b"float")
+    tree, binary = glb_tree([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    data = {
+        "ply": header + body + struct.pack("<B3i", 3, 0, 1, 2),
+        "stl": bytes(80) + struct.pack("<I3f", 1, 0, 0, 1) + body + bytes(2),
+        "glb": glb_of(tree, body + binary[36:]),
+    }[kind]
+    assert "must be finite" in str(refusal(data, kind))
+
+
+def test_glb_places_beyond_all_numbers_are_refused_without_a_warning() -> None:
+    nodes = [
+        {"scale": [1e308, 1e308, 1e308], "children": [1]},
+        {"scale": [1e308, 1e308, 1e308], "children": [2]},
+        {"mesh": 0, "translation": [1, -1, 0]},
+    ]
+    assert "must be finite" in str(refusal(glb_scene(nodes, [0]), "glb"))
+
+
+@pytest.mark.parametrize(
+    ("where", "to", "says"),
+    [
+        (("meshes",), 5, "meshes is 5"),
+        (("meshes", 0, "primitives"), {}, "meshes[0].primitives is dict"),
+        (("meshes", 0, "primitives", 0), {}, "meshes[0].primitives[0].attributes is missing"),
+        (("accessors", 1, "count"), "9", "accessors[1].count is '9'"),
+        (("accessors", 1, "count"), True, "accessors[1].count is True"),
+        (("accessors", 1, "count"), 10, "accessor 1 of the GLB file has 10"),
+        (("accessors", 1, "count"), 8, "accessor 1 of the GLB file has 8 corners"),
+        (("accessors", 1, "type"), "VEC3", "accessor 1 of the GLB file: indices"),
+        (("nodes", 0, "mesh"), 4, "nodes[0].mesh is 4"),
+        (("nodes", 0, "matrix"), [1, 2, 3], "nodes[0].matrix is list"),
+        (("nodes", 0, "rotation"), [0, 0, 0, "1"], "nodes[0].rotation is list"),
+        (("nodes", 0, "children"), [-1], "nodes[0].children[0] is -1"),
+        (("scene",), 1, "scene is 1"),
+        (("bufferViews", 1, "byteLength"), 10**9, "bufferView 1 of the GLB file ends"),
+        (("bufferViews", 1, "byteStride"), 2, "accessor 1 of the GLB file has 9"),
+        (("buffers", 0, "byteLength"), 10**9, "buffer 0 of the GLB file declares"),
+        (("buffers", 0, "uri"), "data:;base64,x", "buffer 0 of the GLB file is no base64"),
+    ],
+)
+def test_a_glb_document_names_the_member_at_fault(
+    where: tuple[str | int, ...], to: Any, says: str
+) -> None:
+    tree, binary = glb_tree(VERTICES, FACES)
+    lie(tree, *where, to=to)
+    assert says in str(refusal(glb_of(tree, binary), "glb"))
+
+
+@pytest.mark.parametrize(
+    ("where", "to"),
+    [
+        (("materials",), [None, 7]),
+        (("cameras",), "none"),
+        (("meshes", 0, "name"), [[]]),
+        (("meshes", 0, "primitives", 0, "material"), 99),
+        (("meshes", 0, "primitives", 0, "attributes", "NORMAL"), 77),
+        (("accessors", 0, "min"), {}),
+        (("asset",), 3),
+    ],
+)
+def test_glb_members_that_are_not_read_are_no_fault(where: tuple[str | int, ...], to: Any) -> None:
+    tree, binary = glb_tree(VERTICES, FACES)
+    lie(tree, *where, to=to)
+    assert load_mesh(glb_of(tree, binary), "glb").faces.tolist() == FACES.tolist()
+
+
+def test_glb_documents_that_are_nested_too_deep_are_refused() -> None:
+    for document in (b"[" * 10**5 + b"]" * 10**5, b'{"scene": ' + LONG + b"}"):
+        text = document + b" " * (-len(document) % 4)
+        body = struct.pack("<I4s", len(text), b"JSON") + text
+        data = struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+        assert "glTF document cannot be read" in str(refusal(data, "glb"))
+
+
+def test_ascii_stl_normals_that_cannot_be_read_leave_no_line_in_the_log(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    data = stl(VERTICES, FACES)
+    expected = load_mesh(data, "stl")
+    mesh = load_mesh(data.replace(b"normal 0 0 1", b"normal 0 x " + LONG), "stl")
+    assert mesh.vertices.tolist() == expected.vertices.tolist()
+    assert mesh.faces.tolist() == expected.faces.tolist()
+    assert not caplog.records
+
+
+@pytest.mark.parametrize("row", [b"endloop\nendfacet\n", b"facet normal 0 0 1\n"])
+def test_ascii_stl_facets_that_run_into_each_other_are_refused(row: bytes) -> None:
+    data = stl(VERTICES, FACES)
+    head, _, tail = data.partition(row)
+    error = refusal(head + row + tail.replace(row, b"", 1), "stl")
+    assert (error.kind, error.elements) == ("face", (1,))
 
 
 # --- Whatever the bytes ---------------------------------------------------------------------------

@@ -1,0 +1,97 @@
+"""Writers of mesh files, by hand, so that no reader is tested by its own writer."""
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+
+
+def obj(vertices: Any, polygons: Any) -> bytes:
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices).tolist()]
+    rows += ["f " + " ".join(str(i + 1) for i in polygon) for polygon in polygons]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def off(vertices: Any, polygons: Any) -> bytes:
+    rows = ["OFF", f"{len(vertices)} {len(polygons)} 0"]
+    rows += [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices).tolist()]
+    rows += [f"{len(polygon)} " + " ".join(map(str, polygon)) for polygon in polygons]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def ply_header(form: str, vertex_count: int, face_count: int) -> bytes:
+    return (
+        f"ply\nformat {form} 1.0\ncomment by hand\nelement vertex {vertex_count}\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"element face {face_count}\nproperty list uchar int vertex_indices\nend_header\n"
+    ).encode()
+
+
+def ply(vertices: Any, polygons: Any) -> bytes:
+    rows = [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices).tolist()]
+    rows += [f"{len(polygon)} " + " ".join(map(str, polygon)) for polygon in polygons]
+    body = "\n".join(rows) + "\n"
+    return ply_header("ascii", len(vertices), len(polygons)) + body.encode()
+
+
+def ply_binary(vertices: Any, polygons: Any, order: str = "<") -> bytes:
+    body = b"".join(struct.pack(order + "3d", *vertex) for vertex in vertices)
+    for polygon in polygons:
+        body += struct.pack(f"{order}B{len(polygon)}i", len(polygon), *polygon)
+    name = "binary_little_endian" if order == "<" else "binary_big_endian"
+    return ply_header(name, len(vertices), len(polygons)) + body
+
+
+def ply_big_endian(vertices: Any, polygons: Any) -> bytes:
+    return ply_binary(vertices, polygons, ">")
+
+
+def stl(vertices: Any, faces: Any) -> bytes:
+    rows = ["solid part"]
+    for face in faces:
+        corners = [f"vertex {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices)[face].tolist()]
+        rows += ["facet normal 0 0 1", "outer loop", *corners, "endloop", "endfacet"]
+    return "\n".join([*rows, "endsolid part", ""]).encode()
+
+
+def stl_binary(vertices: Any, faces: Any) -> bytes:
+    body = bytes(80) + struct.pack("<I", len(faces))
+    for face in faces:
+        body += struct.pack("<12fH", 0, 0, 1, *np.asarray(vertices)[face].ravel(), 0)
+    return body
+
+
+def glb_of(tree: dict[str, Any], binary: bytes = b"") -> bytes:
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    binary += bytes(-len(binary) % 4)
+    body = struct.pack("<I4s", len(text), b"JSON") + text
+    body += struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def glb_tree(vertices: Any, faces: Any) -> tuple[dict[str, Any], bytes]:
+    points = np.asarray(vertices, "<f4").tobytes()
+    indices = np.asarray(faces, "<u4").tobytes()
+    tree = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "buffers": [{"byteLength": len(points) + len(indices)}],
+        "bufferViews": [
+            {"buffer": 0, "byteOffset": 0, "byteLength": len(points)},
+            {"buffer": 0, "byteOffset": len(points), "byteLength": len(indices)},
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": len(vertices), "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5125, "count": 3 * len(faces), "type": "SCALAR"},
+        ],
+    }
+    return tree, points + indices
+
+
+def glb(vertices: Any, faces: Any) -> bytes:
+    return glb_of(*glb_tree(vertices, faces))

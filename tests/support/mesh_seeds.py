@@ -1,0 +1,252 @@
+"""Small mesh files of every format, with what files of that format may hold besides."""
+
+import base64
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from tests.support.mesh_files import (
+    glb,
+    glb_of,
+    glb_tree,
+    obj,
+    off,
+    ply,
+    ply_big_endian,
+    ply_binary,
+    stl,
+    stl_binary,
+)
+
+VERTICES = np.array(
+    [[0, 0, 0], [2, 0, 0.5], [3, 1, 0], [2, 2, 0], [0, 2, 0], [3, 3, 0], [2, 4, 0], [0, 4, -1.5]]
+)
+POLYGONS = [[0, 1, 2, 3, 4], [3, 2, 5], [4, 3, 6, 7]]
+TRIANGLES = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [3, 2, 5]])
+
+OBJ_WITH_ALL = b"""# by hand
+mtllib none.mtl
+o part
+v 0 0 0 1 0.5 0
+v 1.5 0 0 1 0.5 0
+v 1 1 0.25 0 0 1
+vt 0 0
+vt 1 0
+vn 0 0 1
+g one
+usemtl red
+s 1
+f 1/1/1 2/2/1 3/1/1
+v 0 1e0 0
+f -4//1 -2//1 \\
+ -1//1
+g two
+v 2 2 2
+f 1/2 4/1 5/2 3/1
+l 1 2
+p 4
+"""
+PLY_WITH_ALL = """ply
+format ascii 1.0
+comment by hand
+obj_info none
+element vertex 5
+property float x
+property float y
+property double z
+property float nx
+property uchar red
+property char quality
+element face 3
+property uchar flags
+property list uchar uint vertex_index
+property list uchar float texcoord
+element edge 1
+property int vertex1
+property int vertex2
+end_header
+0 0 0 1 255 -1
+1 0 0.25 1 0 1
+1 1 0 1 7 2
+0 1 0 1 7 2
+2 2 2 1 7 2
+1 4 0 1 2 3 0
+2 3 0 1 2 2 0.5 0.5
+3 3 1 4 2 0
+0 1
+"""
+BINARY_PLY_HEADER = """ply
+format {form} 1.0
+element edge 2
+property list ushort int path
+property float weight
+element vertex 5
+property double nx
+property short x
+property uchar red
+property float y
+property double z
+element face 3
+property list {count} {item} vertex_indices
+property uchar flags
+property list uchar float texcoord
+end_header
+"""
+
+
+def ply_with_all(order: str, count: str, item: str) -> bytes:
+    """Return a binary PLY file with faces of several sizes, and lists elsewhere; types as codes."""
+    names = {"B": "uchar", "i": "int", "I": "uint", "h": "short", "H": "uint16", "b": "int8"}
+    form = "binary_little_endian" if order == "<" else "binary_big_endian"
+    header = BINARY_PLY_HEADER.format(form=form, count=names[count], item=names[item])
+    body = struct.pack(order + "H2if", 2, 0, 1, 0.5) + struct.pack(order + "H1if", 1, 4, 0.5)
+    for x, y, z in [(0, 0, 0), (1, 0, 0.25), (1, 1, 0), (0, 1, 0), (2, 2, 2)]:
+        body += struct.pack(order + "dhBfd", 1, x, 7, y, z)
+    for face in ([0, 1, 2, 3], [1, 4, 2], [3, 2, 4]):
+        body += struct.pack(f"{order}{count}{len(face)}{item}", len(face), *face)
+        body += struct.pack(order + "BBf", 1, 1, 0.5)
+    return header.encode() + body
+
+
+def glb_with_nodes() -> bytes:
+    """Return a scene of nodes with every kind of place, and of several meshes."""
+    tree, binary = glb_tree(VERTICES, TRIANGLES)
+    part = tree["meshes"][0]["primitives"][0]
+    tree["meshes"] = [
+        {"name": "both", "primitives": [part, {"attributes": {"POSITION": 0}, "mode": 5}]},
+        {"primitives": [{**part, "mode": 4, "material": 0}, {**part, "mode": 1}]},
+    ]
+    tree["nodes"] = [
+        {"children": [1, 2], "translation": [1, 2, 3], "scale": [2, 2, -2]},
+        {"mesh": 0, "rotation": [0, 0, 0.6, 0.8]},
+        {"mesh": 1, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 5, 5, 1], "children": [3]},
+        {"mesh": 0, "camera": 0},
+    ]
+    tree["cameras"] = [{"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}]
+    tree["materials"] = [{"name": "red", "pbrMetallicRoughness": {"baseColorFactor": [1, 0, 0, 1]}}]
+    return glb_of(tree, binary)
+
+
+def glb_with_attributes() -> bytes:
+    """Return positions between normals, indices of two bytes, and a second part without any."""
+    tree, _ = glb_tree(VERTICES, TRIANGLES)
+    rows = np.hstack([VERTICES, np.tile([0.0, 0.0, 1.0], (len(VERTICES), 1))]).astype("<f4")
+    corners = TRIANGLES.astype("<u2")
+    size = rows.nbytes + corners.nbytes
+    tree["buffers"] = [{"byteLength": size}]
+    tree["bufferViews"] = [
+        {
+            "buffer": 0,
+            "byteOffset": 0,
+            "byteLength": rows.nbytes,
+            "byteStride": 24,
+            "target": 34962,
+        },
+        {"buffer": 0, "byteOffset": rows.nbytes, "byteLength": corners.nbytes, "target": 34963},
+    ]
+    vector = {"bufferView": 0, "componentType": 5126, "type": "VEC3"}
+    tree["accessors"] = [
+        {**vector, "count": len(VERTICES), "min": [0, 0, -1.5], "max": [3, 4, 0.5]},
+        {"bufferView": 1, "componentType": 5123, "count": corners.size, "type": "SCALAR"},
+        {**vector, "count": len(VERTICES), "byteOffset": 12},
+        {**vector, "count": 6},
+    ]
+    attributes = {"POSITION": 0, "NORMAL": 2}
+    tree["meshes"] = [
+        {"primitives": [{"attributes": attributes, "indices": 1}]},
+        {"primitives": [{"attributes": {"POSITION": 3}}]},
+    ]
+    tree["nodes"] = [{"mesh": 0}, {"mesh": 1, "translation": [9, 0, 0]}]
+    tree["scenes"] = [{"nodes": [0, 1]}]
+    return glb_of(tree, rows.tobytes() + corners.tobytes())
+
+
+def glb_with_data_uri() -> bytes:
+    tree, binary = glb_tree(VERTICES, TRIANGLES)
+    text = base64.b64encode(binary).decode()
+    tree["buffers"][0]["uri"] = f"data:application/octet-stream;base64,{text}"
+    return glb_of(tree)
+
+
+def glb_sparse() -> bytes:
+    """Return a file with a sparse accessor, which is refused."""
+    tree, binary = glb_tree(VERTICES, TRIANGLES)
+    tree["accessors"][0]["sparse"] = {
+        "count": 1,
+        "indices": {"bufferView": 1, "componentType": 5125},
+        "values": {"bufferView": 0},
+    }
+    return glb_of(tree, binary)
+
+
+def windows(data: bytes) -> bytes:
+    return data.replace(b"\n", b"\r\n")
+
+
+SEEDS: Mapping[str, tuple[bytes, ...]] = {
+    "obj": (
+        obj(VERTICES, POLYGONS),
+        OBJ_WITH_ALL,
+        windows(OBJ_WITH_ALL),
+        b"\xef\xbb\xbf" + obj(VERTICES, TRIANGLES).replace(b"\n", b"\r"),
+    ),
+    "off": (
+        off(VERTICES, POLYGONS),
+        windows(off(VERTICES, TRIANGLES)).replace(b"OFF", b"# by hand\r\nOFF"),
+        b"OFF 3 1\n0 0 0 # corner\n1 0 0\n\n0 1 0\n3 0 1 2 255 0 0\n",
+        b"COFF\n3 1 3\n0 0 0 255 0 0 1\n1 0 0 0 0 0 1\n0 1 0 9 9 9 1\n3  0 1 2  0.5 0.5 0.5",
+    ),
+    "ply": (ply(VERTICES, POLYGONS), PLY_WITH_ALL.encode(), windows(PLY_WITH_ALL.encode())),
+    "binary ply": (
+        ply_binary(VERTICES, TRIANGLES),
+        ply_binary(VERTICES, POLYGONS),
+        ply_big_endian(VERTICES, POLYGONS),
+        ply_with_all("<", "B", "i"),
+        ply_with_all(">", "i", "H"),
+        ply_with_all("<", "b", "b"),
+    ),
+    "stl": (
+        stl(VERTICES, TRIANGLES),
+        windows(stl(VERTICES, TRIANGLES) + stl(VERTICES + 9, TRIANGLES)),
+        stl(VERTICES, TRIANGLES).upper(),
+    ),
+    "binary stl": (
+        stl_binary(VERTICES, TRIANGLES),
+        b"solid" + stl_binary(VERTICES, TRIANGLES)[5:],
+    ),
+    "glb": (
+        glb(VERTICES, TRIANGLES),
+        glb_with_nodes(),
+        glb_with_attributes(),
+        glb_with_data_uri(),
+        glb_sparse(),
+    ),
+}
+"""Files by format, text and binary ones apart"""
+REFUSED = (glb_sparse(),)
+"""Those of them that are refused as they are"""
+
+
+def type_of(name: str) -> str:
+    """Return the file type of a format."""
+    return name.removeprefix("binary ")
+
+
+def glb_parts(data: bytes) -> tuple[bytes, bytes]:
+    """Return the glTF document and the binary chunk of a GLB file."""
+    size = int.from_bytes(data[12:16], "little")
+    return data[20 : 20 + size], data[28 + size :]
+
+
+def glb_around(document: bytes, binary: bytes) -> bytes:
+    """Return the GLB file of a glTF document, which may be no JSON."""
+    document += b" " * (-len(document) % 4)
+    body = struct.pack("<I4s", len(document), b"JSON") + document
+    body += struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def json_mesh() -> dict[str, Any]:
+    return {"vertices": VERTICES.tolist(), "faces": TRIANGLES.tolist()}
