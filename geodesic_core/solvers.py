@@ -558,7 +558,7 @@ def _shortest_through(
     positions = np.array(
         [search.mesh.position_from_origin(stop) for stop in control.watched(stops)]
     )
-    left = limit * (1.0 + AT_LIMIT)
+    left = limit if len(stops) == 2 else limit * (1.0 + AT_LIMIT)  # sums of legs round
     for here, there in pairwise(stops):
         leg_control = control.for_part(len(legs), len(stops) - 1)
         if legs:

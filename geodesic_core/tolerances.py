@@ -175,9 +175,9 @@ The path itself must not be pruned by rounding.
 """
 
 AT_LIMIT = 1e-12
-"""Relative amount by which the path between two points may exceed ``max_distance``: rounding.
+"""Relative distance from ``max_distance`` at which a search asks a field whether a path is within.
 
-A path exactly at the limit is found, whichever sweep its distance was taken from.
+Their sums are rounded differently; so all questions have one answer.
 """
 
 SAME_PLACE = 1e-9

@@ -18,7 +18,6 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import available_cores, share_out
-from geodesic_core.tolerances import AT_LIMIT
 from geodesic_core.validation import as_limit, check_choice, is_index
 
 if TYPE_CHECKING:
@@ -179,9 +178,7 @@ def _searched(
         control.checkpoint(0.0)
         return math.inf
     try:
-        return search.find(
-            source, target, control, explain=False, limit=limit * (1.0 + AT_LIMIT)
-        ).length
+        return search.find(source, target, control, explain=False, limit=limit).length
     except NoPath:
         return math.inf
     finally:

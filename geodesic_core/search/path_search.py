@@ -36,6 +36,7 @@ from geodesic_core.fields.path import (
     rounding_of,
     traced_path,
 )
+from geodesic_core.fields.repeatable_sweep import RepeatableSweep
 from geodesic_core.fields.sources import Nodes, corners_of, nodes_of
 from geodesic_core.fields.sweep import sweep_nodes, winners_of
 from geodesic_core.kernels.mesh.half_edges import LENGTH
@@ -61,7 +62,7 @@ from geodesic_core.kernels.sweep.state import (
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.landmarks import Landmarks
-from geodesic_core.tolerances import SEARCH_SLACK, STRAIGHT
+from geodesic_core.tolerances import AT_LIMIT, SEARCH_SLACK, STRAIGHT
 
 GUIDE_ERROR = 1e-3
 """Relative error of the sweep that guides the exact one (the paper's)."""
@@ -109,6 +110,9 @@ class PathSearch:
     ) -> GeodesicPath:
         """Return an exact path between two canonical points of one component.
 
+        A path to a point in a face may exceed the limit by ``AT_LIMIT``; one to a vertex is found
+        where a field reaches that.
+
         Raises
         ------
         NoPath
@@ -119,15 +123,28 @@ class PathSearch:
         control.check_memory(self.nbytes)
         control.checkpoint(0.0)
         ends = _End(self.mesh, source), _End(self.mesh, target)
+        leg = _Leg(*ends, limit, SEARCH_SLACK, control, _Log(self, explain))
         try:
-            return self._search(_Leg(*ends, limit, SEARCH_SLACK, control, _Log(self, explain)))
+            path = self._search(leg)
         except InternalError:
             # Rounding on slivers can exceed any slack; without bounds there is nothing to lose.
             # Where many faces lie near each other, the path of the merging sweep may be lost.
-            return self._search(_Leg(*ends, limit, math.inf, control, _Log(self, explain)))
+            leg = _Leg(*ends, limit, math.inf, control, _Log(self, explain))
+            path = self._search(leg)
+        is_rounding = limit * (1.0 - AT_LIMIT) < path.length
+        if is_rounding and target.vertex_index is not None and not self._is_within(leg):
+            raise leg.beyond()
+        return path
+
+    def _is_within(self, leg: "_Leg") -> bool:
+        """Tell whether a vertex is within the limit for fields, whose sums round differently."""
+        control = replace(leg.control.holding(self.nbytes), progress=None)
+        start, end, bounds = leg.start.point, leg.end.point, exact_bounds(leg.limit)
+        sweep = RepeatableSweep.between(self.mesh, [(start,)], np.zeros(1), [end], bounds, control)
+        return math.isfinite(sweep.run(control).vertices.distance[sweep.nodes.targets[0]])
 
     def _search(self, leg: "_Leg") -> GeodesicPath:
-        if leg.straight > leg.limit:
+        if leg.straight > leg.longest:
             raise leg.beyond()
         try:
             upper = self._search_edges(leg)
@@ -140,7 +157,7 @@ class PathSearch:
             path = self._sweep_outward(leg, upper, pruning_bounds)
         finally:
             self._forget()
-        if path.length > leg.limit:
+        if path.length > leg.longest:
             raise leg.beyond()
         return replace(path, steps=leg.log.steps)
 
@@ -269,6 +286,11 @@ class _Leg(NamedTuple):
     """Relative amount by which it looks beyond its bounds; infinite where it is not to have any"""
     control: Control
     log: "_Log"
+
+    @property
+    def longest(self) -> float:
+        """Length above which a path is beyond the limit however it is rounded."""
+        return self.limit * (1.0 + AT_LIMIT)
 
     @property
     def straight(self) -> float:

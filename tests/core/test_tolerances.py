@@ -686,16 +686,17 @@ def test_search_slack_keeps_the_path_itself(case):
 
 @SCALES
 @pytest.mark.parametrize(("share", "is_found"), [(0.9, True), (1.1, False)])
-def test_at_limit_is_how_much_longer_a_path_may_be(scale, share, is_found):
+def test_at_limit_is_how_much_longer_a_path_to_a_point_may_be(scale, share, is_found):
     mesh = gc.TriangleMesh(np.eye(3)[[0, 0, 1]] * scale * [[0], [1], [1]], [[0, 1, 2]])
-    limit = scale / (1.0 + share * AT_LIMIT)
-    found = gc.distance_matrix(mesh, [0], [1], limit, "pairs")
+    middle = gc.SurfacePoint.edge(0, 0, 0.5)
+    limit = 0.5 * scale / (1.0 + share * AT_LIMIT)
+    found = gc.distance_matrix(mesh, [0], [middle], limit, "pairs")
     assert np.isfinite(found).tolist() == [is_found]
     if is_found:
-        assert gc.shortest_path(mesh, 0, 1, max_distance=limit).length == scale
+        assert gc.shortest_path(mesh, 0, middle, max_distance=limit).length == 0.5 * scale
     else:
         with pytest.raises(gc.errors.NoPath):
-            gc.shortest_path(mesh, 0, 1, max_distance=limit)
+            gc.shortest_path(mesh, 0, middle, max_distance=limit)
 
 
 @SCALES

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -30,6 +31,46 @@ def test_the_limit_divides_paths_as_the_full_sweep_does(case):
             with pytest.raises(gc.errors.NoPath, match="max_distance") as caught:
                 solver.shortest_path(source, target, max_distance=share * distance)
             assert caught.value.reason == "beyond_max_distance"
+
+
+@pytest.mark.slice(8)
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
+def test_all_questions_agree_on_what_is_within_a_limit(case):
+    """Also where the limit is the next number below the distance, or above it."""
+    solver = solver_of(case)
+    for source, target in random_pairs(solver.mesh, 2 if WITHOUT_JIT else 6):
+        distance = solver.exact_distance(source).distances[target]
+        if not 0 < distance < math.inf:
+            continue
+        below, above = np.nextafter(distance, 0), np.nextafter(distance, math.inf)
+        for limit, is_within in ((below, False), (distance, True), (above, True)):
+            found = is_within_limit(solver, source, target, limit)
+            assert found == dict.fromkeys(found, is_within)
+
+
+def is_within_limit(solver, source, target, limit):
+    """Return whether each way to ask finds a target within a limit."""
+
+    def finds(path_of, *arguments):
+        try:
+            return path_of(*arguments).length > 0
+        except gc.errors.NoPath:
+            return False
+
+    field = solver.exact_distance(source, limit)
+    aimed = solver.exact_distance(source, limit, targets=[target])
+    searched = partial(solver.shortest_path, max_distance=limit)
+    one = [source], [target], limit
+    return {
+        "field": math.isfinite(field.distance_at(target)),
+        "target": math.isfinite(aimed.distance_at(target)),
+        "path_to": finds(field.path_to, target),
+        "search": finds(searched, source, target),
+        "dense": bool(np.isfinite(solver.distance_matrix(*one)).all()),
+        "sparse": solver.distance_matrix(*one, "sparse").nnz == 1,
+        "pairs": bool(np.isfinite(solver.distance_matrix(*one, "pairs")).all()),
+        "nearest": len(solver.nearest(source, [target], max_distance=limit).indices) == 1,
+    }
 
 
 @pytest.mark.jit
