@@ -142,7 +142,10 @@ class ResultStore:
         """Results dropped so far to make room in memory"""
 
     def prepare(self) -> None:
-        """Index the results of a former service, the oldest first, and remove incomplete ones."""
+        """Index the results of a former service, the oldest first, and remove incomplete ones.
+
+        `make_room` is to follow once those that must stay are pinned.
+        """
         self._root.mkdir(parents=True, exist_ok=True)
         bodies = sorted(self._root.glob("*/*.body"), key=lambda path: path.stat().st_mtime)
         for path in bodies:
@@ -152,7 +155,6 @@ class ResultStore:
             else:
                 path.unlink()
         remove_partial(self._root)
-        self._evict()
 
     @property
     def nbytes(self) -> int:
@@ -194,7 +196,7 @@ class ResultStore:
         self._decrement_use(result.name)
         if not result.is_reusable and result.name not in self._pins:
             self._remove(result.name)
-        self._evict()
+        self.make_room()
 
     async def with_files(self, result: Result) -> Result:
         """Return an acquired result with files, which are written now where it had none.
@@ -229,7 +231,7 @@ class ResultStore:
     def unpin(self, name: str) -> None:
         """Take one pin off a result."""
         self._pins -= Counter([name])
-        self._evict()
+        self.make_room()
 
     def discard(self, name: str) -> None:
         """Remove a result, unless it is pinned or in use."""
@@ -257,7 +259,8 @@ class ResultStore:
         if not self._in_use[name]:
             del self._in_use[name]
 
-    def _evict(self) -> None:
+    def make_room(self) -> None:
+        """Remove results until the rest fits, but none that is pinned or in use."""
         if self._total <= self._capacity:
             return
         for name in list(self._sizes):
