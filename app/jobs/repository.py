@@ -10,7 +10,8 @@ class JobRepository(Protocol):
     """The records of jobs; pages begin with the newest.
 
     Every method raises ``OSError`` where the database cannot be read or written, with ``ENOSPC``
-    where its disk is full. ``update`` and ``remove`` work on a full disk as well.
+    where its disk is full, and ``EROFS`` where it can only be read. ``update`` and ``remove`` work
+    on a full disk as well.
     """
 
     async def open(self) -> None:

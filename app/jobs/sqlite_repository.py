@@ -187,14 +187,18 @@ class SqliteJobRepository:
         return self._database
 
 
+_ERRORS = {sqlite3.SQLITE_FULL: errno.ENOSPC, sqlite3.SQLITE_READONLY: errno.EROFS}
+"""System errors by the primary codes of SQLite"""
+
+
 @contextmanager
 def _as_os_errors() -> Iterator[None]:
     """Raise the errors of SQLite as ``JobRepository`` promises them."""
     try:
         yield
     except sqlite3.Error as error:
-        is_full = getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
-        raise OSError(errno.ENOSPC if is_full else errno.EIO, str(error)) from error
+        primary = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
+        raise OSError(_ERRORS.get(primary, errno.EIO), str(error)) from error
 
 
 def read_jobs(path: Path) -> list[Job]:

@@ -6,7 +6,7 @@ was cheap to compute stays in memory and has no files: two files took half as lo
 on it.
 """
 
-import os
+import errno
 import zlib
 from collections import Counter, OrderedDict
 from collections.abc import Iterable, Mapping
@@ -17,7 +17,8 @@ from pathlib import Path
 from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from app.store.atomic import atomic_write, remove_partial
+from app.store.atomic import atomic_write, note_use, remove_partial
+from app.store.log import warn
 
 Buffer = bytes | memoryview
 
@@ -71,6 +72,8 @@ def write_result(
 ) -> Result:
     """Write a result under ``root``, unless it is both small and cheap.
 
+    A small one is returned without files where the disk can only be read.
+
     The parts are written as they are produced, so that they need not be in memory together.
 
     Parameters
@@ -95,12 +98,19 @@ def write_result(
         if sum(map(len, first)) > _SMALL:
             return _write(root, name, chain(first, rest), headers, code)
     body = b"".join(first)
+    manifest = ResultManifest(
+        headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code
+    )
+    in_memory = Result(name, manifest, body, has_files=False)
     if is_cheap:
-        manifest = ResultManifest(
-            headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code
-        )
-        return Result(name, manifest, body, has_files=False)
-    return replace(_write(root, name, [body], headers, code), body=body)
+        return in_memory
+    try:
+        return replace(_write(root, name, [body], headers, code), body=body)
+    except OSError as error:
+        if error.errno != errno.EROFS:
+            raise
+        warn("result not stored", name=name, error=repr(error))
+        return in_memory
 
 
 def _write(
@@ -176,7 +186,7 @@ class ResultStore:
         try:
             result = await to_thread.run_sync(_read, self._root, name)
             if result is not None:
-                os.utime(_body_path(self._root, name))  # the order of use, for the next start
+                note_use(_body_path(self._root, name))
                 self._cache_small(result)
                 return self._acquire(result)
         finally:

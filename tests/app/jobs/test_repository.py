@@ -1,9 +1,7 @@
 """The records of jobs: counted by owner, and on a disk that is full, of 16 megabytes in memory."""
 
 import errno
-import shutil
 import sqlite3
-import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -15,7 +13,7 @@ import pytest
 
 from app.jobs.job import Job, JobSpec
 from app.jobs.sqlite_repository import SqliteJobRepository
-from tests.support.paths import ROOT
+from tests.support.disks import run_on_own_disk
 
 SPEC = JobSpec(
     owner=None,
@@ -190,17 +188,8 @@ async def use(repository: SqliteJobRepository, folder: Path) -> None:
     assert (folder / "jobs.reserve").exists(), "there is room again"
 
 
-def run_on_own_disk(command: str) -> subprocess.CompletedProcess[str]:
-    """Run a command where ``/mnt`` is a disk of 16 megabytes, which no one else sees."""
-    script = f"mount -t tmpfs -o size=16m none /mnt && {command}"
-    words = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", script]
-    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S603 - our own command
-
-
 def test_on_a_full_disk_jobs_end_and_are_removed_but_none_is_accepted() -> None:
-    if shutil.which("unshare") is None or run_on_own_disk("true").returncode:
-        pytest.skip("this system lets nobody mount a disk of their own")
-    ran = run_on_own_disk(f"exec {sys.executable} -m {__name__}")
+    ran = run_on_own_disk(f"{sys.executable} -m {__name__}")
     assert (ran.returncode, ran.stdout) == (0, "done\n"), ran.stderr
 
 
