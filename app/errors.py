@@ -113,7 +113,9 @@ CODES: Mapping[str, Code] = {
     "deadline_exceeded": Code(
         504, "Deadline exceeded", "The answer was not ready in the time granted."
     ),
-    "storage_full": Code(507, "Storage full", "The store has no room left."),
+    "storage_full": Code(
+        507, "Storage full", "The store has no room left, or its disk can only be read."
+    ),
 }
 
 
@@ -240,12 +242,15 @@ def _over_memory(error: core.MemoryLimitExceeded) -> Problem:
 def _system_error(error: OSError) -> Problem:
     if error.errno in (errno.ENOSPC, errno.EDQUOT):
         return _DISK_FULL
+    if error.errno == errno.EROFS:
+        return _READ_ONLY
     return (
         _NO_DESCRIPTORS if error.errno in (errno.EMFILE, errno.ENFILE) else _internal_error(error)
     )
 
 
 _DISK_FULL = Problem("storage_full", "the store has no room left on its disk")
+_READ_ONLY = Problem("storage_full", "the disk of the store can only be read at the moment")
 _NO_DESCRIPTORS = Problem(
     "too_many_connections",
     "the service has too many files and connections open",

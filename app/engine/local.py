@@ -244,7 +244,7 @@ class LocalEngine:
         """Wait for a free slot, preferably one whose worker has cached what the task needs."""
         self._idle = [slot for slot in self._idle if slot.is_alive]
         suitable = [slot for slot in self._idle if self._takes(slot, task.is_small)]
-        if not suitable:
+        if not suitable and not task.is_promised:
             self._refuse_to_wait(task.client)
         with self._measured_wait():
             if suitable:

@@ -83,6 +83,8 @@ class Task:
     """Keys of what a worker may have cached, the most valuable first"""
     is_small: bool = False
     """Whether the work is so short that it should not wait behind long work"""
+    is_promised: bool = False
+    """Whether it was accepted before, so that it waits for a worker however full the queue is"""
 
 
 @dataclass(frozen=True)

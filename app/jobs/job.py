@@ -9,9 +9,12 @@ from pydantic import AliasChoices, BaseModel, ConfigDict, Field
 from app.errors import Problem
 from app.schemas.service import JobStatus
 
+_STATES_OF_RUN = 100_000
+"""More states than a run of a job has: its progress has four digits"""
+
 
 class JobSpec(BaseModel):
-    """The query of a job, and its owner."""
+    """What a job is to do, but for its query, and its owner."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -22,6 +25,12 @@ class JobSpec(BaseModel):
     mesh_id: str
     media_type: str
     """Media type of the answer"""
+    dtype: str = "float64"
+    """Of the numbers of the answer"""
+    coding: str | None = None
+    """Content coding of the answer"""
+    client: str = ""
+    """Name of the caller; callers take turns"""
     fingerprint: str
     """Hash of the query and its representation"""
     idempotency_key: str | None = None
@@ -43,7 +52,9 @@ class Job(BaseModel):
     status: JobStatus = "accepted"
     progress: float = 0.0
     version: int = 1
-    """Number of states so far, this one included"""
+    """Greater than that of each state before"""
+    runs: int = 0
+    """Number of times that a worker has begun the job"""
     created: datetime = Field(default_factory=lambda: datetime.now(UTC))
     started: datetime | None = None
     finished: datetime | None = None
@@ -59,8 +70,17 @@ class Job(BaseModel):
 
     def running(self, progress: float) -> "Job":
         """Return the state of a job that a worker has begun."""
-        started = self.started or datetime.now(UTC)
-        return self._next(status="running", started=started, progress=progress)
+        if self.started is None:
+            begun = {"started": datetime.now(UTC), "runs": self.runs + 1}
+            return self._next(status="running", progress=progress, **begun)
+        return self._next(progress=progress)
+
+    def accepted_again(self) -> "Job":
+        """Return the state of a job that was under way when the service ended."""
+        # Not all states of the last run were stored, and clients may have seen them.
+        version = self.version + _STATES_OF_RUN
+        again = {"status": "accepted", "progress": 0.0, "started": None, "version": version}
+        return self.model_copy(update=again)
 
     def successful(self, result: str) -> "Job":
         """Return the state of a job with a result."""

@@ -3,14 +3,15 @@
 import asyncio
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from math import ceil
 
 import structlog
+from structlog.contextvars import bound_contextvars
 
 from app.engine.interface import ProgressCallback
-from app.errors import Fault, Problem, over_limit, problem, problem_of
+from app.errors import Fault, Problem, ProblemError, over_limit, problem, problem_of
 from app.jobs.job import Job, JobSpec
 from app.jobs.repository import JobRepository
 from app.settings import variable_of
@@ -21,14 +22,28 @@ logger = structlog.get_logger(module=__name__)
 Solve = Callable[[ProgressCallback], Awaitable[Result]]
 """The computation of a job, which reports its progress"""
 
-_EXPIRY_PERIOD_S = 60.0
+SolveAgain = Callable[[JobSpec, bytes, ProgressCallback], Awaitable[Result]]
+"""The same for a stored job, from its query as JSON"""
+
+_TIDY_PERIOD_S = 60.0
 """Seconds between two removals of expired jobs"""
+
+_MOST_RUNS = 3
+"""Runs of a job: the first, and two more where the service ended while it ran. A job may itself be
+the reason why the service ends."""
 
 _STOPPED = Problem(
     "engine_unavailable",
     "the service stopped while the job was under way",
     hint="send the query again",
 )
+_STOPPED_TOO_OFTEN = Problem(
+    "engine_unavailable",
+    f"the service stopped while the job ran, {_MOST_RUNS} times",
+    hint="ask for less at once, if it was the job that took too much",
+)
+_SIGNS_OF_THE_END = frozenset({"draining", "engine_unavailable", "worker_died"})
+"""Problems of jobs that the end of the service interrupts: a signal may have gone to workers too"""
 _NO_ROOM = Problem(
     "storage_full",
     "the answers that jobs hold leave no room for this one",
@@ -38,12 +53,14 @@ _NO_ROOM = Problem(
 
 
 class _LiveJob:
-    """A job that has not finished, its task, and an event for those who watch it."""
+    """A job whose end is not recorded yet, its tasks, and an event for those who watch it."""
 
     def __init__(self, job: Job) -> None:
         self.job = job
         self.changed = asyncio.Event()
-        self.task: asyncio.Task[None] | None = None
+        self.tasks: list[asyncio.Task[None]] = []
+        self.recording = asyncio.Lock()
+        """Held while the state is written to the repository"""
 
     def update(self, job: Job) -> None:
         """Change the state, and notify watchers."""
@@ -55,8 +72,13 @@ class _LiveJob:
         changed, self.changed = self.changed, asyncio.Event()
         changed.set()
 
+    def cancel(self) -> None:
+        """Stop the work."""
+        for task in self.tasks:
+            task.cancel()
+
     def on_progress(self, share: float) -> None:
-        """Record the share of the work that is done; the first call marks the start."""
+        """Note the share of the work that is done."""
         share = round(share, 4)
         if not self.job.is_finished and (share > self.job.progress or self.job.started is None):
             self.update(self.job.running(share))
@@ -84,22 +106,24 @@ class JobManager:
         self._is_stopping = False
 
     @asynccontextmanager
-    async def running(self) -> AsyncIterator[None]:
-        """Open the repository, and remove expired jobs, inside the block."""
+    async def running(self, solve_again: SolveAgain) -> AsyncIterator[None]:
+        """Open the repository, run jobs, and remove expired ones, inside the block.
+
+        Jobs that are under way at its end are run again, by ``solve_again``, inside the next one.
+        """
         await self._repository.open()
-        for job in await self._repository.unfinished():
-            await self._repository.update(job.failed(_STOPPED))
         for job in await self._repository.with_results():
             assert job.result is not None, "successful jobs have one"  # noqa: S101
             self._results.pin(job.result)
-        expiring = asyncio.create_task(self._remove_expired())
+        for job in await self._repository.unfinished():
+            await self._resume(job.accepted_again(), solve_again)
+        tidying = asyncio.create_task(self._tidy())
         try:
             yield
         finally:
-            expiring.cancel()
+            tidying.cancel()
             self.end_events()
-            for live in list(self._live.values()):
-                await self._finish(live, live.job.failed(_STOPPED))
+            await self._interrupt()
             await self._repository.close()
 
     def end_events(self) -> None:
@@ -108,10 +132,11 @@ class JobManager:
         for live in self._live.values():
             live.notify()
 
-    async def submit(self, spec: JobSpec, solve: Solve) -> Job:
+    async def submit(self, spec: JobSpec, query: bytes, solve: Solve) -> Job:
         """Accept a job, or return the job that has the idempotency key of ``spec``.
 
-        The key of a job that failed or was dismissed is free again.
+        The key of a job that failed or was dismissed is free again. The ``query`` as JSON is stored
+        until the job has finished.
 
         Raises
         ------
@@ -123,11 +148,10 @@ class JobManager:
             if known is not None:
                 return known
             await self._refuse_over_quota(spec.owner)
-            live = _LiveJob(Job(spec=spec))
-            await self._repository.add(live.job)
-            self._live[live.job.id] = live
-            live.task = asyncio.create_task(self._run(live, solve), name=f"job {live.job.id}")
-            return live.job
+            job = Job(spec=spec)
+            await self._repository.add(job, query)
+            self._begin(job, solve)
+            return job
 
     async def find(self, owner: str | None, job_id: str) -> Job:
         """Return the present state of a job; raises ``ProblemError`` where the owner has none."""
@@ -157,7 +181,9 @@ class JobManager:
         job = await self.find(owner, job_id)
         live = self._live.get(job_id)
         if live is not None and not live.job.is_finished:
-            await self._finish(live, live.job.dismissed())
+            live.update(live.job.dismissed())
+            live.cancel()
+            await self._record_end(live)
             return live.job
         await self._remove(job)
         return job
@@ -229,14 +255,48 @@ class JobManager:
             headers={"Retry-After": str(wait_s)},
         )
 
+    async def _resume(self, job: Job, solve_again: SolveAgain) -> None:
+        """Run a stored job, unless it has been run too often."""
+        if job.runs >= _MOST_RUNS:
+            await self._repository.update(job.failed(_STOPPED_TOO_OFTEN))
+            return
+
+        async def solve(on_progress: ProgressCallback) -> Result:
+            query = await self._repository.query(job.id)
+            if query is None:  # an older release accepted the job
+                raise ProblemError(_STOPPED)
+            return await solve_again(job.spec, query, on_progress)
+
+        await self._repository.update(job)
+        with bound_contextvars(request_id=job.spec.request_id):
+            self._begin(job, solve)
+
+    def _begin(self, job: Job, solve: Solve) -> None:
+        live = self._live[job.id] = _LiveJob(job)
+        for work in (self._run(live, solve), self._record_start(live)):
+            live.tasks.append(asyncio.create_task(work, name=f"job {job.id}"))
+
+    async def _interrupt(self) -> None:
+        """Stop all jobs, and leave their records as they are: the next start runs them again."""
+        jobs = list(self._live.values())
+        for live in jobs:
+            if not live.job.is_finished:
+                live.cancel()
+        tasks = (task for live in jobs for task in live.tasks)
+        await asyncio.gather(*tasks, return_exceptions=True)
+        with suppress(OSError):  # logged when it failed first; the job is run again
+            await self._record_ends()
+
     async def _run(self, live: _LiveJob, solve: Solve) -> None:
         try:
             result = await self._results.with_files(await solve(live.on_progress))
         except Exception as error:
             problem = problem_of(error)
+            if self._is_stopping and problem.code in _SIGNS_OF_THE_END:
+                return
             if problem.code == "internal_error":
                 logger.exception("job failed", job_id=live.job.id)
-            await self._finish(live, live.job.failed(problem))
+            await self._end(live, live.job.failed(problem))
             return
         if self._results.can_pin(result.name):
             self._results.pin(result.name)
@@ -244,29 +304,54 @@ class JobManager:
         else:
             last = live.job.failed(_NO_ROOM)
         self._results.release(result)
-        await self._finish(live, last)
+        await self._end(live, last)
 
-    async def _finish(self, live: _LiveJob, last: Job) -> None:
-        """Give a job its last state, and stop its task."""
+    async def _end(self, live: _LiveJob, last: Job) -> None:
+        """Give a job its last state; record it later where the disk refuses that now."""
         if live.job.is_finished:
             return
         live.update(last)
-        assert live.task is not None, "a job starts before it ends"  # noqa: S101
-        if live.task is not asyncio.current_task():
-            live.task.cancel()
-        await self._repository.update(last)
-        self._live.pop(last.id, None)
+        try:
+            await self._record_end(live)
+        except OSError:
+            logger.exception("end of a job not recorded, to be tried again", job_id=last.id)
 
-    async def _remove_expired(self) -> None:
+    async def _record_start(self, live: _LiveJob) -> None:
+        """Record the run of a job once a worker has begun it."""
+        while live.job.started is None and not live.job.is_finished:
+            await live.changed.wait()
+        async with live.recording:
+            if live.job.is_finished:
+                return
+            try:
+                await self._repository.update(live.job)
+            except OSError:  # a run that is not counted does no harm, unless the service dies of it
+                logger.exception("start of a job not recorded", job_id=live.job.id)
+
+    async def _record_end(self, live: _LiveJob) -> None:
+        async with live.recording:
+            await self._repository.update(live.job)
+            self._live.pop(live.job.id, None)
+
+    async def _record_ends(self) -> None:
+        """Record the ends of jobs that could not be recorded when they came."""
+        for live in list(self._live.values()):
+            if live.job.is_finished:
+                await self._record_end(live)
+
+    async def _tidy(self) -> None:
+        """Record what could not be recorded before, and remove expired jobs; again and again."""
         while True:
             try:
+                await self._record_ends()
                 for job in await self._repository.finished_before(datetime.now(UTC) - self._ttl):
                     await self._remove(job)
             except OSError:  # such as a full disk: there may be room the next time
-                logger.exception("expired jobs not removed")
-            await asyncio.sleep(min(_EXPIRY_PERIOD_S, self._ttl.total_seconds()))
+                logger.exception("jobs neither recorded nor removed")
+            await asyncio.sleep(min(_TIDY_PERIOD_S, self._ttl.total_seconds()))
 
     async def _remove(self, job: Job) -> None:
         await self._repository.remove(job.id)
+        self._live.pop(job.id, None)
         if job.result is not None:
             self._results.unpin(job.result)

@@ -7,10 +7,11 @@ from app.jobs.job import Job
 
 
 class JobRepository(Protocol):
-    """The records of jobs; lists begin with the newest.
+    """The records of jobs; pages begin with the newest.
 
     Every method raises ``OSError`` where the database cannot be read or written, with ``ENOSPC``
-    where its disk is full. ``update`` and ``remove`` work on a full disk as well.
+    where its disk is full, and ``EROFS`` where it can only be read. ``update`` and ``remove`` work
+    on a full disk as well.
     """
 
     async def open(self) -> None:
@@ -19,14 +20,17 @@ class JobRepository(Protocol):
     async def close(self) -> None:
         """Close the database."""
 
-    async def add(self, job: Job) -> None:
-        """Insert the record of a new job."""
+    async def add(self, job: Job, query: bytes) -> None:
+        """Insert the record of a new job, and its query as JSON."""
 
     async def update(self, job: Job) -> None:
-        """Replace the record of a job."""
+        """Replace the record of a job; the query of one that has finished is forgotten."""
 
     async def remove(self, job_id: str) -> None:
         """Remove the record of a job."""
+
+    async def query(self, job_id: str) -> bytes | None:
+        """Return the query of a job that has not finished; None where it was not stored."""
 
     async def find(self, owner: str | None, job_id: str) -> Job | None:
         """Return the job of an owner with this id; None where there is none."""
@@ -46,7 +50,7 @@ class JobRepository(Protocol):
         """Return the number of finished jobs by status."""
 
     async def unfinished(self) -> list[Job]:
-        """Return the jobs that have not finished."""
+        """Return the jobs that have not finished, the oldest first."""
 
     async def with_results(self) -> list[Job]:
         """Return the jobs that have a result."""

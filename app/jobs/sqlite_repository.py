@@ -33,7 +33,13 @@ CREATE INDEX IF NOT EXISTS jobs_by_owner ON jobs (owner, number);
 CREATE INDEX IF NOT EXISTS jobs_by_key ON jobs (owner, idempotency_key)
     WHERE idempotency_key IS NOT NULL;
 CREATE INDEX IF NOT EXISTS jobs_by_end ON jobs (finished);
+CREATE TABLE IF NOT EXISTS queries (job_id TEXT PRIMARY KEY, query BLOB NOT NULL) WITHOUT ROWID;
 """
+_FORGET_UNNEEDED = """
+DELETE FROM queries WHERE job_id NOT IN (SELECT id FROM jobs WHERE finished IS NULL)
+"""
+"""Queries have a table of their own, since they may be large, and records change often. A crash
+between changes of both leaves a query too many, and never one too few."""
 
 
 _RESERVED = 2**20
@@ -56,6 +62,7 @@ class SqliteJobRepository:
             await self._database.execute("PRAGMA synchronous = NORMAL")
             await self._database.executescript(_SCHEMA)
         await to_thread.run_sync(self._reserve.restore)
+        await self._run_on_reserve(_FORGET_UNNEEDED)
 
     async def close(self) -> None:
         """Close the database."""
@@ -63,19 +70,34 @@ class SqliteJobRepository:
             await self._database.close()
             self._database = None
 
-    async def add(self, job: Job) -> None:
-        """Insert the record of a new job."""
-        await self._run("INSERT INTO jobs (record) VALUES (?)", job.model_dump_json())
+    async def add(self, job: Job, query: bytes) -> None:
+        """Insert the record of a new job, and its query as JSON."""
+        await self._run("INSERT INTO queries VALUES (?, ?)", job.id, query)
+        try:
+            await self._run("INSERT INTO jobs (record) VALUES (?)", job.model_dump_json())
+        except OSError:
+            await self._forget_query(job.id)
+            raise
         await to_thread.run_sync(self._reserve.restore)  # now there is room
 
     async def update(self, job: Job) -> None:
-        """Replace the record of a job; this works on a full disk as well."""
+        """Replace the record of a job; this works on a full disk as well.
+
+        The query of one that has finished is forgotten.
+        """
         statement = "UPDATE jobs SET record = ? WHERE id = ?"
         await self._run_on_reserve(statement, job.model_dump_json(), job.id)
+        if job.is_finished:
+            await self._forget_query(job.id)
 
     async def remove(self, job_id: str) -> None:
         """Remove the record of a job; this works on a full disk as well."""
         await self._run_on_reserve("DELETE FROM jobs WHERE id = ?", job_id)
+
+    async def query(self, job_id: str) -> bytes | None:
+        """Return the query of a job that has not finished; None where it was not stored."""
+        rows = await self._rows("SELECT query FROM queries WHERE job_id = ?", job_id)
+        return rows[0][0] if rows else None
 
     async def find(self, owner: str | None, job_id: str) -> Job | None:
         """Return the job of an owner with this id; None where there is none."""
@@ -115,8 +137,8 @@ class SqliteJobRepository:
         return dict(await self._rows(statement))
 
     async def unfinished(self) -> list[Job]:
-        """Return the jobs that have not finished."""
-        return await self._jobs("WHERE finished IS NULL")
+        """Return the jobs that have not finished, the oldest first."""
+        return await self._jobs("WHERE finished IS NULL ORDER BY number")
 
     async def with_results(self) -> list[Job]:
         """Return the jobs that have a result."""
@@ -129,6 +151,9 @@ class SqliteJobRepository:
             for job in await self._jobs("WHERE finished IS NOT NULL")
             if job.finished is not None and job.finished < moment
         ]
+
+    async def _forget_query(self, job_id: str) -> None:
+        await self._run_on_reserve("DELETE FROM queries WHERE job_id = ?", job_id)
 
     async def _jobs(self, condition: str, *values: Any) -> list[Job]:
         rows = await self._rows(f"SELECT record FROM jobs {condition}", *values)  # noqa: S608
@@ -162,14 +187,18 @@ class SqliteJobRepository:
         return self._database
 
 
+_ERRORS = {sqlite3.SQLITE_FULL: errno.ENOSPC, sqlite3.SQLITE_READONLY: errno.EROFS}
+"""System errors by the primary codes of SQLite"""
+
+
 @contextmanager
 def _as_os_errors() -> Iterator[None]:
     """Raise the errors of SQLite as ``JobRepository`` promises them."""
     try:
         yield
     except sqlite3.Error as error:
-        is_full = getattr(error, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
-        raise OSError(errno.ENOSPC if is_full else errno.EIO, str(error)) from error
+        primary = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
+        raise OSError(_ERRORS.get(primary, errno.EIO), str(error)) from error
 
 
 def read_jobs(path: Path) -> list[Job]:

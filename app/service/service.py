@@ -26,7 +26,7 @@ from gc import collect, freeze
 from pathlib import Path
 from typing import Any
 
-from anyio import to_thread
+from anyio import CapacityLimiter, to_thread
 
 from app.access import Caller
 from app.encoding import Representation
@@ -35,7 +35,7 @@ from app.engine.local import LocalEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, problem
 from app.jobs import Job, JobManager, JobSpec, SqliteJobRepository, require_intact
-from app.queries import Estimate, MeshSize, Query, fingerprint, result_key
+from app.queries import KINDS, Estimate, MeshSize, Query, fingerprint, result_key
 from app.service.concurrency import ConcurrencyLimit
 from app.service.maintenance import Damage
 from app.service.scrub import scrubbing
@@ -107,6 +107,7 @@ class Service:
         """Queries that workers answered, by kind"""
         self.solve_seconds: defaultdict[str, float] = defaultdict(float)
         """Seconds of solving, by kind of query"""
+        self._reading = CapacityLimiter(1)
         self._single_flight: SingleFlight[TaskResult] = SingleFlight()
 
     @asynccontextmanager
@@ -121,7 +122,11 @@ class Service:
             collect()
             freeze()
             try:
-                async with self.jobs.running(), scrubbing(self.settings.store, self._repair):
+                async with (
+                    self.jobs.running(self._solve_again),
+                    scrubbing(self.settings.store, self._repair),
+                ):
+                    self.results.make_room()  # now it is known which are those of jobs
                     yield
             finally:
                 await self.engine.stop()
@@ -280,11 +285,41 @@ class Service:
             kind=query.kind,
             mesh_id=query.mesh_id,
             media_type=representation.media_type,
+            dtype=representation.dtype,
+            coding=representation.coding,
+            client=client,
             fingerprint=fingerprint(query, representation),
             idempotency_key=idempotency_key,
             request_id=context.request_id,
         )
-        return await self.jobs.submit(spec, solve)
+        return await self.jobs.submit(spec, query.written, solve)
+
+    async def _solve_again(
+        self, spec: JobSpec, written: bytes, on_progress: ProgressCallback
+    ) -> Result:
+        """Compute the answer of a job that was under way when the service ended."""
+        representation = Representation(spec.media_type, spec.dtype, spec.coding)
+        async with self.time_limit(self.settings.job_deadline_s, "job_deadline_s"):
+            with self.mesh_catalog.pinned(spec.mesh_id):
+                size = self.size(spec.mesh_id)
+                # One at a time: each may take a tenth of a second, and others want to be served.
+                query = await to_thread.run_sync(
+                    self._stored_query, spec, size, written, limiter=self._reading
+                )
+                result, _ = await self._answer(
+                    query, size, representation, spec.client, on_progress, is_promised=True
+                )
+                return result
+
+    def _stored_query(self, spec: JobSpec, size: MeshSize, written: bytes) -> Query[Any]:
+        """Return the query of a job, which an older release may have written."""
+        try:
+            kind = KINDS[spec.kind]
+            request = kind.model.model_validate_json(written)
+        except (KeyError, ValueError) as error:
+            detail = "this release of the service cannot read the query of the job"
+            raise problem("engine_unavailable", detail, hint="send the query again") from error
+        return kind.ask(spec.mesh_id, size, request, self.settings)
 
     async def _answer(
         self,
@@ -293,6 +328,8 @@ class Service:
         representation: Representation,
         client: str,
         on_progress: ProgressCallback,
+        *,
+        is_promised: bool = False,
     ) -> tuple[Result, PhaseSeconds]:
         with self.mesh_catalog.pinned(query.mesh_id):
             query.check_answer(representation.media_type, size, self.settings)
@@ -302,7 +339,8 @@ class Service:
             if stored is not None:
                 return stored, {}
             work = RunQuery(query, representation, name)
-            task = Task(work, client, query.affinity_keys, query.is_small(size))
+            is_small = query.is_small(size)
+            task = Task(work, client, query.affinity_keys, is_small, is_promised)
             start = partial(self._run, task, query.kind)
             done = await self._single_flight.join(name, start, on_progress)
             assert done.result is not None, "this kind of work answers"  # noqa: S101

@@ -21,7 +21,7 @@ from geodesic_core import TriangleMesh
 
 
 def convert(root: Path) -> None:
-    """Convert the store ``root`` to the present layout, after reading all its meshes once.
+    """Convert the meshes of the store ``root`` to the present layout, after reading each once.
 
     A damaged mesh stays as it is, and is as damaged in the present layout. A conversion that was
     interrupted can be begun again.

@@ -16,7 +16,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from app.store.atomic import atomic_write, remove_partial
+from app.store.atomic import atomic_write, note_use, remove_partial
 from app.store.layout import FIELDS
 from app.store.log import warn
 
@@ -51,7 +51,7 @@ class FieldStore:
         path = self._path(mesh_id, key)
         try:
             arrays = _read(path)
-            path.touch()  # records the order of use
+            note_use(path)
         except FileNotFoundError:
             return None
         except (*_DAMAGED, OSError) as error:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import orjson
 
-LAYOUT = 6
+LAYOUT = 7
 """Number of the layout that this code reads and writes. Raise it with every change of any file,
 including the tables of jobs."""
 
@@ -25,8 +25,10 @@ JOB_DATABASE, JOB_RESERVE = "jobs.sqlite3", "jobs.reserve"
 MESHES, RESULTS, FIELDS = "meshes", "results", "fields"
 TEMPORARY = "tmp"
 
-CONVERTIBLE = (4, 5)
-"""Older layouts, which `app.store.conversion` makes current; in 4, each manifest had the number."""
+WITH_OLDER_MESHES = (4, 5)
+"""Layouts whose meshes `app.store.conversion` makes current; in 4, each manifest had the number."""
+CONVERTIBLE = (*WITH_OLDER_MESHES, 6)
+"""Older layouts that this code takes over; in 6, the queries of jobs were not stored."""
 
 
 class StoreError(Exception):

@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import ProblemError, problem
+from app.store.atomic import note_use
 from app.store.layout import MESHES
 from app.store.manifests import MANIFEST, encode_manifest, manifest_of, read_manifest
 from app.store.verified import FileVersion, checksum_of, read_checksum, version_of
@@ -260,7 +261,7 @@ class MeshStore:
     def note_use(self, mesh_id: str) -> None:
         """Record a use of a mesh as the time of its folder, which a restart reads."""
         try:
-            os.utime(self._path(mesh_id))
+            note_use(self._path(mesh_id))
         except FileNotFoundError:
             raise mesh_not_found(mesh_id) from None
 

@@ -9,7 +9,7 @@ from filelock import FileLock, Timeout
 from app.settings import variable_of
 from app.store.atomic import sync
 from app.store.conversion import convert
-from app.store.layout import LAYOUT, StoreError, layout_of
+from app.store.layout import LAYOUT, WITH_OLDER_MESHES, StoreError, layout_of
 
 
 @contextmanager
@@ -38,7 +38,7 @@ def owned(root: Path) -> Iterator[None]:
     except OSError as error:
         raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
     try:
-        if layout_of(root) != LAYOUT:
+        if layout_of(root) in WITH_OLDER_MESHES:
             convert(root)
         _write_layout(root)
         yield

@@ -6,7 +6,7 @@ was cheap to compute stays in memory and has no files: two files took half as lo
 on it.
 """
 
-import os
+import errno
 import zlib
 from collections import Counter, OrderedDict
 from collections.abc import Iterable, Mapping
@@ -17,7 +17,8 @@ from pathlib import Path
 from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from app.store.atomic import atomic_write, remove_partial
+from app.store.atomic import atomic_write, note_use, remove_partial
+from app.store.log import warn
 
 Buffer = bytes | memoryview
 
@@ -71,6 +72,8 @@ def write_result(
 ) -> Result:
     """Write a result under ``root``, unless it is both small and cheap.
 
+    A small one is returned without files where the disk can only be read.
+
     The parts are written as they are produced, so that they need not be in memory together.
 
     Parameters
@@ -95,12 +98,19 @@ def write_result(
         if sum(map(len, first)) > _SMALL:
             return _write(root, name, chain(first, rest), headers, code)
     body = b"".join(first)
+    manifest = ResultManifest(
+        headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code
+    )
+    in_memory = Result(name, manifest, body, has_files=False)
     if is_cheap:
-        manifest = ResultManifest(
-            headers=dict(headers), size=len(body), crc32=zlib.crc32(body), code=code
-        )
-        return Result(name, manifest, body, has_files=False)
-    return replace(_write(root, name, [body], headers, code), body=body)
+        return in_memory
+    try:
+        return replace(_write(root, name, [body], headers, code), body=body)
+    except OSError as error:
+        if error.errno != errno.EROFS:
+            raise
+        warn("result not stored", name=name, error=repr(error))
+        return in_memory
 
 
 def _write(
@@ -142,7 +152,10 @@ class ResultStore:
         """Results dropped so far to make room in memory"""
 
     def prepare(self) -> None:
-        """Index the results of a former service, the oldest first, and remove incomplete ones."""
+        """Index the results of a former service, the oldest first, and remove incomplete ones.
+
+        `make_room` is to follow once those that must stay are pinned.
+        """
         self._root.mkdir(parents=True, exist_ok=True)
         bodies = sorted(self._root.glob("*/*.body"), key=lambda path: path.stat().st_mtime)
         for path in bodies:
@@ -152,7 +165,6 @@ class ResultStore:
             else:
                 path.unlink()
         remove_partial(self._root)
-        self._evict()
 
     @property
     def nbytes(self) -> int:
@@ -174,7 +186,7 @@ class ResultStore:
         try:
             result = await to_thread.run_sync(_read, self._root, name)
             if result is not None:
-                os.utime(_body_path(self._root, name))  # the order of use, for the next start
+                note_use(_body_path(self._root, name))
                 self._cache_small(result)
                 return self._acquire(result)
         finally:
@@ -194,7 +206,7 @@ class ResultStore:
         self._decrement_use(result.name)
         if not result.is_reusable and result.name not in self._pins:
             self._remove(result.name)
-        self._evict()
+        self.make_room()
 
     async def with_files(self, result: Result) -> Result:
         """Return an acquired result with files, which are written now where it had none.
@@ -229,7 +241,7 @@ class ResultStore:
     def unpin(self, name: str) -> None:
         """Take one pin off a result."""
         self._pins -= Counter([name])
-        self._evict()
+        self.make_room()
 
     def discard(self, name: str) -> None:
         """Remove a result, unless it is pinned or in use."""
@@ -257,7 +269,8 @@ class ResultStore:
         if not self._in_use[name]:
             del self._in_use[name]
 
-    def _evict(self) -> None:
+    def make_room(self) -> None:
+        """Remove results until the rest fits, but none that is pinned or in use."""
         if self._total <= self._capacity:
             return
         for name in list(self._sizes):

@@ -247,10 +247,10 @@ def test_what_is_no_store_is_refused(run: Run, tmp_path: Path, command: str) -> 
         assert f"there is no store in {tmp_path / name}" in error_line(ran)
     assert list((tmp_path / "photos").iterdir()) == []
 
-    (tmp_path / "photos" / "VERSION").write_text("7\n")
+    (tmp_path / "photos" / "VERSION").write_text("8\n")
     ran = run("store", command, tmp_path / "photos")
     assert ran.code == 1
-    assert "has layout 7, and this release reads 6" in error_line(ran)
+    assert "has layout 8, and this release reads 7" in error_line(ran)
 
 
 @pytest.mark.parametrize("command", ["ls", "check", "prune"])
@@ -258,7 +258,7 @@ def test_an_older_store_is_for_the_service_to_convert(run: Run, left: Left, comm
     (left.root / "VERSION").write_text("5\n")
     ran = run("store", command, left.root)
     assert ran.code == 1
-    assert "has layout 5, and this release reads 6: start the service on it" in error_line(ran)
+    assert "has layout 5, and this release reads 7: start the service on it" in error_line(ran)
 
 
 def test_serve_refuses_a_store_that_it_cannot_have(

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.jobs import Job, read_jobs
 from app.jobs.sqlite_repository import SqliteJobRepository
 from tests.support.processes import stopped
 from tests.support.service import (
@@ -342,6 +343,29 @@ def test_jobs_are_forgotten_although_the_disk_was_full(
         job = job_of(submit(client, upload_sample(client, "plane", 50)))
         wait_until(lambda: client.get(job).status_code == 404)
     assert len(refused) == 2
+
+
+def test_the_end_of_a_job_is_recorded_once_the_disk_can_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    update, is_read_only = SqliteJobRepository.update, True
+
+    async def update_later(repository: SqliteJobRepository, job: Job) -> None:
+        if is_read_only:
+            raise OSError(errno.EROFS, "attempt to write a readonly database")
+        await update(repository, job)
+
+    monkeypatch.setattr(SqliteJobRepository, "update", update_later)
+    monkeypatch.setattr("app.jobs.manager._TIDY_PERIOD_S", 0.01)
+    with serving(tmp_path) as client:
+        job = job_of(submit(client, upload_sample(client, "plane", 50)))
+        wait_for(client, job, "successful")
+        assert client.get(f"{job}/results").status_code == 200
+        assert {stored.status for stored in read_jobs(tmp_path / "jobs.sqlite3")} == {"accepted"}
+        is_read_only = False
+        wait_until(
+            lambda: all(stored.is_finished for stored in read_jobs(tmp_path / "jobs.sqlite3"))
+        )
 
 
 @pytest.fixture

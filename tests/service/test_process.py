@@ -146,8 +146,10 @@ class Restart:
     done: str
     """A job that had finished"""
     answer: Any
-    lost: str
+    interrupted: str
     """A job that ran"""
+    waiting: str
+    """A job that waited for the same worker"""
     server: Server
 
 
@@ -168,13 +170,16 @@ def restart(started: list[Server], tmp_path_factory: pytest.TempPathFactory) -> 
         wait_until(lambda: any(first.store.glob("tmp/*/upload")))
         with pytest.raises(StoreError, match="in use by another process"):
             owned(first.store).__enter__()
-        lost = submit(first, slow, 5)
-        wait_until(lambda: status_of(first, lost) == "running")
-        first.kill()
+        with stopped(workers):
+            interrupted = submit(first, slow, 5)
+            wait_until(lambda: status_of(first, interrupted) == "running")
+            waiting = submit(first, slow, 6)
+            assert status_of(first, waiting) == "accepted"
+            first.kill()
     wait_until(lambda: are_gone(workers))  # however busy they are
     assert any(first.store.glob("tmp/*/upload"))
     started.append(Server(first.store, **PATIENT))
-    return Restart(meshes, done, answer, lost, started[-1])
+    return Restart(meshes, done, answer, interrupted, waiting, started[-1])
 
 
 def test_a_body_that_arrived_when_the_service_was_killed_is_removed(restart: Restart) -> None:
@@ -190,18 +195,12 @@ def test_a_job_that_had_finished_has_its_answer_after_a_restart(restart: Restart
     assert restart.server.client.get(f"{restart.done}/results").json() == restart.answer
 
 
-def test_a_job_that_ran_says_after_a_restart_why_it_failed(restart: Restart) -> None:
-    client = restart.server.client
-
-    job = client.get(restart.lost).json()
-    assert job["status"] == "failed"
-    assert job["problem"]["code"] == "engine_unavailable"
-    assert job["problem"]["hint"] == "send the query again"
-    response = client.get(f"{restart.lost}/results")
-    assert (response.status_code, response.json()["code"]) == (503, "engine_unavailable")
-
-    again = submit(restart.server, job["mesh_id"], 5)
-    wait_until(lambda: status_of(restart.server, again) == "successful")
+def test_jobs_that_were_under_way_are_run_again_after_a_restart(restart: Restart) -> None:
+    mesh = gc.TriangleMesh(*gc.samples.sphere(SLOW_FACES))
+    for job, source in ((restart.interrupted, 5), (restart.waiting, 6)):
+        wait_until(lambda job=job: status_of(restart.server, job) == "successful")
+        answer = restart.server.client.get(f"{job}/results").json()
+        assert answer["distances"] == [gc.exact_distance(mesh, source).distances[1]]
 
 
 # It ends
@@ -294,7 +293,10 @@ def test_a_client_that_watches_a_job_does_not_keep_the_service_from_stopping(
             server.process.send_signal(signal.SIGTERM)
 
             assert server.process.wait(LONG_S) in ENDED_WELL
-            assert not any('"status": "failed"' in line for line in lines), "it is still to be told"
+            assert not any('"status": "failed"' in line for line in lines)
+
+    with closing(Server(server.store)) as next_server:
+        wait_until(lambda: status_of(next_server, job) == "successful")
 
 
 def test_processes_that_compile_kernels_end_with_the_service(tmp_path):

@@ -1,8 +1,7 @@
 """The records of jobs: counted by owner, and on a disk that is full, of 16 megabytes in memory."""
 
 import errno
-import shutil
-import subprocess
+import sqlite3
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -14,7 +13,7 @@ import pytest
 
 from app.jobs.job import Job, JobSpec
 from app.jobs.sqlite_repository import SqliteJobRepository
-from tests.support.paths import ROOT
+from tests.support.disks import run_on_own_disk
 
 SPEC = JobSpec(
     owner=None,
@@ -25,6 +24,8 @@ SPEC = JobSpec(
     idempotency_key=None,
     request_id="",
 )
+
+QUERY = b'{"sources":[{"vertex":0}]}'
 
 
 def new_job(owner: str | None = None) -> Job:
@@ -40,7 +41,7 @@ async def count_usage(path: Path) -> None:
     await repository.open()
     mine = [new_job("alice") for _ in range(4)]
     for job in (*mine, new_job("bob"), new_job()):
-        await repository.add(job)
+        await repository.add(job, QUERY)
     assert await repository.usage("alice") == (4, None)
 
     noon = datetime(2005, 7, 1, 12, tzinfo=UTC)
@@ -56,6 +57,78 @@ async def count_usage(path: Path) -> None:
     assert await repository.usage("bob") == await repository.usage(None) == (1, None)
     assert await repository.usage("carol") == (0, None)
     await repository.close()
+
+
+def test_the_query_of_a_job_is_stored_until_the_job_has_finished(tmp_path: Path) -> None:
+    anyio.run(store_queries, tmp_path / "jobs.sqlite3")
+
+
+async def store_queries(path: Path) -> None:
+    repository = SqliteJobRepository(path)
+    await repository.open()
+    first, second, third = (new_job() for _ in range(3))
+    for number, job in enumerate((first, second, third)):
+        await repository.add(job, QUERY + bytes([number]))
+    await repository.update(first.running(0.0))
+    await repository.update(second.dismissed())
+    assert await repository.query(first.id) == QUERY + b"\x00"
+    assert await repository.query(second.id) is None
+    assert [job.id for job in await repository.unfinished()] == [first.id, third.id]
+    await repository.close()
+
+    with sqlite3.connect(path) as database:  # as if killed between the record and its query
+        record = third.dismissed().model_dump_json()
+        database.execute("UPDATE jobs SET record = ? WHERE id = ?", (record, third.id))
+        database.execute("INSERT INTO queries VALUES ('of no job', 'x')")
+    database.close()
+    await repository.open()
+    assert await repository.query(first.id) == QUERY + b"\x00"
+    await repository.close()
+    with sqlite3.connect(path) as database:
+        assert database.execute("SELECT job_id FROM queries").fetchall() == [(first.id,)]
+    database.close()
+
+
+def test_jobs_of_a_database_without_queries_are_read(tmp_path: Path) -> None:
+    """That of layout 6, as its last release made it."""
+    anyio.run(read_older, tmp_path / "jobs.sqlite3")
+
+
+async def read_older(path: Path) -> None:
+    record = (
+        '{"id":"1f","errand":{"owner":"alice","kind":"distances","mesh_id":"00","media_type":'
+        '"text/csv","fingerprint":"ab","idempotency_key":null,"request_id":"r"},'
+        '"status":"accepted","progress":0.0,"version":1,"created":"2005-07-01T12:00:00Z",'
+        '"started":null,"finished":null,"problem":null,"result":null}'
+    )
+    with sqlite3.connect(path) as database:
+        database.executescript(TABLES_OF_LAYOUT_6)
+        database.execute("INSERT INTO jobs (record) VALUES (?)", (record,))
+    database.close()
+    repository = SqliteJobRepository(path)
+    await repository.open()
+    (job,) = await repository.unfinished()
+    assert (job.id, job.spec.owner, job.runs) == ("1f", "alice", 0)
+    assert await repository.query(job.id) is None
+    await repository.update(job.dismissed())
+    assert await repository.unfinished() == []
+    await repository.close()
+
+
+TABLES_OF_LAYOUT_6 = """
+CREATE TABLE jobs (
+    number INTEGER PRIMARY KEY AUTOINCREMENT,
+    record TEXT NOT NULL,
+    id TEXT UNIQUE AS (record ->> '$.id'),
+    owner TEXT AS (record ->> '$.errand.owner'),
+    idempotency_key TEXT AS (record ->> '$.errand.idempotency_key'),
+    status TEXT AS (record ->> '$.status'),
+    finished TEXT AS (record ->> '$.finished')
+);
+CREATE INDEX jobs_by_owner ON jobs (owner, number);
+CREATE INDEX jobs_by_key ON jobs (owner, idempotency_key) WHERE idempotency_key IS NOT NULL;
+CREATE INDEX jobs_by_end ON jobs (finished);
+"""
 
 
 def test_a_database_that_cannot_be_read_is_an_os_error(tmp_path: Path) -> None:
@@ -92,13 +165,13 @@ async def use_full_disk(folder: Path) -> None:
 async def use(repository: SqliteJobRepository, folder: Path) -> None:
     jobs = [new_job() for _ in range(100)]
     for job in jobs:
-        await repository.add(job)
+        await repository.add(job, bytes(10_000))
     await repository.close()  # empties SQLite's log
     await repository.open()
     fill(folder / "others")
 
     with refused_for_want_of_room():
-        await repository.add(new_job())
+        await repository.add(new_job(), QUERY)
     for job in jobs:
         await repository.update(job.dismissed())
     assert await repository.count_finished() == {"dismissed": 100}
@@ -106,26 +179,17 @@ async def use(repository: SqliteJobRepository, folder: Path) -> None:
         await repository.remove(job.id)
     assert await repository.page(None, 1, None) == ([], None)
     with refused_for_want_of_room():
-        await repository.add(new_job())
+        await repository.add(new_job(), bytes(10_000))
 
     (folder / "jobs.reserve").unlink()
     fill(folder / "more")
     (folder / "others").unlink()
-    await repository.add(new_job())
+    await repository.add(new_job(), QUERY)
     assert (folder / "jobs.reserve").exists(), "there is room again"
 
 
-def run_on_own_disk(command: str) -> subprocess.CompletedProcess[str]:
-    """Run a command where ``/mnt`` is a disk of 16 megabytes, which no one else sees."""
-    script = f"mount -t tmpfs -o size=16m none /mnt && {command}"
-    words = ["unshare", "--user", "--map-root-user", "--mount", "sh", "-c", script]
-    return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S603 - our own command
-
-
 def test_on_a_full_disk_jobs_end_and_are_removed_but_none_is_accepted() -> None:
-    if shutil.which("unshare") is None or run_on_own_disk("true").returncode:
-        pytest.skip("this system lets nobody mount a disk of their own")
-    ran = run_on_own_disk(f"exec {sys.executable} -m {__name__}")
+    ran = run_on_own_disk(f"{sys.executable} -m {__name__}")
     assert (ran.returncode, ran.stdout) == (0, "done\n"), ran.stderr
 
 

@@ -107,11 +107,11 @@ def test_a_new_store_has_the_number_of_its_layout(tmp_path: Path) -> None:
     assert files_in(tmp_path) == {"VERSION", "lock"}
 
 
-@pytest.mark.parametrize("written", ["3", "7", "6.1", "", "five", "-5"])
+@pytest.mark.parametrize("written", ["3", "8", "7.1", "", "five", "-5"])
 def test_another_layout_is_refused(tmp_path: Path, written: str) -> None:
     (tmp_path / "VERSION").write_text(written)
 
-    with pytest.raises(StoreError, match=rf"has layout '?{written}'?, and this release reads 6:"):
+    with pytest.raises(StoreError, match=rf"has layout '?{written}'?, and this release reads 7:"):
         owned(tmp_path).__enter__()
     assert (tmp_path / "VERSION").read_text() == written
 
@@ -171,6 +171,17 @@ def test_an_older_store_is_converted(
         np.testing.assert_array_equal(arrays[name], array)
     assert any(store.inspect(damaged))
     assert not list((tmp_path / "meshes").glob("*/tmp*"))
+
+
+def test_a_store_of_layout_6_is_taken_over_as_it_is(tmp_path: Path) -> None:
+    mesh_id = store_mesh(tmp_path, plane())
+    (tmp_path / "VERSION").write_text("6\n")
+
+    with owned(tmp_path):
+        pass
+
+    assert (tmp_path / "VERSION").read_text() == f"{LAYOUT}\n"
+    assert MeshStore(tmp_path).is_intact(mesh_id)
 
 
 def failing(*_: object) -> None:

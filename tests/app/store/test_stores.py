@@ -204,6 +204,22 @@ def test_a_broken_manifest_is_not_served(results: ResultStore, tmp_path: Path) -
     assert find(results, "m/a") is None
 
 
+def test_the_answer_of_a_job_stays_where_a_start_has_to_make_room(
+    results: ResultStore, tmp_path: Path
+) -> None:
+    for key, second in (("job", 1), ("new", 2)):
+        put(results, tmp_path, f"m/{key}")
+        os.utime(tmp_path / "results" / "m" / f"{key}.body", (second, second))
+
+    restarted = ResultStore(tmp_path / "results", 50, memory=0)
+    restarted.prepare()
+    restarted.pin("m/job")
+    restarted.make_room()
+
+    assert find(restarted, "m/job") is not None
+    assert find(restarted, "m/new") is None
+
+
 def test_results_survive_a_restart(results: ResultStore, tmp_path: Path) -> None:
     for key, second in (("old", 1), ("new", 2)):
         put(results, tmp_path, f"m/{key}")
@@ -213,6 +229,7 @@ def test_results_survive_a_restart(results: ResultStore, tmp_path: Path) -> None
 
     restarted = ResultStore(tmp_path / "results", 50, memory=0)
     restarted.prepare()
+    restarted.make_room()
 
     assert find(restarted, "m/old") is None
     assert find(restarted, "m/new") is not None

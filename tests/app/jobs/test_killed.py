@@ -1,0 +1,21 @@
+"""A service that dies during jobs; ``tests.support.killed_jobs`` is what runs and checks it."""
+
+import subprocess
+import sys
+
+import pytest
+
+from tests.support.paths import ROOT
+
+
+@pytest.mark.slow
+@pytest.mark.slice(1)
+@pytest.mark.parametrize("compute", ["cheap", "dear"])
+def test_a_service_killed_at_any_step_of_a_job_loses_nothing(compute: str) -> None:
+    """Whether the service writes the answer or a worker does; a job that kills it fails at last."""
+    command = [sys.executable, "-m", "tests.support.killed_jobs", compute]
+    ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S603 - this Python
+    assert ran.returncode == 0, ran.stderr
+    steps, steps_of_restart = map(int, ran.stdout.split())
+    assert steps > 40
+    assert steps_of_restart > 20

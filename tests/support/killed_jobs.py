@@ -1,0 +1,264 @@
+"""A service that is killed at each step of its jobs, and started again: ``python killed_jobs.py``.
+
+Each service is a process forked from this one, which has loaded kernels and has no threads. It does
+the work of its workers itself, so that the steps come in one order. It ends with an error where
+something is lost, left behind, or answered otherwise.
+"""
+
+import asyncio
+import gc
+import shutil
+import signal
+import sqlite3
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager, closing
+from io import BytesIO
+from itertools import pairwise
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import orjson
+
+import geodesic_core
+from app.access import Caller
+from app.encoding import JSON, NPY, OCTETS, Representation
+from app.engine import worker
+from app.jobs import Job, read_jobs
+from app.queries import DistancesQuery, MeshSize, code_version, field_cache
+from app.schemas.requests import DistancesRequest
+from app.service.maintenance import inspect, leftovers
+from app.service.service import RequestContext, Service
+from app.settings import Settings
+from tests.support.direct_engine import DirectEngine
+from tests.support.killing import Killer, in_child
+from tests.support.service import store_mesh
+from tests.support.workers import new_worker
+
+MESH = geodesic_core.TriangleMesh(*geodesic_core.samples.plane(50))
+SIZE = MeshSize(len(MESH.vertices), len(MESH.faces), MESH.report.mean_edge_length)
+CONTEXT = RequestContext(Caller("127.0.0.1", has_key=False), 60.0, "a request")
+EXPECTED = geodesic_core.exact_distance(MESH, 3).distances
+KILLED = -signal.SIGKILL
+
+
+class Store:
+    """A store, and beside it what clients were told, line by line."""
+
+    def __init__(self, root: Path, mesh_id: str) -> None:
+        self.root = root
+        self.mesh_id = mesh_id
+        self._told = root.with_suffix(".told")
+
+    def tell(self, job_id: str, what: str) -> None:
+        """Note what a client was told of a job, or what it asked."""
+        with self._told.open("a") as file:
+            file.write(f"{job_id} {what}\n")
+
+    def told(self) -> dict[str, str]:
+        """Return the last that was told of each job."""
+        if not self._told.exists():
+            return {}
+        return dict(line.split() for line in self._told.read_text().splitlines())
+
+    def copy(self, root: Path) -> "Store":
+        shutil.copytree(self.root, root)
+        copied = Store(root, self.mesh_id)
+        if self._told.exists():
+            shutil.copy(self._told, copied._told)
+        return copied
+
+    @asynccontextmanager
+    async def service(self) -> AsyncIterator[tuple[Service, DirectEngine]]:
+        """Run a service; each piece of work waits until its job is recorded as running."""
+        service = Service(Settings(store=self.root))
+        engine = DirectEngine(new_worker(self.root), self._until_running_is_recorded)
+        service.engine = engine
+        async with service.running():
+            yield service, engine
+
+    async def _until_running_is_recorded(self) -> None:
+        while not any(job.status == "running" for job in read_jobs(self.root / "jobs.sqlite3")):
+            await asyncio.sleep(0)
+
+    async def submit(self, service: Service, media_type: str, key: str | None = None) -> str:
+        query = DistancesQuery.ask(self.mesh_id, SIZE, DistancesRequest(sources=[{"vertex": 3}]))
+        job = await service.submit(query, SIZE, Representation(media_type), CONTEXT, key)
+        return job.id
+
+
+async def end_of(service: Service, job_id: str) -> Job:
+    """Return the last state of a job."""
+    job = await service.jobs.find(None, job_id)
+    states = [state async for state in service.jobs.watch(job, 0)]
+    return states[-1]
+
+
+async def live(store: Store) -> None:
+    """Have jobs accepted, finished, dismissed and deleted, and tell so."""
+    async with store.service() as (service, engine):
+        for media_type in (JSON, NPY):
+            job_id = await store.submit(service, media_type)
+            store.tell(job_id, "accepted")
+            await end_of(service, job_id)
+            store.tell(job_id, "successful")
+        store.tell(job_id, "deleting")
+        await service.jobs.dismiss(None, job_id)
+        store.tell(job_id, "deleted")
+
+        has_begun = asyncio.Event()
+
+        async def stay() -> None:
+            has_begun.set()
+            await asyncio.Event().wait()
+
+        engine.before_work = stay
+        job_id = await store.submit(service, OCTETS)  # not the answer that is stored by now
+        store.tell(job_id, "accepted")
+        await has_begun.wait()
+        store.tell(job_id, "deleting")
+        await service.jobs.dismiss(None, job_id)
+        store.tell(job_id, "dismissed")
+
+
+async def finish(store: Store) -> None:
+    """Let all jobs finish."""
+    async with store.service() as (service, _):
+        for job in await service.jobs._repository.unfinished():
+            await end_of(service, job.id)
+
+
+async def verify(store: Store) -> None:
+    """Check that all jobs finish with right answers, that what was told holds, and all files."""
+    async with store.service() as (service, _):
+        jobs, _more = await service.jobs.page(None, 100, None)
+        ends = {job.id: await end_of(service, job.id) for job in jobs}
+        for job in ends.values():
+            if job.status == "successful":
+                await check_answer(service, job)
+        for job_id, told in store.told().items():
+            check_told(told, ends.get(job_id))
+        assert all(job.status in ("successful", "dismissed") for job in ends.values())
+        bodies = sum(path.stat().st_size for path in store.root.glob("results/*/*.body"))
+        assert service.results.nbytes == bodies, "each file is counted"
+    assert [damage for damage in inspect(store.root) if damage is not None] == []
+    assert list(leftovers(store.root, code_version())) == []
+    with closing(sqlite3.connect(store.root / "jobs.sqlite3")) as database:
+        assert database.execute("SELECT * FROM queries").fetchall() == []
+
+
+def check_told(told: str, job: Job | None) -> None:
+    match told:
+        case "accepted" | "successful":
+            assert job is not None
+            assert job.status == "successful"
+        case "dismissed":
+            assert job is not None
+            assert job.status == "dismissed"
+        case "deleted":
+            assert job is None
+        case "deleting":
+            pass  # done or not
+
+
+async def check_answer(service: Service, job: Job) -> None:
+    """Check an answer to the bit."""
+    _, result = await service.jobs.result(None, job.id)
+    body = service.results.body_path(result).read_bytes()
+    service.results.release(result)
+    match job.spec.media_type:
+        case "application/json":
+            assert orjson.loads(body)["distances"] == EXPECTED.tolist()
+        case "application/x-npy":
+            np.testing.assert_array_equal(np.load(BytesIO(body)), EXPECTED)
+        case "application/octet-stream":
+            assert body == EXPECTED.tobytes()
+
+
+async def die_of_a_job(store: Store) -> None:
+    """Run a job that kills the service, while another one waits; both are accepted only once."""
+    async with store.service() as (service, engine):
+        recorded = engine.before_work
+
+        async def die() -> None:
+            await recorded()
+            while len(store.told()) < 2:
+                await asyncio.sleep(0)
+            signal.raise_signal(signal.SIGKILL)
+
+        engine.before_work = die
+        for media_type in (JSON, NPY):
+            store.tell(await store.submit(service, media_type, key=media_type), "accepted")
+        await asyncio.Event().wait()
+
+
+async def give_up(store: Store) -> None:
+    """Check that the job that ran at each death has failed, and that the other one has not."""
+    async with store.service() as (service, _):
+        fatal, other = store.told()
+        job = await end_of(service, fatal)
+        assert job.status == "failed"
+        assert job.problem is not None
+        assert job.problem.code == "engine_unavailable"
+        assert "while the job ran, 3 times" in job.problem.detail
+        assert await store.submit(service, NPY, key=NPY) == other
+        await check_answer(service, await end_of(service, other))
+        assert await store.submit(service, JSON, key=JSON) != fatal, "it can be sent again"
+
+
+def kill_by_a_job(store: Store) -> None:
+    """Have a job kill the service as often as it may."""
+    versions = []
+    for _ in range(3):
+        assert in_child(lambda: asyncio.run(die_of_a_job(store))) == KILLED
+        fatal, other = read_jobs(store.root / "jobs.sqlite3")
+        assert (fatal.status, other.status) == ("running", "accepted")
+        assert [fatal.id, other.id] == list(store.told())
+        versions.append(fatal.version)
+    # Clients have seen up to 10,000 states of each run.
+    assert all(after - before > 10_000 for before, after in pairwise(versions))
+    assert in_child(lambda: asyncio.run(give_up(store))) == 0
+
+
+def kill_at_each_step(killer: Killer, before: Store, folder: Path, scenario: str) -> int:
+    """Kill a service at each step of a scenario; return the number of steps."""
+    for step in range(1, 1000):
+        store = before.copy(folder / f"{scenario}-{step}")
+
+        def run(store: Store = store, step: int = step) -> None:
+            killer.arm(store.root, step)
+            asyncio.run(SCENARIOS[scenario](store))
+
+        code = in_child(run)
+        assert code in (0, KILLED), f"{scenario}, step {step}"
+        verified = in_child(lambda store=store: asyncio.run(verify(store)))
+        assert verified == 0, f"{scenario}, after step {step}: {store.told()}"
+        if code == 0:
+            return step
+    raise AssertionError("it never ends")
+
+
+SCENARIOS = {"live": live, "finish": finish}
+
+
+def main(compute: str) -> None:
+    # Answers that took long are written by workers, and so are their fields.
+    worker.SMALL_SECONDS = field_cache._WORTH_WRITING_S = {"cheap": 1e9, "dear": 0.0}[compute]
+    killer = Killer()
+    gc.collect()
+    gc.freeze()  # or else each service looks at all objects of this process
+    with TemporaryDirectory() as folder:
+        root = Path(folder)
+        new = Store(root / "new", store_mesh(root / "new", MESH))
+        assert in_child(lambda: asyncio.run(finish(new))) == 0  # the first start writes more
+        steps = kill_at_each_step(killer, new, root, "live")
+        stopped = new.copy(root / "stopped")
+        assert in_child(lambda: asyncio.run(die_of_a_job(stopped))) == KILLED
+        more = kill_at_each_step(killer, stopped, root, "finish")
+        kill_by_a_job(new.copy(root / "thrice"))
+    sys.stdout.write(f"{steps} {more}\n")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,65 @@
+"""Processes that are killed before the n-th change of files in a folder, or of records of jobs.
+
+Python tells audit hooks of each change of a file before it is made. What SQLite does itself is told
+by the repository of jobs: there is a step before each statement, and one after it.
+"""
+
+import os
+import signal
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from app.jobs.sqlite_repository import SqliteJobRepository
+
+_CHANGES = frozenset({"os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.utime", "os.truncate"})
+_WRITING = os.O_WRONLY | os.O_RDWR
+
+
+class Killer:
+    """Kills this process at a step, once `arm` was called; alone in its process."""
+
+    def __init__(self) -> None:
+        self._folder: str | None = None
+        self._left = 0
+        sys.addaudithook(self._hear)  # it cannot be removed
+        run = SqliteJobRepository._run
+
+        async def run_in_steps(repository: SqliteJobRepository, sql: str, *values: Any) -> None:
+            self.step()
+            await run(repository, sql, *values)
+            self.step()
+
+        SqliteJobRepository._run = run_in_steps  # type: ignore[method-assign]
+
+    def arm(self, folder: Path, steps: int) -> None:
+        """Have the process killed before a change of files in ``folder``, the ``steps``-th."""
+        self._folder, self._left = f"{folder}/", steps
+
+    def step(self) -> None:
+        if self._folder is not None:
+            self._left -= 1
+            if self._left == 0:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+    def _hear(self, event: str, args: tuple[Any, ...]) -> None:
+        if self._folder is None or not (event in _CHANGES or event == "open"):
+            return
+        if event == "open" and not int(args[2] or 0) & _WRITING:
+            return
+        if str(args[0]).startswith(self._folder):
+            self.step()
+
+
+def in_child(do: Callable[[], object]) -> int:
+    """Do something in a forked process; return its exit code, or the negative signal."""
+    pid = os.fork()
+    if not pid:
+        try:
+            do()
+        except BaseException:  # noqa: BLE001 - whatever it is, the child ends here
+            sys.excepthook(*sys.exc_info())
+            os._exit(1)
+        os._exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
