@@ -83,10 +83,8 @@ def make_plan(scale: Scale) -> Plan:
 def _upload(
     opened: OpenMesh, parameters: str, body: bytes, headers: Mapping[str, str], random: Random
 ) -> Upload:
-    # 200 where the mesh is there already; `traffic` takes both.
-    request = Request(
-        "createMesh", "POST", f"/v1/meshes{parameters}", body, headers, Expected(status=201)
-    )
+    expected = Expected(201, headers={"Location": f"/v1/meshes/{opened.name[0]}"})
+    request = Request("createMesh", "POST", f"/v1/meshes{parameters}", body, headers, expected)
     ends = random.sample(range(len(opened.mesh.vertices)), 2)
     query = {"source": {"vertex": ends[0]}, "target": {"vertex": ends[1]}}
     return Upload(request, opened.name[0], _query(opened, "path", query))

@@ -158,10 +158,9 @@ class Client(User):
         link = submit(self, request)
         if link is None:
             return
-        watched = self.exchange("watchJob", "GET", f"{link}/events", 200)
-        if watched.status_code == 200 and last_state(watched)["status"] == "successful":
-            path = f"{link}/results"
-            self.send(Request("getJobResults", "GET", path, expected=request.expected))
+        self.exchange("watchJob", "GET", f"{link}/events", 200)  # until the job has ended
+        results = Request("getJobResults", "GET", f"{link}/results", expected=request.expected)
+        self.send(results)
         if DICE.random() < 0.9:  # the others are removed when they have expired
             self.exchange("dismissJob", "DELETE", link, 200)
             self.exchange("getJob", "GET", link, 404)
@@ -284,10 +283,16 @@ class Hoarder(User):
 
 
 def store(user: User, upload: Upload) -> bool:
-    """Upload a mesh; return whether it is in the store now."""
+    """Upload a mesh; return whether it is in the store now, under its id."""
     sent = upload.request
     response = user.exchange(
-        sent.operation, "POST", sent.path, 200, 201, data=sent.body, headers=sent.headers
+        sent.operation,
+        "POST",
+        sent.path,
+        *(200, 201),  # it may have been there
+        request=sent,
+        data=sent.body,
+        headers=sent.headers,
     )
     return response.status_code in (200, 201)
 
@@ -299,12 +304,6 @@ def submit(user: User, request: Request) -> str | None:
         request.operation, "POST", request.path, 202, data=request.body, headers=headers
     )
     return response.headers["location"] if response.status_code == 202 else None
-
-
-def last_state(watched: FastResponse) -> Any:
-    """Return the job as its last event has it."""
-    lines = watched.content.decode().splitlines()
-    return json.loads([line for line in lines if line.startswith("data: ")][-1][6:])
 
 
 def long_query(plan: Plan) -> Request:
@@ -354,7 +353,6 @@ def main() -> None:
     bound.add_argument("--seconds", type=float)
     bound.add_argument("--requests", type=int)
     arguments = parser.parse_args()
-
     User.plan = pickle.loads(arguments.plan.read_bytes())  # noqa: S301 - written by our parent
     kinds = [Reader, Uploader, Client, Wrong, Impatient, Greedy, Hoarder]
     User.host = arguments.url

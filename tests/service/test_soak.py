@@ -2,16 +2,17 @@
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from benchmarks.soak.plan import SETTINGS
-from benchmarks.soak.reference import SHORT, WHOLE, Scale, make_plan
+from benchmarks.soak.plan import SETTINGS, Expected, Plan
+from benchmarks.soak.reference import SHORT, WHOLE, make_plan
 from benchmarks.soak.trial import ALL, Trial, try_out
 from tests.support.processes import Server
 
-FEW_REQUESTS = 600
+FEW_REQUESTS = 400
 WHOLE_S = 600.0
 MOST_GROWTH = 1.05
 
@@ -33,18 +34,20 @@ OUTCOMES = {
 """What must have happened, among others, in any run that is long enough"""
 
 
-def soak(folder: Path, scale: Scale, seconds: float = 0, requests: int = 0) -> Trial:
-    """Send traffic to a service; check its answers, and that it logged nothing worse."""
-    plan = make_plan(scale)
-    server = Server(folder / "store", log=folder / "log", **SETTINGS)
-    try:
-        trial = try_out(
-            plan, server.address, server.process.pid, seconds=seconds, requests=requests
-        )
-    finally:
-        server.close()
-    assert trial.faults == []
-    assert list(complaints(folder / "log")) == []
+@pytest.fixture
+def server(tmp_path: Path) -> Iterator[Server]:
+    """A service with small bounds, whose log is checked at the end."""
+    log = tmp_path / "log"
+    server = Server(tmp_path / "store", log=log, **SETTINGS)
+    yield server
+    server.close()
+    assert list(complaints(log)) == []
+
+
+def soak(server: Server, plan: Plan, seconds: float = 0, requests: int = 0) -> Trial:
+    """Send the traffic of a plan to a service, which loses no worker over it."""
+    service = server.process.pid
+    trial = try_out(plan, server.address, service, seconds=seconds, requests=requests)
     assert trial.samples[-1].lost == 0
     return trial
 
@@ -56,16 +59,23 @@ def complaints(log: Path) -> Iterator[str]:
             yield line
 
 
-def test_every_answer_of_mixed_traffic_is_right(tmp_path: Path) -> None:
-    trial = soak(tmp_path, SHORT, requests=FEW_REQUESTS)
+def test_every_answer_of_mixed_traffic_is_right(server: Server) -> None:
+    plan = make_plan(SHORT)
 
-    assert len(trial.exchanges) >= FEW_REQUESTS
+    assert soak(server, plan, requests=FEW_REQUESTS).faults == []
+
+    # Else nobody would know that answers are looked at.
+    mistaken = [replace(each, expected=Expected(digest="of another")) for each in plan.queries]
+    faults = soak(server, replace(plan, queries=mistaken), requests=FEW_REQUESTS // 4).faults
+    assert faults
+    assert all("another answer" in fault for fault in faults)
 
 
 @pytest.mark.full
-def test_ten_minutes_of_mixed_traffic_take_no_more_memory(tmp_path: Path) -> None:
-    trial = soak(tmp_path, WHOLE, seconds=WHOLE_S)
+def test_ten_minutes_of_mixed_traffic_take_no_more_memory(server: Server) -> None:
+    trial = soak(server, make_plan(WHOLE), seconds=WHOLE_S)
 
+    assert trial.faults == []
     assert {each.outcome for each in trial.exchanges} >= OUTCOMES
     for process in ("API", ALL):
         before, after = trial.medians(process)
