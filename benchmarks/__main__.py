@@ -5,6 +5,7 @@ from pathlib import Path
 
 from benchmarks import approximate, attacks, exact, load, matrix, page, path, service, topology
 from benchmarks.inputs import Inputs
+from benchmarks.soak import measurement as soak
 from benchmarks.tables import write
 
 BENCHMARKS = {
@@ -23,14 +24,18 @@ BENCHMARKS = {
     "large-answers": service.run_large,
     "page": page.run,
 }
+SOAK = "soak"
+"""Runs only where it is named, and writes a report of its own"""
+NAMES = (*BENCHMARKS, SOAK)
 ROOT = Path(__file__).parents[1]
 
 
 def main() -> None:
     """Run the benchmarks that the arguments name, by default all of them."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="name", help=f"any of {', '.join(BENCHMARKS)}")
+    parser.add_argument("names", nargs="*", metavar="name", help=f"any of {', '.join(NAMES)}")
     parser.add_argument("--runs", type=int, default=5, help="runs of which the median counts")
+    parser.add_argument("--minutes", type=float, default=10.0, help="minutes of the soak")
     parser.add_argument(
         "--meshes",
         type=Path,
@@ -38,11 +43,14 @@ def main() -> None:
         help="folder of real meshes; those it lacks are left out",
     )
     arguments = parser.parse_args()
-    unknown = set(arguments.names) - set(BENCHMARKS)
+    unknown = set(arguments.names) - set(NAMES)
     if unknown:
         parser.error(f"unknown benchmark: {', '.join(sorted(unknown))}")
     inputs = Inputs(arguments.meshes)
     for name in arguments.names or BENCHMARKS:
+        if name == SOAK:
+            print(soak.run(arguments.minutes, Path(__file__).with_name("results") / "soak.md"))
+            continue
         section = BENCHMARKS[name](inputs, arguments.runs)
         print(section.text())
         write(section, Path(__file__).with_name("RESULTS.md"))

@@ -20,6 +20,13 @@ SERVE = "from app.cli import main; main()"
 @contextmanager
 def serving(**settings: str) -> Iterator[int]:
     """Serve on a free port of the loopback interface, with a store of its own; yield the port."""
+    with serving_process(**settings) as (port, _):
+        yield port
+
+
+@contextmanager
+def serving_process(**settings: str) -> Iterator[tuple[int, int]]:
+    """Serve likewise; yield the port, and the id of the process."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -31,7 +38,7 @@ def serving(**settings: str) -> Iterator[int]:
         )
         try:
             _wait_until_ready(port, server)
-            yield port
+            yield port, server.pid
         finally:
             server.terminate()
             server.wait(30)

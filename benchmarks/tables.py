@@ -23,9 +23,13 @@ class Section:
     def text(self) -> str:
         """Return the section as Markdown."""
         lines = [f"## {self.title}", "", self.about, "", f"_{machine()}_", ""]
-        lines += [_row(self.columns), _row(["---"] + ["---:"] * (len(self.columns) - 1))]
-        lines += [_row(row) for row in self.rows]
-        return "\n".join([*lines, ""])
+        return "\n".join([*lines, table(self.columns, self.rows), ""])
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table as Markdown, numbers to the right of a first column of names."""
+    rule = ["---"] + ["---:"] * (len(columns) - 1)
+    return "\n".join(map(_row, [columns, rule, *rows]))
 
 
 def write(section: Section, path: Path) -> None:

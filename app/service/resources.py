@@ -4,10 +4,14 @@ import resource
 import shutil
 from collections.abc import Collection, Mapping
 from contextlib import suppress
+from ctypes import CDLL
 from dataclasses import dataclass
 from pathlib import Path
 
 from psutil import NoSuchProcess, Process
+
+_M_ARENA_MAX, _ARENAS = -8, 2
+"""glibc's number for the option, and how many arenas are enough: threads here mostly wait"""
 
 
 @dataclass(frozen=True)
@@ -35,3 +39,14 @@ def measure(workers: Collection[int], store: Path) -> Resources:
     limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
     max_fds = float("inf") if limit == resource.RLIM_INFINITY else limit
     return Resources(memory, api.num_fds(), max_fds, shutil.disk_usage(store).free)
+
+
+def share_arenas() -> None:
+    """Have the threads of this process share arenas, from which glibc allocates.
+
+    Otherwise up to eight for each core grow side by side, and what was freed in one is of no use to
+    the others: under mixed traffic that took 53 MB instead of 34, still growing after minutes.
+    Other C libraries have no such option.
+    """
+    with suppress(AttributeError):
+        CDLL(None).mallopt(_M_ARENA_MAX, _ARENAS)

@@ -38,6 +38,7 @@ from app.jobs import Job, JobManager, JobSpec, SqliteJobRepository, require_inta
 from app.queries import KINDS, Estimate, MeshSize, Query, fingerprint, result_key
 from app.service.concurrency import ConcurrencyLimit
 from app.service.maintenance import Damage
+from app.service.resources import share_arenas
 from app.service.scrub import scrubbing
 from app.service.single_flight import SingleFlight
 from app.settings import Settings, variable_of
@@ -113,6 +114,7 @@ class Service:
     @asynccontextmanager
     async def running(self) -> AsyncIterator[None]:
         """Own the store, supply workers and run jobs inside the block."""
+        share_arenas()
         with self.owning_store():
             self.mesh_catalog.prepare()
             self.results.prepare()

@@ -15,7 +15,7 @@ DOCUMENTS = sorted(
     [
         *ROOT.glob("*.md"),
         *(ROOT / "docs").rglob("*.md"),
-        ROOT / "benchmarks" / "RESULTS.md",
+        *(ROOT / "benchmarks").rglob("*.md"),
         ROOT / "geodesic_core" / "README.md",
     ]
 )
