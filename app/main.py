@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from threading import Lock
 from typing import Any
 
 from anyio import CapacityLimiter, to_thread
@@ -82,8 +83,14 @@ def create_app(settings: Settings) -> FastAPI:
 
 
 class _Application(FastAPI):
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self._describing = Lock()
+        self._document: dict[str, Any] | None = None
+
     def openapi(self) -> dict[str, Any]:
-        """Return the OpenAPI document, made on first use."""
-        if self.openapi_schema is None:
-            self.openapi_schema = complete(super().openapi())
-        return self.openapi_schema
+        """Return the OpenAPI document, made on first use; threads never see it half made."""
+        with self._describing:
+            if self._document is None:
+                self._document = complete(super().openapi())
+        return self._document

@@ -85,7 +85,7 @@ def ids(client: TestClient) -> dict[str, str]:
     return {name: upload_sample(client, name, faces) for name, faces in MESHES.items()}
 
 
-@pytest.mark.slice(18)
+@pytest.mark.slice(9)
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("name", QUERIES)
 def test_bytes_of_the_response(
@@ -142,7 +142,7 @@ STATEFUL = [name for name, (operation, *_) in QUERIES.items() if operation != "l
 ALLOCATED = [name for name in STATEFUL if QUERIES[name][0] != "paths"]
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("name", ALLOCATED)
 def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mesh: str) -> None:
@@ -160,7 +160,7 @@ def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mes
     assert 1 / 3 <= estimated.memory_bytes / peak <= 3
 
 
-@pytest.mark.slice(8)
+@pytest.mark.slice(4)
 @pytest.mark.parametrize("name", STATEFUL)
 def test_memory_that_suffices(
     client: TestClient, ids: dict[str, str], name: str, monkeypatch: pytest.MonkeyPatch

@@ -12,7 +12,7 @@ from benchmarks.soak.reference import SHORT, WHOLE, make_plan
 from benchmarks.soak.trial import ALL, Trial, try_out
 from tests.support.processes import Server
 
-FEW_REQUESTS = 400
+FEW_REQUESTS = 200
 WHOLE_S = 600.0
 MOST_GROWTH = 1.05
 

@@ -221,9 +221,11 @@ def kill_by_a_job(store: Store) -> None:
     assert in_child(lambda: asyncio.run(give_up(store))) == 0
 
 
-def kill_at_each_step(killer: Killer, before: Store, folder: Path, scenario: str) -> int:
-    """Kill a service at each step of a scenario; return the number of steps."""
-    for step in range(1, 1000):
+def kill_at_each_step(
+    killer: Killer, before: Store, folder: Path, scenario: str, every: int
+) -> int:
+    """Kill a service at each step of a scenario, one in ``every``; return about how many it has."""
+    for step in range(1, 1000, every):
         store = before.copy(folder / f"{scenario}-{step}")
 
         def run(store: Store = store, step: int = step) -> None:
@@ -242,7 +244,7 @@ def kill_at_each_step(killer: Killer, before: Store, folder: Path, scenario: str
 SCENARIOS = {"live": live, "finish": finish}
 
 
-def main(compute: str) -> None:
+def main(compute: str, every: str) -> None:
     # Answers that took long are written by workers, and so are their fields.
     worker.SMALL_SECONDS = field_cache._WORTH_WRITING_S = {"cheap": 1e9, "dear": 0.0}[compute]
     killer = Killer()
@@ -252,10 +254,10 @@ def main(compute: str) -> None:
         root = Path(folder)
         new = Store(root / "new", store_mesh(root / "new", MESH))
         assert in_child(lambda: asyncio.run(finish(new))) == 0  # the first start writes more
-        steps = kill_at_each_step(killer, new, root, "live")
+        steps = kill_at_each_step(killer, new, root, "live", int(every))
         stopped = new.copy(root / "stopped")
         assert in_child(lambda: asyncio.run(die_of_a_job(stopped))) == KILLED
-        more = kill_at_each_step(killer, stopped, root, "finish")
+        more = kill_at_each_step(killer, stopped, root, "finish", int(every))
         kill_by_a_job(new.copy(root / "thrice"))
     sys.stdout.write(f"{steps} {more}\n")
 

@@ -1,5 +1,13 @@
+import threading
+from concurrent.futures import ThreadPoolExecutor, wait
+from typing import Any
+
+import pytest
+
+from app import main
 from app.cli.openapi import openapi_text
 from app.errors import PROBLEM_JSON
+from app.settings import Settings
 from tests.support.paths import ROOT
 
 COMMITTED = ROOT / "openapi" / "openapi.json"
@@ -74,3 +82,22 @@ def test_no_code_of_a_status_is_named_twice(client) -> None:
             for status, response in operation["responses"].items():
                 codes = response["description"].split(", ")
                 assert status < "400" or len(set(codes)) == len(codes), codes
+
+
+def test_threads_never_see_the_document_half_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, go_on = threading.Event(), threading.Event()
+
+    def complete(_document: dict[str, Any]) -> dict[str, Any]:
+        begun.set()
+        assert go_on.wait(60)
+        return {"is": "complete"}
+
+    monkeypatch.setattr(main, "complete", complete)
+    app = main.create_app(Settings())
+    with ThreadPoolExecutor(2) as pool:
+        first = pool.submit(app.openapi)
+        assert begun.wait(60)
+        second = pool.submit(app.openapi)
+        wait([second], timeout=0.2)
+        go_on.set()
+        assert first.result() == second.result() == {"is": "complete"}

@@ -7,13 +7,19 @@ import pytest
 
 from tests.support.paths import ROOT
 
+SOME = 11
+"""Of this many steps one is tried, but for ``--full``"""
+
 
 @pytest.mark.slow
 @pytest.mark.slice(1)
 @pytest.mark.parametrize("compute", ["cheap", "dear"])
-def test_a_service_killed_at_any_step_of_a_job_loses_nothing(compute: str) -> None:
+def test_a_service_killed_at_any_step_of_a_job_loses_nothing(
+    compute: str, pytestconfig: pytest.Config
+) -> None:
     """Whether the service writes the answer or a worker does; a job that kills it fails at last."""
-    command = [sys.executable, "-m", "tests.support.killed_jobs", compute]
+    every = 1 if pytestconfig.option.full else SOME
+    command = [sys.executable, "-m", "tests.support.killed_jobs", compute, str(every)]
     ran = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)  # noqa: S603 - this Python
     assert ran.returncode == 0, ran.stderr
     steps, steps_of_restart = map(int, ran.stdout.split())

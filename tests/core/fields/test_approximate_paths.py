@@ -17,7 +17,7 @@ from tests.support.meshes import mesh_of
 
 
 @pytest.mark.slow
-@pytest.mark.slice(3)
+@pytest.mark.slice(2)
 @zoo.each(MERGING)
 def test_paths_where_much_is_merged(case):
     mesh = mesh_of(case)

@@ -180,7 +180,7 @@ def test_points_on_a_box_are_at_the_level_by_unfolding():
 
 
 @pytest.mark.slow
-@pytest.mark.slice(3)
+@pytest.mark.slice(2)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_all_of_each_level_is_found(case):
@@ -194,7 +194,7 @@ def test_all_of_each_level_is_found(case):
         check_all(mesh, sources, field, some_levels(field, 51, 2))
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL)
 def test_levels_of_vertices(case):

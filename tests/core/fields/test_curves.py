@@ -105,7 +105,7 @@ def check_path_from(mesh, path, curve, target, distance):
 
 
 @pytest.mark.slow
-@pytest.mark.slice(3)
+@pytest.mark.slice(2)
 @pytest.mark.jit
 @pytest.mark.parametrize("seed", range(12))
 def test_distances_among_obstacles_are_those_of_the_visibility_graph(seed):
@@ -180,7 +180,7 @@ def test_distances_on_a_plane_are_those_of_segments(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.slice(3)
+@pytest.mark.slice(2)
 @pytest.mark.parametrize("seed", range(2 if WITHOUT_JIT else 8))
 def test_distances_on_a_box_are_least_over_the_curve(seed):
     rng = np.random.default_rng(seed)
@@ -209,7 +209,7 @@ def test_distances_on_a_box_are_least_over_the_curve(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.slice(8)
+@pytest.mark.slice(4)
 @pytest.mark.parametrize("error", [None, 1e-3])
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_distances_are_least_over_the_points_of_the_curve(case, error):

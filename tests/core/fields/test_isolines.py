@@ -41,7 +41,7 @@ def check_all(mesh, sources, field, levels, *, crossings=True):
 
 
 @pytest.mark.slow
-@pytest.mark.slice(3)
+@pytest.mark.slice(2)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_all_of_each_level_is_found(case):
@@ -51,7 +51,7 @@ def test_all_of_each_level_is_found(case):
         check_all(mesh, source, field, some_levels(field, 41, 2))
 
 
-@pytest.mark.slice(8)
+@pytest.mark.slice(4)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_points_lie_at_the_level_on_slivers_too(case):
@@ -61,7 +61,7 @@ def test_points_lie_at_the_level_on_slivers_too(case):
         check_all(mesh, source, field, some_levels(field, 42, 2), crossings=False)
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @zoo.each(zoo.SMALL)
 def test_levels_of_vertices(case):
     """A level passes through its vertex, or has all around it within."""
@@ -247,7 +247,7 @@ def test_max_distance_and_what_is_kept_change_no_line_within(case):
             assert sorted(line.closed for line in ours) == sorted(line.closed for line in theirs)
 
 
-@pytest.mark.slice(15)
+@pytest.mark.slice(8)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_windows_kept_or_found_again_draw_the_same_lines(case):
@@ -257,7 +257,7 @@ def test_windows_kept_or_found_again_draw_the_same_lines(case):
         check_found_again(mesh, sources, seed=46)
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL)
 def test_approximate_lines_keep_to_the_error(case):

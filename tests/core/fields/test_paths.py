@@ -28,7 +28,7 @@ def check_paths(mesh, source, exact, error, at_most=10**9):
             check_approximate_path(field, target, exact[target], error)
 
 
-@pytest.mark.slice(15)
+@pytest.mark.slice(8)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_paths_on_small_meshes(case):
     mesh = mesh_of(case)
@@ -38,7 +38,7 @@ def test_paths_on_small_meshes(case):
         check_paths(mesh, source, exact, 1e-2, at_most=30)
 
 
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_paths_on_larger_meshes_and_slivers(case):

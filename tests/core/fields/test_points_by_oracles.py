@@ -64,7 +64,7 @@ def domain(seed) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.slow
-@pytest.mark.slice(3)
+@pytest.mark.slice(2)
 @pytest.mark.parametrize("seed", range(2 if WITHOUT_JIT else 12))
 def test_planar_domains_with_polygonal_holes(seed):
     vertices, faces = domain(seed)

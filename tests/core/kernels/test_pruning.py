@@ -110,7 +110,7 @@ def test_the_steepest_bound_exceeds_any_other_by_the_way_between(case):
             assert least[q] <= (steepest + matrix[v, q]) * (1 + ROUNDING)
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @pytest.mark.jit
 @zoo.each(MERGING)
 @pytest.mark.parametrize("count", [0, 3])

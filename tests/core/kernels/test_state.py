@@ -56,7 +56,7 @@ def watch(case, oracle, sources, starts, limit=math.inf):
 
 
 @pytest.mark.slow
-@pytest.mark.slice(5)
+@pytest.mark.slice(3)
 @pytest.mark.parametrize("name", CURVED)
 def test_every_step_on_curved_meshes(name):
     case = CASES[name]

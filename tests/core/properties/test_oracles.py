@@ -26,7 +26,7 @@ def test_unfolding_solves_the_regular_solids(name):
 
 
 @pytest.mark.slow
-@pytest.mark.slice(3)
+@pytest.mark.slice(2)
 @pytest.mark.parametrize("name", FLAT)
 def test_unfolding_and_visibility_agree_on_planar_domains(name):
     case = zoo.SMALL[name]
@@ -38,7 +38,7 @@ def test_unfolding_and_visibility_agree_on_planar_domains(name):
 
 
 @pytest.mark.slow
-@pytest.mark.slice(3)
+@pytest.mark.slice(2)
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_unfolding_reproduces_the_closed_forms(name):
     case = zoo.KNOWN[name]
@@ -118,7 +118,7 @@ def test_unfolding_says_where_it_does_not_know():
         unfolding.distance_matrix(LINE, sheets)
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_unfolding_is_a_metric_between_its_bounds(case):
     matrix = unfolding.distance_matrix(case.vertices, case.faces)

@@ -23,7 +23,7 @@ EXACT = 1e-9
 """Relative error allowed against an oracle, as of exact fields."""
 
 
-@pytest.mark.slice(10)
+@pytest.mark.slice(5)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_between_vertices_everywhere(case):
     solver = solver_of(case)
@@ -32,7 +32,7 @@ def test_small_meshes_between_vertices_everywhere(case):
     assert landmark_count(solver) > 0, "else only searches without landmarks were tried"
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_against_unfolding(case):
     solver = solver_of(case)
@@ -67,7 +67,7 @@ def check_known(case, sources, targets):
             assert path.length == pytest.approx(distances[target], rel=EXACT, abs=0)
 
 
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_closed_forms(case):

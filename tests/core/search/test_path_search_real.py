@@ -41,7 +41,7 @@ def ends(mesh, sources, targets, seed=5):
 
 
 @pytest.mark.slow
-@pytest.mark.slice(5)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @pytest.mark.parametrize(("name", "sources", "targets"), CASES)
 def test_equals_the_full_sweep_both_ways(name, sources, targets):
@@ -54,7 +54,7 @@ def test_equals_the_full_sweep_both_ways(name, sources, targets):
     assert landmark_count(solver) > 0
 
 
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @pytest.mark.jit
 @pytest.mark.parametrize("name", SLICE + SMALL)
 def test_paths_lie_on_the_surface(name):
