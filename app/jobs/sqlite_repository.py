@@ -8,7 +8,6 @@ import errno
 import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -125,11 +124,10 @@ class SqliteJobRepository:
         jobs = [Job.model_validate_json(record) for _, record in rows[:limit]]
         return jobs, rows[limit - 1][0] if len(rows) > limit else None
 
-    async def usage(self, owner: str | None) -> tuple[int, datetime | None]:
-        """Return the number of an owner's jobs, and the end of the first one that has finished."""
-        statement = "SELECT COUNT(*), MIN(finished) FROM jobs WHERE owner IS ?"
-        ((count, first_end),) = await self._rows(statement, owner)
-        return count, None if first_end is None else datetime.fromisoformat(first_end)
+    async def count(self, owner: str | None) -> int:
+        """Return the number of an owner's jobs."""
+        ((count,),) = await self._rows("SELECT COUNT(*) FROM jobs WHERE owner IS ?", owner)
+        return int(count)
 
     async def count_finished(self) -> dict[str, int]:
         """Return the number of finished jobs by status."""
@@ -140,17 +138,9 @@ class SqliteJobRepository:
         """Return the jobs that have not finished, the oldest first."""
         return await self._jobs("WHERE finished IS NULL ORDER BY number")
 
-    async def with_results(self) -> list[Job]:
-        """Return the jobs that have a result."""
-        return await self._jobs("WHERE status = 'successful'")
-
-    async def finished_before(self, moment: datetime) -> list[Job]:
-        """Return the jobs that finished before a moment."""
-        return [
-            job
-            for job in await self._jobs("WHERE finished IS NOT NULL")
-            if job.finished is not None and job.finished < moment
-        ]
+    async def finished(self) -> list[Job]:
+        """Return the jobs that have finished."""
+        return await self._jobs("WHERE finished IS NOT NULL")
 
     async def _forget_query(self, job_id: str) -> None:
         await self._run_on_reserve("DELETE FROM queries WHERE job_id = ?", job_id)
