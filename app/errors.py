@@ -240,7 +240,7 @@ def _over_memory(error: core.MemoryLimitExceeded) -> Problem:
 
 
 def _system_error(error: OSError) -> Problem:
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+    if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return _DISK_FULL
     if error.errno == errno.EROFS:
         return _READ_ONLY

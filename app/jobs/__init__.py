@@ -3,7 +3,12 @@
 from app.jobs.job import Job, JobSpec
 from app.jobs.manager import JobManager
 from app.jobs.repository import JobRepository
-from app.jobs.sqlite_repository import SqliteJobRepository, read_jobs, require_intact
+from app.jobs.sqlite_repository import (
+    SqliteJobRepository,
+    prepare_database,
+    read_jobs,
+    require_intact,
+)
 
 __all__ = [
     "Job",
@@ -11,6 +16,7 @@ __all__ = [
     "JobRepository",
     "JobSpec",
     "SqliteJobRepository",
+    "prepare_database",
     "read_jobs",
     "require_intact",
 ]

@@ -71,7 +71,7 @@ class Job(BaseModel):
     def running(self, progress: float) -> "Job":
         """Return the state of a job that a worker has begun."""
         if self.started is None:
-            begun = {"started": datetime.now(UTC), "runs": self.runs + 1}
+            begun = {"started": _now_after(self.created), "runs": self.runs + 1}
             return self._next(status="running", progress=progress, **begun)
         return self._next(progress=progress)
 
@@ -95,7 +95,12 @@ class Job(BaseModel):
         return self._finish(status="dismissed")
 
     def _finish(self, **changes: Any) -> "Job":
-        return self._next(**changes, finished=datetime.now(UTC))
+        return self._next(**changes, finished=_now_after(self.started or self.created))
 
     def _next(self, **changes: Any) -> "Job":
         return self.model_copy(update={"version": self.version + 1, **changes})
+
+
+def _now_after(earlier: datetime) -> datetime:
+    """Return the time, or that of what came before, where the clock was set back since."""
+    return max(earlier, datetime.now(UTC))

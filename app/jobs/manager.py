@@ -4,8 +4,6 @@ import asyncio
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, suppress
-from datetime import UTC, datetime, timedelta
-from math import ceil
 
 import structlog
 from structlog.contextvars import bound_contextvars
@@ -14,6 +12,7 @@ from app.engine.interface import ProgressCallback
 from app.errors import Fault, Problem, ProblemError, over_limit, problem, problem_of
 from app.jobs.job import Job, JobSpec
 from app.jobs.repository import JobRepository
+from app.jobs.retention import FinishedJob, Retention
 from app.settings import variable_of
 from app.store.results import Result, ResultStore
 
@@ -99,7 +98,8 @@ class JobManager:
     ) -> None:
         self._repository = repository
         self._results = results
-        self._ttl = timedelta(seconds=ttl_s)
+        self._tidy_period_s = min(_TIDY_PERIOD_S, ttl_s)
+        self._retention = Retention(ttl_s)
         self._quota = quota
         self._live: dict[str, _LiveJob] = {}
         self._submitting = asyncio.Lock()
@@ -112,9 +112,10 @@ class JobManager:
         Jobs that are under way at its end are run again, by ``solve_again``, inside the next one.
         """
         await self._repository.open()
-        for job in await self._repository.with_results():
-            assert job.result is not None, "successful jobs have one"  # noqa: S101
-            self._results.pin(job.result)
+        for job in await self._repository.finished():
+            self._retention.add_older(job)
+            if job.result is not None:
+                self._results.pin(job.result)
         for job in await self._repository.unfinished():
             await self._resume(job.accepted_again(), solve_again)
         tidying = asyncio.create_task(self._tidy())
@@ -239,12 +240,10 @@ class JobManager:
     async def _refuse_over_quota(self, owner: str | None) -> None:
         if self._quota is None:
             return
-        count, first_end = await self._repository.usage(owner)
+        count = await self._repository.count(owner)
         if count < self._quota:
             return
-        wait_s = 1
-        if first_end is not None:  # that job goes first
-            wait_s = max(1, ceil((first_end + self._ttl - datetime.now(UTC)).total_seconds()))
+        wait_s = self._retention.seconds_to_first(owner) or 1
         raise over_limit(
             "quota_exceeded",
             "jobs of one owner",
@@ -258,7 +257,9 @@ class JobManager:
     async def _resume(self, job: Job, solve_again: SolveAgain) -> None:
         """Run a stored job, unless it has been run too often."""
         if job.runs >= _MOST_RUNS:
-            await self._repository.update(job.failed(_STOPPED_TOO_OFTEN))
+            last = job.failed(_STOPPED_TOO_OFTEN)
+            await self._repository.update(last)
+            self._retention.add(last)
             return
 
         async def solve(on_progress: ProgressCallback) -> Result:
@@ -332,6 +333,7 @@ class JobManager:
         async with live.recording:
             await self._repository.update(live.job)
             self._live.pop(live.job.id, None)
+            self._retention.add(live.job)
 
     async def _record_ends(self) -> None:
         """Record the ends of jobs that could not be recorded when they came."""
@@ -344,14 +346,15 @@ class JobManager:
         while True:
             try:
                 await self._record_ends()
-                for job in await self._repository.finished_before(datetime.now(UTC) - self._ttl):
+                for job in self._retention.due():
                     await self._remove(job)
             except OSError:  # such as a full disk: there may be room the next time
                 logger.exception("jobs neither recorded nor removed")
-            await asyncio.sleep(min(_TIDY_PERIOD_S, self._ttl.total_seconds()))
+            await asyncio.sleep(self._tidy_period_s)
 
-    async def _remove(self, job: Job) -> None:
+    async def _remove(self, job: Job | FinishedJob) -> None:
         await self._repository.remove(job.id)
         self._live.pop(job.id, None)
+        self._retention.discard(job.id)
         if job.result is not None:
             self._results.unpin(job.result)

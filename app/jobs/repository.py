@@ -1,6 +1,5 @@
 """The interface to the database of jobs: records outlive the process that wrote them."""
 
-from datetime import datetime
 from typing import Protocol
 
 from app.jobs.job import Job
@@ -43,8 +42,8 @@ class JobRepository(Protocol):
     ) -> tuple[list[Job], int | None]:
         """Return ``limit`` jobs of an owner, and the number to go on before; None at the end."""
 
-    async def usage(self, owner: str | None) -> tuple[int, datetime | None]:
-        """Return the number of an owner's jobs, and the end of the first one that has finished."""
+    async def count(self, owner: str | None) -> int:
+        """Return the number of an owner's jobs."""
 
     async def count_finished(self) -> dict[str, int]:
         """Return the number of finished jobs by status."""
@@ -52,8 +51,5 @@ class JobRepository(Protocol):
     async def unfinished(self) -> list[Job]:
         """Return the jobs that have not finished, the oldest first."""
 
-    async def with_results(self) -> list[Job]:
-        """Return the jobs that have a result."""
-
-    async def finished_before(self, moment: datetime) -> list[Job]:
-        """Return the jobs that finished before a moment."""
+    async def finished(self) -> list[Job]:
+        """Return the jobs that have finished."""

@@ -5,10 +5,11 @@ for changes of jobs that exist: on a full disk they can still end and be removed
 """
 
 import errno
+import os
 import sqlite3
+import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -52,15 +53,14 @@ class SqliteJobRepository:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._database: aiosqlite.Connection | None = None
-        self._reserve = Reserve(path.with_name(JOB_RESERVE), _RESERVED)
+        self._reserve = _reserve_of(path)
 
     async def open(self) -> None:
         """Open the database, which is created if missing."""
-        with _as_os_errors():
+        await to_thread.run_sync(_create_on_reserve, self._path)
+        with _as_os_errors(self._path.parent):
             self._database = await aiosqlite.connect(self._path, isolation_level=None)
-            await self._database.execute("PRAGMA journal_mode = WAL")
             await self._database.execute("PRAGMA synchronous = NORMAL")
-            await self._database.executescript(_SCHEMA)
         await to_thread.run_sync(self._reserve.restore)
         await self._run_on_reserve(_FORGET_UNNEEDED)
 
@@ -125,11 +125,10 @@ class SqliteJobRepository:
         jobs = [Job.model_validate_json(record) for _, record in rows[:limit]]
         return jobs, rows[limit - 1][0] if len(rows) > limit else None
 
-    async def usage(self, owner: str | None) -> tuple[int, datetime | None]:
-        """Return the number of an owner's jobs, and the end of the first one that has finished."""
-        statement = "SELECT COUNT(*), MIN(finished) FROM jobs WHERE owner IS ?"
-        ((count, first_end),) = await self._rows(statement, owner)
-        return count, None if first_end is None else datetime.fromisoformat(first_end)
+    async def count(self, owner: str | None) -> int:
+        """Return the number of an owner's jobs."""
+        ((count,),) = await self._rows("SELECT COUNT(*) FROM jobs WHERE owner IS ?", owner)
+        return int(count)
 
     async def count_finished(self) -> dict[str, int]:
         """Return the number of finished jobs by status."""
@@ -140,17 +139,9 @@ class SqliteJobRepository:
         """Return the jobs that have not finished, the oldest first."""
         return await self._jobs("WHERE finished IS NULL ORDER BY number")
 
-    async def with_results(self) -> list[Job]:
-        """Return the jobs that have a result."""
-        return await self._jobs("WHERE status = 'successful'")
-
-    async def finished_before(self, moment: datetime) -> list[Job]:
-        """Return the jobs that finished before a moment."""
-        return [
-            job
-            for job in await self._jobs("WHERE finished IS NOT NULL")
-            if job.finished is not None and job.finished < moment
-        ]
+    async def finished(self) -> list[Job]:
+        """Return the jobs that have finished."""
+        return await self._jobs("WHERE finished IS NOT NULL")
 
     async def _forget_query(self, job_id: str) -> None:
         await self._run_on_reserve("DELETE FROM queries WHERE job_id = ?", job_id)
@@ -160,11 +151,11 @@ class SqliteJobRepository:
         return [Job.model_validate_json(record) for (record,) in rows]
 
     async def _rows(self, statement: str, *values: Any) -> Sequence[Any]:
-        with _as_os_errors():
+        with _as_os_errors(self._path.parent):
             return list(await self._connection.execute_fetchall(statement, values))
 
     async def _run(self, statement: str, *values: Any) -> None:
-        with _as_os_errors():
+        with _as_os_errors(self._path.parent):
             async with self._connection.execute(statement, values):
                 pass
 
@@ -187,18 +178,81 @@ class SqliteJobRepository:
         return self._database
 
 
+def prepare_database(path: Path) -> None:
+    """Create the database at ``path``, or the tables that it lacks, and verify it.
+
+    Raises
+    ------
+    StoreError
+        It is damaged, or cannot be written.
+    """
+    try:
+        _create_on_reserve(path)
+    except OSError as error:
+        require_intact(path)
+        raise StoreError(f"{path} cannot be written: {error.strerror}") from error
+    require_intact(path)
+
+
+def _create_on_reserve(path: Path) -> None:
+    """Create what is missing of a database; where the disk is full, in the room of the reserve.
+
+    The reserve is not restored: to open the database takes room once more.
+    """
+    try:
+        _create(path)
+    except OSError as error:
+        if error.errno != errno.ENOSPC:
+            raise
+        _reserve_of(path).give_up()
+        _create(path)
+
+
+def _create(path: Path) -> None:
+    with _as_os_errors(path.parent), closing(sqlite3.connect(path)) as database:
+        database.execute("PRAGMA journal_mode = WAL")
+        database.executescript(_SCHEMA)
+
+
+def _reserve_of(path: Path) -> Reserve:
+    return Reserve(path.with_name(JOB_RESERVE), _RESERVED)
+
+
 _ERRORS = {sqlite3.SQLITE_FULL: errno.ENOSPC, sqlite3.SQLITE_READONLY: errno.EROFS}
 """System errors by the primary codes of SQLite"""
+_ERRORS_OF_THE_DISK = frozenset({sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN})
+"""Codes that many system errors have in common, such as those of read-only disks and of quotas"""
 
 
 @contextmanager
-def _as_os_errors() -> Iterator[None]:
-    """Raise the errors of SQLite as ``JobRepository`` promises them."""
+def _as_os_errors(folder: Path) -> Iterator[None]:
+    """Raise the errors of SQLite as ``JobRepository`` promises them, for a database in a folder."""
     try:
         yield
     except sqlite3.Error as error:
-        primary = getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
-        raise OSError(_ERRORS.get(primary, errno.EIO), str(error)) from error
+        primary = _primary_code(error)
+        is_of_disk = primary in _ERRORS_OF_THE_DISK
+        number = _error_of_disk(folder) if is_of_disk else _ERRORS.get(primary, errno.EIO)
+        raise OSError(number, str(error)) from error
+
+
+def _primary_code(error: sqlite3.Error) -> int:
+    return getattr(error, "sqlite_errorcode", sqlite3.SQLITE_ERROR) & 0xFF
+
+
+_TRIED = 2**16
+"""Bytes to write to a disk to see its error: more than SQLite needs at once, which is 32 kB"""
+
+
+def _error_of_disk(folder: Path) -> int:
+    """Return the number of the error that a write to the disk has now; EIO where it has none."""
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(_TRIED))
+            file.flush()
+    except OSError as error:
+        return error.errno or errno.EIO
+    return errno.EIO
 
 
 def read_jobs(path: Path) -> list[Job]:
@@ -221,6 +275,9 @@ def _read(path: Path, statement: str) -> list[Any]:
         with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
             return database.execute(statement).fetchall()
     except sqlite3.DatabaseError as error:
+        if _primary_code(error) in _ERRORS_OF_THE_DISK:
+            reason = os.strerror(_error_of_disk(path.parent))
+            raise StoreError(f"{path} cannot be read: {reason}") from error
         raise _damaged(path, error) from error
 
 

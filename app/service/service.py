@@ -34,7 +34,7 @@ from app.engine.interface import Engine, ProgressCallback
 from app.engine.local import LocalEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, problem
-from app.jobs import Job, JobManager, JobSpec, SqliteJobRepository, require_intact
+from app.jobs import Job, JobManager, JobSpec, SqliteJobRepository, prepare_database
 from app.queries import KINDS, Estimate, MeshSize, Query, fingerprint, result_key
 from app.service.concurrency import ConcurrencyLimit
 from app.service.maintenance import Damage
@@ -137,7 +137,7 @@ class Service:
     def owning_store(self) -> Iterator[None]:
         """Own the store inside the block; raises ``StoreError`` where it is not usable."""
         with owned(self.settings.store):
-            require_intact(self._job_database)
+            prepare_database(self._job_database)
             yield
 
     def announce_end(self) -> None:

@@ -1,6 +1,5 @@
 """Files that are written whole or not at all, and that survive a power cut."""
 
-import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -34,18 +33,6 @@ def remove_partial(folder: Path) -> None:
     """Remove the files that `atomic_write` did not finish from the folders in ``folder``."""
     for path in folder.glob(f"*/{_PARTIAL}*"):
         path.unlink()
-
-
-def note_use(path: str | Path) -> None:
-    """Set the time of a file or folder to now: the order of use, for evictions after a restart.
-
-    On a disk that can only be read the order stays as it was.
-    """
-    try:
-        os.utime(path)
-    except OSError as error:
-        if error.errno != errno.EROFS:
-            raise
 
 
 def sync(path: Path) -> None:

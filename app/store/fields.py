@@ -16,7 +16,8 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from app.store.atomic import atomic_write, note_use, remove_partial
+from app.store.atomic import atomic_write, remove_partial
+from app.store.last_use import note_use, order_of_use
 from app.store.layout import FIELDS
 from app.store.log import warn
 
@@ -99,7 +100,7 @@ def field_files(root: Path) -> dict[Path, int]:
     for path in (root / FIELDS).glob("*/*.npz"):
         with suppress(FileNotFoundError):  # evicted a moment ago
             status = path.stat()
-            files.append((status.st_mtime_ns, path, status.st_size))
+            files.append((order_of_use(status), path, status.st_size))
     return {path: size for _, path, size in sorted(files)}
 
 

@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import ProblemError, problem
-from app.store.atomic import note_use
+from app.store.last_use import note_use, order_of_use
 from app.store.layout import MESHES
 from app.store.manifests import MANIFEST, encode_manifest, manifest_of, read_manifest
 from app.store.verified import FileVersion, checksum_of, read_checksum, version_of
@@ -251,7 +251,7 @@ class MeshStore:
     def sizes(self) -> dict[str, int]:
         """Return the bytes of each mesh on disk, the least recently used first."""
         folders = [entry for entry in self.folder.glob("*") if entry.is_dir()]
-        folders.sort(key=lambda folder: folder.stat().st_mtime_ns)
+        folders.sort(key=lambda folder: order_of_use(folder.stat()))
         return {folder.name: _bytes_in(folder) for folder in folders}
 
     def last_used(self, mesh_id: str) -> datetime:

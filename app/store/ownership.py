@@ -38,12 +38,21 @@ def owned(root: Path) -> Iterator[None]:
     except OSError as error:
         raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
     try:
-        if layout_of(root) in WITH_OLDER_MESHES:
-            convert(root)
-        _write_layout(root)
+        _bring_up_to_date(root)
         yield
     finally:
         lock.release()
+
+
+def _bring_up_to_date(root: Path) -> None:
+    try:
+        if layout_of(root) in WITH_OLDER_MESHES:
+            convert(root)
+        _write_layout(root)
+    except OSError as error:
+        raise StoreError(
+            f"the store {root} cannot be brought up to date: {error.strerror}"
+        ) from error
 
 
 def _write_layout(root: Path) -> None:

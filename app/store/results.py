@@ -17,7 +17,8 @@ from pathlib import Path
 from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from app.store.atomic import atomic_write, note_use, remove_partial
+from app.store.atomic import atomic_write, remove_partial
+from app.store.last_use import note_use, order_of_use
 from app.store.log import warn
 
 Buffer = bytes | memoryview
@@ -157,7 +158,7 @@ class ResultStore:
         `make_room` is to follow once those that must stay are pinned.
         """
         self._root.mkdir(parents=True, exist_ok=True)
-        bodies = sorted(self._root.glob("*/*.body"), key=lambda path: path.stat().st_mtime)
+        bodies = sorted(self._root.glob("*/*.body"), key=lambda path: order_of_use(path.stat()))
         for path in bodies:
             name = path.relative_to(self._root).with_suffix("").as_posix()
             if _manifest_path(self._root, name).exists():

@@ -4,7 +4,7 @@ import errno
 import json
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from datetime import datetime, timedelta, tzinfo
+from datetime import timedelta
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.jobs import Job, read_jobs
+from app.jobs.retention import Retention
 from app.jobs.sqlite_repository import SqliteJobRepository
+from tests.support.clocks import TEN_YEARS, Calendar, Clock
 from tests.support.processes import stopped
 from tests.support.service import (
     SLOW_FACES,
@@ -318,13 +320,47 @@ def test_a_job_has_a_deadline_of_its_own(tmp_path: Path) -> None:
 
 
 def test_jobs_are_forgotten_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    calendar = Calendar()
-    monkeypatch.setattr("app.jobs.manager.datetime", calendar)
+    clock = Clock()
+    monkeypatch.setattr("app.jobs.retention.monotonic", clock)
     with serving(tmp_path, job_ttl=0.1, results_bytes=1) as client:
         job = job_of(submit(client, upload_sample(client, "plane", 50)))
         assert wait_for(client, job, "failed")["problem"]["code"] == "storage_full"
-        calendar.days += 1
+        clock.now += 1
         wait_until(lambda: client.get(job).status_code == 404)
+
+
+@pytest.mark.parametrize("moved", [TEN_YEARS, -TEN_YEARS])
+def test_jobs_stay_as_long_as_ever_when_the_clock_is_moved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, moved: timedelta
+) -> None:
+    clock, calendar, due = Clock(), Calendar(), Retention.due
+    tidied = []
+
+    def due_noted(retention: Retention) -> Any:
+        tidied.append(retention)
+        return due(retention)
+
+    monkeypatch.setattr(Retention, "due", due_noted)
+    monkeypatch.setattr("app.jobs.retention.monotonic", clock)
+    for module in ("job", "retention"):
+        monkeypatch.setattr(f"app.jobs.{module}.datetime", calendar)
+    monkeypatch.setattr("app.jobs.manager._TIDY_PERIOD_S", 0.01)
+    with serving(tmp_path, job_ttl=60) as client:
+        mesh_id = upload_sample(client, "plane", 50)
+        jobs = [job_of(submit(client, mesh_id))]
+        wait_for(client, jobs[0], "successful")
+        calendar.moved = moved
+        jobs.append(job_of(submit(client, mesh_id)))
+        wait_for(client, jobs[1], "successful")
+
+        clock.now += 59
+        before = len(tidied)
+        wait_until(lambda: len(tidied) > before + 2)
+        for job in jobs:
+            assert client.get(f"{job}/results").status_code == 200
+        clock.now += 1
+        for job in jobs:
+            wait_until(lambda job=job: client.get(job).status_code == 404)
 
 
 def test_jobs_are_forgotten_although_the_disk_was_full(
@@ -408,15 +444,6 @@ def test_jobs_are_dismissed_although_the_disk_is_full(
         (left,) = client.get("/v1/jobs").json()["jobs"]
         assert f"/v1/jobs/{left['id']}" == running
         assert left["status"] == "dismissed"
-
-
-class Calendar:
-    """Shows the time of yesterday, or of some days later."""
-
-    days = -1
-
-    def now(self, zone: tzinfo) -> datetime:
-        return datetime.now(zone) + timedelta(days=self.days)
 
 
 def test_answers_of_jobs_outlive_those_that_are_only_kept(tmp_path: Path) -> None:

@@ -1,10 +1,12 @@
 """The service as a process of its own: clients that leave, restarts, and how it ends."""
 
+import json
 import os
 import signal
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -138,6 +140,19 @@ def status_of(server: Server, job: str) -> str:
     return str(server.client.get(job).json()["status"])
 
 
+def events_of(server: Server, job: str, seen: int | None = None) -> Iterator[tuple[int, Any]]:
+    """Yield id and document of each event of a job, but for those up to ``seen``."""
+    headers = {} if seen is None else {"Last-Event-ID": str(seen)}
+    with server.client.stream("GET", f"{job}/events", headers=headers) as events:
+        document = None
+        for line in events.iter_lines():
+            field, _, value = line.partition(": ")
+            if field == "data":
+                document = json.loads(value)
+            elif field == "id":
+                yield int(value), document
+
+
 @dataclass
 class Restart:
     """What a service was doing when it was killed, and the one that was started on its store."""
@@ -148,6 +163,8 @@ class Restart:
     answer: Any
     interrupted: str
     """A job that ran"""
+    seen: int
+    """Id of the last event of that job which a client saw"""
     waiting: str
     """A job that waited for the same worker"""
     server: Server
@@ -175,11 +192,13 @@ def restart(started: list[Server], tmp_path_factory: pytest.TempPathFactory) -> 
             wait_until(lambda: status_of(first, interrupted) == "running")
             waiting = submit(first, slow, 6)
             assert status_of(first, waiting) == "accepted"
+            ((seen, state),) = islice(events_of(first, interrupted), 1)
+            assert state["status"] == "running"
             first.kill()
     wait_until(lambda: are_gone(workers))  # however busy they are
     assert any(first.store.glob("tmp/*/upload"))
     started.append(Server(first.store, **PATIENT))
-    return Restart(meshes, done, answer, interrupted, waiting, started[-1])
+    return Restart(meshes, done, answer, interrupted, seen, waiting, started[-1])
 
 
 def test_a_body_that_arrived_when_the_service_was_killed_is_removed(restart: Restart) -> None:
@@ -201,6 +220,20 @@ def test_jobs_that_were_under_way_are_run_again_after_a_restart(restart: Restart
         wait_until(lambda job=job: status_of(restart.server, job) == "successful")
         answer = restart.server.client.get(f"{job}/results").json()
         assert answer["distances"] == [gc.exact_distance(mesh, source).distances[1]]
+
+
+def test_a_client_that_watched_a_job_goes_on_after_a_restart(restart: Restart) -> None:
+    """It sees the job accepted again or further, once each state, and its end."""
+    events = list(events_of(restart.server, restart.interrupted, restart.seen))
+
+    ids = [number for number, _ in events]
+    assert ids == sorted(set(ids))
+    assert ids[0] > restart.seen
+    assert events[-1][1] == restart.server.client.get(restart.interrupted).json()
+    assert events[-1][1]["status"] == "successful"
+    last = ids[-1]
+    assert list(events_of(restart.server, restart.interrupted, last)) == []
+    assert [number for number, _ in events_of(restart.server, restart.interrupted)] == [last]
 
 
 # It ends

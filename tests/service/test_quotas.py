@@ -3,13 +3,13 @@
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from datetime import datetime, timedelta, tzinfo
 from pathlib import Path
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
+from tests.support.clocks import TEN_YEARS, Calendar, Clock
 from tests.support.processes import stopped
 from tests.support.service import ServiceClient, check_problem, serving, upload_sample
 from tests.support.waiting import LONG_S, wait_until
@@ -118,8 +118,10 @@ class Asker:
 
 
 def test_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    calendar = Calendar()
-    monkeypatch.setattr("app.jobs.manager.datetime", calendar)
+    clock, calendar = Clock(), Calendar()
+    monkeypatch.setattr("app.jobs.retention.monotonic", clock)
+    for module in ("job", "retention"):
+        monkeypatch.setattr(f"app.jobs.{module}.datetime", calendar)
     with keyed(tmp_path, quota_jobs=2, job_ttl=86_400) as client, ThreadPoolExecutor(4) as pool:
         assert limits_of(client, ALICE)["GEODESIC_QUOTA_JOBS"] == 2
         asker = Asker(client)
@@ -144,24 +146,18 @@ def test_jobs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
             asker.wait_for_end(response.headers["location"], caller)
         refused = asker.submit(ALICE)
         check_problem(refused, 429, "quota_exceeded")
-        assert 0 < int(refused.headers["retry-after"]) <= 86_400
-        calendar.hours = 23
-        assert int(asker.submit(ALICE).headers["retry-after"]) <= 3600
+        assert refused.headers["retry-after"] == "86400"
+        clock.now += 23 * 3600
+        for calendar.moved in (TEN_YEARS, -TEN_YEARS):
+            assert asker.submit(ALICE).headers["retry-after"] == "3600"
 
     with keyed(tmp_path, quota_jobs=2, job_ttl=86_400) as client:
         asker = Asker(client)
-        check_problem(asker.submit(ALICE), 429, "quota_exceeded")
+        refused = asker.submit(ALICE)
+        check_problem(refused, 429, "quota_exceeded")
+        assert refused.headers["retry-after"] == "86400", "ten years ago nothing had ended"
         assert client.delete(second.headers["location"], headers=ALICE).status_code == 200
         assert asker.submit(ALICE).status_code == 202
-
-
-class Calendar:
-    """Shows the time of some hours later."""
-
-    hours = 0
-
-    def now(self, zone: tzinfo) -> datetime:
-        return datetime.now(zone) + timedelta(hours=self.hours)
 
 
 def test_without_keys_all_that_is_stored_has_one_owner(tmp_path: Path) -> None:

@@ -1,4 +1,6 @@
-"""A clock for tests: it stands still, so that nothing depends on how fast the machine is."""
+"""Clocks for tests: nothing depends on how fast the machine is, or on what its clock says."""
+
+from datetime import datetime, timedelta, tzinfo
 
 
 class Clock:
@@ -9,3 +11,16 @@ class Clock:
 
     def __call__(self) -> float:
         return self.now
+
+
+class Calendar:
+    """Stands for ``datetime`` in a module, with a clock that was ``moved``."""
+
+    def __init__(self) -> None:
+        self.moved = timedelta()
+
+    def now(self, zone: tzinfo) -> datetime:
+        return datetime.now(zone) + self.moved
+
+
+TEN_YEARS = timedelta(days=3653)

@@ -5,7 +5,6 @@ import sqlite3
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import anyio
@@ -32,30 +31,29 @@ def new_job(owner: str | None = None) -> Job:
     return Job(spec=SPEC.model_copy(update={"owner": owner}))
 
 
-def test_usage_counts_the_jobs_of_one_owner_in_every_state(tmp_path: Path) -> None:
-    anyio.run(count_usage, tmp_path / "jobs.sqlite3")
+def test_the_jobs_of_an_owner_are_counted_in_every_state(tmp_path: Path) -> None:
+    anyio.run(count_jobs, tmp_path / "jobs.sqlite3")
 
 
-async def count_usage(path: Path) -> None:
+async def count_jobs(path: Path) -> None:
     repository = SqliteJobRepository(path)
     await repository.open()
     mine = [new_job("alice") for _ in range(4)]
     for job in (*mine, new_job("bob"), new_job()):
         await repository.add(job, QUERY)
-    assert await repository.usage("alice") == (4, None)
+    assert await repository.finished() == []
 
-    noon = datetime(2005, 7, 1, 12, tzinfo=UTC)
-    ends = [noon + timedelta(microseconds=offset) for offset in (2_000_000, 500_000, 1_500_000)]
-    for job, end in zip(mine, ends, strict=False):
-        await repository.update(job.dismissed().model_copy(update={"finished": end}))
-    assert await repository.usage("alice") == (4, min(ends))
+    ended = [job.dismissed() for job in mine[:3]]
+    for job in ended:
+        await repository.update(job)
     await repository.close()
     await repository.open()
-    assert await repository.usage("alice") == (4, min(ends))
+    assert await repository.count("alice") == 4
+    assert await repository.finished() == ended
     await repository.remove(mine[1].id)
-    assert await repository.usage("alice") == (3, ends[2])
-    assert await repository.usage("bob") == await repository.usage(None) == (1, None)
-    assert await repository.usage("carol") == (0, None)
+    assert await repository.count("alice") == 3
+    assert await repository.count("bob") == await repository.count(None) == 1
+    assert await repository.count("carol") == 0
     await repository.close()
 
 

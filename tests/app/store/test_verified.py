@@ -82,6 +82,21 @@ def test_a_change_in_the_same_tick_of_the_clock_cannot_come_after_the_reading(
     assert slept == [0.006]
 
 
+def test_the_wait_is_short_though_the_clock_was_set_back_by_years(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(CONTENT)
+    ten_years_ago = time.time_ns() - 10 * 365 * 86_400 * 10**9
+    slept: list[float] = []
+    monkeypatch.setattr(time, "sleep", slept.append)
+    monkeypatch.setattr(time, "time_ns", lambda: ten_years_ago)
+
+    for _ in range(3):
+        assert checksum_of(str(path)) == zlib.crc32(CONTENT)
+    assert slept == [0.01]
+
+
 def test_what_says_nothing_about_the_file_is_raised(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
