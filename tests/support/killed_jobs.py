@@ -11,7 +11,7 @@ import shutil
 import signal
 import sqlite3
 import sys
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager, closing
 from io import BytesIO
 from itertools import pairwise
@@ -70,15 +70,21 @@ class Store:
         return copied
 
     @asynccontextmanager
-    async def service(self) -> AsyncIterator[tuple[Service, DirectEngine]]:
-        """Run a service; each piece of work waits until its job is recorded as running."""
+    async def service(
+        self, before_work: Callable[[], Awaitable[None]] | None = None
+    ) -> AsyncIterator[tuple[Service, DirectEngine]]:
+        """Run a service; each piece of work waits, by default until its job is recorded as running.
+
+        Jobs that are run again may begin before this yields.
+        """
         service = Service(Settings(store=self.root))
-        engine = DirectEngine(new_worker(self.root), self._until_running_is_recorded)
+        wait = before_work or self.until_running_is_recorded
+        engine = DirectEngine(new_worker(self.root), wait)
         service.engine = engine
         async with service.running():
             yield service, engine
 
-    async def _until_running_is_recorded(self) -> None:
+    async def until_running_is_recorded(self) -> None:
         while not any(job.status == "running" for job in read_jobs(self.root / "jobs.sqlite3")):
             await asyncio.sleep(0)
 
@@ -178,16 +184,14 @@ async def check_answer(service: Service, job: Job) -> None:
 
 async def die_of_a_job(store: Store) -> None:
     """Run a job that kills the service, while another one waits; both are accepted only once."""
-    async with store.service() as (service, engine):
-        recorded = engine.before_work
 
-        async def die() -> None:
-            await recorded()
-            while len(store.told()) < 2:
-                await asyncio.sleep(0)
-            signal.raise_signal(signal.SIGKILL)
+    async def die() -> None:
+        await store.until_running_is_recorded()
+        while len(store.told()) < 2:
+            await asyncio.sleep(0)
+        signal.raise_signal(signal.SIGKILL)
 
-        engine.before_work = die
+    async with store.service(die) as (service, _):
         for media_type in (JSON, NPY):
             store.tell(await store.submit(service, media_type, key=media_type), "accepted")
         await asyncio.Event().wait()
@@ -213,7 +217,8 @@ def kill_by_a_job(store: Store) -> None:
     for _ in range(3):
         assert in_child(lambda: asyncio.run(die_of_a_job(store))) == KILLED
         fatal, other = read_jobs(store.root / "jobs.sqlite3")
-        assert (fatal.status, other.status) == ("running", "accepted")
+        statuses = fatal.status, other.status
+        assert statuses == ("running", "accepted"), statuses
         assert [fatal.id, other.id] == list(store.told())
         versions.append(fatal.version)
     # Clients have seen up to 10,000 states of each run.
