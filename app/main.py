@@ -1,9 +1,7 @@
 """The application: settings, service, middleware and routes put together."""
 
-import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from threading import Lock
 from typing import Any
 
 from anyio import CapacityLimiter, to_thread
@@ -33,10 +31,10 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         async with service.running(), measuring_lag(metrics.note_lag):
-            # The document takes a quarter of a second: no request should wait for it.
-            describing = asyncio.create_task(to_thread.run_sync(app.openapi))
+            # The document takes a quarter of a second. It is made while workers start and before
+            # requests come: FastAPI silences warnings for all threads while it makes it.
+            await to_thread.run_sync(app.openapi)
             yield
-            await asyncio.wait({describing})
 
     metrics = Metrics(service)
     app = _Application(
@@ -83,14 +81,10 @@ def create_app(settings: Settings) -> FastAPI:
 
 
 class _Application(FastAPI):
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
-        self._describing = Lock()
-        self._document: dict[str, Any] | None = None
+    _document: dict[str, Any] | None = None
 
     def openapi(self) -> dict[str, Any]:
-        """Return the OpenAPI document, made on first use; threads never see it half made."""
-        with self._describing:
-            if self._document is None:
-                self._document = complete(super().openapi())
+        """Return the OpenAPI document, made on first use."""
+        if self._document is None:
+            self._document = complete(super().openapi())
         return self._document

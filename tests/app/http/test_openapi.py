@@ -1,8 +1,8 @@
-import threading
-from concurrent.futures import ThreadPoolExecutor, wait
+from pathlib import Path
 from typing import Any
 
 import pytest
+from starlette.testclient import TestClient
 
 from app import main
 from app.cli.openapi import openapi_text
@@ -84,20 +84,15 @@ def test_no_code_of_a_status_is_named_twice(client) -> None:
                 assert status < "400" or len(set(codes)) == len(codes), codes
 
 
-def test_threads_never_see_the_document_half_made(monkeypatch: pytest.MonkeyPatch) -> None:
-    begun, go_on = threading.Event(), threading.Event()
+def test_the_document_is_made_before_the_first_request(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    made: list[dict[str, Any]] = []
+    monkeypatch.setattr(main, "complete", lambda document: made.append(document) or document)
+    app = main.create_app(Settings(store=tmp_path))
 
-    def complete(_document: dict[str, Any]) -> dict[str, Any]:
-        begun.set()
-        assert go_on.wait(60)
-        return {"is": "complete"}
-
-    monkeypatch.setattr(main, "complete", complete)
-    app = main.create_app(Settings())
-    with ThreadPoolExecutor(2) as pool:
-        first = pool.submit(app.openapi)
-        assert begun.wait(60)
-        second = pool.submit(app.openapi)
-        wait([second], timeout=0.2)
-        go_on.set()
-        assert first.result() == second.result() == {"is": "complete"}
+    assert not made
+    with TestClient(app, base_url="http://127.0.0.1") as client:
+        assert len(made) == 1
+        assert client.get("/openapi.json").json() == made[0]
+        assert len(made) == 1
