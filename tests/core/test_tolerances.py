@@ -570,6 +570,7 @@ def test_a_sweep_whose_runs_are_used_up_begins_anew_exactly():
             np.testing.assert_array_equal(line.points, other.points)
 
 
+@pytest.mark.jit
 @pytest.mark.usefixtures("worn_out")
 def test_searches_whose_runs_are_used_up_find_the_shortest_path():
     mesh = gc.TriangleMesh(*gc.samples.knot(500))
@@ -587,6 +588,7 @@ def test_searches_whose_runs_are_used_up_find_the_shortest_path():
     np.testing.assert_allclose(stored, expected, rtol=1e-7)
 
 
+@pytest.mark.jit
 def test_widest_error_is_the_most_that_is_used():
     mesh = gc.TriangleMesh(*gc.samples.knot(2000))
     widest = gc.approximate_distance(mesh, 0, WIDEST_ERROR)
@@ -617,6 +619,7 @@ def test_straight_is_the_least_turn_that_is_taken_out(scale, share, passes, side
     assert bent > 2.0 * (1 + 1e-13), "else the two could not be told apart"
 
 
+@pytest.mark.jit
 @zoo.each(MERGING)
 def test_landmark_error_is_all_that_landmarks_fall_short(case):
     """Their bounds make up for it; taken as exact, their distances would bound too much."""

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.certificates import check_path
 from tests.support.oracles import unfolding, visibility
@@ -41,6 +40,7 @@ BLOCKABLE = {
 # What distances are ------------------------------------------------------------------------------
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @pytest.mark.slice(2)
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_blocked_cells_of_a_grid(cells):
     blocked = [2 * (6 * row + column) + half for column, row in cells for half in (0, 1)]
     matrix = visibility.distance_matrix(points[:, :2], np.delete(faces, blocked, axis=0))
     mesh = gc.TriangleMesh(points, faces)
-    for source in range(0, len(points), 12 if WITHOUT_JIT else 1):
+    for source in range(len(points)):
         field = gc.exact_distance(mesh, source, barriers=blocked)
         np.testing.assert_allclose(field.distances, matrix[source], rtol=EXACT, atol=0)
 
@@ -92,6 +92,7 @@ def test_distances_are_those_of_the_unfolded_free_faces(case, share):
         np.testing.assert_allclose(found, matrix[source], rtol=EXACT, atol=0)
 
 
+@pytest.mark.jit
 @pytest.mark.slice(8)
 @zoo.each(BLOCKABLE)
 def test_all_is_as_on_a_mesh_of_the_free_faces(case):

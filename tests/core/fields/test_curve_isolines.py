@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_curves import random_curve
 from tests.core.fields.test_isolines import FINE, check_all, total_length
 from tests.support import zoo
@@ -38,7 +37,7 @@ def with_middles(line):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(1 if WITHOUT_JIT else 4))
+@pytest.mark.parametrize("seed", range(4))
 def test_stadiums_around_a_segment(seed):
     rng = np.random.default_rng(seed)
     points, faces = zoo.grid(8, 8, seed=seed, jitter=0.2)
@@ -58,7 +57,7 @@ def test_stadiums_around_a_segment(seed):
         check_pieces(mesh, line)
 
 
-@pytest.mark.parametrize("seed", range(1 if WITHOUT_JIT else 4))
+@pytest.mark.parametrize("seed", range(4))
 def test_around_a_polyline_is_the_edge_of_its_stadiums(seed):
     """All points at the level; within, as much area as a fine raster says."""
     rng = np.random.default_rng(seed)
@@ -101,7 +100,7 @@ def test_open_lines_where_the_domain_ends(jitter):
             check_ends(mesh, line)
 
 
-@pytest.mark.parametrize("seed", range(1 if WITHOUT_JIT else 6))
+@pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("scale", [1.0, 1.37])
 @pytest.mark.parametrize("limited", [False, True])
 def test_lines_along_edges_do_not_depend_on_rounding(seed, scale, limited):
@@ -165,6 +164,7 @@ def test_bands_around_a_box():
     assert end.length == pytest.approx(4 * (2 - 2 * 0.2), rel=1e-11)
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 def test_points_on_a_box_are_at_the_level_by_unfolding():
     size = 3, 2, 2

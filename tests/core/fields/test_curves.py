@@ -135,7 +135,7 @@ def test_distances_among_obstacles_are_those_of_the_visibility_graph(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(3 if WITHOUT_JIT else 12))
+@pytest.mark.parametrize("seed", range(12))
 def test_distances_on_a_plane_are_those_of_segments(seed):
     rng = np.random.default_rng(seed)
     points, faces = zoo.grid(7, 6, seed=seed, jitter=0.2)
@@ -179,9 +179,10 @@ def test_distances_on_a_plane_are_those_of_segments(seed):
     np.testing.assert_allclose(later[0].gradient, away, atol=1e-9)
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @pytest.mark.slice(2)
-@pytest.mark.parametrize("seed", range(2 if WITHOUT_JIT else 8))
+@pytest.mark.parametrize("seed", range(8))
 def test_distances_on_a_box_are_least_over_the_curve(seed):
     rng = np.random.default_rng(seed)
     size = 3, 2, 2

@@ -99,6 +99,7 @@ def test_lines_along_edges_are_one_and_whole(share, scale):
             check_pieces(mesh, line)
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @pytest.mark.slice(2)
 @LEVELS

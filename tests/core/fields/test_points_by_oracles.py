@@ -63,9 +63,10 @@ def domain(seed) -> tuple[np.ndarray, np.ndarray]:
     return zoo.drop_unused(points, zoo.without_cells(faces, columns, map(tuple, cells.tolist())))
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @pytest.mark.slice(2)
-@pytest.mark.parametrize("seed", range(2 if WITHOUT_JIT else 12))
+@pytest.mark.parametrize("seed", range(12))
 def test_planar_domains_with_polygonal_holes(seed):
     vertices, faces = domain(seed)
     mesh = gc.TriangleMesh(vertices * PARTS, faces)
@@ -119,6 +120,7 @@ def test_prisms(sides, heights):
     check_table(mesh, points, [closed_forms.around(places, i, girth) for i in range(len(points))])
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -9,6 +9,7 @@ WORDS = "distances", "paths", "windows"
 MESH = gc.TriangleMesh(*gc.samples.knot(500))
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("solve", [gc.exact_distance, gc.approximate_distance])
 def test_each_word_holds_more_and_answers_the_same(solve):
     least, *others = (solve(MESH, [3, 50], retain=word) for word in WORDS)

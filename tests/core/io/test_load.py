@@ -384,6 +384,7 @@ def test_glb_mirrored_nodes_keep_their_outside_out() -> None:
     assert mirrored.faces.tolist() == [[2, 1, 0], [3, 2, 0]]
 
 
+@pytest.mark.jit
 def test_glb_nodes_of_any_depth_place_their_meshes() -> None:
     depth = 5000
     nodes = [{"mesh": 0, "translation": [1, 0, 0], "children": [i + 1]} for i in range(depth - 1)]
@@ -402,6 +403,7 @@ def test_a_glb_node_with_a_camera_places_what_is_below_it() -> None:
     np.testing.assert_array_equal(mesh.vertices, VERTICES[:4] + np.array([5, 0, 0]))
 
 
+@pytest.mark.jit
 def test_no_glb_part_is_lost_among_many() -> None:
     tree, binary = glb_tree(VERTICES[:4], FACES[:2])
     tree["meshes"] = [{"name": "same", "primitives": tree["meshes"][0]["primitives"] * 5000}] * 2

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from geodesic_core.kernels.outcome import Outcome
-from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.invariants import Watch, exact_by_euclid, exact_by_unfolding
 from tests.support.stepping import finished, started, steps, topology_of, with_pool
@@ -55,13 +54,14 @@ def watch(case, oracle, sources, starts, limit=math.inf):
     witness.finish(now)
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @pytest.mark.slice(3)
 @pytest.mark.parametrize("name", CURVED)
 def test_every_step_on_curved_meshes(name):
     case = CASES[name]
     used = np.unique(case.faces)
-    for source in used[:: max(1, len(used) // (2 if WITHOUT_JIT else 5))]:
+    for source in used[:: max(1, len(used) // 5)]:
         watch(case, exact_by_unfolding, [source], [0.0])
 
 
@@ -80,6 +80,7 @@ def test_every_step_on_slivers(aspect):
     watch(case, exact_by_euclid, [8], [0.0])
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @pytest.mark.slice(2)
 @pytest.mark.parametrize("name", ["icosahedron", "crag", "bow_tie", "saddle_fan"])

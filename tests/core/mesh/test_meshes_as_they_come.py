@@ -360,6 +360,7 @@ def test_what_is_pinched_is_no_other_mesh_to_the_report():
     assert [line.closed for line in lines] == [False, False]
 
 
+@pytest.mark.jit
 def test_points_inside_three_sheets_upon_each_other():
     """The way from inside one sheet into another is over the nearest edge, in its mirror image."""
     corners = np.array([(0, 0, 0), (4, 0, 0), (1, 3, 0)])

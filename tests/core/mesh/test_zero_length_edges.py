@@ -51,6 +51,7 @@ def test_distances_are_those_without_them_to_the_bit(case):
             assert found.nearest_source.tobytes() == nearest.tobytes()
 
 
+@pytest.mark.jit
 @pytest.mark.slice(5)
 @zoo.each(ALL)
 def test_paths_are_those_without_them(case):

@@ -52,7 +52,7 @@ def test_among_holes_in_the_plane(name):
     case = zoo.SMALL[name]
     solver = solver_of(case)
     matrix = visibility.distance_matrix(case.vertices[:, :2], case.faces)
-    for source, target in random_pairs(solver.mesh, 8 if WITHOUT_JIT else 200):
+    for source, target in random_pairs(solver.mesh, 200):
         path = solver.shortest_path(source, target)
         assert path.length == pytest.approx(matrix[source, target], rel=1e-12, abs=0)
 
@@ -179,6 +179,7 @@ def test_between_the_corners_of_a_face(name):
         check_searches(solver, a, [b, c])
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @pytest.mark.slice(2)
 @pytest.mark.parametrize("name", ["crags_with_holes", "double_frame", "open_fan", "comb"])
@@ -189,8 +190,8 @@ def test_between_the_rims(name):
     edges, uses = np.unique(sides, axis=0, return_counts=True)
     rim = np.unique(edges[uses == 1])
     ends = rim if len(rim) else np.unique(case.faces)
-    for source in ends[:: 12 if WITHOUT_JIT else 4].tolist():
-        check_searches(solver, source, ends[:: 12 if WITHOUT_JIT else 3].tolist())
+    for source in ends[::4].tolist():
+        check_searches(solver, source, ends[::3].tolist())
 
 
 @pytest.mark.jit
@@ -262,10 +263,11 @@ def test_ends_may_be_surface_points():
 # What a solver keeps ----------------------------------------------------------------------------
 
 
+@pytest.mark.jit
 def test_a_solver_answers_as_a_new_one_does():
     """To the bit, whatever was asked before, landmarks or not."""
     solver = solver_of(zoo.SMALL["crumpled_torus"])
-    for source, target in random_pairs(solver.mesh, 10 if WITHOUT_JIT else 60):
+    for source, target in random_pairs(solver.mesh, 60):
         fresh = gc.shortest_path(solver.mesh, source, target)
         used = solver.shortest_path(source, target)
         assert used.points.tobytes() == fresh.points.tobytes()
