@@ -167,7 +167,7 @@ class Settings(BaseSettings):
     drain_s: Seconds = 20.0
     """Seconds that running requests get when the service is told to stop."""
     cancel_grace_s: Seconds = 2.0
-    """Seconds that a query gets to stop, before its worker is killed."""
+    """Seconds that work gets to stop, before its worker is killed."""
     auth: Literal["on", "off"] = "on"
     """`off` serves without keys on any address, for instance behind a proxy with its own."""
     api_keys: Annotated[tuple[ApiKey, ...], NoDecode, BeforeValidator(_keys)] = ()

@@ -18,7 +18,7 @@ from app.engine import worker
 from app.engine.interface import Load, ProgressCallback
 from app.engine.queue import FairQueue
 from app.engine.slot import Slot, WorkerLostError
-from app.engine.work import Outcome, Task, TaskResult, Work
+from app.engine.work import Outcome, Task, TaskResult
 from app.engine.worker import WorkerConfig
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.settings import Settings
@@ -168,7 +168,7 @@ class LocalEngine:
             result = outcome.result()
         except asyncio.CancelledError:
             self._cancelled += 1
-            self._spawn(self._stop_work(slot, outcome, task.work))
+            self._spawn(self._stop_work(slot, outcome))
             raise
         except WorkerLostError:
             slot.retire()
@@ -176,11 +176,14 @@ class LocalEngine:
         self._release(slot)
         return result
 
-    async def _stop_work(self, slot: Slot, outcome: "asyncio.Future[Outcome]", work: Work) -> None:
-        """Stop work that nobody waits for: ask first, and kill the worker if that fails."""
+    async def _stop_work(self, slot: Slot, outcome: "asyncio.Future[Outcome]") -> None:
+        """Stop work that nobody waits for: ask first, and kill the worker if that fails.
+
+        A worker takes a second or two to replace, and the work that is not asked, such as reading
+        a small file, mostly ends sooner.
+        """
         slot.ask_to_stop()
-        grace = self._settings.cancel_grace_s if work.stops_when_asked else 0
-        await asyncio.wait({outcome}, timeout=grace)
+        await asyncio.wait({outcome}, timeout=self._settings.cancel_grace_s)
         if outcome.done() and outcome.exception() is None:
             self._release(slot)
         else:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from app.encoding import Representation
 from app.errors import Problem
@@ -45,8 +45,6 @@ class StoreMesh:
     mesh_input: MeshInput
     folder: Path
 
-    stops_when_asked: ClassVar[bool] = False
-
 
 @dataclass(frozen=True)
 class RunQuery:
@@ -56,8 +54,6 @@ class RunQuery:
     representation: Representation
     result_name: str
 
-    stops_when_asked: ClassVar[bool] = True
-
 
 @dataclass(frozen=True)
 class EstimateQuery:
@@ -65,8 +61,6 @@ class EstimateQuery:
 
     query: Query[Any]
     representation: Representation
-
-    stops_when_asked: ClassVar[bool] = True
 
 
 Work = StoreMesh | RunQuery | EstimateQuery

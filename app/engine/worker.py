@@ -138,7 +138,7 @@ class Worker:
 
         match work:
             case StoreMesh():
-                return self._store(work, clock)
+                return self._store(work, clock, is_cancelled)
             case RunQuery():
                 try:
                     return self._answer(work, clock, is_cancelled)
@@ -149,11 +149,16 @@ class Worker:
             case EstimateQuery():
                 return self._estimate(work, clock, is_cancelled)
 
-    def _store(self, work: StoreMesh, clock: "Clock") -> TaskResult:
-        with clock.phase("load"):
-            mesh = _make_mesh(work.mesh_input, self.settings.max_faces)
-        with clock.phase("store"):
-            written = self.store.write_aside(mesh, work.folder, work.mesh_input.owner)
+    def _store(self, work: StoreMesh, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
+        try:
+            with clock.phase("load"):
+                mesh = _make_mesh(work.mesh_input, self.settings.max_faces)
+            with clock.phase("store"):
+                written = self.store.write_aside(mesh, work.folder, work.mesh_input.owner)
+        except FileNotFoundError:
+            if cancel():  # then the upload and the scratch folder are removed
+                raise gc.errors.Cancelled from None
+            raise
         return TaskResult(clock.seconds, clock.periods, mesh=written)
 
     def _answer(self, work: RunQuery, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:

@@ -157,14 +157,18 @@ class Service:
             self.time_limit(context.deadline_s),
         ):
             task = Task(StoreMesh(mesh_input, scratch / "mesh"), context.caller.name)
-            done = await self.engine.run(task, ignore_progress)
-            assert done.mesh is not None, "this kind of work writes a mesh"  # noqa: S101
-            change = await self.mesh_catalog.add(done.mesh)
+            while True:
+                done = await self.engine.run(task, ignore_progress)
+                written = done.mesh
+                assert written is not None, "this kind of work writes a mesh"  # noqa: S101
+                change = await self.mesh_catalog.add(written)
+                if change is not None:
+                    break
         for mesh_id in change.evicted:
             await self._forget(mesh_id)
         if change.is_healed:
-            await self._forget(done.mesh.mesh_id)
-        return StoredMesh(done.mesh.manifest, change.is_new, done.seconds)
+            await self._forget(written.mesh_id)
+        return StoredMesh(written.manifest, change.is_new, done.seconds)
 
     def manifest(self, mesh_id: str) -> Manifest:
         """Return the manifest of a mesh, and mark the mesh as used."""

@@ -110,10 +110,11 @@ class MeshCatalog:
                 gone = folder
             await asyncio.to_thread(_remove, gone)
 
-    async def add(self, written: WrittenMesh) -> CatalogChange:
+    async def add(self, written: WrittenMesh) -> CatalogChange | None:
         """Move a mesh from its scratch folder into the store; if it is there, mark it as used.
 
-        The files of one that is there and damaged are replaced.
+        The files of one that is there and damaged are replaced. None means that the mesh was in
+        the store when it was to be written, and has been removed since: write it again.
 
         Raises
         ------
@@ -122,11 +123,12 @@ class MeshCatalog:
         """
         mesh_id = written.mesh_id
         if written.folder is None:
-            self.use(mesh_id)
-            return CatalogChange(is_new=False)
+            return self._use_again(mesh_id)
         await asyncio.to_thread(sync_all, written.folder)
         if await asyncio.to_thread(self._store.is_intact, mesh_id):  # another upload was faster
-            return CatalogChange(is_new=False)
+            change = self._use_again(mesh_id)
+            if change is not None:
+                return change
         is_new, place = mesh_id not in self._entries, self._store.folder / mesh_id
         entry = _Entry(written.size, written.manifest["owner"])
         if is_new:  # one that is healed has its room already
@@ -150,6 +152,11 @@ class MeshCatalog:
             await asyncio.to_thread(_remove, *gone)
         self.evictions += len(evicted)
         return CatalogChange(is_new, is_healed=not is_new, evicted=evicted)
+
+    def _use_again(self, mesh_id: str) -> CatalogChange | None:
+        """Mark a mesh that was in the store as used; None if it has been removed since."""
+        self.use(mesh_id)
+        return CatalogChange(is_new=False) if mesh_id in self._entries else None
 
     async def delete(self, mesh_id: str) -> None:
         """Remove a mesh at once; processes that have it open can go on reading it."""

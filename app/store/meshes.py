@@ -20,7 +20,7 @@ import re
 import zlib
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from io import BytesIO
@@ -113,8 +113,9 @@ class MeshStore:
         """
         arrays = mesh.arrays()
         mesh_id = content_hash(arrays)
-        if self.is_intact(mesh_id):
-            return WrittenMesh(self.manifest(mesh_id), folder=None)
+        with suppress(ProblemError):  # removed since it was read
+            if self.is_intact(mesh_id):
+                return WrittenMesh(self.manifest(mesh_id), folder=None)
         folder.mkdir()
         manifest = {
             "id": mesh_id,
@@ -184,24 +185,36 @@ class MeshStore:
     def inspect(self, mesh_id: str) -> Iterator[ProblemError | None]:
         """Read each file of a mesh as it is now, and yield its damage; None where it is intact.
 
-        Raises ``ProblemError`` where there is no such mesh.
+        Ends early where the mesh is removed meanwhile. Raises ``ProblemError`` where there is no
+        such mesh.
         """
-        try:
-            checksums = self._manifest(mesh_id, read_manifest)["crc32"]
-        except ProblemError as error:
-            if error.problem.code != "mesh_damaged":
+        folder = self._folder(mesh_id)
+        with _watched(folder) as was_removed:
+            try:
+                checksums = self._manifest(mesh_id, read_manifest)["crc32"]
+            except ProblemError as error:
+                if error.problem.code != "mesh_damaged":
+                    raise
+                if not was_removed():
+                    yield error
+                return
+            is_intact = True
+            for name, checksum in checksums.items():
+                if read_checksum(f"{folder}/{name}.npy") == checksum:
+                    yield None
+                elif was_removed():
+                    return
+                else:
+                    is_intact = False
+                    yield _damaged(mesh_id, f"its array {name} is not what was written")
+            if not is_intact:
+                return
+            try:
+                arrays = {name: _open_array(folder / f"{name}.npy") for name in checksums}
+            except FileNotFoundError:
+                if was_removed():
+                    return
                 raise
-            yield error
-            return
-        folder, is_intact = self._folder(mesh_id), True
-        for name, checksum in checksums.items():
-            if read_checksum(f"{folder}/{name}.npy") == checksum:
-                yield None
-            else:
-                is_intact = False
-                yield _damaged(mesh_id, f"its array {name} is not what was written")
-        if is_intact:
-            arrays = {name: _open_array(folder / f"{name}.npy") for name in checksums}
             is_named = content_hash(arrays) == mesh_id
             yield None if is_named else _damaged(mesh_id, "its name is not that of its content")
 
@@ -250,9 +263,11 @@ class MeshStore:
 
     def sizes(self) -> dict[str, int]:
         """Return the bytes of each mesh on disk, the least recently used first."""
-        folders = [entry for entry in self.folder.glob("*") if entry.is_dir()]
-        folders.sort(key=lambda folder: order_of_use(folder.stat()))
-        return {folder.name: _bytes_in(folder) for folder in folders}
+        found = []
+        for folder in self.folder.glob("*"):
+            with suppress(FileNotFoundError, NotADirectoryError):  # removed meanwhile, or no mesh
+                found.append((order_of_use(folder.stat()), folder.name, _bytes_in(folder)))
+        return {name: size for _, name, size in sorted(found)}
 
     def last_used(self, mesh_id: str) -> datetime:
         """Return the time of a mesh's last use."""
@@ -287,6 +302,28 @@ def content_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
             digest.update(f"{name}{array.dtype.str}{array.shape}".encode())
             digest.update(array.data.cast("B") if array.size else b"")
     return digest.hexdigest()
+
+
+@contextmanager
+def _watched(folder: Path) -> Iterator[Callable[[], bool]]:
+    """Lend a function that tells whether ``folder`` was removed, even if it is there again."""
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except FileNotFoundError:
+        raise mesh_not_found(folder.name) from None
+    # While it is open, no new folder gets its inode.
+    watched = os.fstat(descriptor)
+
+    def was_removed() -> bool:
+        try:
+            return not os.path.samestat(watched, folder.stat())
+        except FileNotFoundError:
+            return True
+
+    try:
+        yield was_removed
+    finally:
+        os.close(descriptor)
 
 
 def _write_array(path: Path, array: NDArray[Any]) -> int:

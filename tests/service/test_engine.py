@@ -256,19 +256,21 @@ def test_a_deadline_counts_in_the_queue(
         assert two.load.waiting == 0
 
 
-def test_reading_a_mesh_is_killed_at_its_deadline(two: ServiceClient, small: str) -> None:
-    before, lost = two.workers(), two.load.lost
+def test_a_mesh_read_past_its_deadline_costs_no_worker(two: ServiceClient, small: str) -> None:
+    before, stored = two.workers(), two.get("/v1/meshes").json()
 
-    response = two.post(
-        "/v1/meshes",
-        params={"sample": "sphere", "faces": 2_000_000},
-        headers={"X-Timeout-Ms": "200"},
-    )
+    for faces, timeout in (*((20, each) for each in range(1, 9)), (200_000, 20)):
+        sample = {"sample": "sphere", "faces": faces}
+        response = two.post("/v1/meshes", params=sample, headers={"X-Timeout-Ms": str(timeout)})
+        if response.status_code == 201:
+            assert faces == 20, "it takes longer"
+            two.delete(f"/v1/meshes/{response.json()['id']}")
+        else:
+            check_problem(response, 504, "deadline_exceeded")
 
-    check_problem(response, 504, "deadline_exceeded")
-    wait_until(lambda: two.load.lost == lost + 1)
     two.wait_until_idle()
-    assert len(two.workers() & before) == 2
+    assert two.workers() == before
+    assert two.get("/v1/meshes").json() == stored
     assert ask(two, small).status_code == 200
 
 
@@ -455,7 +457,7 @@ def test_the_server_s_own_deadline_names_its_setting(tmp_path: Path) -> None:
     assert (problem["limit"], problem["setting"]) == (0.2, "GEODESIC_DEADLINE_S")
 
 
-def test_a_query_that_does_not_stop_is_killed(tmp_path: Path) -> None:
+def test_work_that_does_not_stop_is_killed(tmp_path: Path) -> None:
     with serving(tmp_path, cancel_grace_s=1e-6) as client:
         mesh_id = upload_sample(client, "plane", 50)
         client.wait_until_idle()
@@ -469,6 +471,13 @@ def test_a_query_that_does_not_stop_is_killed(tmp_path: Path) -> None:
         client.wait_until_idle()
         assert len(client.workers() - before) == 1
         assert ask(client, mesh_id).status_code == 200
+
+        with stopped(client.workers()):
+            sample = {"sample": "plane", "faces": 8}
+            headers = {"X-Timeout-Ms": "100"}
+            response = client.post("/v1/meshes", params=sample, headers=headers)
+            check_problem(response, 504, "deadline_exceeded")
+            wait_until(lambda: client.load.lost == 2)
 
 
 def test_workers_that_cannot_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

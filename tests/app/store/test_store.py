@@ -29,7 +29,7 @@ from app.jobs import require_intact
 from app.store import mesh_catalog, ownership
 from app.store.layout import LAYOUT, StoreError, require_layout
 from app.store.mesh_catalog import CatalogChange, MeshCatalog
-from app.store.meshes import MeshStore
+from app.store.meshes import MeshStore, WrittenMesh
 from app.store.ownership import owned
 from tests.support.disks import fill_disk
 from tests.support.paths import ROOT
@@ -247,7 +247,9 @@ def add(
     async def run() -> tuple[str, CatalogChange]:
         async with catalog.scratch_folder() as folder:
             written = store.write_aside(mesh, folder / "mesh", owner)
-            return written.mesh_id, await catalog.add(written)
+            change = await catalog.add(written)
+            assert change is not None
+            return written.mesh_id, change
 
     return anyio.run(run)
 
@@ -487,6 +489,48 @@ def test_over_http(tmp_path: Path) -> None:
         assert len(list((store / "results" / first).glob("*.body"))) == 1
         total = client.app.state.service.mesh_catalog.total
         assert total == sum(MeshStore(store).sizes().values()) <= room
+
+
+def test_a_mesh_removed_while_it_is_inspected_is_not_damaged(tmp_path: Path) -> None:
+    with opened(tmp_path / "store") as store:
+        for comes_back in (False, True):
+            mesh_id, _ = add(store, plane(50))
+            findings = store[0].inspect(mesh_id)
+            assert next(findings) is None
+            anyio.run(store[1].delete, mesh_id)
+            if comes_back:
+                add(store, plane(50))
+            assert not any(findings)
+        assert not any(store[0].inspect(mesh_id))
+
+
+def test_a_mesh_removed_before_it_is_found_again_is_written_anew(tmp_path: Path) -> None:
+    with opened(tmp_path / "store") as store:
+        mesh_id, _ = add(store, plane(50))
+        found = store[0].write_aside(plane(50), tmp_path / "aside", None)
+        assert found.folder is None
+        anyio.run(store[1].delete, mesh_id)
+        assert anyio.run(store[1].add, found) is None
+
+
+@pytest.mark.service
+def test_a_mesh_evicted_while_it_is_uploaded_again_is_there_afterwards(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    add_to_catalog, lost = MeshCatalog.add, []
+
+    async def add_late(catalog: MeshCatalog, written: WrittenMesh) -> CatalogChange | None:
+        if written.folder is None and not lost:
+            lost.append(written.mesh_id)
+            await catalog.delete(written.mesh_id)
+        return await add_to_catalog(catalog, written)
+
+    with serving(tmp_path / "store") as client:
+        mesh_id = upload_sample(client, "plane", 50)
+        monkeypatch.setattr(MeshCatalog, "add", add_late)
+        assert upload_sample(client, "plane", 50) == mesh_id
+        assert lost == [mesh_id]
+        assert distances(client, mesh_id).status_code == 200
 
 
 @pytest.mark.service
