@@ -24,7 +24,7 @@ EXAMPLES = {"quick": 4, "slice": 15, "full": 2000, "interpreted": 4}
 
 QUICK_SLICE = 2
 CASES_WITHOUT_JIT = 1
-"""Of any test: one reaches nearly every line."""
+"""Cases of each test; one reaches nearly every line."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -179,8 +179,8 @@ class LocalEngine:
     async def _stop_work(self, slot: Slot, outcome: "asyncio.Future[Outcome]") -> None:
         """Stop work that nobody waits for: ask first, and kill the worker if that fails.
 
-        A worker takes a second or two to replace, and the work that is not asked, such as reading
-        a small file, mostly ends sooner.
+        The reading of a mesh cannot be stopped, but mostly ends in time. A new worker takes a
+        second or two to start.
         """
         slot.ask_to_stop()
         await asyncio.wait({outcome}, timeout=self._settings.cancel_grace_s)

@@ -188,35 +188,37 @@ class MeshStore:
         Ends early where the mesh is removed meanwhile. Raises ``ProblemError`` where there is no
         such mesh.
         """
-        folder = self._folder(mesh_id)
-        with _watched(folder) as was_removed:
-            try:
-                checksums = self._manifest(mesh_id, read_manifest)["crc32"]
-            except ProblemError as error:
-                if error.problem.code != "mesh_damaged":
-                    raise
-                if not was_removed():
-                    yield error
-                return
-            is_intact = True
-            for name, checksum in checksums.items():
-                if read_checksum(f"{folder}/{name}.npy") == checksum:
-                    yield None
-                elif was_removed():
+        with _watched(self._folder(mesh_id)) as was_removed:
+            for error in self._findings(mesh_id):
+                if error is not None and was_removed():
                     return
-                else:
-                    is_intact = False
-                    yield _damaged(mesh_id, f"its array {name} is not what was written")
-            if not is_intact:
-                return
-            try:
-                arrays = {name: _open_array(folder / f"{name}.npy") for name in checksums}
-            except FileNotFoundError:
-                if was_removed():
-                    return
+                yield error
+
+    def _findings(self, mesh_id: str) -> Iterator[ProblemError | None]:
+        """Yield what `inspect` does; files that were removed count as damaged."""
+        try:
+            checksums = self._manifest(mesh_id, read_manifest)["crc32"]
+        except ProblemError as error:
+            if error.problem.code != "mesh_damaged":
                 raise
-            is_named = content_hash(arrays) == mesh_id
-            yield None if is_named else _damaged(mesh_id, "its name is not that of its content")
+            yield error
+            return
+        folder, is_intact = self._path(mesh_id), True
+        for name, checksum in checksums.items():
+            if read_checksum(f"{folder}/{name}.npy") == checksum:
+                yield None
+            else:
+                is_intact = False
+                yield _damaged(mesh_id, f"its array {name} is not what was written")
+        if not is_intact:
+            return
+        try:
+            arrays = {name: _open_array(Path(folder) / f"{name}.npy") for name in checksums}
+        except FileNotFoundError:
+            yield _damaged(mesh_id, "an array is missing")
+            return
+        is_named = content_hash(arrays) == mesh_id
+        yield None if is_named else _damaged(mesh_id, "its name is not that of its content")
 
     def is_intact(self, mesh_id: str) -> bool:
         """Read the files of a mesh; tell whether it is in the store and all are as written."""
@@ -306,7 +308,7 @@ def content_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
 
 @contextmanager
 def _watched(folder: Path) -> Iterator[Callable[[], bool]]:
-    """Lend a function that tells whether ``folder`` was removed, even if it is there again."""
+    """Yield a function that tells whether ``folder`` was removed, even if there is a new one."""
     try:
         descriptor = os.open(folder, os.O_RDONLY)
     except FileNotFoundError:

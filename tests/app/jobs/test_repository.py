@@ -10,25 +10,11 @@ from pathlib import Path
 import anyio
 import pytest
 
-from app.jobs.job import Job, JobSpec
 from app.jobs.sqlite_repository import SqliteJobRepository
 from tests.support.disks import run_on_own_disk
-
-SPEC = JobSpec(
-    owner=None,
-    kind="distances",
-    mesh_id="0" * 32,
-    media_type="application/json",
-    fingerprint="",
-    idempotency_key=None,
-    request_id="",
-)
+from tests.support.jobs import new_job
 
 QUERY = b'{"sources":[{"vertex":0}]}'
-
-
-def new_job(owner: str | None = None) -> Job:
-    return Job(spec=SPEC.model_copy(update={"owner": owner}))
 
 
 def test_the_jobs_of_an_owner_are_counted_in_every_state(tmp_path: Path) -> None:

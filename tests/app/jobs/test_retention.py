@@ -5,9 +5,10 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from app.jobs import retention
-from app.jobs.job import Job, JobSpec
+from app.jobs.job import Job
 from app.jobs.retention import Retention
 from tests.support.clocks import TEN_YEARS, Calendar, Clock
+from tests.support.jobs import new_job
 
 HOUR_S = 3600.0
 
@@ -28,15 +29,7 @@ def calendar(monkeypatch: pytest.MonkeyPatch) -> Calendar:
 
 
 def finished_job(owner: str | None = None) -> Job:
-    spec = JobSpec(
-        owner=owner,
-        kind="distances",
-        mesh_id="0" * 32,
-        media_type="application/json",
-        fingerprint="",
-        request_id="",
-    )
-    return Job(spec=spec).running(0.0).successful("a result")
+    return new_job(owner).running(0.0).successful("a result")
 
 
 def ids_due(jobs: Retention) -> list[str]:

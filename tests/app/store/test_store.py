@@ -504,7 +504,7 @@ def test_a_mesh_removed_while_it_is_inspected_is_not_damaged(tmp_path: Path) -> 
         assert not any(store[0].inspect(mesh_id))
 
 
-def test_a_mesh_removed_before_it_is_found_again_is_written_anew(tmp_path: Path) -> None:
+def test_a_mesh_removed_before_its_upload_ends_is_to_be_written_again(tmp_path: Path) -> None:
     with opened(tmp_path / "store") as store:
         mesh_id, _ = add(store, plane(50))
         found = store[0].write_aside(plane(50), tmp_path / "aside", None)
