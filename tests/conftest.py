@@ -64,12 +64,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(marker)
         if WITHOUT_JIT and item.get_closest_marker("jit"):
             item.add_marker(pytest.mark.skip(reason="kernels run in pure Python"))
-    items.sort(key=lambda item: item.path.name != "test_page.py")  # the longest goes first
+    items.sort(key=_turn)
     if not config.option.full:
         _deselect(config, items, FULL_ONLY)
         _deselect_beyond_slices(config, items)
     if config.option.quick:
         _deselect(config, items, NOT_QUICK)
+
+
+def _turn(item: pytest.Item) -> tuple[bool, bool, bool]:
+    """Return when an item runs: the longest file first, then what waits for browsers and services.
+
+    What computes goes last: processors would idle if only waiting were left.
+    """
+    folder = item.path.parent.name
+    return item.path.name != "test_page.py", folder != "page", folder != "service"
 
 
 def _deselect(config: pytest.Config, items: list[pytest.Item], markers: tuple[str, ...]) -> None:

@@ -38,6 +38,7 @@ def with_middles(line):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.jit
 def test_stadiums_around_a_segment(seed):
     rng = np.random.default_rng(seed)
     points, faces = zoo.grid(8, 8, seed=seed, jitter=0.2)

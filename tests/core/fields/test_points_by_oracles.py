@@ -107,6 +107,7 @@ def test_boxes(size):
 @pytest.mark.parametrize(
     ("sides", "heights"), [(5, np.linspace(0, 9, 4)), (12, [0, 1e-3, 0.5, 0.502, 1.0])]
 )
+@pytest.mark.jit
 def test_prisms(sides, heights):
     vertices, faces, chart, girth = zoo.prism(sides, heights)
     mesh = gc.TriangleMesh(vertices, faces)

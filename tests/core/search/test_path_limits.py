@@ -35,6 +35,7 @@ def test_the_limit_divides_paths_as_the_full_sweep_does(case):
 
 @pytest.mark.slice(4)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
+@pytest.mark.jit
 def test_all_questions_agree_on_what_is_within_a_limit(case):
     """Also where the limit is the next number below the distance, or above it."""
     solver = solver_of(case)
@@ -115,6 +116,7 @@ def test_points_in_faces():
             solver.shortest_path(source, target, max_distance=distance * (1 - NEAR))
 
 
+@pytest.mark.jit
 def test_the_limit_is_that_of_the_whole_path():
     solver = solver_of(zoo.SMALL["crags"])
     stops = [3, 30, 30, 8, 50]

@@ -62,6 +62,7 @@ def test_steps_of_a_leg_on_larger_meshes(name):
             check_steps(solver.mesh, solver.shortest_path(source, target, explain=True))
 
 
+@pytest.mark.jit
 def test_without_explain_there_are_no_steps_and_the_same_path():
     for source, target in random_pairs(solver_of(zoo.SMALL["crags"]).mesh, 5):
         plain, told = (solver_of(zoo.SMALL["crags"]) for _ in range(2))
