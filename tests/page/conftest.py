@@ -12,11 +12,12 @@ from typing import NoReturn
 import httpx2
 import pytest
 from filelock import FileLock
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from tests.support.paths import ROOT
 from tests.support.processes import Server
 from tests.support.viewing import View
+from tests.support.waiting import LONG_S
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = [
@@ -57,6 +58,7 @@ def browser(_built: None) -> Iterator[Browser]:
     if executable is None:
         miss(f"install one of these browsers to run this: {', '.join(BROWSERS)}")
     with sync_playwright() as playwright:
+        expect.set_options(timeout=1000 * LONG_S)
         browser = playwright.chromium.launch(executable_path=executable, args=FLAGS)
         yield browser
         browser.close()
@@ -82,7 +84,7 @@ def serving(store: Path, **settings: str) -> Iterator[str]:
 def sample(service: str, name: str, faces: int, **headers: str) -> str:
     """Have a sample made, and give its id."""
     parameters = {"sample": name, "faces": faces}
-    answer = httpx2.post(f"{service}/v1/meshes", params=parameters, headers=headers, timeout=120)
+    answer = httpx2.post(f"{service}/v1/meshes", params=parameters, headers=headers, timeout=LONG_S)
     return str(answer.json()["id"])
 
 
@@ -117,6 +119,7 @@ def view(browser: Browser, service: str) -> Iterator[View]:
     context = browser.new_context(
         viewport={"width": 1100, "height": 700}, has_touch=True, base_url=service
     )
+    context.set_default_timeout(1000 * LONG_S)
     context.grant_permissions(["clipboard-read", "clipboard-write"])
     page: Page = context.new_page()
     view = View(page)

@@ -32,7 +32,7 @@ class View:
         """Wait until the page is in a state, for so long that it is there to stay."""
         there = self.page.locator(f"html[data-state={state}]")
         while True:
-            there.wait_for(timeout=90_000)
+            there.wait_for()
             self.page.wait_for_timeout(50)
             if there.count():
                 return
