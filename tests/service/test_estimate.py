@@ -142,21 +142,27 @@ STATEFUL = [name for name, (operation, *_) in QUERIES.items() if operation != "l
 ALLOCATED = [name for name in STATEFUL if QUERIES[name][0] != "paths"]
 
 
+def allocated_by(query: Query[Any], opened: OpenMesh) -> int:
+    """Return the bytes that are allocated at most, by all threads, while a query is answered."""
+    tracemalloc.start()
+    try:
+        query.answer(opened, context())
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
 @pytest.mark.slice(6)
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("name", ALLOCATED)
 def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mesh: str) -> None:
     surface, query = stored_mesh(client, ids[mesh]), query_of(name)
-    unmeasured, opened = (OpenMesh(("", b""), gc.Solver(surface), []) for _ in range(2))
-    query.answer(unmeasured, context())  # loads kernels, whose memory is not the answer's
-    estimated = estimate(query, Representation(JSON), opened, lambda: False)
-    tracemalloc.start()
-    try:
-        query.answer(opened, context())
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
+    new_mesh = lambda: OpenMesh(("", b""), gc.Solver(surface), [])  # noqa: E731
+    query.answer(new_mesh(), context())  # loads kernels, whose memory is not the answer's
+    estimated = estimate(query, Representation(JSON), new_mesh(), lambda: False)
 
+    # Threads of the service allocate too, now and then: not three times in a row.
+    peak = min(allocated_by(query, new_mesh()) for _ in range(3))
     assert 1 / 3 <= estimated.memory_bytes / peak <= 3
 
 
