@@ -17,6 +17,7 @@ pytest_plugins = ["tests.support.logs", "tests.support.service"]
 WITHOUT_JIT = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
 MARKER_OF_FOLDER = {"service": "service", "page": "page"}
+LONGEST = ("test_page.py", "test_process.py")
 NOT_QUICK = ("service", "page", "slow")
 FULL_ONLY = ("full",)
 EXAMPLES = {"quick": 4, "slice": 15, "full": 2000, "interpreted": 4}
@@ -64,7 +65,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
             item.add_marker(marker)
         if WITHOUT_JIT and item.get_closest_marker("jit"):
             item.add_marker(pytest.mark.skip(reason="kernels run in pure Python"))
-    items.sort(key=_turn)
+    _mix(items)
     if not config.option.full:
         _deselect(config, items, FULL_ONLY)
         _deselect_beyond_slices(config, items)
@@ -72,13 +73,25 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         _deselect(config, items, NOT_QUICK)
 
 
-def _turn(item: pytest.Item) -> tuple[bool, bool, bool]:
-    """Return when an item runs: the longest file first, then what waits for browsers and services.
+def _mix(items: list[pytest.Item]) -> None:
+    """Spread the files that wait, for services and browsers, evenly among those that compute.
 
-    What computes goes last: processors would idle if only waiting were left.
+    Processors idle where all wait, and each test takes long where all compute. The longest go first.
     """
-    folder = item.path.parent.name
-    return item.path.name != "test_page.py", folder != "page", folder != "service"
+    waiting, computing = (
+        list(dict.fromkeys(item.path for item in items if _waits(item) == waits))
+        for waits in (True, False)
+    )
+    place = {
+        path: number / len(paths)
+        for paths in (waiting, computing)
+        for number, path in enumerate(paths)
+    }
+    items.sort(key=lambda item: (item.path.name not in LONGEST, place[item.path], item.path))
+
+
+def _waits(item: pytest.Item) -> bool:
+    return item.path.parent.name in MARKER_OF_FOLDER
 
 
 def _deselect(config: pytest.Config, items: list[pytest.Item], markers: tuple[str, ...]) -> None:
