@@ -76,7 +76,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 def _mix(items: list[pytest.Item]) -> None:
     """Spread the files that wait, for services and browsers, evenly among those that compute.
 
-    Processors idle where all wait, and each test takes long where all compute. The longest go first.
+    Processors idle where all wait, and tests take long where all compute. The longest go first.
     """
     waiting, computing = (
         list(dict.fromkeys(item.path for item in items if _waits(item) == waits))
