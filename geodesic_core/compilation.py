@@ -89,7 +89,8 @@ def compile_kernels(
         Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
         ``"approximate-curves"`` and ``"isolines"``; None for all.
     cancel
-        Called ten times a second; compilation ends once it returns True.
+        Called before the first compilation and then ten times a second; all ends once it returns
+        True. Where nothing is missing it is not called.
 
     Raises
     ------
@@ -114,14 +115,14 @@ def compile_kernels(
     if getattr(sys, "frozen", False):  # an application without an interpreter to start
         run_shared(waiting)
         return
+    _stop_if_asked(cancel)
     running: list[subprocess.Popen[bytes]] = []
     try:
         with progress.shown(cache.folder_for(machine.best_target())):
             running += [_start(waiting) for _ in range(min(available_cores(), len(waiting)))]
             while running:
                 time.sleep(_POLL_S)
-                if cancel is not None and cancel():
-                    raise Cancelled
+                _stop_if_asked(cancel)
                 for process in [each for each in running if each.poll() is not None]:
                     running.remove(process)
                     if process.returncode:
@@ -130,6 +131,11 @@ def compile_kernels(
         for process in running:
             process.terminate()
             process.wait()
+
+
+def _stop_if_asked(cancel: Callable[[], bool] | None) -> None:
+    if cancel is not None and cancel():
+        raise Cancelled
 
 
 def warm_up(workloads: Sequence[str] | None = None) -> None:

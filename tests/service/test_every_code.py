@@ -1,5 +1,6 @@
 """Every code of the error table, met by a client of a service that runs."""
 
+import asyncio
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ import pytest
 from starlette.routing import compile_path
 from starlette.testclient import TestClient
 
+from app.engine.slot import Slot
 from app.errors import CODES
 from app.main import create_app
 from app.settings import Settings
@@ -170,7 +172,12 @@ def no_disk(site: Site) -> Any:
     return site.client.post("/v1/meshes", json=TWO_TRIANGLES)
 
 
+async def never_open(_slot: Slot) -> None:
+    await asyncio.Event().wait()
+
+
 def not_started(site: Site) -> Any:
+    site.patch.setattr(Slot, "open", never_open)
     with TestClient(create_app(Settings(store=site.store / "other", workers=1))) as client:
         return client.get("/readyz")
 

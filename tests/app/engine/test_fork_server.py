@@ -5,7 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from app.engine.fork_server import LATE
+import geodesic_core as gc
+from app.engine.fork_server import PRELOADED
+from app.engine.worker import FIRST_KERNELS
 from tests.support.fresh import told_by
 from tests.support.paths import ROOT
 
@@ -26,5 +28,24 @@ def late_imports(path: Path) -> set[str]:
 def test_workers_find_loaded_what_is_imported_late() -> None:
     wanted = {name for room in WORK for path in room.rglob("*.py") for name in late_imports(path)}
     assert {"igl", "scipy.sparse"} < wanted
-    modules = ", ".join(["app.engine.worker", *LATE])
+    modules = ", ".join(PRELOADED)
     assert told_by(f"import sys, {modules}; print({wanted!r} - set(sys.modules))") == "set()\n"
+
+
+COUNT_LOADED = f"""
+from geodesic_core.kernels.jit.cache import StoredKernel
+load, loaded = StoredKernel.load, []
+StoredKernel.load = lambda self, context: loaded.append(self) or load(self, context)
+
+import {", ".join(PRELOADED)}
+print(len(loaded) > 0)
+loaded.clear()
+app.engine.worker.gc.warm_up(app.engine.worker.FIRST_KERNELS)
+print(len(loaded))
+"""
+
+
+@pytest.mark.slow
+def test_workers_find_their_first_kernels_loaded() -> None:
+    gc.compile_kernels(FIRST_KERNELS)
+    assert told_by(COUNT_LOADED) == "True\n0\n"
