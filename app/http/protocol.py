@@ -42,6 +42,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         self._head_bytes = 0
         self._unparsed_bytes = 0  # received since the parser reported an element
         self._chunks = self._body_bytes = 0
+        self._body: list[bytes] = []  # received and not passed on yet
         self._head_timer: TimerHandle | None = None
         self._stall_timer: TimerHandle | None = None
 
@@ -75,6 +76,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         super().data_received(data)
         if self._is_refused:
             return
+        self._pass_body_on()
         # The parser holds back an element until it is complete.
         if self._unparsed_bytes > MOST_HEAD_BYTES:
             self._refuse(_head_too_large())
@@ -119,10 +121,20 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         super().on_headers_complete()
 
     def on_body(self, body: bytes) -> None:
-        """Pass on a part of the body."""
+        """Take a part of the body. uvicorn copies all before it, so small parts are joined first."""
         self._unparsed_bytes = 0
         self._body_bytes += len(body)
-        super().on_body(body)
+        self._body.append(body)
+
+    def on_message_complete(self) -> None:
+        """End a request."""
+        self._pass_body_on()
+        super().on_message_complete()
+
+    def _pass_body_on(self) -> None:
+        if self._body:
+            super().on_body(b"".join(self._body))
+            self._body.clear()
 
     def on_chunk_header(self) -> None:
         """Begin a chunk of the body, unless those before it were too small."""
