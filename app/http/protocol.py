@@ -14,6 +14,8 @@ from app.http.responses import common_headers, problem_response
 
 MOST_HEAD_BYTES = 32 * 1024
 """Largest request line and headers together; trailers count as well."""
+BYTES_BESIDE_HEADER = 32
+"""Counted for each header beside its name and value, as in HTTP/2: short ones take as long."""
 MOST_PIPELINED = 16
 """Requests of one connection that may wait for the answer to the one before."""
 HEAD_S = 10.0
@@ -110,7 +112,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
 
     def on_header(self, name: bytes, value: bytes) -> None:
         """Take a header."""
-        self._count(len(name) + len(b": \r\n") + len(value))
+        self._count(len(name) + len(value) + BYTES_BESIDE_HEADER)
         super().on_header(name, value)
 
     def on_headers_complete(self) -> None:
@@ -121,7 +123,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         super().on_headers_complete()
 
     def on_body(self, body: bytes) -> None:
-        """Take a part of the body. uvicorn copies all before it, so small parts are joined first."""
+        """Take a part of the body; small ones are joined, as uvicorn copies all before each."""
         self._unparsed_bytes = 0
         self._body_bytes += len(body)
         self._body.append(body)

@@ -10,7 +10,13 @@ import pytest
 from structlog.testing import capture_logs
 
 from app.http import connections, protocol
-from app.http.protocol import FREE_CHUNKS, LEAST_CHUNK, MOST_HEAD_BYTES, MOST_PIPELINED
+from app.http.protocol import (
+    BYTES_BESIDE_HEADER,
+    FREE_CHUNKS,
+    LEAST_CHUNK,
+    MOST_HEAD_BYTES,
+    MOST_PIPELINED,
+)
 from app.settings import Settings
 from tests.support.listening import Listener, listening, read_answer
 from tests.support.service import check_problem
@@ -94,7 +100,8 @@ def test_bytes_without_meaning_are_refused(listener: Listener, data: bytes) -> N
 
 @pytest.mark.parametrize("step", [1, 1000, MOST_HEAD_BYTES])
 def test_the_largest_head_is_served_and_one_byte_more_is_not(listener: Listener, step: int) -> None:
-    rest = MOST_HEAD_BYTES - len("/?answer") - len("Host: localhost\r\n") - len("X: \r\n")
+    headers = len("Hostlocalhost") + len("X") + 2 * BYTES_BESIDE_HEADER
+    rest = MOST_HEAD_BYTES - len("/?answer") - headers
     for excess, status in ((0, 200), (1, 431)):
         head = START + b"X: " + b"a" * (rest + excess) + b"\r\n\r\n"
         with listener.connect() as connection:
@@ -102,6 +109,12 @@ def test_the_largest_head_is_served_and_one_byte_more_is_not(listener: Listener,
             for begin in range(0, len(head), step):
                 connection.sendall(head[begin : begin + step])
             assert read_answer(connection).status_code == status
+
+
+def test_short_headers_count_as_in_http2(listener: Listener) -> None:
+    most = (MOST_HEAD_BYTES - len("/?answer")) // (len("ab") + BYTES_BESIDE_HEADER) - 2
+    assert listener.send(START + b"a:b\r\n" * most + b"\r\n").status_code == 200
+    check_problem(listener.send(START + b"a:b\r\n" * (most + 3)), 431, "header_too_large")
 
 
 def test_each_head_of_a_connection_is_counted_by_itself(listener: Listener) -> None:

@@ -1,10 +1,15 @@
 """Refused bodies: however many elements are faulty, few are looked at."""
 
+from contextlib import nullcontext
 from typing import Any
 
+import anyio
 import pytest
+from anyio import CapacityLimiter
+from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, TypeAdapter, ValidationError, create_model
+from starlette.requests import Request
 
 from app.errors import ProblemError
 from app.http.routes import query_request
@@ -99,3 +104,25 @@ def test_a_body_of_64_kib_may_hold_any_number_of_values(most_bytes: int) -> None
     settings = Settings(max_query_bytes=most_bytes)
     body = b"[" + b"1," * (2**15 - 2) + b"1]"
     assert len(query_request.parse_json(body, settings)) == 2**15 - 1
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_reading_a_large_body_rests_as_long_as_it_held_the_interpreter(
+    monkeypatch: pytest.MonkeyPatch, fails: bool
+) -> None:
+    clock, rests = iter([1.0, 3.5]), []
+    monkeypatch.setattr(query_request, "thread_time", lambda: next(clock))
+    monkeypatch.setattr(query_request, "sleep", rests.append)
+
+    async def receive() -> Any:
+        return {"type": "http.request", "body": b"1" * query_request.LARGE}
+
+    async def ask() -> int:
+        app = FastAPI()
+        app.state.large_bodies = CapacityLimiter(1)
+        request = Request({"type": "http", "app": app}, receive)
+        return await query_request.offload_if_large(request, lambda: 1 // (not fails))
+
+    with pytest.raises(ZeroDivisionError) if fails else nullcontext():
+        assert anyio.run(ask) == 1
+    assert rests == [2.5]
