@@ -176,11 +176,11 @@ def _status(pid: int) -> list[str]:
 
 
 def processor_time(pid: int) -> Counter[int]:
-    """Return the nanoseconds that the threads of a process have had, by niceness."""
-    taken: Counter[int] = Counter()
+    """Return the nanoseconds that the threads of a process have had, by niceness above ours."""
+    taken, own = Counter[int](), os.getpriority(os.PRIO_PROCESS, 0)
     for thread in Path(f"/proc/{pid}/task").iterdir():
         niceness = int((thread / "stat").read_text().rpartition(")")[2].split()[16])
-        taken[niceness] += int((thread / "schedstat").read_text().split()[0])
+        taken[niceness - own] += int((thread / "schedstat").read_text().split()[0])
     return taken
 
 
