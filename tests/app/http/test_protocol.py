@@ -196,9 +196,9 @@ def test_an_answer_under_way_is_not_cut_off(listener: Listener) -> None:
 def test_a_client_that_does_not_read_is_dropped(
     listener: Listener, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(protocol, "STALLED_S", 0.05)
     listener.disconnects.clear()
-    with socket.socket() as connection:
+    with socket.socket() as connection, monkeypatch.context() as patch:
+        patch.setattr(protocol, "STALLED_S", 0.05)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         connection.connect(("127.0.0.1", listener.port))
         connection.sendall(b"GET /large HTTP/1.1\r\nHost: localhost\r\n\r\n")
