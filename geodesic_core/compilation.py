@@ -89,8 +89,8 @@ def compile_kernels(
         Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
         ``"approximate-curves"`` and ``"isolines"``; None for all.
     cancel
-        Called before the first compilation and then ten times a second; all ends once it returns
-        True. Where nothing is missing it is not called.
+        Called before compilation begins and then ten times a second; compilation ends once it
+        returns True. Not called where no kernel is missing.
 
     Raises
     ------

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from structlog.testing import capture_logs
+from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol
 
 from app.http import connections, protocol
 from app.http.protocol import (
@@ -109,6 +110,23 @@ def test_the_largest_head_is_served_and_one_byte_more_is_not(listener: Listener,
             for begin in range(0, len(head), step):
                 connection.sendall(head[begin : begin + step])
             assert read_answer(connection).status_code == status
+
+
+def test_small_chunks_are_passed_on_together(
+    listener: Listener, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parts: list[bytes] = []
+    pass_on = HttpToolsProtocol.on_body
+
+    def count(self: HttpToolsProtocol, body: bytes) -> None:
+        parts.append(body)
+        pass_on(self, body)
+
+    monkeypatch.setattr(HttpToolsProtocol, "on_body", count)
+    listener.parsed_bytes.clear()
+    assert listener.send(CHUNKED + b"8\r\nxxxxxxxx\r\n" * 5000 + b"0\r\n\r\n").status_code == 200
+    assert listener.bodies[-1] == b"".join(parts) == b"x" * 40_000
+    assert len(parts) <= len(listener.parsed_bytes)
 
 
 def test_short_headers_count_as_in_http2(listener: Listener) -> None:
