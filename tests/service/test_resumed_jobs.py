@@ -1,7 +1,7 @@
 """Jobs that a service left when it stopped, as the next one on the same store runs them."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +33,14 @@ QUERIES: dict[str, dict[str, Any]] = {
 def held(store: Path, **settings: Any) -> Iterator[tuple[ServiceClient, str]]:
     """Run a service whose workers get no further, so that all jobs are under way at its end.
 
-    Yield it, and the path of a mesh.
+    Yield it, and the path of a mesh. The workers stay stopped until the service's end kills them:
+    one that went on before would finish its job.
     """
-    with serving(store, cancel_grace_s=LONG_S, **settings) as client:
-        client.wait_until_idle()
-        mesh_id = upload_sample(client, "terrain", 200)
-        with stopped(client.workers()):
+    with ExitStack() as until_the_end:
+        with serving(store, cancel_grace_s=LONG_S, **settings) as client:
+            client.wait_until_idle()
+            mesh_id = upload_sample(client, "terrain", 200)
+            until_the_end.enter_context(stopped(client.workers()))
             yield client, f"/v1/meshes/{mesh_id}"
 
 
