@@ -33,6 +33,7 @@ from geodesic_core.solvers import (
     Solver,
     approximate_distance,
     exact_distance,
+    fast_distance,
     kernel_digest,
     shortest_path,
 )
@@ -62,6 +63,7 @@ __all__ = [
     "distance_matrix",
     "errors",
     "exact_distance",
+    "fast_distance",
     "kernel_digest",
     "load_mesh",
     "nearest",

@@ -19,7 +19,7 @@ from geodesic_core.mesh.curve import Curve
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.threads import available_cores
-from geodesic_core.solvers import Solver, approximate_distance, exact_distance
+from geodesic_core.solvers import Solver, approximate_distance, exact_distance, fast_distance
 
 _POLL_S = 0.1
 _INSIDE = SurfacePoint.face(0, (0.2, 0.3, 0.5))
@@ -53,6 +53,15 @@ def _approximate() -> None:
     approximate_distance(_mesh(), 0, targets=[_INSIDE], retain="paths").path_to(8)
 
 
+def _fast() -> None:
+    fast_distance(_mesh(), 0, targets=[_INSIDE]).path_to(8)
+
+
+def _fast_curves() -> None:
+    mesh = _mesh()
+    fast_distance(mesh, _curve(mesh), targets=[_INSIDE])
+
+
 def _isolines() -> None:
     exact_distance(_mesh(), 0).isolines([0.1])
 
@@ -72,6 +81,8 @@ WORKLOADS: dict[str, Callable[[], None]] = {
     "approximate": _approximate,
     "approximate-curves": _approximate_curves,
     "curves": _curves,
+    "fast": _fast,
+    "fast-curves": _fast_curves,
     "isolines": _isolines,
     "paths": _paths,
 }
@@ -87,7 +98,7 @@ def compile_kernels(
     ----------
     workloads
         Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
-        ``"approximate-curves"`` and ``"isolines"``; None for all.
+        ``"approximate-curves"``, ``"fast"``, ``"fast-curves"`` and ``"isolines"``; None for all.
     cancel
         Called before compilation begins and then ten times a second; compilation ends once it
         returns True. Not called where no kernel is missing.

@@ -13,11 +13,13 @@ from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.fields.distance_field import DistanceField, field_of
+from geodesic_core.fields.fast_sweep import FastSweep
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep, stats_of
-from geodesic_core.fields.sources import Sources, as_sources, component_of, disconnected
+from geodesic_core.fields.sources import Source, Sources, as_sources, component_of, disconnected
 from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
+from geodesic_core.mesh.curve import Polyline
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.call_lock import CallLock
@@ -33,6 +35,9 @@ if TYPE_CHECKING:
 
 Retain = Literal["distances", "paths", "windows"]
 """Contents of a field in memory: each word includes the ones before it."""
+
+Effort = Literal[1, 2, 4, 8]
+"""Places of a half-edge at which a fast sweep compares windows"""
 
 
 def exact_distance(
@@ -181,6 +186,79 @@ def approximate_distance(
     else:
         promise = ErrorBound("absolute", absolute, "guaranteed")
     return _solve(mesh, sources, targets, bounds, promise, retain, control)
+
+
+def fast_distance(
+    mesh: TriangleMesh,
+    sources: Sources,
+    effort: Effort = 2,
+    max_distance: float | None = None,
+    targets: Sequence[Point] = (),
+    barriers: Iterable[int] = (),
+    *,
+    retain: Literal["distances", "paths"] = "paths",
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> DistanceField:
+    """Return geodesic distances in one quick pass: lengths of paths, never too short.
+
+    Each distance is the length of a path over the surface. It is mostly within a per mille or a
+    per cent of the shortest, which nothing guarantees: ``error_bound`` is an estimate.
+
+    Parameters
+    ----------
+    mesh, sources
+        As in `exact_distance`.
+    effort
+        1, 2, 4 or 8: at how many places of each half-edge windows compete. Time grows with it, and
+        the error falls.
+    max_distance, targets, barriers
+        As in `exact_distance`.
+    retain
+        What the field holds in memory. ``"distances"``: distances and nearest sources. ``"paths"``:
+        also what `DistanceField.path_to` and `DistanceField.gradient` need, 36 bytes a vertex.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    DistanceField
+        Distances, (V,) float64 in mesh units, and their estimated error. Its isolines, and
+        distances inside faces, come from an exact sweep, when they are first asked for.
+
+    Raises
+    ------
+    InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    O(F) in practice. docs/accuracy.md tells how the error was measured.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.sphere(320))
+    >>> field = gc.fast_distance(mesh, 0)
+    >>> field.error_bound.kind
+    'estimated'
+    >>> exact = gc.exact_distance(mesh, 0)
+    >>> bool(np.all(field.distances >= exact.distances * (1 - 1e-12)))
+    True
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    if not is_number(effort) or effort not in get_args(Effort):
+        raise InvalidArgument(f"effort is {effort!r}; it must be 1, 2, 4 or 8")
+    check_choice("retain", retain, ("distances", "paths"))
+    bounds = exact_bounds(as_limit(max_distance))
+    mesh, control = _with_barriers(mesh, barriers, control)
+    starts, polylines, ends, exact = _as_question(mesh, sources, targets, bounds, control)
+    sweep = FastSweep(exact, int(effort))
+    front = sweep.run(control)
+    result = sweep.result_of(front, paths=retain == "paths")
+    stats = sweep.stats_of(front, time.perf_counter() - control.began)
+    return field_of(starts, polylines, ends, exact, sweep, sweep.error_bound, result, stats)
 
 
 def shortest_path(
@@ -381,6 +459,59 @@ class Solver:
             sources,
             relative_error,
             absolute_error,
+            max_distance,
+            targets,
+            barriers,
+            retain=retain,
+            progress=progress,
+            cancel=cancel,
+            deadline_s=deadline_s,
+            memory_limit=memory_limit,
+        )
+
+    def fast_distance(
+        self,
+        sources: Sources,
+        effort: Effort = 2,
+        max_distance: float | None = None,
+        targets: Sequence[Point] = (),
+        barriers: Iterable[int] = (),
+        *,
+        retain: Literal["distances", "paths"] = "paths",
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> DistanceField:
+        """Return distances in one quick pass, never too short, as `fast_distance` does.
+
+        Parameters
+        ----------
+        sources, effort, max_distance, targets, barriers, retain
+            As in the function `fast_distance`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        DistanceField
+            Distances, (V,) float64, mesh units, and their estimated error.
+
+        Raises
+        ------
+        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in the function.
+
+        Examples
+        --------
+        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver.fast_distance([0, 3]).distances.tolist()
+        [0.0, 1.0, 1.0, 0.0]
+        """
+        return fast_distance(
+            self.mesh,
+            sources,
+            effort,
             max_distance,
             targets,
             barriers,
@@ -619,16 +750,28 @@ def _solve(
     """Check the arguments, sweep, and return the field with what it is to retain."""
     check_choice("retain", retain, get_args(Retain))
     paths, windows = retain != "distances", retain == "windows"
+    starts, polylines, ends, sweep = _as_question(mesh, sources, targets, bounds, control)
+    wave = sweep.run(control, paths=paths, windows=sweep.all_faces if windows else None)
+    result = sweep.result_of(wave, paths=paths, windows=windows)
+    stats = stats_of(mesh, wave, time.perf_counter() - control.began)
+    return field_of(starts, polylines, ends, sweep, None, promise, result, stats)
+
+
+def _as_question(
+    mesh: TriangleMesh,
+    sources: Sources,
+    targets: Sequence[Point],
+    bounds: Bounds,
+    control: Control,
+) -> tuple[tuple[Source, ...], tuple[Polyline, ...], tuple[SurfacePoint, ...], RepeatableSweep]:
+    """Check sources and targets; return them, canonical points included, and their sweep."""
     starts, polylines = as_sources(mesh, sources, control)
     ends = tuple(
         mesh.point(point, f"target {i}") for i, point in enumerate(control.watched(targets))
     )
     distances = np.array([start.start_distance for start in starts])
     sweep = RepeatableSweep.between(mesh, polylines, distances, ends, bounds, control)
-    wave = sweep.run(control, paths=paths, windows=sweep.all_faces if windows else None)
-    result = sweep.result_of(wave, paths=paths, windows=windows)
-    stats = stats_of(mesh, wave, time.perf_counter() - control.began)
-    return field_of(starts, polylines, ends, sweep, promise, result, stats)
+    return starts, polylines, ends, sweep
 
 
 def _as_stops(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import InternalError, NoPath
+from geodesic_core.fields.fast_sweep import FastSweep
 from geodesic_core.fields.gradient import gradient_at_vertices
 from geodesic_core.fields.isolines import (
     Drawing,
@@ -79,6 +80,9 @@ class DistanceField:
     _targets: tuple[SurfacePoint, ...]
     """Targets of the sweep, canonical"""
     _sweep: RepeatableSweep
+    """The sweep; of a fast field, the exact one of the same question"""
+    _fast: FastSweep | None
+    """The sweep of a fast field"""
     _result: SweepResult
 
     @classmethod
@@ -120,11 +124,13 @@ class DistanceField:
         of_type, kind = arrays["promise"].tolist()
         created, kept, peak, peak_bytes = arrays["counts"].tolist()
         seconds = float(arrays["seconds"])
+        sweep = RepeatableSweep.between(mesh, polylines, starts, targets, bounds, Control())
         return field_of(
             sources,
             polylines,
             targets,
-            RepeatableSweep.between(mesh, polylines, starts, targets, bounds, Control()),
+            sweep,
+            FastSweep(sweep, int(arrays["effort"])) if "effort" in arrays else None,
             ErrorBound(of_type, float(arrays["promised"]), kind),
             SweepResult.from_arrays(arrays),
             SweepStats.of(mesh, created, kept, peak, peak_bytes, seconds),
@@ -156,6 +162,7 @@ class DistanceField:
             "limits": np.array([bounds.max_distance, *errors]),
             "promise": np.array([promise.type, promise.kind]),
             "promised": np.array(promise.value),
+            **({} if self._fast is None else {"effort": np.array(self._fast.effort)}),
             **self._result.arrays(),
             "counts": np.array(counts, np.int64),
             "seconds": np.array(stats.seconds),
@@ -179,7 +186,7 @@ class DistanceField:
     @cached_property
     def _winners(self) -> Lazy[Winners]:
         """Data of paths to vertices and targets, swept for again if not retained."""
-        return Lazy(self._sweep.find_winners, self._result.winners)
+        return Lazy((self._fast or self._sweep).find_winners, self._result.winners)
 
     @cached_property
     def _winners_and_windows(self) -> Lazy[tuple[Winners, FaceWindows]] | None:
@@ -190,6 +197,8 @@ class DistanceField:
         if bounds.parallel:  # a sweep back from a point ends at points, not on curves
             exact = with_parallel_windows(exact_bounds(bounds.max_distance), bounds.first_segment)
             return Lazy(replace(sweep, bounds=exact).find_winners_and_windows)
+        if self._fast is not None:  # its distances are no lower bounds, which a search back needs
+            return Lazy(sweep.find_winners_and_windows)
         return None
 
     def distance_at(
@@ -206,8 +215,8 @@ class DistanceField:
         At a vertex or a target of the sweep it is the sweep's value, O(1). Elsewhere it is exact,
         also where the field is approximate: from the windows of an exact field that retains them,
         O(windows of the face); else by an exact sweep from the point to the nearest source, in a
-        thin strip that the field's own values leave. Where a source is a curve, the first such
-        point runs the sweep again, exactly, and retains its windows.
+        thin strip that the field's own values leave. Where a source is a curve, or the field a fast
+        one, the first such point runs the sweep again, exactly, and retains its windows.
 
         Parameters
         ----------
@@ -305,9 +314,9 @@ class DistanceField:
         """Return a path from the nearest source to any point of the surface (sections 3.5 and 4.3).
 
         Of an exact field its length is the point's distance less the start distance of its source;
-        of an approximate one at most the promised error more. O(faces crossed) to a vertex or a
-        target of the sweep; a field that does not retain paths runs the sweep again for the first
-        of those. To other points as `distance_at` finds their distances.
+        of an approximate one at most the promised error more; of a fast one no more. O(faces
+        crossed) to a vertex or a target of the sweep; a field that does not retain paths runs the
+        sweep again for the first of those. To other points as `distance_at` finds their distances.
 
         Parameters
         ----------
@@ -422,7 +431,8 @@ class DistanceField:
         arcs, and of straight lines beside curves; their ends and crossings of edges are exact, and
         between them arcs become chords. A vertex at the level itself counts as within. Levels
         beyond all distances, or beyond ``max_distance``, have no lines. Of an approximate field
-        they are those of its own distances, which the same error bounds.
+        they are those of its own distances, which the same error bounds; of a fast field they are
+        exact, from an exact sweep whose windows it retains.
 
         Parameters
         ----------
@@ -518,13 +528,16 @@ class DistanceField:
         if not within:
             yield from ([] for _ in levels)
             return
-        windows = self._result.windows
-        if windows is None:
+        distance, windows = self._result.distance, self._result.windows
+        if self._fast is not None and self._winners_and_windows is not None:
+            winners, windows = self._winners_and_windows.get(control.for_part(0, 2))
+            distance, control = winners.distance, control.for_part(1, 2)
+        elif windows is None:
             windows = self._windows_at(within, control.for_part(0, 2))
             control = control.for_part(1, 2)
         parts = 1 + len(levels)
         drawing = Drawing(
-            self.mesh, windows, self._result.distance, self._sweep.nodes, control.for_part(0, parts)
+            self.mesh, windows, distance, self._sweep.nodes, control.for_part(0, parts)
         )
         for i, level in enumerate(levels):
             part = control.for_part(1 + i, parts)
@@ -543,18 +556,23 @@ class DistanceField:
     def _traced(
         self, target: SurfacePoint, winners: Winners, nodes: Nodes, node: int
     ) -> GeodesicPath:
-        """Return the path to a node, whose length must be the distance in the field."""
+        """Return the path to a node, whose length must be the distance in the field.
+
+        That of a fast sweep may be shorter: it goes on with what was found later.
+        """
         distance = float(winners.distance[node])
         path = traced_path(self.mesh, winners, nodes, node, EXACT)
         start = self.sources[winners.nearest[node]].start_distance
         excess = start + path.length - distance
-        exact = self.error_bound == EXACT
+        is_fast, exact = len(winners.crossing) > 0, not self._sweep.bounds.merging
         most = rounding_of(self.mesh, distance)
-        if excess < -most or (exact and excess > most):
+        if (excess < -most and not is_fast) or (exact and excess > most):
             raise InternalError(
                 f"the path to {target} has length {path.length}, but the field says "
                 f"{distance - start}; please report this mesh"
             )
+        if is_fast:
+            return replace(path, error_bound=self.error_bound)
         if exact:
             return path
         share = max(excess, 0.0) / distance if distance > most else 0.0
@@ -600,6 +618,7 @@ def field_of(
     polylines: tuple[Polyline, ...],
     targets: tuple[SurfacePoint, ...],
     sweep: RepeatableSweep,
+    fast: FastSweep | None,
     promise: ErrorBound,
     result: SweepResult,
     stats: SweepStats,
@@ -617,5 +636,6 @@ def field_of(
         _polylines=polylines,
         _targets=targets,
         _sweep=sweep,
+        _fast=fast,
         _result=result,
     )

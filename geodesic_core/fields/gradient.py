@@ -28,9 +28,15 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
     geometry, positions = topology.geometry[via], topology.positions
     tail, head, apex = (positions[topology.links[via, k]] for k in (TAIL, HEAD, APEX))
     reach = geometry[:, LENGTH_LEFT]
-    away = np.column_stack([geometry[:, COS_LEFT] * reach, geometry[:, SIN_LEFT] * reach])
-    away[is_parallel[reached]] = 0.0  # a parallel window has a direction only
-    away -= winners.winner[reached]
+    at_apex = np.column_stack([geometry[:, COS_LEFT] * reach, geometry[:, SIN_LEFT] * reach])
+    away = at_apex - winners.winner[reached]
+    parallel = is_parallel[reached]
+    away[parallel] = -winners.winner[reached[parallel]]  # a parallel window has a direction only
+    if len(winners.crossing):  # the path may bend where it crosses its last edge
+        crossing = winners.crossing[reached]
+        crosses = np.isfinite(crossing)
+        away[crosses] = at_apex[crosses]
+        away[crosses, 0] -= crossing[crosses]
     along = _unit(head - tail)
     across = apex - tail
     across = _unit(across - np.einsum("ij,ij->i", across, along)[:, None] * along)

@@ -4,6 +4,8 @@ import math
 import time
 from collections.abc import Callable
 
+import numpy as np
+
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import SLICE_SECONDS, Control
 from geodesic_core.fields.sources import Nodes
@@ -128,6 +130,7 @@ def winners_of(wave: Wavefront, nearest: Ints) -> Winners:
         distance=wave.vertices.distance,
         winner=wave.vertices.winner,
         winner_ints=wave.vertices.winner_ints,
+        crossing=np.empty(0),
         reference=wave.vertices.reference,
         merges=wave.pool.merges[:count],
         merge_ints=wave.pool.merge_ints[:count],

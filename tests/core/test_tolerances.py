@@ -436,6 +436,7 @@ def winners(distance, nearest=(0, 0)) -> Winners:
         distance,
         nothing,
         none,
+        nothing[:, 0].copy(),
         none[:, 0].copy(),
         nothing,
         none,

@@ -73,6 +73,8 @@ class Winners(NamedTuple):
     distance: Floats
     winner: Floats
     winner_ints: Ints
+    crossing: Floats
+    """As in `fast.state.Wavefront`; empty after other sweeps, of straight lines"""
     reference: Ints
     merges: Floats
     merge_ints: Ints
@@ -97,6 +99,8 @@ class View(NamedTuple):
     site_rows: int
     segment_rows: int
     merging: bool
+    bends: bool
+    """Whether a path may bend where it crosses its last edge, as those of fast sweeps do"""
 
 
 class Line(NamedTuple):
@@ -209,6 +213,7 @@ def view_of(topology: Any, winners: Any) -> View:
         len(winners.site_ints),
         len(winners.piece_ints),
         len(winners.reference) > 0,
+        len(winners.crossing) > 0,
     )
 
 
@@ -279,6 +284,8 @@ def jump_to_window(view: Any, v: int, count: int) -> tuple[Line, Walk, int]:
     rise = sw * ay - sy
     x = (sx * ay - ax * sy) / rise if rise > 0.0 else sx
     x = min(max(x, 0.0), length)
+    if view.bends and not math.isnan(winners.crossing[v]):
+        x = winners.crossing[v]
     walked = math.hypot(ax - x, ay)
     sigma = distance - walked
     if sw > 0.0:

@@ -23,7 +23,7 @@ from geodesic_core.kernels.mesh.half_edges import (
 from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.relaxation import bound_vertex, illuminate_vertex, relax_vertex
 from geodesic_core.kernels.sweep.state import FACE, NODE, SEGMENT, SEGMENT_END, SEGMENT_ENDS
-from geodesic_core.kernels.sweep.window import emitted_window
+from geodesic_core.kernels.sweep.window import Window, emitted_window
 from geodesic_core.kernels.sweep.window_lists import send_out
 from geodesic_core.tolerances import SLANT
 
@@ -57,16 +57,22 @@ def emit_segment(wave: Any, k: int) -> None:
     face = wave.sites.segment_ints[SEGMENT * k + FACE]
     ends = wave.sites.segment_ends
     for h in range(3 * face, 3 * face + 3):
-        px, py = weights_in_frame(wave.mesh.geometry, ends, SEGMENT_ENDS * k, h)
-        qx, qy = weights_in_frame(wave.mesh.geometry, ends, SEGMENT_ENDS * k + SEGMENT_END, h)
-        length = math.hypot(qx - px, qy - py)
-        dx, dy = (qx - px) / length, (qy - py) / length
-        if dx < 0.0:
-            px, py, qx, qy, dx, dy = qx, qy, px, py, -dx, -dy
-        segment = PlacedSegment(px, py, qx, qy, dx, dy, length)
-        if dx > SLANT and is_off_edge(ends, k, h):
+        segment = place_segment(wave.mesh.geometry, ends, k, h)
+        if segment.dx > SLANT and is_off_edge(ends, k, h):
             emit_parallel_window(wave, node, h, segment)
         reach_corner(wave, node, h, segment)
+
+
+@kernel
+def place_segment(geometry: Any, ends: Any, k: int, h: int) -> PlacedSegment:
+    """Return the segment of row k in the frame of h, of the same face."""
+    px, py = weights_in_frame(geometry, ends, SEGMENT_ENDS * k, h)
+    qx, qy = weights_in_frame(geometry, ends, SEGMENT_ENDS * k + SEGMENT_END, h)
+    length = math.hypot(qx - px, qy - py)
+    dx, dy = (qx - px) / length, (qy - py) / length
+    if dx < 0.0:
+        px, py, qx, qy, dx, dy = qx, qy, px, py, -dx, -dy
+    return PlacedSegment(px, py, qx, qy, dx, dy, length)
 
 
 @kernel
@@ -79,37 +85,57 @@ def is_off_edge(ends: Any, k: int, h: int) -> bool:
 @kernel
 def emit_parallel_window(wave: Any, node: int, h: int, segment: PlacedSegment) -> None:
     """Send the parallel window that leaves a segment over the edge of h, for dx > 0."""
-    mesh, row = wave.mesh, ROW * h
-    length = mesh.geometry[row + LENGTH]
+    length = wave.mesh.geometry[ROW * h + LENGTH]
+    window = parallel_window(wave, wave.vertices.distance[node], node, length, segment)
+    if wave.mesh.links[ROW * h + OPPOSITE] != NO_FACE and window.b1 > window.b0:
+        send_out(wave, h, window)
+
+
+@kernel
+def parallel_window(
+    wave: Any, start: float, node: int, length: float, segment: PlacedSegment
+) -> Window:
+    """Return the parallel window of a segment at distance ``start``, as the face across sees it.
+
+    The segment is placed in the frame of an edge of this ``length``. Empty if b1 <= b0.
+    """
     px, py, dx, dy = segment.px, segment.py, segment.dx, segment.dy
     b0, b1 = max(px + py * dy / dx, 0.0), min(segment.qx + segment.qy * dy / dx, length)
-    if mesh.links[row + OPPOSITE] == NO_FACE or b1 <= b0:
-        return
     # The rays run along (dy, -dx). The frame across begins at the other end, and looks that way.
-    sigma = wave.vertices.distance[node] + (length - px) * dy + py * dx
-    send_out(wave, h, emitted_window(wave, length - b1, length - b0, dy, -dx, sigma, node, 0.0))
+    sigma = start + (length - px) * dy + py * dx
+    return emitted_window(wave, length - b1, length - b0, dy, -dx, sigma, node, 0.0)
 
 
 @kernel
 def reach_corner(wave: Any, node: int, h: int, segment: PlacedSegment) -> None:
-    """Offer the apex of h the perpendicular to a segment, if its foot is on it.
+    """Offer the apex of h the perpendicular to a segment, if its foot is on it."""
+    is_foot, reach, sx, sy = perpendicular_to(wave.mesh.geometry, h, segment)
+    if not is_foot:
+        return
+    distance = wave.vertices.distance[node] + reach
+    apex = wave.mesh.links[ROW * h + APEX]
+    if merging(wave):
+        bound_vertex(wave, apex, distance)
+        if wave.mesh.flags[apex]:
+            illuminate_vertex(wave, apex, distance, h, sx, sy, 0.0)
+    relax_vertex(wave, apex, distance, h, sx, sy, node, -1 - node)
+
+
+@kernel
+def perpendicular_to(
+    geometry: Any, h: int, segment: PlacedSegment
+) -> tuple[bool, float, float, float]:
+    """Return whether a segment has a foot for the apex of h, how far it is, and the way to it.
 
     In a face of no area the apex may lie on the segment itself, and not be an end of it.
     """
-    mesh, row, dx, dy = wave.mesh, ROW * h, segment.dx, segment.dy
-    x = mesh.geometry[row + COS_LEFT] * mesh.geometry[row + LENGTH_LEFT] - segment.px
-    y = mesh.geometry[row + SIN_LEFT] * mesh.geometry[row + LENGTH_LEFT] - segment.py
+    row, dx, dy = ROW * h, segment.dx, segment.dy
+    x = geometry[row + COS_LEFT] * geometry[row + LENGTH_LEFT] - segment.px
+    y = geometry[row + SIN_LEFT] * geometry[row + LENGTH_LEFT] - segment.py
     height = y * dx - x * dy
-    if not 0.0 <= x * dx + y * dy <= segment.length:
-        return
+    is_foot = 0.0 <= x * dx + y * dy <= segment.length
     sx, sy = (dy, -dx) if height >= 0.0 else (-dy, dx)  # against the ray to the apex
-    distance = wave.vertices.distance[node] + abs(height)
-    apex = mesh.links[row + APEX]
-    if merging(wave):
-        bound_vertex(wave, apex, distance)
-        if mesh.flags[apex]:
-            illuminate_vertex(wave, apex, distance, h, sx, sy, 0.0)
-    relax_vertex(wave, apex, distance, h, sx, sy, node, -1 - node)
+    return is_foot, abs(height), sx, sy
 
 
 @kernel

@@ -1,0 +1,184 @@
+"""A window crosses a face: the apex, the sites inside, and windows for the two other edges (3.2).
+
+What the window lights goes on as it is. Beyond that light paths bend, so that the ends of each
+edge are offered to it as pseudosources, from the distances that they have by then; where the ray to
+the apex passes by an end of the half-edge that is a vertex, that vertex is, too. All of these are
+paths that exist: the best of them wins a place, or several, and the rest is dropped.
+"""
+
+import math
+from typing import Any
+
+from geodesic_core.kernels.fast.places import distance_along, offer_over, relax
+from geodesic_core.kernels.fast.state import CROSSED, WON
+from geodesic_core.kernels.jit import as_ints, inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import (
+    APEX,
+    HEAD,
+    IRREGULAR,
+    LENGTH,
+    OUT_LEFT,
+    OUT_RIGHT,
+    ROW,
+    TAIL,
+    following,
+    previous,
+    weights_in_frame,
+)
+from geodesic_core.kernels.planar import hit_left
+from geodesic_core.kernels.sweep.spread import Side, left_of, right_of
+from geodesic_core.kernels.sweep.state import NEXT_SITE, NODE, SITE
+from geodesic_core.kernels.sweep.window import (
+    INTS,
+    Window,
+    distance_at,
+    emitted_window,
+    load_window,
+    reversed_window,
+    straight_distance,
+)
+from geodesic_core.kernels.sweep.window_lists import faces_beyond
+from geodesic_core.tolerances import TIE
+
+OFFERS = 4
+"""Windows offered to an edge, at most"""
+VERTICES = 3
+"""Times that the apex may be reached, at most"""
+
+
+@inlined
+def is_live(wave: Any, h: int, window: Window, won: int) -> bool:
+    """Whether a window is still the nearest at a place that it won."""
+    values, places = wave.front.values, wave.bounds.places
+    step = wave.mesh.geometry[ROW * h + LENGTH] / places
+    for k in range(places):
+        if won >> k & 1:
+            distance = distance_along(window, step * (k + 0.5))
+            if distance == values[places * h + k]:
+                return True
+    return False
+
+
+@inlined
+def room_to_cross(wave: Any, h: int) -> int:
+    """Return how many windows a crossing of the face of h may make, at most."""
+    links, room = wave.mesh.links, 2 * OFFERS + VERTICES
+    if links[ROW * h + OUT_LEFT] == IRREGULAR:
+        room += OFFERS * faces_beyond(wave, previous(h))
+    if links[ROW * h + OUT_RIGHT] == IRREGULAR:
+        room += OFFERS * faces_beyond(wave, following(h))
+    return room
+
+
+@inlined
+def cross(wave: Any, h: int, slot: int) -> None:
+    """Send the window of a row, if it is live, over the face of h. Modifies the wavefront."""
+    mesh, front = wave.mesh, wave.front
+    window = load_window(wave, front.windows, slot)
+    if not is_live(wave, h, window, as_ints(front.windows)[INTS * slot + WON]):
+        return
+    front.counters[CROSSED] += 1
+    left, right = left_of(wave, h), right_of(wave, h)
+    tail, head = int(mesh.links[ROW * h + TAIL]), int(mesh.links[ROW * h + HEAD])
+    apex = int(mesh.links[ROW * h + APEX])
+    ax, ay = left.cosine * left.length, left.sine * left.length
+    x = ray_through(window, ax, ay)
+    reach(wave, apex, h, window, ax, ay, x)
+    relax(wave, apex, front.distance[tail] + left.length, h, 0.0, 0.0, tail, 0.0)
+    far_end = right.start
+    relax(wave, apex, front.distance[head] + right.length, h, far_end, 0.0, head, far_end)
+    if wave.sizes.first_site > 0:
+        reach_sites(wave, h, window)
+    send_over(wave, window, left, previous(h), x, far_end, tail, apex, head)
+    mirrored = reversed_window(window, far_end)
+    send_over(wave, mirrored, right, following(h), far_end - x, far_end, head, apex, tail)
+
+
+@inlined
+def ray_through(window: Window, ax: float, ay: float) -> float:
+    """Place on the edge, or beyond it, of the ray of a window to a point of the face."""
+    rise = ay * window.weight - window.sy
+    return (window.sx * ay - ax * window.sy) / rise if rise > 0.0 else window.sx
+
+
+@inlined
+def reach(wave: Any, node: int, h: int, window: Window, ax: float, ay: float, x: float) -> None:
+    """Offer a node at (ax, ay) the path through a window, bent at its end where it must.
+
+    ``x`` is where its ray to that point crosses the edge.
+    """
+    place = min(max(x, window.b0), window.b1)
+    if place == x:
+        distance = straight_distance(window, ax, ay)
+    else:
+        distance = distance_at(window, place) + math.hypot(ax - place, ay)
+    relax(wave, node, distance, h, window.sx, window.sy, window.root, place)
+
+
+@kernel
+def reach_sites(wave: Any, h: int, window: Window) -> None:
+    """Offer the sites in the face of h the path through a window. Modifies their nodes."""
+    mesh, sites = wave.mesh, wave.front.sites
+    k = int(wave.front.first_site[h // 3])
+    while k >= 0:
+        x, y = weights_in_frame(mesh.geometry, sites.weights, 3 * k, h)
+        node = int(sites.ints[SITE * k + NODE])
+        reach(wave, node, h, window, x, y, ray_through(window, x, y))
+        k = int(sites.ints[SITE * k + NEXT_SITE])
+
+
+@inlined
+def send_over(
+    wave: Any,
+    window: Window,
+    side: Side,
+    g: int,
+    x: float,
+    length: float,
+    near: int,
+    apex: int,
+    far: int,
+) -> None:
+    """Offer all windows that leave a face over one of its sides to the half-edge across.
+
+    The window is in the frame of the half-edge that it crosses, of this ``length``, as seen from
+    the ``near`` end, at which the side g begins; its ray to the apex crosses at ``x``.
+    """
+    if side.out < 0 and side.out != IRREGULAR:
+        return
+    distance = wave.front.distance
+    depth = window.sy * side.cosine - window.sx * side.sine
+    u0 = hit_left(window.b0, window.sy, depth, side.sine, side.length, window.weight)
+    u1 = side.length
+    if x > window.b1:
+        u1 = hit_left(window.b1, window.sy, depth, side.sine, side.length, window.weight)
+    lights_near = lights_apex = False
+    if u1 > u0:
+        along = window.sx * side.cosine + window.sy * side.sine
+        lit = Window(
+            u0, u1, along, depth, window.sigma, window.weight, window.root, 0.0, window.reference
+        )
+        offer_side(wave, side, g, lit)
+        lights_near = u0 <= 0.0 and distance_at(lit, 0.0) <= distance[near] * (1.0 + TIE)
+        lights_apex = u1 >= side.length and distance_at(lit, side.length) <= distance[apex] * (
+            1.0 + TIE
+        )
+    if not lights_near:
+        emitted = emitted_window(wave, 0.0, side.length, 0.0, 0.0, distance[near], near, 0.0)
+        offer_side(wave, side, g, emitted)
+    if not lights_apex:
+        place = side.length
+        emitted = emitted_window(wave, 0.0, place, place, 0.0, distance[apex], apex, 0.0)
+        offer_side(wave, side, g, emitted)
+    if x > window.b1 and window.b1 == length:
+        sx, sy = length * side.cosine, -length * side.sine
+        emitted = emitted_window(wave, 0.0, side.length, sx, sy, distance[far], far, 0.0)
+        offer_side(wave, side, g, emitted)
+
+
+@inlined
+def offer_side(wave: Any, side: Side, g: int, window: Window) -> None:
+    """Offer a window, as seen from the end of the side g at which that begins, across it."""
+    if side.is_right:  # the half-edge across begins at the apex
+        window = reversed_window(window, side.length)
+    offer_over(wave, side.out, g, side.length, window)

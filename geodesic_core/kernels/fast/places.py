@@ -1,0 +1,119 @@
+"""Windows offered to a half-edge, and nodes offered a distance: what is nearer goes on."""
+
+import math
+from typing import Any
+
+from geodesic_core.kernels.fast.buckets import push
+from geodesic_core.kernels.fast.state import REACHED
+from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import (
+    AROUND,
+    FANS,
+    IRREGULAR,
+    LENGTH,
+    PINCHED,
+    ROW,
+    SEAM,
+    TAIL,
+)
+from geodesic_core.kernels.sweep.relaxation import precedence
+from geodesic_core.kernels.sweep.state import ENTRY_EDGE, PREDECESSOR, WINNER
+from geodesic_core.kernels.sweep.window import (
+    Window,
+    distance_at,
+    emitted_window,
+    reversed_window,
+)
+from geodesic_core.tolerances import TIE
+
+
+@inlined
+def distance_along(window: Window, x: float) -> float:
+    """Distance at (x, 0): beyond the window's ends, over the nearer of them and along the edge."""
+    end = min(max(x, window.b0), window.b1)
+    return distance_at(window, end) + abs(x - end)
+
+
+@kernel
+def offer(wave: Any, h: int, twin: int, length: float, window: Window) -> None:
+    """Offer a window to h, of this length; it waits if it is the nearest at any place.
+
+    ``twin`` is the half-edge of the same edge that it leaves by, or -1: a window that is no nearer
+    than one that went the other way there goes back. Modifies values, pool and buckets.
+    """
+    values, places = wave.front.values, wave.bounds.places
+    won, key, step = 0, math.inf, length / places
+    for k in range(places):
+        distance = distance_along(window, step * (k + 0.5))
+        is_nearer = distance < values[places * h + k] * (1.0 - TIE)
+        if is_nearer and (twin < 0 or distance < values[places * twin + places - 1 - k]):
+            values[places * h + k] = distance
+            won |= 1 << k
+            key = min(key, distance)
+    if won and key <= wave.bounds.max_distance:
+        push(wave, h, window, won, key)
+
+
+@inlined
+def offer_over(wave: Any, out: int, g: int, length: float, window: Window) -> None:
+    """Offer a window that leaves a face by its half-edge g to ``out``, across that edge.
+
+    The window is in the frame of a half-edge that runs the other way than g. ``out`` may be
+    NO_FACE, or IRREGULAR: then the window goes into each other face of the edge.
+    """
+    if out >= 0:
+        offer(wave, out, g, length, window)
+    elif out == IRREGULAR:
+        offer_around(wave, g, window)
+
+
+@kernel
+def offer_around(wave: Any, g: int, window: Window) -> None:
+    """Offer a window that leaves by g to each other half-edge of that irregular edge."""
+    mesh = wave.mesh
+    length = mesh.geometry[ROW * g + LENGTH]
+    h = int(mesh.links[ROW * g + AROUND] >> 1)
+    while h != g:
+        seen = window
+        if mesh.links[ROW * h + TAIL] == mesh.links[ROW * g + TAIL]:
+            seen = reversed_window(window, length)
+        offer(wave, h, -1, length, seen)
+        h = int(mesh.links[ROW * h + AROUND] >> 1)
+
+
+@inlined
+def relax(
+    wave: Any, node: int, distance: float, via: int, sx: float, sy: float, root: int, x: float
+) -> None:
+    """Offer a node a distance, over (x, 0) on ``via`` from the pseudosource ``root`` at (sx, sy).
+
+    Ties go to the lower source. A vertex where several fans meet is to emit all around: windows
+    that turn about it stay in their fan. Modifies the node, pool and buckets.
+    """
+    front = wave.front
+    known = front.distance[node]
+    if distance > known * (1.0 + TIE):
+        return
+    own, others = front.source_index[root], front.source_index[node]
+    if not precedence(distance, own, known, others):
+        return
+    front.winner[2 * node], front.winner[2 * node + 1] = sx, sy
+    front.winner_ints[WINNER * node + ENTRY_EDGE] = via
+    front.winner_ints[WINNER * node + PREDECESSOR] = root
+    front.crossing[node] = x
+    front.source_index[node] = own
+    if distance < known:
+        front.distance[node] = distance
+        if node < wave.sizes.vertices:
+            if known == math.inf:
+                front.counters[REACHED] += 1
+            if wave.mesh.flags[node] & (FANS | SEAM | PINCHED):
+                push_vertex(wave, node)
+
+
+@kernel
+def push_vertex(wave: Any, v: int) -> None:
+    """Have a vertex wait to emit windows all around. Modifies pool and buckets."""
+    distance = wave.front.distance[v]
+    if distance <= wave.bounds.max_distance:
+        push(wave, -1 - v, emitted_window(wave, 0.0, 0.0, 0.0, 0.0, distance, v, 0.0), 0, distance)
