@@ -279,3 +279,14 @@ PASSES = 400
 
 Each pass shortens the path, so that what is left is an upper bound in any case.
 """
+
+FAR_NEARER = 1.01
+"""How many times nearer a window is, at its middle, that goes on in a fast sweep without a place.
+
+With 1.01 the mean error of one place a half-edge falls by a tenth, the largest errors on slivers by
+far more, and time grows by 2 %.
+"""
+
+MOST_AT_LARGE = 4
+"""Windows without a place that a half-edge passes on in a fast sweep: they may split without end.
+"""

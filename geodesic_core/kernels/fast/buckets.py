@@ -27,7 +27,8 @@ from geodesic_core.kernels.fast.state import (
     PEAK,
     WON,
 )
-from geodesic_core.kernels.jit import as_ints, inlined, kernel
+from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
+from geodesic_core.kernels.mesh.half_edges import ROW
 from geodesic_core.kernels.sweep.window import INTS, NEXT, WIDTH, Window, store_window
 
 _LAST_BUCKET = 1e18  # far below the largest integer
@@ -49,6 +50,9 @@ def push(wave: Any, h: int, window: Window, won: int, key: float) -> None:
     counters[PEAK] = max(counters[PEAK], counters[FRESH] - counters[FREE_SIZE])
     store_window(wave, front.windows, slot, window)
     ints[INTS * slot + HALF_EDGE], ints[INTS * slot + WON] = h, won
+    if h >= 0:  # it comes up long after: to wait for memory then took a third of the sweep
+        prefetch(wave.mesh.links, ROW * h)
+        prefetch(wave.mesh.geometry, ROW * h)
     due = math.floor(min(key * wave.bounds.buckets_per_unit, _LAST_BUCKET))
     bucket = max(int(due), counters[CURRENT])
     if bucket < counters[CURRENT] + BUCKETS:

@@ -9,7 +9,13 @@ paths that exist: the best of them wins a place, or several, and the rest is dro
 import math
 from typing import Any
 
-from geodesic_core.kernels.fast.places import distance_along, offer_over, relax
+from geodesic_core.kernels.fast.places import (
+    AT_LARGE,
+    distance_along,
+    offer_end,
+    offer_over,
+    relax,
+)
 from geodesic_core.kernels.fast.state import CROSSED, WON
 from geodesic_core.kernels.jit import as_ints, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
@@ -38,7 +44,6 @@ from geodesic_core.kernels.sweep.window import (
     straight_distance,
 )
 from geodesic_core.kernels.sweep.window_lists import faces_beyond
-from geodesic_core.tolerances import TIE
 
 OFFERS = 4
 """Windows offered to an edge, at most"""
@@ -49,6 +54,8 @@ VERTICES = 3
 @inlined
 def is_live(wave: Any, h: int, window: Window, won: int) -> bool:
     """Whether a window is still the nearest at a place that it won."""
+    if won & AT_LARGE:
+        return True
     values, places = wave.front.values, wave.bounds.places
     step = wave.mesh.geometry[ROW * h + LENGTH] / places
     for k in range(places):
@@ -111,7 +118,7 @@ def reach(wave: Any, node: int, h: int, window: Window, ax: float, ay: float, x:
     if place == x:
         distance = straight_distance(window, ax, ay)
     else:
-        distance = distance_at(window, place) + math.hypot(ax - place, ay)
+        distance = distance_at(window, place) + math.sqrt((ax - place) * (ax - place) + ay * ay)
     relax(wave, node, distance, h, window.sx, window.sy, window.root, place)
 
 
@@ -146,34 +153,29 @@ def send_over(
     """
     if side.out < 0 and side.out != IRREGULAR:
         return
-    distance = wave.front.distance
+    along = window.sx * side.cosine + window.sy * side.sine
     depth = window.sy * side.cosine - window.sx * side.sine
     u0 = hit_left(window.b0, window.sy, depth, side.sine, side.length, window.weight)
     u1 = side.length
     if x > window.b1:
         u1 = hit_left(window.b1, window.sy, depth, side.sine, side.length, window.weight)
-    lights_near = lights_apex = False
     if u1 > u0:
-        along = window.sx * side.cosine + window.sy * side.sine
-        lit = Window(
-            u0, u1, along, depth, window.sigma, window.weight, window.root, 0.0, window.reference
-        )
+        sigma, root = window.sigma, window.root
+        lit = Window(u0, u1, along, depth, sigma, window.weight, root, 0.0, window.reference)
         offer_side(wave, side, g, lit)
-        lights_near = u0 <= 0.0 and distance_at(lit, 0.0) <= distance[near] * (1.0 + TIE)
-        lights_apex = u1 >= side.length and distance_at(lit, side.length) <= distance[apex] * (
-            1.0 + TIE
+    if side.out >= 0:
+        offer_end(wave, side.out, g, side.length, near, not side.is_right)
+        offer_end(wave, side.out, g, side.length, apex, side.is_right)
+    else:
+        ends = wave.front.distance[near], wave.front.distance[apex]
+        offer_side(
+            wave, side, g, emitted_window(wave, 0.0, side.length, 0.0, 0.0, ends[0], near, 0.0)
         )
-    if not lights_near:
-        emitted = emitted_window(wave, 0.0, side.length, 0.0, 0.0, distance[near], near, 0.0)
-        offer_side(wave, side, g, emitted)
-    if not lights_apex:
         place = side.length
-        emitted = emitted_window(wave, 0.0, place, place, 0.0, distance[apex], apex, 0.0)
-        offer_side(wave, side, g, emitted)
+        offer_side(wave, side, g, emitted_window(wave, 0.0, place, place, 0.0, ends[1], apex, 0.0))
     if x > window.b1 and window.b1 == length:
-        sx, sy = length * side.cosine, -length * side.sine
-        emitted = emitted_window(wave, 0.0, side.length, sx, sy, distance[far], far, 0.0)
-        offer_side(wave, side, g, emitted)
+        sx, sy, sigma = length * side.cosine, -length * side.sine, wave.front.distance[far]
+        offer_side(wave, side, g, emitted_window(wave, 0.0, side.length, sx, sy, sigma, far, 0.0))
 
 
 @inlined

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints, Longs, aligned_rows
+from geodesic_core.arrays import Flags, Floats, Ints, Longs, aligned_rows
 from geodesic_core.kernels.jit import kernel, pointers
 from geodesic_core.kernels.mesh.half_edges import Topology
 from geodesic_core.kernels.sweep.state import FACE, NEXT_SITE, WINNER, Sites
@@ -84,6 +84,8 @@ class Wavefront(NamedTuple):
     source_index: Ints
     """(N,): as in `sweep.state.Vertices`"""
     sites: Sites
+    at_large: Flags
+    """(3F,): windows that went on without a place"""
     first_site: Ints
     """(F,): row of the first site to reach in a face, -1 for none; or empty"""
     counters: Longs
@@ -146,6 +148,7 @@ def new_wavefront(topology: Topology, sites: Sites, places: int, first_target: i
         crossing=np.zeros(nodes),
         source_index=np.zeros(nodes, np.int32),
         sites=sites._replace(ints=own),
+        at_large=np.zeros(half_edges, np.uint8),
         first_site=first_site,
         counters=counters,
     )

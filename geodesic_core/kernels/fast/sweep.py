@@ -24,7 +24,7 @@ from geodesic_core.kernels.fast.state import (
     view_of,
 )
 from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
-from geodesic_core.kernels.mesh.half_edges import ROW
+from geodesic_core.kernels.mesh.half_edges import APEX, OUT_LEFT, OUT_RIGHT, ROW
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.sweep.state import NODE, PREDECESSOR, SEGMENT, SITE, WINNER
 from geodesic_core.kernels.sweep.window import INTS, SIGMA, WIDTH
@@ -102,13 +102,15 @@ def advance(topology: Any, wavefront: Any, bounds: Any, budget: int) -> Outcome:
 
 @inlined
 def prefetch_next(wave: Any) -> None:
-    """Prefetch the rows of the half-edge that will probably be crossed next."""
-    front = wave.front
-    row = BUCKET_ENDS * (front.counters[CURRENT] & (BUCKETS - 1))
-    slot = front.buckets[row + FIRST]
+    """Prefetch what the window that is probably next will be compared with."""
+    front, mesh, places = wave.front, wave.mesh, wave.bounds.places
+    slot = front.buckets[BUCKET_ENDS * (front.counters[CURRENT] & (BUCKETS - 1)) + FIRST]
+    h = -1
     if slot >= 0:
         h = int(as_ints(front.windows)[INTS * slot + HALF_EDGE])
-        if h >= 0:
-            prefetch(wave.mesh.geometry, ROW * h)
-            prefetch(wave.mesh.links, ROW * h)
-            prefetch(front.values, wave.bounds.places * h)
+    if h >= 0:
+        links = ROW * h
+        prefetch(front.values, places * h)
+        prefetch(front.values, places * max(mesh.links[links + OUT_LEFT], 0))
+        prefetch(front.values, places * max(mesh.links[links + OUT_RIGHT], 0))
+        prefetch(front.distance, int(mesh.links[links + APEX]))
