@@ -16,8 +16,11 @@ from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources
 from geodesic_core.kernels.sweep.state import MERGE, MERGE_INTS
 
-ESTIMATES = {1: 0.03, 2: 0.012, 4: 0.005, 8: 0.002}
-"""Estimated relative errors by effort, the number of places of a half-edge."""
+ESTIMATES = {1: 0.03, 2: 0.01, 4: 0.005, 8: 0.002}
+"""Estimated relative errors by effort, the number of places of a half-edge.
+
+In 19 of 20 fields that were measured, 99 of 100 vertices lie within; see docs/accuracy.md.
+"""
 
 _FIRST_BUDGET = 50_000
 _SMALLEST_BUDGET = 1_000

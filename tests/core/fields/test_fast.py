@@ -1,0 +1,261 @@
+"""Fast distances: lengths of paths that exist, so never too short; mostly little too long."""
+
+import math
+
+import numpy as np
+import pytest
+
+import geodesic_core as gc
+from geodesic_core.fields import fast_sweep
+from geodesic_core.kernels.fast import state
+from tests.conftest import WITHOUT_JIT
+from tests.support import expected, zoo
+from tests.support.approximation import MERGING, some_sources
+from tests.support.certificates import check_path
+from tests.support.meshes import mesh_of
+
+EFFORTS = (1, 2) if WITHOUT_JIT else (1, 2, 4, 8)
+each_effort = pytest.mark.parametrize("effort", EFFORTS)
+EXACT = 1e-12
+"""Relative: all that a fast distance may lie below the exact one."""
+ROUNDING = 1e-9
+INSIDE = gc.SurfacePoint.face(0, (0.2, 0.3, 0.5))
+SOURCES = {
+    "vertex": lambda _: 0,
+    "inside": lambda _: INSIDE,
+    "edge": lambda _: gc.SurfacePoint.edge(1, 0, 0.4),
+    "curve": lambda mesh: gc.Curve([INSIDE, int(mesh.faces[0, 0])]),
+    "several": lambda _: [gc.Source(0, 0.25), gc.SurfacePoint.face(2, (0.1, 0.1, 0.8))],
+}
+each_source = pytest.mark.parametrize("source", list(SOURCES))
+
+
+def check_never_below(found: np.ndarray, exact: np.ndarray) -> None:
+    """Reached where the exact ones are, and no nearer."""
+    np.testing.assert_array_equal(np.isfinite(found), np.isfinite(exact))
+    reached = np.isfinite(exact)
+    assert (found[reached] >= exact[reached] * (1 - EXACT)).all()
+
+
+def check_paths(field: gc.DistanceField, exact: np.ndarray, targets) -> None:
+    """Over the surface, no longer than the field says, no shorter than exact."""
+    for target in targets:
+        path = field.path_to(target)
+        start = field.sources[field.nearest_source[target]].start_distance
+        point = field.sources[field.nearest_source[target]].point
+        rounding = ROUNDING * field.mesh.diagonal
+        assert start + path.length <= field.distances[target] * (1 + ROUNDING) + rounding
+        assert start + path.length >= exact[target] * (1 - ROUNDING) - rounding
+        assert path.error_bound == field.error_bound
+        if isinstance(point, int):
+            check_path(field.mesh, path, point, target, path.length)
+
+
+def reached_by(field: gc.DistanceField, count: int) -> list[int]:
+    reached = np.flatnonzero(np.isfinite(field.distances) & (field.distances > 0.0))
+    return np.random.default_rng(1).permutation(reached)[:count].tolist()
+
+
+@pytest.mark.slice(12)
+@zoo.each(zoo.SMALL | zoo.IRREGULAR)
+def test_never_below_the_oracle_and_paths_are_as_short(case):
+    matrix, mesh = expected.matrix(case), mesh_of(case)
+    for source in some_sources(case, 6):
+        for effort in EFFORTS:
+            field = gc.fast_distance(mesh, source, effort)
+            check_never_below(field.distances, matrix[source])
+            reached = np.isfinite(matrix[source])
+            np.testing.assert_array_equal(field.nearest_source, np.where(reached, 0, -1))
+            check_paths(field, matrix[source], reached_by(field, 8))
+
+
+@pytest.mark.jit
+@zoo.each(zoo.KNOWN)
+def test_never_below_closed_forms(case):
+    """Slivers among them."""
+    mesh = mesh_of(case)
+    for source in some_sources(case, 3):
+        exact = case.distances(source)
+        for effort in EFFORTS:
+            field = gc.fast_distance(mesh, source, effort)
+            rounding = 1e-9 * mesh.diagonal
+            assert (field.distances >= exact * (1 - 1e-9) - rounding).all()
+            check_paths(field, exact, reached_by(field, 8))
+
+
+@pytest.mark.jit
+@zoo.each(MERGING)
+def test_more_effort_brings_accuracy(case):
+    mesh = mesh_of(case)
+    errors = []
+    for effort in EFFORTS:
+        errors.append(0.0)
+        for source in some_sources(case, 8):
+            exact = gc.exact_distance(mesh, source).distances
+            field = gc.fast_distance(mesh, source, effort)
+            errors[-1] += float((field.distances - exact).sum() / exact.sum())
+    assert errors[0] > errors[1] > errors[2] > errors[3]
+    assert errors[0] / 8 < 0.02
+    assert errors[3] / 8 < 5e-4
+
+
+@pytest.mark.jit
+@each_source
+@each_effort
+@pytest.mark.parametrize("name", ["land", "islands", "ring"])
+def test_every_source(name, effort, source):
+    mesh = mesh_of(MERGING[name])
+    sources = SOURCES[source](mesh)
+    targets = [gc.SurfacePoint.face(5, (0.3, 0.3, 0.4)), gc.SurfacePoint.edge(9, 2, 0.25)]
+    targets += [gc.SurfacePoint.face(0, (0.6, 0.2, 0.2)), 7]
+    exact = gc.exact_distance(mesh, sources, targets=targets)
+    field = gc.fast_distance(mesh, sources, effort, targets=targets)
+    check_never_below(field.distances, exact.distances)
+    check_paths(field, exact.distances, reached_by(field, 20))
+    for target in targets:
+        distance = field.distance_at(target)
+        assert distance >= exact.distance_at(target) * (1 - EXACT)
+        assert distance <= exact.distance_at(target) * 1.2
+        path = field.path_to(target)
+        start = field.sources[field.nearest_source_at(target)].start_distance
+        assert start + path.length <= distance * (1 + ROUNDING)
+
+
+@each_source
+def test_points_that_were_no_targets_and_isolines_are_exact(source):
+    mesh = mesh_of(MERGING["islands"])
+    sources = SOURCES[source](mesh)
+    exact = gc.exact_distance(mesh, sources, retain="windows")
+    field = gc.fast_distance(mesh, sources, 1, retain="distances")
+    point = gc.SurfacePoint.face(17, (0.3, 0.3, 0.4))
+    assert field.distance_at(point) == exact.distance_at(point)
+    assert field.nearest_source_at(point) == exact.nearest_source_at(point)
+    assert field.path_to(point).length == exact.path_to(point).length
+    levels = exact.levels(3)
+    for found, lines in zip(field.isolines(levels), exact.isolines(levels), strict=True):
+        assert len(found) == len(lines)
+        for one, other in zip(found, lines, strict=True):
+            np.testing.assert_array_equal(one.points, other.points)
+
+
+@pytest.mark.jit
+@each_effort
+def test_barriers_and_limits(effort):
+    mesh = mesh_of(MERGING["land"])
+    barriers = list(range(40, 60))
+    limit = 0.4 * float(gc.exact_distance(mesh, 0).distances.max())
+    for options in ({"barriers": barriers}, {"max_distance": limit}):
+        exact = gc.exact_distance(mesh, 0, **options)
+        field = gc.fast_distance(mesh, 0, effort, **options)
+        reached = np.isfinite(field.distances)
+        assert (field.distances[reached] >= exact.distances[reached] * (1 - EXACT)).all()
+        assert (field.distances[reached] <= limit).all() or "barriers" in options
+        np.testing.assert_array_equal(field.nearest_source, np.where(reached, 0, -1))
+        if "barriers" in options:
+            np.testing.assert_array_equal(reached, np.isfinite(exact.distances))
+
+
+@pytest.mark.parametrize("gap", [1e3, 1e9, 1e300])
+def test_start_distances_far_beyond_the_ring_of_buckets(gap):
+    """Two components, the second of which starts when the first has long been done."""
+    vertices, faces = gc.samples.plane(50)
+    both = np.vstack([vertices, vertices + np.array([0.0, 0.0, 5.0])])
+    mesh = gc.TriangleMesh(both, np.vstack([faces, faces + len(vertices)]))
+    field = gc.fast_distance(mesh, [0, gc.Source(len(vertices) + 3, gap)])
+    alone = gc.fast_distance(gc.TriangleMesh(vertices, faces), 0)
+    np.testing.assert_allclose(field.distances[: len(vertices)], alone.distances, rtol=1e-15)
+    assert (field.distances[len(vertices) :] >= gap).all()
+    assert set(field.nearest_source[len(vertices) :].tolist()) == {1}
+
+
+def test_ties_go_to_the_lower_source():
+    mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    assert gc.fast_distance(mesh, [0, 3]).nearest_source.tolist() == [0, 0, 0, 1]
+
+
+@each_effort
+def test_the_same_to_the_bit_whatever_the_slices_and_the_room(effort, monkeypatch):
+    mesh = mesh_of(MERGING["ring"])
+    whole = gc.fast_distance(mesh, 3, effort)
+
+    def crowded(topology, sites, places, first_target):
+        front = new_wavefront(topology, sites, places, first_target)
+        return front._replace(windows=front.windows[:40].copy())
+
+    new_wavefront = state.new_wavefront
+    monkeypatch.setattr(state, "new_wavefront", crowded)
+    monkeypatch.setattr(fast_sweep, "_FIRST_BUDGET", 1)
+    monkeypatch.setattr(fast_sweep, "_SMALLEST_BUDGET", 1)
+    monkeypatch.setattr(fast_sweep, "SLICE_SECONDS", 0.0)
+    sliced = gc.fast_distance(mesh, 3, effort)
+    assert sliced.stats.windows_created == whole.stats.windows_created
+    for name, array in whole.arrays().items():
+        if name not in ("seconds", "counts"):
+            np.testing.assert_array_equal(sliced.arrays()[name], array)
+
+
+@pytest.mark.parametrize("retain", ["distances", "paths"])
+def test_arrays_make_the_same_field(retain):
+    mesh = mesh_of(MERGING["land"])
+    field = gc.fast_distance(mesh, [SOURCES["curve"](mesh), 5], 4, targets=[9], retain=retain)
+    again = gc.DistanceField.from_arrays(mesh, field.arrays())
+    np.testing.assert_array_equal(again.distances, field.distances)
+    assert again.error_bound == field.error_bound
+    assert again.stats == field.stats
+    for target in (3, 9, 50):
+        np.testing.assert_array_equal(again.path_to(target).points, field.path_to(target).points)
+    np.testing.assert_array_equal(again.gradient, field.gradient)
+
+
+@pytest.mark.jit
+@each_source
+def test_the_gradient_is_the_direction_of_the_last_piece_of_the_path(source):
+    mesh = mesh_of(MERGING["dented_ball"])
+    field = gc.fast_distance(mesh, SOURCES[source](mesh), 1)
+    for v in reached_by(field, 60):
+        last = np.diff(field.path_to(v).points[-2:], axis=0)[0]
+        cosine = float(last @ field.gradient[v] / np.linalg.norm(last))
+        assert math.acos(min(cosine, 1.0)) < 1e-4
+
+
+def test_progress_and_stopping():
+    mesh, seen = gc.TriangleMesh(*zoo.icosphere(3)), []
+    exact = gc.exact_distance(mesh, 0).distances
+    gc.fast_distance(mesh, 0, progress=seen.append)
+    assert seen == sorted(seen)
+    assert (seen[0], seen[-1]) == (0.0, 1.0)
+    with pytest.raises(gc.errors.Cancelled):
+        gc.fast_distance(mesh, 0, cancel=lambda: True)
+    with pytest.raises(gc.errors.DeadlineExceeded):
+        gc.fast_distance(mesh, 0, deadline_s=1e-9)
+    with pytest.raises(gc.errors.MemoryLimitExceeded):
+        gc.fast_distance(mesh, 0, memory_limit=1000)
+    check_never_below(gc.fast_distance(mesh, 0).distances, exact)
+
+
+@pytest.mark.jit
+def test_it_can_be_cancelled_on_the_way():
+    mesh, calls = gc.TriangleMesh(*zoo.icosphere(6)), []
+    with pytest.raises(gc.errors.Cancelled):
+        gc.fast_distance(mesh, 0, 8, cancel=lambda: len(calls) > 2 or calls.append(0) is not None)
+    assert len(calls) == 3
+
+
+@pytest.mark.parametrize("effort", [0, 3, 16, -1, 2.5, True, "2", None, math.nan])
+def test_efforts_that_are_none(effort):
+    mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    with pytest.raises(gc.errors.InvalidArgument, match=r"effort is .*; it must be 1, 2, 4 or 8"):
+        gc.fast_distance(mesh, 0, effort)
+
+
+def test_windows_are_not_retained():
+    mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    with pytest.raises(gc.errors.InvalidArgument, match="retain is 'windows'"):
+        gc.fast_distance(mesh, 0, retain="windows")
+
+
+def test_the_error_is_estimated_by_effort():
+    mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    bounds = [gc.fast_distance(mesh, 0, effort).error_bound for effort in (1, 2, 4, 8)]
+    assert {(bound.type, bound.kind) for bound in bounds} == {("relative", "estimated")}
+    assert [bound.value for bound in bounds] == sorted({b.value for b in bounds}, reverse=True)
