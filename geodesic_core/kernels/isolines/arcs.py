@@ -36,7 +36,7 @@ from geodesic_core.kernels.isolines.regions import (
     span_in_half_plane,
     span_on_line,
 )
-from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.jit import borrowed, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import LENGTH, half_edge_in_face
 from geodesic_core.tolerances import LEVEL
 
@@ -180,7 +180,7 @@ def arcs_within(topology: Any, face: int, regions: Floats, slack: float) -> tupl
     A line along an edge, within ``slack``, would be in either face by rounding: it counts as in the
     face that is farther.
     """
-    geometry = topology.geometry
+    geometry, regions = borrowed(topology.geometry), borrowed(regions)
     arcs, owners, count = np.empty((len(regions), ARC)), np.empty((len(regions), 1), np.int32), 0
     intervals = np.empty((INTERVALS, 2))
     ax, ay, _, _ = half_edge_in_face(geometry, 3 * face + 2)
@@ -274,7 +274,7 @@ def outer_arcs(topology: Any, face: int, regions: Floats, level: float, shortest
     what another region holds by more than that, and the others lose all that it holds within that.
     Arcs not longer than ``shortest`` are left out. O(n² log n) for n regions.
     """
-    slack = LEVEL * level
+    slack, regions = LEVEL * level, borrowed(regions)
     arcs, owners = arcs_within(topology, face, regions, slack)
     outer, count = np.empty((len(arcs) + 4, ARC)), 0
     hidden, intervals = np.empty((ROWS, 2)), np.empty((INTERVALS, 2))
@@ -306,6 +306,7 @@ def hidden_intervals(
     They are written to ``hidden``, or to a larger array; ``intervals`` is scratch memory. Their
     number is -1 where one region holds all of the arc.
     """
+    arc, intervals = borrowed(arc), borrowed(intervals)
     start, end, chord, count = arc[START], arc[END], chord_of(arc), 0
     for j in range(len(regions)):
         if j == owner:

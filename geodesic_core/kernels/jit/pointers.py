@@ -69,6 +69,32 @@ def _compiled_pointers(typingcontext: Any, group: Any) -> Any:  # noqa: ARG001
     return _type_of_pointers(group)(group), codegen
 
 
+def _interpreted_borrowed(group: Any) -> Any:
+    return group
+
+
+@intrinsic
+def _compiled_borrowed(typingcontext: Any, group: Any) -> Any:  # noqa: ARG001
+    def convert(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+        if isinstance(kind, types.Array):
+            array = context.make_array(kind)(context, builder, value)
+            array.meminfo = cgutils.get_null_value(array.meminfo.type)
+            return array._getvalue()
+        if isinstance(kind, types.BaseNamedTuple):
+            kinds: Any = kind
+            parts = [
+                convert(context, builder, part, builder.extract_value(value, i))
+                for i, part in enumerate(kinds)
+            ]
+            return context.make_tuple(builder, kind, parts)
+        return value
+
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return convert(context, builder, signature.args[0], arguments[0])
+
+    return group(group), codegen
+
+
 @intrinsic
 def _compiled_ints(typingcontext: Any, rows: Any) -> Any:  # noqa: ARG001
     if isinstance(rows, types.Array):  # in tests, which call kernels on arrays
@@ -113,6 +139,13 @@ Passing an array from kernel to kernel costs two atomic reference counts that nu
 
 pointers: Any = _interpreted_pointers if _interpreted else _compiled_pointers
 """A named tuple with each array in it, at any depth, as a `pointer`; all else as it was."""
+
+borrowed: Any = _interpreted_borrowed if _interpreted else _compiled_borrowed
+"""An array, or a named tuple of them, without its reference counts; valid as a `pointer` is.
+
+Views of it cost nothing, where those of an array cost two atomic counts each. For an argument,
+which the caller holds; never to be returned.
+"""
 
 as_ints: Any = _interpreted_ints if _interpreted else _compiled_ints
 """The memory of a pointer to float64 as int32, two for each; free of cost."""
