@@ -86,6 +86,7 @@ def speed(front: Floats) -> float:
 @kernel
 def clip(intervals: Floats, count: int, start: float, width: float) -> int:
     """Cut the first ``count`` intervals of angles to an arc, in place; return how many are left."""
+    intervals = borrowed(intervals)
     cut, left = np.empty((INTERVALS, 2)), 0
     for i in range(count):
         lo, hi = intervals[i, 0], intervals[i, 1]
@@ -109,6 +110,7 @@ def clip_to_half_plane(
 
     Its (CX, CY) is ``depth`` inside; n is a unit vector, or zero where nothing is to be cut.
     """
+    intervals, front = borrowed(intervals), borrowed(front)
     if count == 0 or (nx == 0.0 and ny == 0.0):
         return count
     if is_line(front):
@@ -145,6 +147,7 @@ def clip_to_disc(
 @kernel
 def clip_to_sides(intervals: Floats, count: int, front: Floats, region: Floats) -> int:
     """Cut ``intervals`` of a front to the sides of a region; return how many are left."""
+    intervals, front, region = borrowed(intervals), borrowed(front), borrowed(region)
     dx, dy = front[CX] - region[CX], front[CY] - region[CY]
     for side in range(FRONT, end_of_sides(region), SIDE):
         nx, ny = region[side + NX], region[side + NY]
