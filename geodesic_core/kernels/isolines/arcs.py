@@ -36,7 +36,7 @@ from geodesic_core.kernels.isolines.regions import (
     span_in_half_plane,
     span_on_line,
 )
-from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.jit import borrowed, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import LENGTH, half_edge_in_face
 from geodesic_core.tolerances import LEVEL
 
@@ -86,6 +86,7 @@ def speed(front: Floats) -> float:
 @kernel
 def clip(intervals: Floats, count: int, start: float, width: float) -> int:
     """Cut the first ``count`` intervals of angles to an arc, in place; return how many are left."""
+    intervals = borrowed(intervals)
     cut, left = np.empty((INTERVALS, 2)), 0
     for i in range(count):
         lo, hi = intervals[i, 0], intervals[i, 1]
@@ -109,6 +110,7 @@ def clip_to_half_plane(
 
     Its (CX, CY) is ``depth`` inside; n is a unit vector, or zero where nothing is to be cut.
     """
+    intervals, front = borrowed(intervals), borrowed(front)
     if count == 0 or (nx == 0.0 and ny == 0.0):
         return count
     if is_line(front):
@@ -145,6 +147,7 @@ def clip_to_disc(
 @kernel
 def clip_to_sides(intervals: Floats, count: int, front: Floats, region: Floats) -> int:
     """Cut ``intervals`` of a front to the sides of a region; return how many are left."""
+    intervals, front, region = borrowed(intervals), borrowed(front), borrowed(region)
     dx, dy = front[CX] - region[CX], front[CY] - region[CY]
     for side in range(FRONT, end_of_sides(region), SIDE):
         nx, ny = region[side + NX], region[side + NY]
@@ -180,7 +183,7 @@ def arcs_within(topology: Any, face: int, regions: Floats, slack: float) -> tupl
     A line along an edge, within ``slack``, would be in either face by rounding: it counts as in the
     face that is farther.
     """
-    geometry = topology.geometry
+    geometry, regions = borrowed(topology.geometry), borrowed(regions)
     arcs, owners, count = np.empty((len(regions), ARC)), np.empty((len(regions), 1), np.int32), 0
     intervals = np.empty((INTERVALS, 2))
     ax, ay, _, _ = half_edge_in_face(geometry, 3 * face + 2)
@@ -274,7 +277,7 @@ def outer_arcs(topology: Any, face: int, regions: Floats, level: float, shortest
     what another region holds by more than that, and the others lose all that it holds within that.
     Arcs not longer than ``shortest`` are left out. O(n² log n) for n regions.
     """
-    slack = LEVEL * level
+    slack, regions = LEVEL * level, borrowed(regions)
     arcs, owners = arcs_within(topology, face, regions, slack)
     outer, count = np.empty((len(arcs) + 4, ARC)), 0
     hidden, intervals = np.empty((ROWS, 2)), np.empty((INTERVALS, 2))
@@ -306,6 +309,7 @@ def hidden_intervals(
     They are written to ``hidden``, or to a larger array; ``intervals`` is scratch memory. Their
     number is -1 where one region holds all of the arc.
     """
+    arc, intervals = borrowed(arc), borrowed(intervals)
     start, end, chord, count = arc[START], arc[END], chord_of(arc), 0
     for j in range(len(regions)):
         if j == owner:

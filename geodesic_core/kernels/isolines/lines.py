@@ -31,7 +31,7 @@ from geodesic_core.kernels.isolines.regions import (
     runs_along,
     span_on_line,
 )
-from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.jit import borrowed, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     COS_LEFT,
     HEAD,
@@ -142,6 +142,7 @@ def cut_faces(
     ``row_of`` (F,) is the row of each face among all that are to be cut, -1 for none. There are
     ``known`` rows; those of the neighbours follow, and are written to ``row_of``.
     """
+    topology, field = borrowed(topology), borrowed(field)
     links, geometry = topology.links, topology.geometry
     slack, shortest = LEVEL * level, PIECE * level
     spans, span_count = np.empty((ROWS, 2)), 0
@@ -182,6 +183,7 @@ def cut_edge(geometry: Floats, h: int, regions: Floats, slack: float, spans: Flo
 
     A line that runs along the edge, within ``slack``, holds it: at the level counts as nearer.
     """
+    regions, spans = borrowed(regions), borrowed(spans)
     edge, length, count = half_edge_in_face(geometry, h), geometry[h, LENGTH], 0
     ox, oy, ux, uy = edge
     for i in range(len(regions)):

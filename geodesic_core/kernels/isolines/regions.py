@@ -23,7 +23,7 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.isolines.face_windows import retained_window
-from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.jit import borrowed, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL, half_edge_in_face, point_in_frame
 from geodesic_core.kernels.sweep.state import FACE, NODE, SEGMENT_END
 from geodesic_core.kernels.sweep.window import ROOT, Window, reaches
@@ -105,6 +105,7 @@ def regions_of_face(topology: Any, field: Any, face: int, level: float) -> Float
 
     Windows come first: of regions that reach equally far, they take precedence.
     """
+    topology, field = borrowed(topology), borrowed(field)
     windows, count = field.face_windows, 0
     first_site, end_site = rows_in_face(field.site_ints, face)
     first_segment, end_segment = rows_in_face(field.segment_ints, face)
@@ -147,6 +148,7 @@ def add_window_regions(
 
     Returns the new count.
     """
+    regions = borrowed(regions)
     face_windows, reach = field.face_windows, level * (1.0 + LEVEL)
     ints, edge = face_windows.windows.view(np.int32), half_edge_in_face(geometry, h)
     gap = GAP * geometry[h, LENGTH]

@@ -1,8 +1,9 @@
-"""Raw pointers to arrays within kernels: what passing them costs nothing.
+"""Raw pointers to arrays within kernels, and borrowed arrays: what passing them costs nothing.
 
 With ``NUMBA_DISABLE_JIT=1`` they are flat views, and the kernels plain Python.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numba
@@ -49,24 +50,45 @@ def _type_of_pointers(group: Any) -> Any:
     return group
 
 
-@intrinsic
-def _compiled_pointers(typingcontext: Any, group: Any) -> Any:  # noqa: ARG001
+def _in_each_array(
+    of_array: Callable[..., Any], type_of: Callable[[Any], Any], group: Any
+) -> tuple[Any, Any]:
+    """Return what an intrinsic does that applies ``of_array`` in a group at any depth."""
+
     def convert(context: Any, builder: Any, kind: Any, value: Any) -> Any:
         if isinstance(kind, types.Array):
-            return context.make_array(kind)(context, builder, value).data
+            return of_array(context.make_array(kind)(context, builder, value))
         if isinstance(kind, types.BaseNamedTuple):
             kinds: Any = kind
             parts = [
                 convert(context, builder, part, builder.extract_value(value, i))
                 for i, part in enumerate(kinds)
             ]
-            return context.make_tuple(builder, _type_of_pointers(kind), parts)
+            return context.make_tuple(builder, type_of(kind), parts)
         return value
 
     def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return convert(context, builder, signature.args[0], arguments[0])
 
-    return _type_of_pointers(group)(group), codegen
+    return type_of(group)(group), codegen
+
+
+@intrinsic
+def _compiled_pointers(typingcontext: Any, group: Any) -> Any:  # noqa: ARG001
+    return _in_each_array(lambda array: array.data, _type_of_pointers, group)
+
+
+def _interpreted_borrowed(group: Any) -> Any:
+    return group
+
+
+@intrinsic
+def _compiled_borrowed(typingcontext: Any, group: Any) -> Any:  # noqa: ARG001
+    def without_owner(array: Any) -> Any:
+        array.meminfo = cgutils.get_null_value(array.meminfo.type)
+        return array._getvalue()
+
+    return _in_each_array(without_owner, lambda kind: kind, group)
 
 
 @intrinsic
@@ -113,6 +135,14 @@ Passing an array from kernel to kernel costs two atomic reference counts that nu
 
 pointers: Any = _interpreted_pointers if _interpreted else _compiled_pointers
 """A named tuple with each array in it, at any depth, as a `pointer`; all else as it was."""
+
+borrowed: Any = _interpreted_borrowed if _interpreted else _compiled_borrowed
+"""An array, or a named tuple with arrays at any depth, whose references are not counted.
+
+For an argument, which the caller holds as long as the call lasts; never to be returned. Each view
+of an array costs two atomic counts, which were most of the time of isolines; one of these costs
+nothing.
+"""
 
 as_ints: Any = _interpreted_ints if _interpreted else _compiled_ints
 """The memory of a pointer to float64 as int32, two for each; free of cost."""

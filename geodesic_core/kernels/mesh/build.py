@@ -69,6 +69,27 @@ def check_arrays(vertices: Floats, faces: Ints | Longs) -> tuple[Outcome, int]:
     return Outcome.FINISHED, 0
 
 
+@kernel
+def origin_of(vertices: Floats, faces: Ints) -> Floats:
+    """Return (3,) what to measure positions from, so that they round by the size of the mesh.
+
+    Coordinates of a georeferenced mesh are many times larger than the mesh, and what is computed
+    from them rounds by their size. Where those of the faces differ by a factor of two at most, the
+    least can be subtracted from all: such differences are exact (Sterbenz's lemma). Elsewhere the
+    origin is 0, as no coordinate is larger than twice the mesh: a few faces show that mostly.
+    """
+    origin, corners = np.zeros(3), faces.reshape(-1)
+    for axis in range(3):
+        low, high = math.inf, -math.inf
+        for v in corners:
+            low, high = min(low, vertices[v, axis]), max(high, vertices[v, axis])
+            if high > 2.0 * low and low < 2.0 * high:
+                break
+        else:
+            origin[axis] = low
+    return origin
+
+
 _MORTON_BITS = 10
 """Bits per axis of a vertex's cell: finer cells change nothing for the caches."""
 
