@@ -36,12 +36,14 @@ def held(store: Path, **settings: Any) -> Iterator[tuple[ServiceClient, str]]:
     Yield it, and the path of a mesh. The workers stay stopped until the service's end kills them:
     one that went on before would finish its job.
     """
-    with ExitStack() as until_the_end:
-        with serving(store, cancel_grace_s=LONG_S, **settings) as client:
-            client.wait_until_idle()
-            mesh_id = upload_sample(client, "terrain", 200)
-            until_the_end.enter_context(stopped(client.workers()))
-            yield client, f"/v1/meshes/{mesh_id}"
+    with (
+        ExitStack() as until_the_end,
+        serving(store, cancel_grace_s=LONG_S, **settings) as client,
+    ):
+        client.wait_until_idle()
+        mesh_id = upload_sample(client, "terrain", 200)
+        until_the_end.enter_context(stopped(client.workers()))
+        yield client, f"/v1/meshes/{mesh_id}"
 
 
 def submit(client: TestClient, link: str, body: Any, headers: Any = ()) -> str:
