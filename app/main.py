@@ -54,6 +54,7 @@ def create_app(settings: Settings) -> FastAPI:
     )
     app.state.service = service
     app.state.metrics = metrics
+    app.state.about = about.about(settings)
     app.state.large_bodies = CapacityLimiter(1)
     # The last one added is the outermost.
     app.add_middleware(BodyTimeoutMiddleware, settings=settings)

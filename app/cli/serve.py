@@ -7,7 +7,7 @@ import sys
 from functools import partial
 from signal import SIGHUP, SIGTERM, raise_signal, signal
 from types import FrameType
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 import typer
 
@@ -31,6 +31,7 @@ def serve(
     from app import logs
     from app.http.connections import Connections
     from app.http.protocol import BoundedHttpProtocol
+    from app.http.reading import PacedReading
     from app.main import create_app
     from app.settings import Settings, variable_of
     from app.store.layout import StoreError
@@ -79,12 +80,16 @@ def serve(
             app.state.service.drain()
             super().handle_exit(sig, frame)
 
-    protocol: Any = partial(BoundedHttpProtocol, connections=Connections(settings))
+    connections = Connections(settings)
+
+    def connect(**arguments: Any) -> PacedReading:
+        return PacedReading(BoundedHttpProtocol(connections=connections, **arguments))
+
     config = uvicorn.Config(
         app,
         host,
         port,
-        http=protocol,
+        http=cast(Any, connect),
         ws="none",
         timeout_graceful_shutdown=math.ceil(settings.drain_s),  # uvicorn takes whole seconds
         log_config=None,

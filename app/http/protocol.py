@@ -44,6 +44,8 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         self._head_bytes = 0
         self._unparsed_bytes = 0  # received since the parser reported an element
         self._chunks = self._body_bytes = 0
+        self.chunks_of_read = 0
+        """Chunks of bodies that began in the last read"""
         self._body: list[bytes] = []  # received and not passed on yet
         self._head_timer: TimerHandle | None = None
         self._stall_timer: TimerHandle | None = None
@@ -70,12 +72,13 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         self._stop_stall_timer()
         super().connection_lost(exc)
 
-    def data_received(self, data: bytes) -> None:
+    def data_received(self, data: bytes | memoryview) -> None:
         """Parse what a client sent, unless it has been refused."""
+        self.chunks_of_read = 0
         if self._is_refused:
             return
         self._unparsed_bytes += len(data)
-        super().data_received(data)
+        super().data_received(data)  # type: ignore[arg-type]
         if self._is_refused:
             return
         self._pass_body_on()
@@ -145,6 +148,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
             self._refusal = Problem("malformed_request", detail, limit=LEAST_CHUNK)
             raise ValueError(detail)
         self._chunks += 1
+        self.chunks_of_read += 1
 
     def _count(self, size: int) -> None:
         self._unparsed_bytes = 0

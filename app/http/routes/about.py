@@ -6,7 +6,7 @@ from fastapi import APIRouter, Request, Response
 from starlette.responses import PlainTextResponse
 
 from app import __version__
-from app.encoding import FORMATS
+from app.encoding import FORMATS, JSON
 from app.errors import CODES, draining, problem
 from app.http import page
 from app.http.dependencies import ServiceDep
@@ -16,7 +16,7 @@ from app.http.uploads import MESH_FORMATS
 from app.schemas.meshes import SampleName
 from app.schemas.requests import Method
 from app.schemas.service import About, Health, Index, ProblemCode
-from app.settings import variable_of
+from app.settings import Settings, variable_of
 
 router = APIRouter(tags=["service"])
 
@@ -90,11 +90,10 @@ async def get_readiness(service: ServiceDep) -> Health:
     return Health(status="ok")
 
 
-@router.get("/v1", operation_id="getAbout", summary="Version, formats and limits in force")
-async def get_about(service: ServiceDep) -> About:
-    """Return version, methods, formats and samples, and the limits in force."""
-    limits = {variable_of(name): getattr(service.settings, name) for name in _LIMITS}
-    return About(
+def about(settings: Settings) -> bytes:
+    """Return what `get_about` answers, which does not change while the service runs."""
+    limits = {variable_of(name): getattr(settings, name) for name in _LIMITS}
+    document = About(
         version=__version__,
         methods=list(get_args(Method)),
         mesh_formats=[*MESH_FORMATS, "json"],
@@ -102,6 +101,18 @@ async def get_about(service: ServiceDep) -> About:
         samples=list(get_args(SampleName)),
         limits={name: limit for name, limit in limits.items() if limit is not None},
     )
+    return document.model_dump_json().encode()
+
+
+@router.get(
+    "/v1",
+    operation_id="getAbout",
+    summary="Version, formats and limits in force",
+    response_model=About,
+)
+async def get_about(request: Request) -> Response:
+    """Return version, methods, formats and samples, and the limits in force."""
+    return Response(request.app.state.about, media_type=JSON)
 
 
 @router.get(

@@ -126,8 +126,8 @@ def test_wrong_method_names_the_right_ones(client: TestClient) -> None:
 
 
 def test_a_defect_is_a_problem_too(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.http.routes.about.About", None)
+    monkeypatch.setattr("app.http.routes.about.Index", None)
 
-    problem = check_problem(client.get("/v1"), 500, "internal_error")
+    problem = check_problem(client.get("/"), 500, "internal_error")
 
     assert "NoneType" not in problem["detail"]

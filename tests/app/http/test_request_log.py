@@ -66,8 +66,8 @@ def test_probes_have_lines_where_they_are_asked_for(
 def test_a_failure_has_its_traceback_and_its_line(
     client: TestClient, log: Log, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("app.http.routes.about.FORMATS", None)
-    answer = client.get("/v1")
+    monkeypatch.setattr("app.http.routes.about.Index", None)
+    answer = client.get("/")
 
     failure, line = log
     assert (failure["event"], failure["exc_info"]) == ("request failed", True)
