@@ -3,7 +3,18 @@
 import argparse
 from pathlib import Path
 
-from benchmarks import approximate, attacks, exact, load, matrix, page, path, service, topology
+from benchmarks import (
+    approximate,
+    attacks,
+    exact,
+    fast,
+    load,
+    matrix,
+    page,
+    path,
+    service,
+    topology,
+)
 from benchmarks.inputs import Inputs
 from benchmarks.soak import measurement as soak
 from benchmarks.tables import write
@@ -14,6 +25,7 @@ BENCHMARKS = {
     "approximate": approximate.run,
     "merging": approximate.run_merging,
     "growth": approximate.run_growth,
+    "fast": fast.run,
     "path": path.run,
     "path-peers": path.run_peers,
     "landmarks": path.run_landmarks,
