@@ -1,4 +1,4 @@
-"""Fast distances from vertex 0: against approximate ones, and potpourri3d's factorised heat query."""
+"""Fast distances, against approximate ones and potpourri3d's factorised heat query."""
 
 from collections.abc import Callable
 from functools import partial
