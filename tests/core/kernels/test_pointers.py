@@ -1,11 +1,23 @@
 """Raw pointers within kernels, compiled and as plain Python."""
 
+from typing import Any, NamedTuple
+
 import numba
 import numpy as np
 import pytest
 
-from geodesic_core.kernels.jit import pointer
-from geodesic_core.kernels.jit.pointers import _interpreted_pointer
+from geodesic_core.kernels.jit import borrowed, pointer
+from geodesic_core.kernels.jit.pointers import _interpreted_borrowed, _interpreted_pointer
+
+
+class Pair(NamedTuple):
+    rows: Any
+    scale: float
+
+
+class Group(NamedTuple):
+    pair: Pair
+    ids: Any
 
 
 def second_of_flat(array):
@@ -28,3 +40,34 @@ def test_a_pointer_writes_through():
     assert array[1, 2] == 42.0
     _interpreted_pointer(array)[0] = 7.0
     assert array[0, 0] == 7.0
+
+
+def scale_a_row(group):
+    group = borrowed(group)
+    row = borrowed(group.pair.rows[group.ids[0]])
+    for column in range(len(row)):
+        row[column] *= group.pair.scale
+
+
+def test_a_borrowed_group_is_the_same_arrays():
+    group = Group(Pair(np.ones((2, 3)), 4.0), np.array([1], np.int32))
+    numba.njit(scale_a_row)(group)
+    assert group.pair.rows.tolist() == [[1.0, 1.0, 1.0], [4.0, 4.0, 4.0]]
+    assert _interpreted_borrowed(group) is group
+
+
+def test_the_owner_of_a_borrowed_array_keeps_it():
+    @numba.njit
+    def fill(row, value):
+        row = borrowed(row)
+        for column in range(len(row)):
+            row[column] = value
+
+    @numba.njit
+    def filled(count):
+        rows = np.empty((count, 3))
+        for i in range(count):
+            fill(rows[i], float(i))
+        return rows
+
+    assert (filled(1000) == np.arange(1000)[:, None]).all()
