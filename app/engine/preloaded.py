@@ -1,6 +1,6 @@
 """Loads kernels when imported by the fork server, so that its workers have them.
 
-The first kernels, and those of fast sweeps, for whoever drags a point: 30 ms and 2.6 MB. Workers do
+The first kernels, and those of fast sweeps, whose users wait least: 30 ms and 2.6 MB. Workers do
 not wait for the latter where they are not compiled yet.
 """
 
