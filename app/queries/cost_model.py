@@ -27,7 +27,7 @@ PER_FACE, PER_WINDOWS = 0.4e-6, 2.5e-9
 """Of an exact sweep: for each of its n faces, and for the windows on it, which are about √n."""
 PER_FACE_MERGED = 0.5e-6
 """Of an approximate sweep."""
-PER_FACE_PASSED, PER_PLACE = 0.08e-6, 0.17e-6
+PER_FACE_PASSED, PER_PLACE = 0.05e-6, 0.14e-6
 """Of a fast sweep: for each face, and for each of its places, which are as many as the effort."""
 PER_SWEEP = 0.3e-3
 """To start and to end a sweep, however short it is."""
@@ -55,7 +55,7 @@ BYTES_OF_WINDOWS_RETAINED = 30
 """Of the windows of an exact sweep, for the n√n of n faces."""
 FACES_RETAINED = 1.5
 """Faces whose windows isolines need, for each that a level crosses."""
-FAST_BYTES, FAST_BYTES_PER_FACE, BYTES_PER_PLACE = 270_000, 25, 24
+FAST_BYTES, FAST_BYTES_PER_FACE, BYTES_PER_PLACE = 270_000, 28, 24
 """Of a fast sweep: room for the windows that wait; for each face, and for each of its places."""
 SEARCH_BYTES, SEARCH_BYTES_PER_FACE = 230_000, 275
 
