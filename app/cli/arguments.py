@@ -23,6 +23,14 @@ class Method(StrEnum):
 
     EXACT = "exact"
     APPROXIMATE = "approximate"
+    FAST = "fast"
+
+
+class BoundedMethod(StrEnum):
+    """Methods of solving with a bound that is guaranteed."""
+
+    EXACT = "exact"
+    APPROXIMATE = "approximate"
 
 
 class Layout(StrEnum):
@@ -119,6 +127,13 @@ def faces(text: str) -> Sequence[int]:
 _FACES = re.compile(r"[0-9]{1,9}(-[0-9]{1,9})?(,[0-9]{1,9}(-[0-9]{1,9})?)*")
 
 
+def effort(text: str) -> int:
+    """Return the effort that an option names."""
+    if text not in {"1", "2", "4", "8"}:
+        raise typer.BadParameter(f"{text!r} is not 1, 2, 4 or 8")
+    return int(text)
+
+
 def writable(*suffixes: str) -> Callable[[Path | None], Path | None]:
     """Return a check of an output path that is made before any work begins."""
 
@@ -198,7 +213,16 @@ Barriers = Annotated[
     ),
 ]
 MethodOption = Annotated[
-    Method, typer.Option("--method", help="'approximate' is faster, within an allowed error.")
+    Method,
+    typer.Option(
+        "--method",
+        help="'approximate' is faster, within an allowed error; 'fast' is one quick pass, whose "
+        "error is estimated.",
+    ),
+]
+BoundedMethodOption = Annotated[
+    BoundedMethod,
+    typer.Option("--method", help="'approximate' is faster, within an allowed error."),
 ]
 RelativeError = Annotated[
     float | None,
@@ -211,15 +235,32 @@ AbsoluteError = Annotated[
     float | None,
     typer.Option(help="For approximate: the same in mesh units; with both, both hold."),
 ]
+EffortOption = Annotated[
+    int | None,
+    typer.Option(
+        "--effort",
+        parser=effort,
+        metavar="1|2|4|8",
+        help="For fast: the more, the more time and the less error; 2 where not named.",
+    ),
+]
 
 
 def accuracy(
-    method: Method, relative_error: float | None, absolute_error: float | None
+    method: Method | BoundedMethod,
+    relative_error: float | None,
+    absolute_error: float | None,
+    effort: int | None = None,
 ) -> dict[str, Any]:
-    """Return the members of a request that state its accuracy; exact answers have no errors."""
-    errors = {"relative_error": relative_error, "absolute_error": absolute_error}
-    given = [name for name, error in errors.items() if error is not None]
-    if given and method is not Method.APPROXIMATE:
-        option = "--" + given[0].replace("_", "-")
-        raise typer.BadParameter(f"{option} goes with --method approximate only")
-    return {"method": method.value, **errors}
+    """Return the members of a request that state its accuracy; each goes with one method only."""
+    options = {
+        "relative_error": (relative_error, "approximate"),
+        "absolute_error": (absolute_error, "approximate"),
+        "effort": (effort, "fast"),
+    }
+    given = {name: option for name, option in options.items() if option[0] is not None}
+    for name, (_, needed) in given.items():
+        if method.value != needed:
+            option = "--" + name.replace("_", "-")
+            raise typer.BadParameter(f"{option} goes with --method {needed} only")
+    return {"method": method.value, **{name: value for name, (value, _) in given.items()}}

@@ -12,6 +12,9 @@ from app.cli import files
 from app.cli.arguments import (
     AbsoluteError,
     Barriers,
+    BoundedMethod,
+    BoundedMethodOption,
+    EffortOption,
     Layout,
     MaxDistance,
     Merge,
@@ -72,11 +75,12 @@ def distance(
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
+    effort: EffortOption = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute the distance of every vertex from the nearest source."""
-    members = accuracy(method, relative_error, absolute_error)
+    members = accuracy(method, relative_error, absolute_error, effort)
     members["include"] = ["nearest_source", *(["gradient"] if gradient else [])]
     members |= {"max_distance": max_distance, "barriers": barriers or []}
     points: WrittenMembers = {"sources": source}
@@ -129,12 +133,13 @@ def path(
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
+    effort: EffortOption = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute a shortest path over the surface between two points."""
-    members = accuracy(method, relative_error, absolute_error)
-    if method is Method.APPROXIMATE and (via or explain):
+    members = accuracy(method, relative_error, absolute_error, effort)
+    if method is not Method.EXACT and (via or explain):
         name = "--via" if via else "--explain"
         raise typer.BadParameter(f"{name} goes with --method exact only")
     members |= {"max_distance": max_distance, "explain": explain, "barriers": barriers or []}
@@ -172,11 +177,12 @@ def paths(
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
+    effort: EffortOption = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
 ) -> None:
     """Compute shortest paths from one point to several others, in one sweep."""
-    members = accuracy(method, relative_error, absolute_error)
+    members = accuracy(method, relative_error, absolute_error, effort)
     members |= {"max_distance": max_distance, "barriers": barriers or []}
     points: WrittenMembers = {"source": source, "targets": target}
     answered = ask("paths", mesh_file, merge, "Computing the paths", points, members)
@@ -214,7 +220,7 @@ def isolines(
         typer.Option(help="How far lines may stray inside faces, in mesh units."),
     ] = None,
     max_distance: MaxDistance = None,
-    method: MethodOption = Method.EXACT,
+    method: BoundedMethodOption = BoundedMethod.EXACT,
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
     barriers: Barriers = None,

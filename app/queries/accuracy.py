@@ -1,4 +1,4 @@
-"""Exact or approximate: the errors that queries allow, and the bounds that answers state."""
+"""Exact, approximate or fast: what queries ask for, and the bounds that answers state."""
 
 import hashlib
 from collections.abc import Mapping, Sequence
@@ -11,34 +11,34 @@ from app.errors import pointer
 from app.queries.base import ExecutionContext, Query
 from app.queries.validation import invalid_fields
 from app.schemas.points import PointOrCurve, Source, StrictModel
-from app.schemas.requests import Accuracy
+from app.schemas.requests import Accuracy, Method
 from app.store.meshes import OpenMesh
 
 A = TypeVar("A", bound=Accuracy)
 
-_ERRORS = ("relative_error", "absolute_error")
-
-_DEFAULT_ERROR = 1e-3
-"""The relative error of approximate answers where the request names none."""
+_OPTIONS: Mapping[Method, Mapping[str, float | None]] = {
+    "approximate": {"relative_error": 1e-3, "absolute_error": None},
+    "fast": {"effort": 2},
+}
+"""Members that go with one method only, and what they are where the request names none of them."""
 
 CERTAIN: Mapping[str, Any] = {"type": "relative", "value": 0.0, "kind": "guaranteed"}
-"""The bound of answers without error: exact ones, and that there is no path."""
+"""The bound of answers without error."""
 
 
-def with_default_error(request: A) -> A:
-    """Return a request that names its error, or refuse an error of an exact answer."""
-    given = [name for name, error in errors_of(request).items() if error is not None]
-    if request.method == "approximate":
-        return request if given else request.model_copy(update={"relative_error": _DEFAULT_ERROR})
-    if given:
-        message = "goes with method 'approximate' only; exact answers have no error"
-        raise invalid_fields([pointer(name) for name in given], message)
-    return request
+def with_default_accuracy(request: A) -> A:
+    """Return a request that names its error or its effort, or refuse those of another method."""
+    given = _options_of(request)
+    for method, defaults in _OPTIONS.items():
+        names = [name for name in defaults if name in given]
+        if names and method != request.method:
+            raise invalid_fields(list(map(pointer, names)), f"goes with method '{method}' only")
+    return request if given else request.model_copy(update=_OPTIONS.get(request.method))
 
 
-def errors_of(request: Accuracy) -> dict[str, float | None]:
-    """Return the errors that a request allows, by name."""
-    return {name: getattr(request, name) for name in _ERRORS}
+def _options_of(request: Accuracy) -> dict[str, Any]:
+    """Return the members that are given of those that go with one method."""
+    return request.model_dump(include=set().union(*_OPTIONS.values()), exclude_none=True)
 
 
 def solve_field(
@@ -57,7 +57,7 @@ def solve_field(
     sweep again: they have so many windows that it takes less time and memory to find only those
     that the levels need.
     """
-    solver, errors = opened.solver, errors_of(request)
+    solver, given = opened.solver, _options_of(request)
     # Vertices are reached in any case.
     off_vertices = tuple(target for target in targets if target.vertex_index is None)
     options = {"max_distance": max_distance, "targets": off_vertices, **context.options}
@@ -65,16 +65,17 @@ def solve_field(
     def solve() -> gc.DistanceField:
         if request.method == "exact":
             return solver.exact_distance(sources, **options)
+        if request.method == "fast":
+            return solver.fast_distance(sources, given["effort"], **options)
+        errors = given.get("relative_error"), given.get("absolute_error")
         retain: gc.Retain = "windows" if isolines else "paths"
-        return solver.approximate_distance(
-            sources, errors["relative_error"], errors["absolute_error"], retain=retain, **options
-        )
+        return solver.approximate_distance(sources, *errors, retain=retain, **options)
 
     if context.fields is None:
         return solve()
     windows = isolines and request.method != "exact"
-    values = errors.values()
-    question = tuple(sources), max_distance, off_vertices, request.method, *values, windows
+    accuracy = request.method, *sorted(given.items())
+    question = tuple(sources), max_distance, off_vertices, accuracy, windows
     return context.fields.find(opened, question, solve)
 
 
@@ -83,7 +84,8 @@ def affinity_keys_of(
 ) -> tuple[str, ...]:
     """Return the affinity keys of a query that needs the field of some sources."""
     request = query.request
-    rest = request.model_dump(include={"method", "max_distance", "barriers", *_ERRORS})
+    rest = request.model_dump(include={"method", "max_distance", "barriers"})
+    rest |= _options_of(request)
     written = orjson.dumps([query.mesh_id, rest, *sources], _as_source, orjson.OPT_SORT_KEYS)
     return hashlib.blake2b(written, digest_size=8).hexdigest(), query.mesh_id
 
@@ -108,7 +110,8 @@ def bound_of(bound: gc.ErrorBound) -> Mapping[str, Any]:
 
 def expected_bound(request: Accuracy) -> Mapping[str, Any]:
     """Return about the same as `bound_of`, for a field that is not solved."""
-    return {"type": "relative", "value": request.relative_error or 0.0, "kind": "guaranteed"}
+    kind = "estimated" if request.method == "fast" else "guaranteed"
+    return {"type": "relative", "value": request.relative_error or 0.0, "kind": kind}
 
 
 def stats_of(stats: gc.SweepStats) -> Mapping[str, Any]:

@@ -18,7 +18,7 @@ from app.queries.accuracy import (
     method_of,
     solve_field,
     stats_of,
-    with_default_error,
+    with_default_accuracy,
 )
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
@@ -59,12 +59,12 @@ class DistancesQuery(Query[DistancesRequest]):
 
     @classmethod
     def normalized(cls, request: DistancesRequest) -> DistancesRequest:
-        """Name the error, and each included array once; refuse the gradient at targets."""
+        """Name error or effort, and each included array once; refuse the gradient at targets."""
         if "gradient" in request.include and request.targets is not None:
             message = "gradient is that of all vertices; ask for it without targets"
             raise invalid_fields(["/include"], message)
         included = list(dict.fromkeys(request.include))
-        return with_default_error(request.model_copy(update={"include": included}))
+        return with_default_accuracy(request.model_copy(update={"include": included}))
 
     def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources."""

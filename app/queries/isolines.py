@@ -17,7 +17,7 @@ from app.queries.accuracy import (
     method_of,
     solve_field,
     stats_of,
-    with_default_error,
+    with_default_accuracy,
 )
 from app.queries.base import ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
@@ -73,7 +73,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
             raise invalid_fields(["/levels"], "give levels, or count for some evenly spaced")
         if request.levels is not None and request.count is not None:
             raise invalid_fields(["/count"], "does not go with levels")
-        return with_default_error(request)
+        return with_default_accuracy(request)
 
     def check_limits(self, settings: Settings) -> None:
         """Refuse too many sources or levels."""

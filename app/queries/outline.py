@@ -29,9 +29,15 @@ def outline_of(path: gc.GeodesicPath) -> dict[str, Any]:
     }
 
 
-def no_outline(reason: str) -> dict[str, Any]:
-    """Return the members that stand for a path that does not exist."""
-    return {"status": "no_path", "reason": reason, "points": None, "error_bound": CERTAIN}
+def no_outline(reason: str, field: gc.DistanceField | None = None) -> dict[str, Any]:
+    """Return the members that stand for a path that does not exist, or that a field has not found.
+
+    That it is longer than the limit is certain, but for fields whose error is estimated.
+    """
+    bound = CERTAIN
+    if field is not None and field.error_bound.kind == "estimated" and reason != "disconnected":
+        bound = bound_of(field.error_bound)
+    return {"status": "no_path", "reason": reason, "points": None, "error_bound": bound}
 
 
 def expected_outline(

@@ -13,7 +13,7 @@ import geodesic_core as gc
 from app.encoding import CSV, GEOJSON, JSON, NPY, OBJ, OCTETS, SVG, Answer
 from app.errors import Fault, ProblemError, pointer
 from app.queries import point_text
-from app.queries.accuracy import method_of, solve_field, with_default_error
+from app.queries.accuracy import method_of, solve_field, with_default_accuracy
 from app.queries.base import ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
     PER_PATH,
@@ -37,7 +37,7 @@ from app.queries.validation import (
 )
 from app.queries.views import line_of
 from app.schemas.points import Point
-from app.schemas.requests import Accuracy, PathParameters, PathRequest
+from app.schemas.requests import AccuracyOrEffort, PathParameters, PathRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
@@ -51,9 +51,9 @@ class PathQuery(Query[PathRequest]):
 
     @classmethod
     def normalized(cls, request: PathRequest) -> PathRequest:
-        """Name the error; refuse options of exact paths where the path is approximate."""
-        request = with_default_error(request)
-        if request.method == "approximate":
+        """Name error or effort; refuse options of exact paths where the path is another."""
+        request = with_default_accuracy(request)
+        if request.method != "exact":
             options = {"/waypoints": request.waypoints, "/explain": request.explain}
             given = [pointer for pointer, value in options.items() if value]
             if given:
@@ -84,15 +84,16 @@ class PathQuery(Query[PathRequest]):
     def rough_seconds(self, size: MeshSize) -> float:
         """Return the cost of a search for each leg, or of a sweep."""
         request = self.request
-        if request.method == "approximate":
+        if request.method != "exact":
             share = rough_share(size, 1, request.max_distance)
             return sweep_cost(size.faces, request, share, paths=True).seconds
         return search_cost(size.faces, 1 + len(request.waypoints)).seconds
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
-        """Search for an exact path, or sweep for an approximate one."""
+        """Search for an exact path, or sweep for another one."""
         request = self.request
         source, target, *waypoints = points
+        field: gc.DistanceField | None = None
         try:
             if request.method == "exact":
                 path = opened.solver.shortest_path(
@@ -115,7 +116,7 @@ class PathQuery(Query[PathRequest]):
                 )
                 path = field.path_to(target, **context.options)
         except gc.errors.NoPath as error:
-            return self._answer(opened, points, no_outline(error.reason))
+            return self._answer(opened, points, no_outline(error.reason, field))
         found = outline_of(path)
         values = 8 * len(path.points)
         if path.steps is not None:
@@ -165,7 +166,7 @@ def written_request(parameters: PathParameters) -> PathRequest:
         waypoints=[_parsed(pointer("waypoints", i), text) for i, text in enumerate(parameters.via)],
         max_distance=parameters.max_distance,
         explain=parameters.explain,
-        **parameters.model_dump(include=set(Accuracy.model_fields)),
+        **parameters.model_dump(include=set(AccuracyOrEffort.model_fields)),
     )
 
 

@@ -12,7 +12,7 @@ from app.queries.accuracy import (
     method_of,
     solve_field,
     stats_of,
-    with_default_error,
+    with_default_accuracy,
 )
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
@@ -57,8 +57,8 @@ class PathsQuery(Query[PathsRequest]):
 
     @classmethod
     def normalized(cls, request: PathsRequest) -> PathsRequest:
-        """Name the error."""
-        return with_default_error(request)
+        """Name error or effort."""
+        return with_default_accuracy(request)
 
     def value_count(self, size: MeshSize) -> int:
         """Return the least number of values: those of the ends of the paths."""
@@ -104,7 +104,7 @@ class PathsQuery(Query[PathsRequest]):
             try:
                 path = field.path_to(target)
             except gc.errors.NoPath as error:
-                found.append(no_outline(error.reason))
+                found.append(no_outline(error.reason, field))
                 continue
             values += VALUES_OF_POINT * len(path.points)
             check_json_size(values, context.max_values, self.hint)

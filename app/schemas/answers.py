@@ -13,7 +13,8 @@ class ErrorBound(BaseModel):
     """Bound of the difference between an answer and the exact one.
 
     Approximate distances are too short by that much at most; the length of an approximate path is
-    too long by that much at most.
+    too long by that much at most. Both are too long in answers of the method `fast`: mostly by less
+    than that, which is estimated.
     """
 
     type: Literal["relative", "absolute"]

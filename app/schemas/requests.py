@@ -2,7 +2,15 @@
 
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, FiniteFloat, StrictBool, StrictInt, model_validator
+from pydantic import (
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    StrictBool,
+    StrictInt,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 from app.schemas.points import (
@@ -19,14 +27,27 @@ from app.schemas.points import (
     Triple,
 )
 
-Method = Literal["exact", "approximate"]
+BoundedMethod = Literal["exact", "approximate"]
+Method = Literal["exact", "approximate", "fast"]
 Layout = Literal["dense", "sparse", "pairs"]
+
+
+def _from_digit(value: Any) -> Any:
+    return int(value) if value in ("1", "2", "4", "8") else value
+
+
+Effort = Annotated[Literal[1, 2, 4, 8], BeforeValidator(_from_digit), NOT_BOOLEAN]
+"""A number that may come as a text, in query parameters"""
 
 
 class Accuracy(StrictModel):
     """The accuracy of an answer."""
 
-    method: Method = "exact"
+    method: Method = Field(
+        default="exact",
+        description="`approximate`: within an error; `fast`: in one quick pass, with an estimate "
+        "of the error",
+    )
     relative_error: Annotated[FiniteFloat, Field(gt=0, lt=1), NOT_BOOLEAN] | None = Field(
         default=None,
         description="For `approximate`: share of the exact distance by which one may fall short; "
@@ -36,6 +57,16 @@ class Accuracy(StrictModel):
         default=None,
         description="For `approximate`: the same in mesh units; where both errors are given, "
         "both hold",
+    )
+
+
+class AccuracyOrEffort(Accuracy):
+    """The accuracy of an answer, or the effort of a fast one."""
+
+    effort: Effort | None = Field(
+        default=None,
+        description="For `fast`: the more effort, the more time and the less error; 2 where not "
+        "given",
     )
 
 
@@ -63,7 +94,7 @@ class AmongBarriers(QueryBody):
     )
 
 
-class DistancesRequest(Accuracy, AmongBarriers):
+class DistancesRequest(AccuracyOrEffort, AmongBarriers):
     """Distances from the nearest of ``sources`` to all vertices, or to ``targets`` only."""
 
     model_config = ConfigDict(
@@ -103,6 +134,10 @@ class IsolinesRequest(Accuracy, AmongBarriers):
         }
     )
 
+    method: BoundedMethod = Field(
+        default="exact",
+        description="Not `fast`: lines need windows, which it does not have",
+    )
     sources: FailFastList[Source] = Field(min_length=1)
     levels: FailFastList[Positive] | None = Field(
         default=None, min_length=1, description="Distances in mesh units; give these or `count`"
@@ -126,7 +161,7 @@ class IsolinesRequest(Accuracy, AmongBarriers):
 _LONGEST = "Longest path to look for, past all waypoints, in mesh units"
 
 
-class PathRequest(Accuracy, AmongBarriers):
+class PathRequest(AccuracyOrEffort, AmongBarriers):
     """The shortest path from ``source`` to ``target``, past ``waypoints`` in their order."""
 
     model_config = ConfigDict(
@@ -152,7 +187,7 @@ class PathRequest(Accuracy, AmongBarriers):
     )
 
 
-class PathsRequest(Accuracy, AmongBarriers):
+class PathsRequest(AccuracyOrEffort, AmongBarriers):
     """The shortest paths from ``source`` to each of ``targets``."""
 
     model_config = ConfigDict(
@@ -258,7 +293,7 @@ _SPELLINGS = (
 )
 
 
-class PathParameters(PathAnswerParameters, Accuracy):
+class PathParameters(PathAnswerParameters, AccuracyOrEffort):
     """The stops of a path.
 
     Each is a vertex as ``v12``, a point of an edge as ``e12-13:0.3``, of a face as

@@ -130,6 +130,7 @@ def _queries(opened: OpenMesh, random: Random) -> Iterator[Request]:
         return _query(opened, kind, body, form, dtype)
 
     approximate = {"method": "approximate", "relative_error": 0.01}
+    fast = {"method": "fast", "effort": 1}
     barriers = random.sample(range(len(triangles)), 5)
     yield ask("path", source=vertex(), target=vertex())
     yield ask("path", source=inside(), target=vertex(), waypoints=[vertex()])
@@ -144,6 +145,8 @@ def _queries(opened: OpenMesh, random: Random) -> Iterator[Request]:
     yield ask("distances", "csv", sources=[inside()], targets=some(vertex, 20))
     yield ask("distances", sources=[vertex()], include=["nearest_source"], max_distance=radius)
     yield ask("distances", sources=[vertex()], **approximate)
+    yield ask("distances", "npy", sources=some(vertex, 2), **fast)
+    yield ask("paths", source=inside(), targets=some(vertex, 3), **fast)
     yield ask("distances", "ply", sources=[vertex()], barriers=barriers)
     yield ask("isolines", sources=[vertex()], count=5)
     yield ask("isolines", "geojson", sources=[vertex()], levels=[radius / 2, radius])

@@ -200,6 +200,18 @@ def test_approximate_distances_are_the_library_s(
     assert (exact - expected.distances <= errors.get("absolute_error", np.inf)).all()
 
 
+@pytest.mark.parametrize("effort", [None, 1, 8])
+def test_fast_distances_are_the_library_s(run: Run, knot: Path, effort: int | None) -> None:
+    options = [] if effort is None else ["--effort", effort]
+    ran = run("distance", knot, "--source", 3, "--method", "fast", *options, "--out", "d.json")
+    assert (ran.code, ran.err) == (0, "")
+    answer = json.loads(Path("d.json").read_text())
+    expected = gc.fast_distance(gc.load_mesh(knot), 3, effort or 2)
+    assert answer["distances"] == expected.distances.tolist()
+    assert answer["error_bound"] == asdict(expected.error_bound)
+    assert ran.figure("error bound") == f"{expected.error_bound.value!r} (relative, estimated)"
+
+
 def test_exact_distances_have_no_error(run: Run, plane: Path) -> None:
     for options in ([], ["--method", "exact"]):
         ran = run("distance", plane, "--source", 0, *options, "--out", "d.json")
@@ -696,6 +708,24 @@ def test_what_fails_says_why_in_one_line(
             "path plane.ply --source 0 --target 1 --out p.obj --method approximate --explain",
             "--explain goes with --method exact only",
         ),
+        ("distance plane.ply --source 0 --out d.npy --method fast --effort 3", "'3' is not 1, 2"),
+        (
+            "distance plane.ply --source 0 --out d.npy --effort 2",
+            "--effort goes with --method fast only",
+        ),
+        (
+            "paths plane.ply --source 0 --target 1 --out p.obj --method approximate --effort 2",
+            "--effort goes with --method fast only",
+        ),
+        (
+            "path plane.ply --source 0 --target 1 --out p.obj --method fast --relative-error 0.1",
+            "--relative-error goes with --method approximate only",
+        ),
+        (
+            "path plane.ply --source 0 --target 1 --out p.obj --method fast --via 3",
+            "--via goes with --method exact only",
+        ),
+        ("isolines plane.ply --source 0 --count 2 --out l.obj --method fast", "'fast' is not one"),
         ("distance plane.ply --source 0/x --out d.npy", "'x' is not a point"),
         ("matrix plane.ply --source 0/1 --target 1 --out m.npy", "'0/1' is not a point"),
         ("paths plane.ply --source 0 --out p.obj", "--target"),

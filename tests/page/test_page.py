@@ -332,6 +332,31 @@ def test_exact_and_approximate_side_by_side(view: View, knot: str) -> None:
     assert view.text("#tick-2") == view.text("#measured-approximate").split()[0]
 
 
+def test_fast_distances_beside_exact_ones(view: View, knot: str) -> None:
+    view.open(f"/?mesh={knot}&source=v0&effort=1&shade=difference&lines=count:3")
+    assert view.text("#bound-fast") == "–"
+
+    view.page.click("#methods >> text=Fast")
+    view.wait()
+
+    estimate = view.text("#bound-fast").split()[0]
+    assert f"estimated: {estimate}" in view.text("#legend-title")
+    assert query_of(view)["method"] == ["fast"]
+    assert query_of(view)["effort"] == ["1"]
+    measured = view.text("#measured-fast").split()[0]
+    assert view.text("#tick-2") == measured
+
+    view.page.select_option("#effort", "8")
+    view.wait()
+
+    assert query_of(view)["effort"] == ["8"]
+    assert float(view.text("#bound-fast").split()[0]) < float(estimate)
+    assert float(view.text("#measured-fast").split()[0]) < float(measured)
+    with view.page.expect_download() as downloaded:
+        view.page.click("#download-isolines >> text=OBJ")
+    assert "\nl " in Path(downloaded.value.path()).read_text()
+
+
 def test_points_can_be_written(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}")
     view.page.fill("#sources", "v0 p0,0,2")
@@ -534,6 +559,9 @@ def test_by_keyboard_alone(view: View, sphere: str) -> None:
     keys.press("e")
     view.wait()
     assert view.page.is_checked("#methods [value=approximate]")
+    keys.press("e")
+    view.wait()
+    assert view.page.is_checked("#methods [value=fast]")
     keys.press("i")
     keys.press("w")
     assert view.page.is_checked("#wireframe")

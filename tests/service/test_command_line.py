@@ -16,6 +16,8 @@ from tests.support.commands import Run
 FACE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
 CURVE = {"polyline": [{"vertex": 3}, {"vertex": 3}]}
 APPROXIMATE = {"method": "approximate", "relative_error": 0.01}
+FAST = {"method": "fast", "effort": 4}
+AS_FAST = "--method fast --effort 4"
 AS_APPROXIMATE = "--method approximate --relative-error 0.01"
 
 
@@ -56,6 +58,31 @@ def knot_file(tmp_path: Path) -> Path:
             f"path --source 3 --target p1,2,0.5 {AS_APPROXIMATE}",
             "path",
             {"source": {"vertex": 3}, "target": {"position": [1, 2, 0.5]}, **APPROXIMATE},
+        ),
+        (
+            "distance --source 3 --source f40:0.2,0.3,0.5 --max-distance 4 --method fast",
+            "distances",
+            {
+                "sources": [{"vertex": 3}, FACE],
+                "max_distance": 4,
+                "include": ["nearest_source"],
+                "method": "fast",
+            },
+        ),
+        (
+            f"path --source 3 --target p1,2,0.5 {AS_FAST}",
+            "path",
+            {"source": {"vertex": 3}, "target": {"position": [1, 2, 0.5]}, **FAST},
+        ),
+        (
+            f"paths --source 3/3 --target 700 --target 20 --barriers 7,100-103 {AS_FAST}",
+            "paths",
+            {
+                "source": CURVE,
+                "targets": [{"vertex": 700}, {"vertex": 20}],
+                "barriers": [7, 100, 101, 102, 103],
+                **FAST,
+            },
         ),
         (
             "paths --source 3 --target 700 --target 20 --max-distance 4",

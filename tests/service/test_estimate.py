@@ -32,6 +32,7 @@ SOME, MANY = ([{"vertex": i} for i in RNG.integers(0, 2000, n).tolist()] for n i
 INSIDE = {"face": 1040, "barycentric": [0.2, 0.3, 0.5]}
 CORNER = {"face": 1040, "barycentric": [1, 0, 0]}
 ROUGH = {"method": "approximate", "relative_error": 0.01}
+FAST = {"method": "fast", "effort": 8}
 PAIRS = {"layout": "pairs"}
 JSON_ONLY: tuple[str, ...] = ("json",)
 
@@ -40,6 +41,8 @@ QUERIES: dict[str, tuple[str, dict[str, Any], tuple[str, ...], float]] = {
     "all": ("distances", {"sources": [INSIDE]}, ("json", "octets", "csv", "ply"), 1.05),
     "near": ("distances", {"sources": SOME[:3], "max_distance": 0.3}, ("json", "npy"), 1.15),
     "rough": ("distances", {"sources": SOME[:2], **ROUGH}, JSON_ONLY, 1.05),
+    "quick": ("distances", {"sources": SOME[:2], "method": "fast"}, JSON_ONLY, 1.05),
+    "deep": ("distances", {"sources": [INSIDE], "include": ["gradient"], **FAST}, JSON_ONLY, 1.1),
     "named": ("distances", {"sources": SOME[:9], "include": ["nearest_source"]}, JSON_ONLY, 1.05),
     "slopes": ("distances", {"sources": SOME[:2], "include": ["gradient"]}, JSON_ONLY, 1.1),
     "some": ("distances", {"sources": SOME[:1], "targets": MANY}, ("json", "npy"), 1.05),
@@ -58,6 +61,8 @@ QUERIES: dict[str, tuple[str, dict[str, Any], tuple[str, ...], float]] = {
     "fine": ("isolines", {"sources": [INSIDE], "count": 3, "chord_error": 1e-6}, JSON_ONLY, 3),
     "paths": ("paths", {"source": INSIDE, "targets": MANY}, ("json", "geojson"), 3),
     "rough paths": ("paths", {"source": INSIDE, "targets": SOME, **ROUGH}, JSON_ONLY, 3),
+    "quick path": ("path", {"source": INSIDE, "target": {"vertex": 1900}, **FAST}, JSON_ONLY, 3),
+    "quick paths": ("paths", {"source": INSIDE, "targets": SOME, **FAST}, JSON_ONLY, 3),
     "curve": ("distances", {"sources": [{"polyline": [CORNER] * 9}]}, JSON_ONLY, 1.05),
     "curve paths": ("paths", {"source": {"polyline": [CORNER]}, "targets": SOME}, JSON_ONLY, 3),
     "locate": ("locate", {"points": [[0.1 * i, 0.3, 0.2] for i in range(30)]}, JSON_ONLY, 1.15),
@@ -197,6 +202,11 @@ def test_seconds_grow_with_the_work(client: TestClient, ids: dict[str, str]) -> 
     assert 4 * everywhere <= seconds("large", "distances", **one) <= 8 * everywhere
     assert seconds("knot", "distances", **one, max_distance=0.1) < everywhere / 4
     assert seconds("large", "distances", **one, **ROUGH) < seconds("large", "distances", **one)
+    quick = [
+        seconds("large", "distances", **one, **FAST | {"effort": effort}) for effort in (1, 2, 4, 8)
+    ]
+    assert quick == sorted(set(quick))
+    assert quick[1] < seconds("large", "distances", **one, **ROUGH)
     row = seconds("large", "matrix", **one, targets=SOME)
     assert 5 * row <= seconds("large", "matrix", sources=MANY, targets=SOME) <= 40 * row
     ends = {"source": INSIDE, "target": {"vertex": 1900}}
@@ -212,7 +222,8 @@ def test_seconds_of_all_kinds_are_off_by_one_factor(
     """That factor is the machine's; each kind is allowed five times as much, or as little."""
     opened = OpenMesh(("", b""), gc.Solver(stored_mesh(client, ids["knot"])), [])
     factors = {}
-    for name in ("all", "rough", "pairs", "nearest", "legs", "rough path", "lines", "rough paths"):
+    one_sweep = "all", "rough", "quick", "rough path", "quick path", "rough paths", "quick paths"
+    for name in (*one_sweep, "pairs", "nearest", "legs", "lines"):
         query = query_of(name)
         estimated = estimate(query, Representation(JSON), opened, lambda: False).seconds
         factors[name] = min(processor_seconds(query, opened) for _ in range(3)) / estimated

@@ -21,7 +21,7 @@ from app.store.fields import FieldStore
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
 from app.store.ownership import owned
-from geodesic_core.fields import repeatable_sweep
+from geodesic_core.fields import fast_sweep, repeatable_sweep
 from tests.support.processes import workers_of
 from tests.support.waiting import LONG_S, wait_until
 
@@ -161,11 +161,12 @@ def check_problem(response: Any, status: int, code: str) -> dict[str, Any]:
 @pytest.fixture
 def sweeps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Grows by one with each sweep."""
-    run, ran = repeatable_sweep.RepeatableSweep.run, []
+    ran: list[int] = []
+    for kind in (repeatable_sweep.RepeatableSweep, fast_sweep.FastSweep):
 
-    def counted(self: Any, *arguments: Any, **options: Any) -> Any:
-        ran.append(1)
-        return run(self, *arguments, **options)
+        def counted(self: Any, *arguments: Any, run: Any = kind.run, **options: Any) -> Any:
+            ran.append(1)
+            return run(self, *arguments, **options)
 
-    monkeypatch.setattr(repeatable_sweep.RepeatableSweep, "run", counted)
+        monkeypatch.setattr(kind, "run", counted)
     return ran

@@ -174,6 +174,11 @@ describe("the question of a state", () => {
   test("has what differs from the service's defaults", () => {
     expect(questionOf(state, "exact")).toEqual({ sources: [{ vertex: 1 }], method: "exact" });
     expect(questionOf(state, "approximate")).toMatchObject({ relative_error: 0.05 });
+    expect(questionOf({ ...state, effort: 4 }, "fast")).toEqual({
+      sources: [{ vertex: 1 }],
+      method: "fast",
+      effort: 4,
+    });
     expect(questionOf({ ...state, maxDistance: 2, barriers: [3] }, "exact")).toEqual({
       sources: [{ vertex: 1 }],
       method: "exact",

@@ -177,7 +177,10 @@ def test_caches_are_emptied_where_memory_runs_out(
 
 
 @pytest.mark.usefixtures("every_field_is_slow")
-@pytest.mark.parametrize("accuracy", [{}, {"method": "approximate", "relative_error": 0.01}])
+@pytest.mark.parametrize(
+    "accuracy",
+    [{}, {"method": "approximate", "relative_error": 0.01}, {"method": "fast", "effort": 4}],
+)
 def test_a_field_that_took_long_is_stored_for_other_workers(
     tmp_path: Path, sweeps: list[int], accuracy: dict[str, Any]
 ) -> None:
@@ -266,7 +269,10 @@ def test_a_defect_is_logged_and_becomes_a_problem(
     assert [(line["event"], line["work"]) for line in log] == [("work failed", "StoreMesh")]
 
 
-@pytest.mark.parametrize("accuracy", [{}, {"method": "approximate", "relative_error": 0.01}])
+@pytest.mark.parametrize(
+    "accuracy",
+    [{}, {"method": "approximate", "relative_error": 0.01}, {"method": "fast", "effort": 4}],
+)
 def test_work_that_is_asked_to_stop_stops(tmp_path: Path, accuracy: dict[str, Any]) -> None:
     signals = Signals(stop_number=2)
     worker = Worker(worker_config(tmp_path), signals)

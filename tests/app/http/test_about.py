@@ -25,7 +25,7 @@ def test_about_tells_the_limits_in_force(client: TestClient) -> None:
     assert "GEODESIC_RATE_LIMIT" not in about["limits"]
     assert about["answer_formats"]["npy"] == "application/x-npy"
     assert "ply" in about["mesh_formats"]
-    assert about["methods"] == ["exact", "approximate"]
+    assert about["methods"] == ["exact", "approximate", "fast"]
 
 
 def test_nothing_is_on_disk_before_the_start(tmp_path) -> None:

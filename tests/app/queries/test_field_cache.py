@@ -13,6 +13,7 @@ from app.store.meshes import OpenMesh
 from tests.support.service import context, field_cache
 
 APPROXIMATE = {"method": "approximate", "relative_error": 0.01}
+FAST = {"method": "fast", "effort": 1}
 
 
 @pytest.fixture
@@ -28,9 +29,16 @@ def ask(opened: OpenMesh, fields: FieldCache, kind: Any, **body: Any) -> bytes:
 
 SOURCES = [{"vertex": 3}, {"face": 70, "barycentric": [0.2, 0.3, 0.5], "start_distance": 0.1}]
 TARGETS = [{"vertex": vertex} for vertex in (5, 400, 901)]
+OF_FIELDS: list[tuple[Any, dict[str, Any]]] = [
+    (DistancesQuery, {"sources": SOURCES}),
+    (DistancesQuery, {"sources": SOURCES, "include": ["gradient", "nearest_source"]}),
+    (DistancesQuery, {"sources": SOURCES, "targets": [*TARGETS, SOURCES[1] | {"face": 9}]}),
+    (PathsQuery, {"source": {"vertex": 3}, "targets": TARGETS}),
+]
+LINES = {"sources": SOURCES, "count": 3}
 
 
-@pytest.mark.parametrize("accuracy", [{}, APPROXIMATE])
+@pytest.mark.parametrize("accuracy", [{}, APPROXIMATE, FAST])
 def test_paths_after_distances_need_no_sweep(
     opened: OpenMesh, sweeps: list[int], accuracy: dict[str, Any]
 ) -> None:
@@ -48,18 +56,19 @@ def test_paths_after_distances_need_no_sweep(
     assert len(sweeps) == 2
 
 
-@pytest.mark.parametrize("accuracy", [{}, APPROXIMATE])
 @pytest.mark.parametrize(
-    ("kind", "body"),
+    ("kind", "body", "accuracy"),
     [
-        (DistancesQuery, {"sources": SOURCES}),
-        (DistancesQuery, {"sources": SOURCES, "include": ["gradient", "nearest_source"]}),
-        (DistancesQuery, {"sources": SOURCES, "targets": [*TARGETS, SOURCES[1] | {"face": 9}]}),
-        (IsolinesQuery, {"sources": SOURCES, "count": 3}),
+        *(
+            (kind, body, accuracy)
+            for accuracy in ({}, APPROXIMATE, FAST)
+            for kind, body in OF_FIELDS
+        ),
+        *((IsolinesQuery, LINES, accuracy) for accuracy in ({}, APPROXIMATE)),
     ],
 )
 def test_an_answer_is_the_same_of_a_field_that_was_kept(
-    opened: OpenMesh, accuracy: dict[str, Any], kind: Any, body: dict[str, Any]
+    opened: OpenMesh, kind: Any, body: dict[str, Any], accuracy: dict[str, Any]
 ) -> None:
     body = orjson.loads(orjson.dumps(body))
     for target in body.get("targets", []):
@@ -84,6 +93,7 @@ def test_what_is_asked_otherwise_is_another_field(opened: OpenMesh, sweeps: list
         {"sources": [{"vertex": 3}], **APPROXIMATE},
         {"sources": [{"vertex": 3}], **APPROXIMATE, "relative_error": 0.02},
         {"sources": [{"vertex": 3}], **APPROXIMATE, "absolute_error": 0.02},
+        *({"sources": [{"vertex": 3}], **FAST, "effort": effort} for effort in (1, 2, 4, 8)),
         {"sources": [{"polyline": [{"vertex": 3}]}]},
         {"sources": [{"vertex": 3}], "targets": [{"face": 5, "barycentric": [0.2, 0.3, 0.5]}]},
     ]
@@ -146,4 +156,10 @@ def test_questions_about_one_field_go_to_one_worker() -> None:
     assert affinity_keys(DistancesQuery, sources=[{"vertex": 3}], targets=TARGETS) == about
     for other in ({"vertex": 4}, {"vertex": 3, "start_distance": 1.0}):
         assert affinity_keys(DistancesQuery, sources=[other])[0] != about[0]
-    assert affinity_keys(DistancesQuery, sources=[{"vertex": 3}], **APPROXIMATE)[0] != about[0]
+    rough, fast, slower = (
+        affinity_keys(DistancesQuery, sources=[{"vertex": 3}], **accuracy)[0]
+        for accuracy in (APPROXIMATE, FAST, FAST | {"effort": 2})
+    )
+    assert len({about[0], rough, fast, slower}) == 4
+    usual = affinity_keys(DistancesQuery, sources=[{"vertex": 3}], method="fast")[0]
+    assert usual == slower

@@ -11,6 +11,7 @@ export type LocateAnswer = Schemas["LocateAnswer"];
 export type MeshDocument = Schemas["MeshDocument"];
 export type MeshList = Schemas["MeshList"];
 export type Method = DistancesRequest["method"] & string;
+export type Effort = NonNullable<DistancesRequest["effort"]>;
 export type Outline = Schemas["PathAnswer"];
 export type Problem = Schemas["ProblemDocument"];
 export type ResolvedPoint = Schemas["ResolvedPoint"];

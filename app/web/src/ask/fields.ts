@@ -1,7 +1,7 @@
 // Distances to all vertices: requested when sources, method or limits change, then painted.
 import type { Field, Question } from "../api/queries";
 import { askDistances, askTerritories } from "../api/queries";
-import type { Method } from "../api/types";
+import type { Effort, Method } from "../api/types";
 import { byId, duration, written } from "../dom";
 import { writePoint } from "../state/point";
 import type { State } from "../state/state";
@@ -15,8 +15,10 @@ interface Answers {
   key: string;
   exact?: Field;
   approximate?: Field;
-  /** The error allowed in ``approximate``. */
+  fast?: Field;
+  /** The error allowed in ``approximate``, and the effort of ``fast``. */
   error?: number;
+  effort?: Effort;
   nearest?: Int32Array;
 }
 
@@ -37,14 +39,16 @@ export class Fields {
 
   /** Request what ``state`` needs and has not been answered yet, and paint it. */
   follow(state: State): void {
-    const { mesh, sources, barriers, maxDistance, method, error, shade } = state;
-    const requested = JSON.stringify([mesh, sources, barriers, maxDistance, method, error, shade]);
+    const { mesh, sources, barriers, maxDistance, method, error, effort, shade } = state;
+    const asked = [mesh, sources, barriers, maxDistance, method, error, effort, shade];
+    const requested = JSON.stringify(asked);
     if (requested === this.requested) return;
     this.requested = requested;
     this.stop.abort();
     const key = JSON.stringify([mesh, sources, barriers, maxDistance]);
     if (key !== this.answers.key) this.answers = { key };
     if (error !== this.answers.error) delete this.answers.approximate;
+    if (effort !== this.answers.effort) delete this.answers.fast;
     if (!mesh || sources.length === 0) this.paint(state);
     else this.request(mesh, state);
   }
@@ -72,11 +76,12 @@ export class Fields {
   ): Promise<void> {
     const { answers } = this;
     const isCompared = state.shade === "difference";
-    const methods: Method[] = isCompared ? ["exact", "approximate"] : [state.method];
+    const methods: Method[] = isCompared ? ["exact", roughOf(state)] : [state.method];
     for (const method of methods) {
       if (answers[method]) continue;
       answers[method] = await askDistances(mesh, questionOf(state, method), onProgress, signal);
       if (method === "approximate") answers.error = state.error;
+      if (method === "fast") answers.effort = state.effort;
     }
     if (state.shade === "territories") {
       answers.nearest ??= await askTerritories(mesh, questionOf(state, state.method), signal);
@@ -98,13 +103,16 @@ export class Fields {
     this.setIsolines(state);
   }
 
-  private paintField(surface: Surface, field: Field, { shade, sources }: State): void {
-    const { exact, approximate, nearest } = this.answers;
-    if (shade === "difference" && exact && approximate) {
-      const errors = shortfall(exact, approximate);
+  private paintField(surface: Surface, field: Field, state: State): void {
+    const { shade, sources } = state;
+    const { exact, nearest } = this.answers;
+    const rough = this.answers[roughOf(state)];
+    if (shade === "difference" && exact && rough) {
+      const errors = errorsOf(exact, rough);
       const largest = largestOf(errors);
       surface.setValues(errors, largest);
-      showScale(`Error, % (promised: ${written(100 * approximate.bound.value, 3)})`, largest);
+      const kind = rough.bound.kind === "guaranteed" ? "promised" : "estimated";
+      showScale(`Error, % (${kind}: ${written(100 * rough.bound.value, 3)})`, largest);
       return;
     }
     surface.setValues(field.distances, field.largest);
@@ -123,18 +131,18 @@ export class Fields {
     stage.invalidate();
   }
 
-  /** Show time and error of both methods side by side. */
+  /** Show time and error of all methods side by side. */
   private compare(): void {
-    const { exact, approximate } = this.answers;
-    const both = exact && approximate;
+    const { exact, approximate, fast } = this.answers;
     byId("time-exact").textContent = timeOf(exact);
-    byId("time-approximate").textContent = timeOf(approximate);
     byId("bound-exact").textContent = exact ? "0" : "–";
-    byId("bound-approximate").textContent = approximate ? percent(approximate.bound.value) : "–";
-    byId("measured-exact").textContent = both ? "0" : "–";
-    byId("measured-approximate").textContent = both
-      ? percent(largestOf(shortfall(exact, approximate)) / 100)
-      : "–";
+    byId("measured-exact").textContent = exact && (approximate ?? fast) ? "0" : "–";
+    for (const [method, rough] of Object.entries({ approximate, fast })) {
+      byId(`time-${method}`).textContent = timeOf(rough);
+      byId(`bound-${method}`).textContent = rough ? percent(rough.bound.value) : "–";
+      byId(`measured-${method}`).textContent =
+        exact && rough ? percent(largestOf(errorsOf(exact, rough)) / 100) : "–";
+    }
   }
 }
 
@@ -144,6 +152,7 @@ export function questionOf(state: State, method: Method): Question {
     sources: state.sources as Question["sources"],
     method,
     ...(method === "approximate" ? { relative_error: state.error } : {}),
+    ...(method === "fast" ? { effort: state.effort } : {}),
     ...(state.maxDistance === null ? {} : { max_distance: state.maxDistance }),
     ...(state.barriers.length > 0 ? { barriers: state.barriers } : {}),
   };
@@ -155,12 +164,17 @@ function spacingOf({ lines }: State, largest: number): number {
   return "count" in lines ? largest / (lines.count + 1) : lines.spacing;
 }
 
-/** Return by how many per cent each approximate distance is too short; -1 where unreachable. */
-function shortfall(exact: Field, approximate: Field): Float64Array {
+/** Return the method that is compared with the exact one. */
+function roughOf({ method }: State): Exclude<Method, "exact"> {
+  return method === "exact" ? "approximate" : method;
+}
+
+/** Return by how many per cent each distance is wrong; -1 where unreachable. */
+function errorsOf(exact: Field, rough: Field): Float64Array {
   return exact.distances.map((distance, i) => {
-    if (distance === Infinity) return -1;
-    const missing = distance - (approximate.distances[i] ?? Number.NaN);
-    return distance > 0 ? Math.max(0, (100 * missing) / distance) : 0;
+    const found = rough.distances[i] ?? Number.NaN;
+    if (distance === Infinity || found === Infinity) return -1;
+    return distance > 0 ? (100 * Math.abs(distance - found)) / distance : 0;
   });
 }
 

@@ -1,6 +1,6 @@
 // Fields and switches: they show the state and change it.
 import { locate } from "../api/queries";
-import type { Method, Point } from "../api/types";
+import type { Effort, Method, Point } from "../api/types";
 import { byId, query } from "../dom";
 import { readState, writeRanges } from "../state/permalink";
 import { parsePoints, type WrittenPoint, writePoint } from "../state/point";
@@ -30,6 +30,10 @@ export class Controls {
     slider.addEventListener("change", () =>
       store.update({ error: errorOf(slider), method: "approximate" }),
     );
+    byId("effort").addEventListener("change", () => {
+      const effort = Number(byId("effort", HTMLSelectElement).value) as Effort;
+      store.update({ effort, method: "fast" });
+    });
     byId("lines").addEventListener("change", () => this.readLines(true));
     byId("lines-value").addEventListener("change", () => this.readLines(false));
     byId("wireframe").addEventListener("change", () =>
@@ -56,6 +60,7 @@ export class Controls {
     choose("shades", state.shade);
     setValue("error-slider", String(Math.log10(state.error)));
     showError(state.error);
+    byId("effort", HTMLSelectElement).value = String(state.effort);
     const { lines } = state;
     byId("lines", HTMLSelectElement).value =
       lines === null ? "none" : "count" in lines ? "count" : "spacing";

@@ -93,10 +93,9 @@ export class ExportPanel {
     const { state } = this.store;
     const { target, waypoints, barriers, lines } = state;
     if (what === "path") return { source: this.source(), target, waypoints, barriers };
-    const question = questionOf(state, state.method);
-    if (what === "distances" || lines === null) return question;
+    if (what === "distances" || lines === null) return questionOf(state, state.method);
     return {
-      ...question,
+      ...questionOf(state, state.method === "fast" ? "exact" : state.method), // it draws no lines
       ...("count" in lines ? { count: lines.count } : { levels: this.levels(lines.spacing) }),
     };
   }

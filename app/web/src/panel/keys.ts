@@ -1,4 +1,5 @@
 // The keyboard: keys for everything that a pointer does.
+import type { Method } from "../api/types";
 import { byId } from "../dom";
 import { INITIAL, type Store } from "../state/state";
 import type { Status } from "../status";
@@ -6,6 +7,7 @@ import type { SceneView } from "../view/sceneView";
 import type { Pointer, Tool } from "./pointer";
 
 const STEP = 0.12;
+const NEXT: Record<Method, Method> = { exact: "approximate", approximate: "fast", fast: "exact" };
 
 export function listenToKeys(
   store: Store,
@@ -32,7 +34,7 @@ export function listenToKeys(
   };
   const anywhere: Record<string, () => void> = {
     Escape: () => status.cancel(),
-    e: () => store.update({ method: store.state.method === "exact" ? "approximate" : "exact" }),
+    e: () => store.update({ method: NEXT[store.state.method] }),
     i: () => store.update({ lines: store.state.lines === null ? INITIAL.lines : null }),
     w: () => store.update({ wireframe: !store.state.wireframe }),
     f: () => byId("fit").click(),

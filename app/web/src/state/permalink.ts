@@ -1,7 +1,9 @@
 // The state as the page's address, and back: /?mesh=ID&source=v0&target=v99
-import type { Method } from "../api/types";
+import type { Effort, Method } from "../api/types";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
 import { INITIAL, type Lines, type Shade, type State } from "./state";
+
+const EFFORTS: Effort[] = [1, 2, 4, 8];
 
 /** A state whose points may still be positions, which the service has to locate. */
 export type WrittenState = Omit<State, "sources" | "target" | "waypoints"> & {
@@ -19,6 +21,7 @@ export function writeState(state: State): string {
   if (state.barriers.length > 0) query.set("barriers", writeRanges(state.barriers));
   if (state.method !== INITIAL.method) query.set("method", state.method);
   if (state.error !== INITIAL.error) query.set("error", String(state.error));
+  if (state.effort !== INITIAL.effort) query.set("effort", String(state.effort));
   if (state.maxDistance !== null) query.set("max_distance", String(state.maxDistance));
   if (state.shade !== INITIAL.shade) query.set("shade", state.shade);
   if (writeLines(state.lines) !== writeLines(INITIAL.lines))
@@ -40,8 +43,9 @@ export function readState(search: string): WrittenState {
     target: target === null ? null : parsePoint(target),
     waypoints: query.getAll("via").map(parsePoint),
     barriers: readRanges(query.get("barriers") ?? ""),
-    method: oneOf<Method>(query.get("method"), ["exact", "approximate"]),
+    method: oneOf<Method>(query.get("method"), ["exact", "approximate", "fast"]),
     error: positive(query.get("error")) ?? INITIAL.error,
+    effort: EFFORTS.find((effort) => String(effort) === query.get("effort")) ?? INITIAL.effort,
     maxDistance: positive(query.get("max_distance")),
     shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference"]),
     lines: readLines(query.get("lines")),

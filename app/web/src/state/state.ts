@@ -1,5 +1,5 @@
 // The state of the page: all that the user has chosen. Everything that is drawn follows from it.
-import type { Method, Point } from "../api/types";
+import type { Effort, Method, Point } from "../api/types";
 
 export type Shade = "distance" | "territories" | "difference";
 export type Lines = { count: number } | { spacing: number } | null;
@@ -12,6 +12,7 @@ export interface State {
   barriers: number[];
   method: Method;
   error: number;
+  effort: Effort;
   maxDistance: number | null;
   shade: Shade;
   lines: Lines;
@@ -28,6 +29,7 @@ export const INITIAL: State = {
   barriers: [],
   method: "exact",
   error: 0.01,
+  effort: 2,
   maxDistance: null,
   shade: "distance",
   lines: { count: 20 },
