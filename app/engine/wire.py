@@ -284,7 +284,7 @@ class Wire:
         return self._store / parts
 
 
-def encode(value: msgspec.Struct) -> bytes:
+def encode(value: object) -> bytes:
     """Return a value as a message."""
     body = msgspec.msgpack.encode(value)
     return _HEAD.pack(_MAGIC, VERSION, zlib.crc32(body)) + body
