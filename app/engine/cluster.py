@@ -17,6 +17,10 @@ LEASE_S = 6.0
 """Time after which a host stops work that nobody renews: its replica is gone, or cut off"""
 
 
+class ClusterError(Exception):
+    """There is no way to the cluster; the message says what to do."""
+
+
 class HostLostError(Exception):
     """A host died, or does not answer: nobody knows what became of the work there."""
 
@@ -41,12 +45,6 @@ class HostReport:
 class Cluster(Protocol):
     """Reaches the hosts: the machines that do work."""
 
-    async def start(self) -> None:
-        """Connect; raises ``ClusterError`` where that is not possible."""
-
-    async def close(self) -> None:
-        """End the connection."""
-
     async def hosts(self) -> Collection[str]:
         """Return the names of the hosts that are there, as far as is known."""
 
@@ -61,7 +59,3 @@ class Cluster(Protocol):
 
     async def beat(self, host: str, tickets: Sequence[str]) -> bytes:
         """Renew the leases of some tickets, and return the ``HostReport``."""
-
-
-class ClusterError(Exception):
-    """There is no way to the cluster; the message says what to do."""

@@ -107,8 +107,7 @@ class DistributedEngine:
         return any(report.is_ready for report in self._usable().values())
 
     async def start(self) -> None:
-        """Connect to the cluster, and look for hosts in the background."""
-        await self._cluster.start()
+        """Look for hosts, in the background."""
         self._spawn(self._search(), self._background)
 
     def drain(self) -> None:
@@ -116,11 +115,10 @@ class DistributedEngine:
         self.is_draining = True
 
     async def stop(self) -> None:
-        """Stop all tasks, and end the connection; leases end what cannot be reached."""
+        """Stop all tasks; leases end what cannot be reached."""
         for background in self._background:
             background.cancel()
         await asyncio.gather(*self._background, *self._stopping, return_exceptions=True)
-        await self._cluster.close()
 
     def refuse_when_full(self, client: str) -> None:  # noqa: ARG002 - hosts know who waits there
         """Raise where each host has more tasks than places, see ``Engine``."""

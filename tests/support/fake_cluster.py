@@ -86,8 +86,13 @@ class FakeCluster:
         """The version of the code that hosts claim to have, if not the true one"""
         self.stops: list[str] = []
         self._death = asyncio.Event()
+        self._is_started = False
 
     async def start(self) -> None:
+        """Start the hosts, unless they run: several replicas may share them."""
+        if self._is_started:
+            return
+        self._is_started = True
         for machine in self.machines.values():
             await machine.start()
 

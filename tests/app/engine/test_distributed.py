@@ -52,11 +52,13 @@ class Replica:
 
 @asynccontextmanager
 async def replica_of(cluster: FakeCluster) -> AsyncIterator[Replica]:
+    await cluster.start()
     engine = DistributedEngine(cluster, SETTINGS)
     await engine.start()
     await asyncio.sleep(2 * BEAT_S)
     yield Replica(cluster, engine)
     await engine.stop()
+    await cluster.close()
 
 
 Scene = Callable[[Replica], Awaitable[None]]
