@@ -146,7 +146,7 @@ class Processes:
 _SIGNS: Mapping[str, str] = {
     "InvalidAuthToken": "the cluster at {address} has another token: give this machine the head's",
     "Version mismatch": "this machine has other versions than the head at {address}: {told}",
-    "cluster ID from GCS server: TimedOut": "what listens at {address} is not the head of a cluster",
+    "cluster ID from GCS server: TimedOut": "what listens at {address} is not the head",
 }
 """What Ray's log says where it cannot start, and what that means"""
 

@@ -1,4 +1,4 @@
-"""Which host gets a task."""
+"""Placement: the host that gets a task."""
 
 from collections import Counter
 
