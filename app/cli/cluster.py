@@ -1,9 +1,10 @@
 """``geodesic head`` and ``geodesic node``: the machines of a cluster."""
 
 import signal
+import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event
@@ -66,7 +67,10 @@ def node(folder: Folder, address: Address = None, store: Store = None) -> None:
         import ray as client
 
         host = start_host(settings)
-        client.get(host.beat.remote([]))
+        try:
+            client.get(host.beat.remote([]))
+        except client.exceptions.RayError as error:
+            raise Failure(f"the host does not start: {error}; see its logs in {folder}") from error
         typer.echo(f"host of the cluster at {settings.address}, with {settings.workers} workers")
         stopped = _stopped()
         while not stopped.wait(_LOOK_S):
@@ -78,7 +82,8 @@ def node(folder: Folder, address: Address = None, store: Store = None) -> None:
         while time.monotonic() < end and not stopped.is_set():
             if client.wait([draining], timeout=_LOOK_S)[0]:
                 break
-        client.get(host.close.remote())
+        with suppress(client.exceptions.RayError):  # it has ended by itself
+            client.get(host.close.remote())
 
 
 @contextmanager
@@ -113,6 +118,8 @@ def _stopped() -> Event:
 def _failing_clearly() -> Iterator[None]:
     from app.engine.cluster import ClusterError
 
+    # Until the command has its own way to end: it ends what it has started of Ray.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     try:
         yield
     except ClusterError as error:

@@ -8,6 +8,7 @@ ours is placed on it.
 import json
 import logging
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -72,6 +73,7 @@ def joined(folder: Path, settings: Settings) -> Iterator["Processes"]:
     with _running(options, folder, settings, {}) as processes:
         import ray
 
+        on_end = signal.getsignal(signal.SIGTERM)
         ray.init(
             address,
             namespace=NAMESPACE,
@@ -80,6 +82,7 @@ def joined(folder: Path, settings: Settings) -> Iterator["Processes"]:
             _node_ip_address=own_address,
             _temp_dir=str(folder.resolve()),
         )
+        signal.signal(signal.SIGTERM, on_end)  # Ray has set one of its own
         try:
             _check_code(address)
             yield processes
@@ -139,7 +142,7 @@ class Processes:
         try:
             self._process.wait(_STOP_S)
         except subprocess.TimeoutExpired:
-            os.killpg(self._process.pid, 9)
+            os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
 
 
