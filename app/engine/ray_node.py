@@ -26,8 +26,8 @@ from app.settings import Settings, variable_of
 
 NAMESPACE = "geodesic"
 
-_START_S = 60.0
-"""Time that Ray's processes get to start: 10 s were seen where two cores were busy"""
+_START_S = 120.0
+"""Time that Ray's processes get to start: 10 s on idle cores, and 40 s were seen on busy ones"""
 _STOP_S = 10.0
 _CONNECT_S = 5.0
 _OBJECT_STORE_BYTES = 80_000_000
@@ -133,7 +133,10 @@ class Processes:
                 last = said.strip().splitlines()[-1:] or ["it said nothing"]
                 raise ClusterError(f"Ray does not start: {last[0]} (see {self._log})")
             if time.monotonic() > end:
-                raise ClusterError(f"Ray has not started within {_START_S:g} s; see {self._log}")
+                raise ClusterError(
+                    f"Ray has not started within {_START_S:g} s: perhaps what listens at {address} "
+                    f"is not the head; see {self._log}"
+                )
             time.sleep(0.05)
 
     def stop(self) -> None:
@@ -149,7 +152,6 @@ class Processes:
 _SIGNS: Mapping[str, str] = {
     "InvalidAuthToken": "the cluster at {address} has another token: give this machine the head's",
     "Version mismatch": "this machine has other versions than the head at {address}: {told}",
-    "cluster ID from GCS server: TimedOut": "what listens at {address} is not the head",
 }
 """What Ray's log says where it cannot start, and what that means"""
 

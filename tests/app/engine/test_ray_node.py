@@ -81,7 +81,6 @@ This process on Ray at 10.0.0.2 was started with:
     ("said", "meaning"),
     [
         ("InvalidAuthToken: Authentication token is missing", "has another token"),
-        ("Failed to get cluster ID from GCS server: TimedOut: x", "is not the head"),
         (VERSIONS, r"Ray: 2\.59\.0 Python: 3\.12\.1 This process .* Python: 3\.11\.7$"),
         ("one line\nthe last line\n", "Ray does not start: the last line"),
         ("", "it said nothing"),
@@ -95,6 +94,17 @@ def test_the_log_of_a_start_that_fails(tmp_path: Path, said: str, meaning: str) 
 
     with pytest.raises(ClusterError, match=meaning):
         Processes(ended, log).wait_until_started("10.0.0.1:6379")
+
+
+def test_a_start_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where some other program listens at the address of the head."""
+    monkeypatch.setattr(ray_node, "_START_S", 0.0)
+    (tmp_path / "ray.log").touch()
+    with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as waiting:
+        processes = Processes(waiting, tmp_path / "ray.log")
+        with pytest.raises(ClusterError, match=r"what listens at 10\.0\.0\.1:6379 is not the head"):
+            processes.wait_until_started("10.0.0.1:6379")
+        processes.stop()
 
 
 def test_one_machine_imports_nothing_for_several(tmp_path: Path) -> None:
