@@ -134,8 +134,8 @@ class Problem:
     code: str
     detail: str
     errors: tuple[Fault, ...] = ()
-    limit: float | None = None
-    actual: float | None = None
+    limit: int | float | None = None
+    actual: int | float | None = None
     setting: str | None = None
     hint: str | None = None
     headers: Mapping[str, str] = field(default_factory=dict)

@@ -12,6 +12,7 @@ from pydantic import (
     BeforeValidator,
     Field,
     PositiveInt,
+    SecretStr,
     field_validator,
     model_validator,
 )
@@ -118,6 +119,12 @@ class Settings(BaseSettings):
 
     store: Annotated[Path, BeforeValidator(_store)] = Path("geodesic-store")
     """Folder of meshes, results and fields, or its `file://` URL; created if missing."""
+    engine: Literal["local", "ray"] = "local"
+    """`local` computes on this machine, `ray` on the hosts of a cluster."""
+    address: str | None = None
+    """Address of the head of the cluster, as `H:P`."""
+    cluster_token: Annotated[SecretStr, Field(min_length=16)] | None = None
+    """Secret of the cluster, the same on all its machines; who knows it runs any code there."""
     workers: PositiveInt = Field(default_factory=available_cores)
     """Worker processes; one for each core, unless set."""
     worker_memory_bytes: int = Field(ge=LEAST_WORKER_MEMORY, default_factory=_worker_memory)
@@ -215,6 +222,8 @@ class Settings(BaseSettings):
 
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Self:
+        if self.engine == "ray" and self.address is None:
+            raise ValueError("GEODESIC_ENGINE is ray, but GEODESIC_ADDRESS names no head")
         if self.auth == "off" and self.api_keys:
             raise ValueError("GEODESIC_AUTH is off, but GEODESIC_API_KEYS has keys")
         for small, large in _AT_MOST:

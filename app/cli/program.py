@@ -7,7 +7,7 @@ import typer
 from typer.exceptions import TyperException
 
 from app import __version__
-from app.cli import compilation, meshes, queries, serve
+from app.cli import cluster, compilation, meshes, queries, serve
 from app.cli.steps import Failure
 from app.cli.store import store
 
@@ -64,6 +64,8 @@ def _options(
 
 for command in (
     serve.serve,
+    cluster.head,
+    cluster.node,
     meshes.info,
     queries.distance,
     queries.path,

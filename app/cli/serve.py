@@ -12,6 +12,8 @@ from typing import Annotated, Any, cast
 import typer
 
 from app.access import is_loopback
+from app.cli.cluster import Address, Store, joined_if_asked
+from app.cli.configuration import read_settings
 from app.cli.steps import Failure
 from app.engine import fork_server
 
@@ -19,32 +21,31 @@ from app.engine import fork_server
 def serve(
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.")] = 8000,
+    engine: Annotated[
+        str | None,
+        typer.Option(
+            help="local, or ray for the hosts of a cluster; GEODESIC_ENGINE unless given."
+        ),
+    ] = None,
+    address: Address = None,
+    store: Store = None,
 ) -> None:
     """Serve geodesics over HTTP until interrupted; settings are GEODESIC_… variables."""
     if not sys.stderr.isatty():
         os.environ["GEODESIC_QUIET"] = "1"  # lines are objects then; the log says that it compiles
-    fork_server.start()  # imports for the workers while this process imports for itself
+    if (engine or os.environ.get("GEODESIC_ENGINE", "local")) == "local":
+        fork_server.start()  # imports for the workers while this process imports for itself
 
     import uvicorn
-    from pydantic import ValidationError
 
     from app import logs
     from app.http.connections import Connections
     from app.http.protocol import BoundedHttpProtocol
     from app.http.reading import PacedReading
     from app.main import create_app
-    from app.settings import Settings, variable_of
     from app.store.layout import StoreError
 
-    try:
-        settings = Settings()
-    except ValidationError as error:
-        faults = [
-            ": ".join([*(variable_of(str(name)) for name in fault["loc"][:1]), fault["msg"]])
-            for fault in error.errors()
-            if fault["type"] != "default_factory_not_called"  # for another fault's sake
-        ]
-        raise typer.BadParameter("; ".join(faults).replace("Value error, ", "")) from error
+    settings = read_settings(engine=engine, address=address, store=store)
     if not is_loopback(host) and not settings.api_keys and settings.auth == "on":
         raise typer.BadParameter(
             f"anybody who reaches {host} could use the service: set GEODESIC_API_KEYS, or "
@@ -98,6 +99,7 @@ def serve(
     server = Server(config)
     # A closed terminal ends the service in the same order.
     signal(SIGHUP, lambda *_: raise_signal(SIGTERM))
-    server.run()
+    with joined_if_asked(settings):
+        server.run()
     if not server.started:
         raise typer.Exit(1)

@@ -31,7 +31,6 @@ from anyio import CapacityLimiter, to_thread
 from app.access import Caller
 from app.encoding import Representation
 from app.engine.interface import Engine, ProgressCallback
-from app.engine.local import LocalEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, problem
 from app.jobs import Job, JobManager, JobSpec, SqliteJobRepository, prepare_database
@@ -88,7 +87,7 @@ class Service:
         )
         self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
         self.fields = FieldStore(settings.store, settings.fields_bytes)
-        self.engine: Engine = LocalEngine(settings, results)
+        self.engine = _engine(settings, results)
         self._job_database = settings.store / layout.JOB_DATABASE
         self.jobs = JobManager(
             SqliteJobRepository(self._job_database),
@@ -283,7 +282,9 @@ class Service:
 
         async def solve(on_progress: ProgressCallback) -> Result:
             async with self.time_limit(self.settings.job_deadline_s, "job_deadline_s"):
-                result, _ = await self._answer(query, size, representation, client, on_progress)
+                result, _ = await self._answer(
+                    query, size, representation, client, on_progress, is_promised=True
+                )
                 return result
 
         spec = JobSpec(
@@ -374,6 +375,17 @@ class Service:
                 limit=seconds,
                 setting=variable_of(setting) if is_ours else None,
             ) from None
+
+
+def _engine(settings: Settings, results: Path) -> Engine:
+    if settings.engine == "ray":  # nothing else imports what several machines need
+        from app.engine.distributed import DistributedEngine
+        from app.engine.ray_cluster import RayCluster
+
+        return DistributedEngine(RayCluster(), settings)
+    from app.engine.local import LocalEngine
+
+    return LocalEngine(settings, results)
 
 
 def ignore_progress(_share: float) -> None:

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from pydantic import ValidationError
+from pydantic import SecretStr, ValidationError
 
 from app.settings import GIB, LIBRARY_VARIABLES, MIB, Settings, available_memory, variable_of
 from tests.support.service import distances, serving, upload_sample
@@ -19,6 +19,9 @@ TEXTS = {
     "cancel_grace_s": ("0.25", 0.25),
     "store_evict": ("lru", "lru"),
     "auth": ("on", "on"),
+    "engine": ("ray", "ray"),
+    "address": ("10.0.0.1:6379", "10.0.0.1:6379"),
+    "cluster_token": ("a long secret of ours", SecretStr("a long secret of ours")),
     "log_format": ("json", "json"),
     "log_probes": ("on", "on"),
     "api_keys": ("", ()),
@@ -36,6 +39,17 @@ def test_every_setting_is_an_environment_variable(monkeypatch: pytest.MonkeyPatc
     settings = Settings()
 
     assert settings.model_dump() == {name: value for name, (_, value) in given.items()}
+
+
+def test_an_engine_of_several_machines_needs_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEODESIC_ENGINE", "ray")
+
+    with pytest.raises(ValidationError, match="GEODESIC_ADDRESS names no head"):
+        Settings()
+
+
+def test_the_token_of_a_cluster_is_never_shown() -> None:
+    assert "a long secret" not in repr(Settings(cluster_token=SecretStr("a long secret of ours")))
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,126 @@
+"""``geodesic head`` and ``geodesic node``: the machines of a cluster."""
+
+import signal
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from threading import Event
+from types import FrameType
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from app.cli.configuration import read_settings
+from app.cli.steps import Failure
+
+Folder = Annotated[
+    Path, typer.Option("--dir", help="Folder of Ray's sockets and logs, and of the head's records.")
+]
+Address = Annotated[
+    str | None, typer.Option(help="Address of the head, as H:P; GEODESIC_ADDRESS unless given.")
+]
+Store = Annotated[
+    str | None,
+    typer.Option(help="Folder of the store, shared by all machines; GEODESIC_STORE unless given."),
+]
+
+if TYPE_CHECKING:
+    from app.settings import Settings
+
+_LOOK_S = 0.5
+"""Between two looks whether Ray still runs"""
+
+
+def head(
+    host: Annotated[str, typer.Option(help="Address of this machine, as others reach it.")],
+    folder: Folder,
+    port: Annotated[int, typer.Option(min=1024, max=65535, help="Port to listen on.")] = 6379,
+) -> None:
+    """Run the head of a cluster, which knows all machines, until interrupted."""
+    settings = read_settings()
+    from app.engine.ray_node import running_head
+
+    with _failing_clearly(), running_head(host, port, folder, settings) as ray:
+        typer.echo(f"the head listens at {host}:{port}; its records outlive it in {folder}")
+        stopped = _stopped()
+        while not stopped.wait(_LOOK_S):
+            if not ray.are_alive:
+                raise ray.end()
+
+
+def node(folder: Folder, address: Address = None, store: Store = None) -> None:
+    """Make this machine a host of a cluster until interrupted; then it ends what it has begun."""
+    settings = read_settings(address=address, store=store)
+    settings = settings.model_copy(update={"store": settings.store.resolve()})
+    from app.engine.ray_cluster import start_host
+    from app.engine.ray_node import joined
+
+    if not settings.store.is_dir():
+        raise Failure(
+            f"there is no store at {settings.store}: start geodesic serve on it first, and give "
+            "the same shared folder on all machines as --store"
+        )
+    with _failing_clearly(), joined(folder, settings) as ray:
+        import ray as client
+
+        host = start_host(settings)
+        try:
+            client.get(host.beat.remote([]))
+        except client.exceptions.RayError as error:
+            raise Failure(f"the host does not start: {error}; see its logs in {folder}") from error
+        typer.echo(f"host of the cluster at {settings.address}, with {settings.workers} workers")
+        stopped = _stopped()
+        while not stopped.wait(_LOOK_S):
+            if not ray.are_alive:
+                raise ray.end()
+        typer.echo("draining")
+        stopped.clear()  # a second signal ends the time that running work gets
+        draining, end = host.drain.remote(), time.monotonic() + settings.drain_s
+        while time.monotonic() < end and not stopped.is_set():
+            if client.wait([draining], timeout=_LOOK_S)[0]:
+                break
+        with suppress(client.exceptions.RayError):  # it has ended by itself
+            client.get(host.close.remote())
+
+
+@contextmanager
+def joined_if_asked(settings: "Settings") -> Iterator[None]:
+    """Be a member of the cluster inside the block, where the settings say so."""
+    if settings.engine == "local":
+        yield
+        return
+    from app.engine.ray_node import joined
+
+    with (
+        TemporaryDirectory(prefix="geodesic-") as folder,
+        _failing_clearly(),
+        joined(Path(folder), settings),
+    ):
+        yield
+
+
+def _stopped() -> Event:
+    """Return an event that a signal sets: to stop, or that the terminal is gone."""
+    stopped = Event()
+
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        stopped.set()
+
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, stop)
+    return stopped
+
+
+@contextmanager
+def _failing_clearly() -> Iterator[None]:
+    from app.engine.cluster import ClusterError
+
+    # Until the command has its own way to end: it ends what it has started of Ray.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    try:
+        yield
+    except ClusterError as error:
+        raise Failure(str(error)) from error

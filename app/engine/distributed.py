@@ -1,0 +1,343 @@
+"""The engine over several machines: it places tasks on hosts, and takes care of those lost."""
+
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Coroutine, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import partial
+from time import time_ns
+from typing import Any
+from uuid import uuid4
+
+import structlog
+from structlog.contextvars import get_contextvars
+
+from app.engine.cluster import BEAT_S, LEASE_S, SILENCE_S, Cluster, HostLostError, HostReport
+from app.engine.interface import Load, ProgressCallback
+from app.engine.placement import Occupancy, choose
+from app.engine.wire import Message, Wire, WireError, decode
+from app.engine.work import Outcome, StoreMesh, Task, TaskResult
+from app.errors import Problem, ProblemError, draining, over_limit, problem
+from app.queries import code_version
+from app.settings import Settings
+from app.tracing import Period, record_span
+
+logger = structlog.get_logger(module=__name__)
+
+_SEARCH_S = 1.0
+"""Between two looks for hosts that have joined"""
+_NOT_BEGUN = frozenset({"queue_full", "draining", "engine_unavailable"})
+"""Codes of refusals by a host; another one may take the task"""
+_RETRY_AFTER = {"Retry-After": "1"}
+
+
+@dataclass(eq=False)
+class _Flight:
+    """A task at a host."""
+
+    on_progress: ProgressCallback
+    lost: "asyncio.Future[None]"
+    """Done once the host is lost"""
+    has_begun: bool = False
+
+    def note(self, share: float) -> None:
+        self.has_begun = True
+        self.on_progress(share)
+
+
+@dataclass(eq=False)
+class _Host:
+    """A host as this replica knows it."""
+
+    flights: dict[str, _Flight] = field(default_factory=dict)
+    report: HostReport | None = None
+    others: int = 0
+    """Tasks of other replicas there, at the time of the report"""
+
+    def note(self, report: HostReport) -> None:
+        self.report = report
+        self.others = max(0, report.load.busy + report.load.waiting - len(self.flights))
+        for ticket, share in report.shares.items():
+            if ticket in self.flights:
+                self.flights[ticket].note(share)
+
+
+class DistributedEngine:
+    """The engine of a replica: the hosts of a cluster do its work.
+
+    Each host has a queue and workers of its own, as on a machine that is alone: callers take turns
+    there, whichever replica they asked. Work on a lost host is done once more on another one. Work
+    whose worker died is not, since it may be its fault.
+    """
+
+    def __init__(self, cluster: Cluster, settings: Settings) -> None:
+        self._cluster = cluster
+        self._wire = Wire(settings.store)
+        self._hosts: dict[str, _Host] = {}
+        self._refused: set[str] = set()
+        """Hosts of another release, which the log has named"""
+        self.is_draining = False
+        self.on_wait: Callable[[float], None] = lambda _seconds: None
+        self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
+        self._background: set[asyncio.Task[None]] = set()
+        self._stopping: set[asyncio.Task[None]] = set()
+
+    @property
+    def load(self) -> Load:
+        """The sums over all hosts; see ``Engine``."""
+        loads = [report.load for report in self._usable().values()]
+        evictions: Counter[str] = Counter()
+        for load in loads:
+            evictions.update(load.evictions)
+        return Load(
+            waiting=sum(load.waiting for load in loads),
+            idle=sum(load.idle for load in loads),
+            busy=sum(load.busy for load in loads),
+            missing=sum(load.missing for load in loads),
+            lost=sum(load.lost for load in loads),
+            cancelled=sum(load.cancelled for load in loads),
+            evictions=evictions,
+            pids=(),
+        )
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether a host is ready."""
+        return any(report.is_ready for report in self._usable().values())
+
+    async def start(self) -> None:
+        """Look for hosts, in the background."""
+        self._spawn(self._search(), self._background)
+
+    def drain(self) -> None:
+        """Refuse new tasks, see ``Engine``."""
+        self.is_draining = True
+
+    async def stop(self) -> None:
+        """Stop all tasks; leases end what cannot be reached."""
+        for background in self._background:
+            background.cancel()
+        await asyncio.gather(*self._background, *self._stopping, return_exceptions=True)
+
+    def refuse_when_full(self, client: str) -> None:  # noqa: ARG002 - hosts know who waits there
+        """Raise where each host has more tasks than places, see ``Engine``."""
+        if self.is_draining:
+            raise draining()
+        usable = self._usable()
+        if not usable:
+            raise _no_host()
+        fullest = [
+            report
+            for report in usable.values()
+            if report.load.idle == 0 and report.load.waiting >= report.queue_size
+        ]
+        if len(fullest) == len(usable):
+            report = fullest[0]
+            waiting, size = report.load.waiting + 1, report.queue_size
+            raise over_limit(
+                "queue_full", "waiting requests", waiting, size, "queue_size", headers=_RETRY_AFTER
+            )
+
+    async def run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
+        """Have a host do the work of a task, see ``Engine``."""
+        if self.is_draining:
+            raise draining()
+        note = _rising(on_progress)
+        refusal: Problem | None = None
+        without: set[str] = set()
+        """Hosts that were lost with this task, or that refused it"""
+        losses = 0
+        while True:
+            name = self._place(task, without)
+            if name is None:
+                if not task.is_promised:
+                    raise _no_host() if refusal is None else ProblemError(refusal)
+                await asyncio.sleep(_SEARCH_S)
+                without.clear()
+                continue
+            try:
+                outcome = await self._run_on(name, task, note)
+            except HostLostError:
+                losses += 1
+                if losses > 1:
+                    raise _lost_twice() from None
+                logger.warning("host lost: its work is done once more", host=name)
+                without.add(name)
+                task = _once_more(task)
+                continue
+            if isinstance(outcome, TaskResult):
+                return outcome
+            if outcome.code not in _NOT_BEGUN:
+                raise ProblemError(outcome)
+            refusal = outcome
+            without.add(name)
+
+    def _usable(self) -> Mapping[str, HostReport]:
+        return {name: host.report for name, host in self._hosts.items() if host.report is not None}
+
+    def _place(self, task: Task, without: set[str]) -> str | None:
+        usable = {
+            name: report
+            for name, report in self._usable().items()
+            if name not in without and not report.is_draining
+        }
+        ready = {name: report for name, report in usable.items() if report.is_ready}
+        hosts = {
+            name: Occupancy(
+                self._hosts[name].others + len(self._hosts[name].flights), report.workers
+            )
+            for name, report in (ready or usable).items()
+        }
+        # The last key is the mesh. What has none, such as an upload, may go anywhere.
+        key = task.affinity_keys[-1] if task.affinity_keys else uuid4().hex
+        return choose(key, hosts, is_small=task.is_small)
+
+    async def _run_on(
+        self, name: str, task: Task, on_progress: ProgressCallback
+    ) -> TaskResult | Problem:
+        host, ticket = self._hosts[name], uuid4().hex
+        lost = asyncio.get_running_loop().create_future()
+        flight = host.flights[ticket] = _Flight(on_progress, lost)
+        data = self._wire.encode_task(Message(task, get_contextvars()))
+        calling = asyncio.ensure_future(self._cluster.run(name, ticket, data))
+        start_ns = time_ns()
+        outcome: Outcome = None
+        try:
+            await asyncio.wait({calling, lost}, return_when=asyncio.FIRST_COMPLETED)
+            if not calling.done():
+                raise HostLostError
+            outcome = self._wire.decode_outcome(calling.result())
+        except asyncio.CancelledError:
+            self._spawn(self._stop(name, ticket), self._stopping)
+            raise
+        except WireError as error:
+            return _unreadable(name, error)
+        finally:
+            calling.cancel()
+            del host.flights[ticket]
+            self._account(task, flight, Period(start_ns, time_ns()), outcome)
+        if outcome is None:  # stopped there, since no beat had come from here
+            raise HostLostError
+        if isinstance(outcome, TaskResult):
+            on_progress(0.0)  # it may have been over before the next beat
+        return outcome
+
+    def _account(self, task: Task, flight: _Flight, period: Period, outcome: Outcome) -> None:
+        """Report the seconds of a task in a queue and with a worker."""
+        seconds = (period.end - period.start) / 1e9
+        queued = 0.0 if flight.has_begun else seconds
+        parts: Mapping[str, Period] = {}
+        failed = outcome is None or (isinstance(outcome, Problem) and outcome.status >= 500)
+        if isinstance(outcome, TaskResult):
+            queued, parts = outcome.seconds["queue"], outcome.periods
+        begun = period.start + round(queued * 1e9)
+        self.on_wait(queued)
+        self.on_work(task.client, seconds - queued)
+        record_span("queue", Period(period.start, begun))
+        record_span("worker", Period(begun, period.end), parts, failed=failed)
+
+    async def _stop(self, name: str, ticket: str) -> None:
+        """Stop work that nobody waits for: ask until the host answers, or the lease has ended."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(LEASE_S):
+                while True:
+                    try:
+                        await asyncio.wait_for(self._cluster.stop(name, ticket), 4 * BEAT_S)
+                    except (TimeoutError, HostLostError):
+                        await asyncio.sleep(BEAT_S)
+                    else:
+                        return
+
+    async def _search(self) -> None:
+        """Look for hosts that have joined, for ever."""
+        while True:
+            for name in await self._cluster.hosts():
+                if name not in self._hosts:
+                    self._hosts[name] = _Host()
+                    self._spawn(self._attend(name), self._background)
+            await asyncio.sleep(_SEARCH_S)
+
+    async def _attend(self, name: str) -> None:
+        """Exchange beats with a host until it is lost."""
+        host = self._hosts[name]
+        try:
+            while True:
+                async with asyncio.timeout(SILENCE_S):
+                    data = await self._cluster.beat(name, list(host.flights))
+                self._note(name, host, data)
+                await asyncio.sleep(BEAT_S)
+        except (HostLostError, TimeoutError) as error:
+            if host.report is not None:
+                logger.warning("host lost", host=name, error=repr(error))
+        finally:
+            del self._hosts[name]
+            for flight in host.flights.values():
+                if not flight.lost.done():
+                    flight.lost.set_result(None)
+
+    def _note(self, name: str, host: _Host, data: bytes) -> None:
+        try:
+            report: HostReport = decode(data, HostReport)
+            fault = None if report.code == code_version() else _other_release(report.code)
+        except WireError as error:
+            fault = str(error)
+        if fault is not None:
+            host.report = None
+            if name not in self._refused:
+                self._refused.add(name)
+                logger.error("host not used", host=name, error=fault)
+            return
+        is_new = host.report is None
+        host.note(report)
+        if is_new:
+            logger.info("host joined", host=name, workers=report.workers)
+
+    def _spawn(self, coroutine: Coroutine[Any, Any, None], group: set[asyncio.Task[None]]) -> None:
+        background = asyncio.create_task(coroutine)
+        group.add(background)
+        background.add_done_callback(partial(self._forget, group))
+
+    def _forget(self, group: set[asyncio.Task[None]], background: asyncio.Task[None]) -> None:
+        group.discard(background)
+        if not background.cancelled() and background.exception() is not None:
+            logger.error("task of the engine failed", exc_info=background.exception())
+
+
+def _other_release(code: str) -> str:
+    return f"it runs {code}, and this machine {code_version()}: install the same release on all"
+
+
+def _rising(on_progress: ProgressCallback) -> ProgressCallback:
+    """Return a callback that passes on no share that is less than one before."""
+    highest = -1.0
+
+    def note(share: float) -> None:
+        nonlocal highest
+        if share > highest:
+            highest = share
+            on_progress(share)
+
+    return note
+
+
+def _once_more(task: Task) -> Task:
+    """Return a task to be done again; the host that was lost may still write where it did."""
+    if isinstance(task.work, StoreMesh):
+        folder = task.work.folder
+        return replace(task, work=replace(task.work, folder=folder.with_name(f"{folder.name}-2")))
+    return task
+
+
+def _no_host() -> ProblemError:
+    detail = "no machine of the cluster takes work at the moment"
+    return problem("engine_unavailable", detail, headers=_RETRY_AFTER)
+
+
+def _lost_twice() -> ProblemError:
+    return problem("worker_died", "two machines were lost, one after the other, at this request")
+
+
+def _unreadable(name: str, error: WireError) -> Problem:
+    logger.error("answer of a host not readable", host=name, error=str(error))
+    return Problem("engine_unavailable", f"a machine of the cluster sent no answer: {error}")

@@ -1,0 +1,262 @@
+"""Ray on this machine: its processes, and the way into the cluster that they form.
+
+Ray runs whatever it is sent. So each machine must know the cluster's token, which Ray checks at
+each call; there is no dashboard; and no machine offers processors, so that nothing but hosts of
+ours is placed on it.
+"""
+
+import json
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from app.engine.cluster import ClusterError
+from app.queries import code_version
+from app.settings import Settings, variable_of
+
+NAMESPACE = "geodesic"
+
+_START_S = 120.0
+"""Time that Ray's processes get to start: 10 s on idle cores, and 40 s were seen on busy ones"""
+_STOP_S = 10.0
+_CONNECT_S = 5.0
+_OBJECT_STORE_BYTES = 80_000_000
+"""About the least that Ray accepts: our messages are small"""
+_LONGEST_FOLDER = 40
+"""Characters: a path of a Unix socket has 107, of which Ray's own names take up to 66"""
+_RECONNECT_S = 86_400
+"""Seconds without the head after which Ray ends a machine's processes; 60 unless set"""
+_LOG = "ray.log"
+_MADE_OF = "geodesic "
+"""Begins the name of the resource that says which code a machine runs"""
+
+
+@contextmanager
+def running_head(host: str, port: int, folder: Path, settings: Settings) -> Iterator["Processes"]:
+    """Run Ray's control store at an address inside the block; ``folder`` keeps its records."""
+    _check_host(host)
+    _check_free(host, port)
+    # Of a head that was killed. With it, Ray takes other members on this machine for a head.
+    (folder / "ray_current_cluster").unlink(missing_ok=True)
+    records = folder / "records"
+    environment = {"RAY_gcs_storage": "rocksdb", "RAY_gcs_storage_path": str(records)}
+    options = ["--head", f"--node-ip-address={host}", f"--port={port}"]
+    options += ["--include-dashboard=false"]
+    with _running(options, folder, settings, environment) as processes:
+        yield processes
+
+
+@contextmanager
+def joined(folder: Path, settings: Settings) -> Iterator["Processes"]:
+    """Make this machine a member of the cluster, and this process a client, inside the block.
+
+    Raises
+    ------
+    ClusterError
+        That is not possible; the message says why.
+    """
+    address = settings.address
+    host, port = host_and_port(address)
+    _check_host(host)
+    own_address = _own_address(host, port)
+    options = [f"--address={address}", f"--node-ip-address={own_address}"]
+    with _running(options, folder, settings, {}) as processes:
+        import ray
+
+        on_end = signal.getsignal(signal.SIGTERM)
+        ray.init(
+            address,
+            namespace=NAMESPACE,
+            log_to_driver=False,
+            logging_level=logging.ERROR,
+            _node_ip_address=own_address,
+            _temp_dir=str(folder.resolve()),
+        )
+        signal.signal(signal.SIGTERM, on_end)  # Ray has set one of its own
+        try:
+            _check_code(address)
+            yield processes
+        finally:
+            ray.shutdown()
+
+
+def host_and_port(address: str | None) -> tuple[str, int]:
+    """Return the parts of an address ``H:P``; raises ``ClusterError`` where it is none."""
+    try:
+        parts = urlsplit(f"//{address or ''}")
+        if parts.hostname and parts.port:
+            return parts.hostname, parts.port
+    except ValueError:
+        pass
+    raise ClusterError(
+        f"{address!r} is no address of a head: give --address H:P or set {variable_of('address')}"
+    )
+
+
+class Processes:
+    """The processes of Ray that belong to one folder."""
+
+    def __init__(self, process: "subprocess.Popen[bytes]", log: Path) -> None:
+        self._process = process
+        self._log = log
+
+    @property
+    def are_alive(self) -> bool:
+        """Whether none of them has ended: Ray ends all where one does."""
+        return self._process.poll() is None
+
+    def end(self) -> ClusterError:
+        """Return the error for an end that nobody asked for."""
+        return ClusterError(f"Ray has ended on this machine; {self._log} may say why")
+
+    def wait_until_started(self, address: str) -> None:
+        """Wait for Ray's word that it runs; raises ``ClusterError`` where it will not."""
+        end = time.monotonic() + _START_S
+        while True:
+            said = self._log.read_text(errors="replace")
+            for sign, meaning in _SIGNS.items():
+                if sign in said:
+                    raise ClusterError(meaning.format(address=address, told=_told(said, sign)))
+            if "Ray runtime started" in said:
+                return
+            if not self.are_alive:
+                last = said.strip().splitlines()[-1:] or ["it said nothing"]
+                raise ClusterError(f"Ray does not start: {last[0]} (see {self._log})")
+            if time.monotonic() > end:
+                raise ClusterError(
+                    f"Ray has not started within {_START_S:g} s: perhaps what listens at {address} "
+                    f"is not the head; see {self._log}"
+                )
+            time.sleep(0.05)
+
+    def stop(self) -> None:
+        """Tell them to end, and kill those that do not."""
+        self._process.terminate()
+        try:
+            self._process.wait(_STOP_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+
+
+_SIGNS: Mapping[str, str] = {
+    "InvalidAuthToken": "the cluster at {address} has another token: give this machine the head's",
+    "Version mismatch": "this machine has other versions than the head at {address}: {told}",
+}
+"""What Ray's log says where it cannot start, and what that means"""
+
+
+def _told(said: str, sign: str) -> str:
+    """Return the versions that Ray has compared, in one line."""
+    lines = said.partition(sign)[2].splitlines()[:7]
+    return " ".join(" ".join(lines).removeprefix(": ").split())
+
+
+@contextmanager
+def _running(
+    options: Sequence[str], folder: Path, settings: Settings, environment: Mapping[str, str]
+) -> Iterator[Processes]:
+    if find_spec("ray") is None:
+        raise ClusterError("Ray is not installed: pip install 'geodesic[cluster]'")
+    if settings.cluster_token is None:
+        raise ClusterError(
+            f"set {variable_of('cluster_token')} to a secret, the same on all machines of the "
+            "cluster: who knows it can run any code there (openssl rand -hex 32 makes one)"
+        )
+    folder = folder.resolve()
+    if len(str(folder)) > _LONGEST_FOLDER:
+        raise ClusterError(
+            f"{folder} is too long a path for sockets: give a --dir of at most {_LONGEST_FOLDER} "
+            "characters"
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    os.environ.update(
+        {
+            "RAY_AUTH_MODE": "token",
+            "RAY_AUTH_TOKEN": settings.cluster_token.get_secret_value(),
+            "RAY_USAGE_STATS_ENABLED": "0",
+            "RAY_gcs_rpc_server_reconnect_timeout_s": str(_RECONNECT_S),
+            "RAY_worker_niceness": "0",  # long work steps back by itself
+            "RAY_memory_monitor_refresh_ms": "0",  # it would kill hosts; workers have limits
+        }
+    )
+    command = [
+        *(sys.executable, "-m", "ray.scripts.scripts", "start", "--block", *options),
+        *("--num-cpus=0", f"--object-store-memory={_OBJECT_STORE_BYTES}"),
+        *("--min-worker-port=0", "--max-worker-port=0"),  # any that is free
+        *("--include-log-monitor=false", "--disable-usage-stats", "--log-color=false"),
+        f"--resources={json.dumps({_MADE_OF + code_version(): 1})}",
+        f"--temp-dir={folder}",
+    ]
+    log = folder / _LOG
+    with log.open("wb") as output:
+        process = subprocess.Popen(  # noqa: S603 - our own command
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            env=os.environ | environment,
+            start_new_session=True,  # an interrupt is for this command, which ends them in order
+        )
+    processes = Processes(process, log)
+    try:
+        processes.wait_until_started(settings.address or options[1])
+        yield processes
+    finally:
+        processes.stop()
+
+
+def _check_host(host: str) -> None:
+    if host in ("localhost", "127.0.0.1", "::1"):
+        raise ClusterError(
+            f"Ray takes {host} for any address of this machine: give one by which other machines "
+            "reach the head, or 127.0.0.2 to try a cluster on one machine"
+        )
+
+
+def _check_free(host: str, port: int) -> None:
+    try:
+        with socket.create_server((host, port)):
+            pass
+    except OSError as error:
+        raise ClusterError(
+            f"the head cannot listen at {host}:{port}: {error.strerror}; see --host and --port"
+        ) from error
+
+
+def _own_address(host: str, port: int) -> str:
+    """Return the address by which this machine reaches the head, and is reached by others."""
+    try:
+        with socket.create_connection((host, port), _CONNECT_S) as connection:
+            address = str(connection.getsockname()[0])
+    except OSError as error:
+        raise ClusterError(
+            f"no head answers at {host}:{port} ({error.strerror or error}): start one with "
+            f"geodesic head, or correct --address"
+        ) from error
+    return host if address == "127.0.0.1" else address  # both are this machine
+
+
+def _check_code(address: str | None) -> None:
+    """Raise where the head runs another release: answers would not be the same to the bit."""
+    import ray
+
+    nodes: list[dict[str, Any]] = ray.nodes()  # type: ignore[no-untyped-call]
+    head = next(node for node in nodes if "node:__internal_head__" in node["Resources"])
+    codes = {name for name in head["Resources"] if name.startswith(_MADE_OF)}
+    if codes != {_MADE_OF + code_version()}:
+        theirs = ", ".join(code.removeprefix(_MADE_OF) for code in sorted(codes)) or "none"
+        raise ClusterError(
+            f"this machine has geodesic {code_version()}, and the head at {address} has {theirs}: "
+            "install the same release on all machines, on the head first"
+        )
