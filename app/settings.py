@@ -12,6 +12,7 @@ from pydantic import (
     BeforeValidator,
     Field,
     PositiveInt,
+    SecretStr,
     field_validator,
     model_validator,
 )
@@ -105,7 +106,8 @@ _HOST = re.compile(r"(\*\.)?[a-z0-9_-]+(\.[a-z0-9_-]+)*|\[[0-9a-f:]+\]")
 class Settings(BaseSettings):
     """All settings, validated at the start; an unknown one, or a contradiction, is an error.
 
-    One store belongs to one service, which removes unfinished files from it at the start.
+    One store belongs to one service, or to all that have one ``state``. The first removes
+    unfinished files from it at the start.
     """
 
     model_config = SettingsConfigDict(
@@ -118,6 +120,8 @@ class Settings(BaseSettings):
 
     store: Annotated[Path, BeforeValidator(_store)] = Path("geodesic-store")
     """Folder of meshes, results and fields, or its `file://` URL; created if missing."""
+    state: SecretStr | None = None
+    """URL of a PostgreSQL database, for several services; SQLite in the store, unless set."""
     workers: PositiveInt = Field(default_factory=available_cores)
     """Worker processes; one for each core, unless set."""
     worker_memory_bytes: int = Field(ge=LEAST_WORKER_MEMORY, default_factory=_worker_memory)
@@ -194,6 +198,14 @@ class Settings(BaseSettings):
     """`json` or `text`; text on a terminal and JSON elsewhere, unless set."""
     log_probes: Literal["on", "off"] = "off"
     """`on` logs requests for `/livez` and `/readyz` too."""
+
+    @field_validator("state")
+    @classmethod
+    def _is_of_postgresql(cls, state: SecretStr | None) -> SecretStr | None:
+        schemes = ("postgresql://", "postgres://")
+        if state is not None and not state.get_secret_value().startswith(schemes):
+            raise ValueError("it is no URL such as postgresql://user:secret@host:5432/database")
+        return state
 
     @field_validator("cors_origins")
     @classmethod

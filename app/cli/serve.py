@@ -19,6 +19,9 @@ from app.engine import fork_server
 def serve(
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.")] = 8000,
+    state: Annotated[
+        str | None, typer.Option(help="URL of a PostgreSQL database that several services share.")
+    ] = None,
 ) -> None:
     """Serve geodesics over HTTP until interrupted; settings are GEODESIC_… variables."""
     if not sys.stderr.isatty():
@@ -26,7 +29,7 @@ def serve(
     fork_server.start()  # imports for the workers while this process imports for itself
 
     import uvicorn
-    from pydantic import ValidationError
+    from pydantic import SecretStr, ValidationError
 
     from app import logs
     from app.http.connections import Connections
@@ -34,10 +37,11 @@ def serve(
     from app.http.reading import PacedReading
     from app.main import create_app
     from app.settings import Settings, variable_of
+    from app.state import StateError
     from app.store.layout import StoreError
 
     try:
-        settings = Settings()
+        settings = Settings() if state is None else Settings(state=SecretStr(state))
     except ValidationError as error:
         faults = [
             ": ".join([*(variable_of(str(name)) for name in fault["loc"][:1]), fault["msg"]])
@@ -51,11 +55,11 @@ def serve(
             f"GEODESIC_AUTH=off where something before it asks for keys"
         )
     logs.install(settings.log_format)
-    app = create_app(settings)
     try:
+        app = create_app(settings)
         with app.state.service.owning_store():
             pass  # the server itself would show a refusal as a traceback
-    except StoreError as error:
+    except (StoreError, StateError) as error:
         raise Failure(str(error)) from error
 
     usual_s = 0.0 if is_loopback(host) else 5.0  # time for a load balancer to notice

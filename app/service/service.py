@@ -34,7 +34,7 @@ from app.engine.interface import Engine, ProgressCallback
 from app.engine.local import LocalEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, problem
-from app.jobs import Job, JobManager, JobSpec, SqliteJobRepository, prepare_database
+from app.jobs import Job, JobManager, JobRepository, JobSpec
 from app.queries import KINDS, Estimate, MeshSize, Query, fingerprint, result_key
 from app.service.concurrency import ConcurrencyLimit
 from app.service.maintenance import Damage
@@ -42,11 +42,12 @@ from app.service.resources import share_arenas
 from app.service.scrub import scrubbing
 from app.service.single_flight import SingleFlight
 from app.settings import Settings, variable_of
+from app.state import Database, Replicas, SqliteDatabase, StateError
 from app.store import layout
 from app.store.fields import FieldStore
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
-from app.store.ownership import owned
+from app.store.ownership import Share, owned, shared
 from app.store.results import Result, ResultStore, result_name
 
 Manifest = Mapping[str, Any]
@@ -89,12 +90,13 @@ class Service:
         self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
         self.fields = FieldStore(settings.store, settings.fields_bytes)
         self.engine: Engine = LocalEngine(settings, results)
-        self._job_database = settings.store / layout.JOB_DATABASE
+        self.database = _database_of(settings)
         self.jobs = JobManager(
-            SqliteJobRepository(self._job_database),
+            JobRepository(self.database),
             self.results,
             settings.job_ttl,
             settings.quota_jobs,
+            Replicas(self.database) if self.database.is_shared else None,
         )
         self.uploads = ConcurrencyLimit(
             settings.quota_uploads, "quota_exceeded", "uploads", "quota_uploads"
@@ -115,16 +117,21 @@ class Service:
     async def running(self) -> AsyncIterator[None]:
         """Own the store, supply workers and run jobs inside the block."""
         share_arenas()
-        with self.owning_store():
-            self.mesh_catalog.prepare()
-            self.results.prepare()
-            self.fields.prepare(self.mesh_catalog.ids)
+        with self.owning_store() as share:
+            is_alone = share is None or share.is_first
+            self.mesh_catalog.prepare(is_alone=is_alone)
+            self.results.prepare(is_alone=is_alone)
+            if is_alone:
+                self.fields.prepare(self.mesh_catalog.ids)
+            if share is not None:
+                share.let_others_in()
             await self.engine.start()
             # Objects of the start live for ever; each full collection over them takes 90 ms.
             collect()
             freeze()
             try:
                 async with (
+                    self._open_database(),
                     self.jobs.running(self._solve_again),
                     scrubbing(self.settings.store, self._repair),
                 ):
@@ -134,11 +141,28 @@ class Service:
                 await self.engine.stop()
 
     @contextmanager
-    def owning_store(self) -> Iterator[None]:
-        """Own the store inside the block; raises ``StoreError`` where it is not usable."""
-        with owned(self.settings.store):
-            prepare_database(self._job_database)
+    def owning_store(self) -> Iterator[Share | None]:
+        """Own the store inside the block, or share it where the database is shared.
+
+        Raises ``StoreError`` where the store is not usable, and ``StateError`` where the database
+        is not.
+        """
+        if self.database.is_shared:
+            with shared(self.settings.store) as share:
+                self.database.prepare()
+                yield share
+        else:
+            with owned(self.settings.store):
+                self.database.prepare()
+                yield None
+
+    @asynccontextmanager
+    async def _open_database(self) -> AsyncIterator[None]:
+        await self.database.open()
+        try:
             yield
+        finally:
+            await self.database.close()
 
     def announce_end(self) -> None:
         """Say that the service is not ready, so that no new clients are sent to it."""
@@ -378,3 +402,14 @@ class Service:
 
 def ignore_progress(_share: float) -> None:
     """Do nothing: the progress callback of calls that nobody watches."""
+
+
+def _database_of(settings: Settings) -> Database:
+    if settings.state is None:
+        return SqliteDatabase(settings.store / layout.JOB_DATABASE)
+    try:
+        from app.state.postgres import PostgresDatabase  # an extra, and half a second  # noqa: PLC0415
+    except ImportError as error:
+        extra = "pip install geodesic[cluster]"
+        raise StateError(f"{variable_of('state')} needs {error.name}: {extra}") from error
+    return PostgresDatabase(settings.state.get_secret_value())

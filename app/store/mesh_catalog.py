@@ -69,11 +69,15 @@ class MeshCatalog:
         self.evictions = 0
         """Meshes removed so far to make room"""
 
-    def prepare(self) -> None:
-        """Remove what a former service left unfinished, and measure the meshes."""
+    def prepare(self, *, is_alone: bool = True) -> None:
+        """Remove what a former service left unfinished, and measure the meshes.
+
+        Another service may be writing it, where this one is not alone.
+        """
         self._store.folder.mkdir(exist_ok=True)
         self._temporary.mkdir(exist_ok=True)
-        _remove(*self._temporary.iterdir())
+        if is_alone:
+            _remove(*self._temporary.iterdir())
         sizes = self._store.sizes().items()
         self._entries = OrderedDict(
             (mesh_id, _Entry(size, self._owner(mesh_id))) for mesh_id, size in sizes

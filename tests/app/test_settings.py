@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from pydantic import ValidationError
+from pydantic import SecretStr, ValidationError
 
 from app.settings import GIB, LIBRARY_VARIABLES, MIB, Settings, available_memory, variable_of
 from tests.support.service import distances, serving, upload_sample
@@ -14,6 +14,7 @@ LIBRARY = TESTS.parent / "geodesic_core"
 
 TEXTS = {
     "store": ("/somewhere", Path("/somewhere")),
+    "state": ("postgresql://a:b@c/d", SecretStr("postgresql://a:b@c/d")),
     "worker_memory_bytes": ("3000000000", 3_000_000_000),
     "deadline_s": ("0.5", 0.5),
     "cancel_grace_s": ("0.25", 0.25),
