@@ -33,7 +33,7 @@ from app.encoding import Representation
 from app.engine.interface import Engine, ProgressCallback
 from app.engine.local import LocalEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
-from app.errors import ProblemError, problem
+from app.errors import ProblemError, StateUnavailableError, problem
 from app.jobs import Job, JobManager, JobRepository, JobSpec
 from app.queries import KINDS, Estimate, MeshSize, Query, fingerprint, result_key
 from app.service.concurrency import ConcurrencyLimit
@@ -42,13 +42,16 @@ from app.service.resources import share_arenas
 from app.service.scrub import scrubbing
 from app.service.single_flight import SingleFlight
 from app.settings import Settings, variable_of
-from app.state import Database, Replicas, SqliteDatabase, StateError
+from app.state import Allowances, Database, MeshRecords, Replicas, SqliteDatabase, StateError
 from app.store import layout
 from app.store.fields import FieldStore
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
 from app.store.ownership import Share, owned, shared
 from app.store.results import Result, ResultStore, result_name
+
+_CATALOG_PERIOD_S = 2.0
+"""Seconds between two looks at what other services did to meshes, where they are shared"""
 
 Manifest = Mapping[str, Any]
 PhaseSeconds = Mapping[str, float]
@@ -78,6 +81,7 @@ class Service:
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
+        self.database = _database_of(settings)
         results = settings.store / layout.RESULTS
         self.meshes = MeshStore(settings.store)
         self.mesh_catalog = MeshCatalog(
@@ -86,22 +90,24 @@ class Service:
             settings.store_bytes,
             evicts=settings.store_evict == "lru",
             quota=settings.quota_bytes,
+            shared=MeshRecords(self.database) if self.database.is_shared else None,
         )
         self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
         self.fields = FieldStore(settings.store, settings.fields_bytes)
         self.engine: Engine = LocalEngine(settings, results)
-        self.database = _database_of(settings)
+        replicas = Replicas(self.database) if self.database.is_shared else None
+        self.allowances = Allowances(self.database, replicas.id) if replicas else None
+        """What callers have taken, where several services count together"""
         self.jobs = JobManager(
             JobRepository(self.database),
             self.results,
             settings.job_ttl,
             settings.quota_jobs,
-            Replicas(self.database) if self.database.is_shared else None,
+            replicas,
         )
-        self.uploads = ConcurrencyLimit(
+        self._uploads = ConcurrencyLimit(
             settings.quota_uploads, "quota_exceeded", "uploads", "quota_uploads"
         )
-        """Uploads that each caller has under way"""
         self.is_leaving = False
         """Whether the service is about to stop: it is not ready, whatever it still answers"""
         self.lookups = {"hit": 0, "miss": 0}
@@ -123,22 +129,20 @@ class Service:
             self.results.prepare(is_alone=is_alone)
             if is_alone:
                 self.fields.prepare(self.mesh_catalog.ids)
-            if share is not None:
-                share.let_others_in()
-            await self.engine.start()
-            # Objects of the start live for ever; each full collection over them takes 90 ms.
-            collect()
-            freeze()
-            try:
-                async with (
-                    self._open_database(),
-                    self.jobs.running(self._solve_again),
-                    scrubbing(self.settings.store, self._repair),
-                ):
-                    self.results.make_room()  # now it is known which are those of jobs
-                    yield
-            finally:
-                await self.engine.stop()
+            async with self._open_database(share):
+                await self.engine.start()
+                # Objects of the start live for ever; each full collection over them takes 90 ms.
+                collect()
+                freeze()
+                try:
+                    async with (
+                        self.jobs.running(self._solve_again),
+                        scrubbing(self.settings.store, self._repair),
+                    ):
+                        self.results.make_room()  # now it is known which are those of jobs
+                        yield
+                finally:
+                    await self.engine.stop()
 
     @contextmanager
     def owning_store(self) -> Iterator[Share | None]:
@@ -157,12 +161,29 @@ class Service:
                 yield None
 
     @asynccontextmanager
-    async def _open_database(self) -> AsyncIterator[None]:
+    async def _open_database(self, share: Share | None) -> AsyncIterator[None]:
+        """Open the database inside the block; keep the catalogue up with other services there."""
         await self.database.open()
+        following = None
         try:
+            if share is not None:
+                if share.is_first:
+                    await self.mesh_catalog.reconcile()
+                    share.let_others_in()
+                following = asyncio.create_task(self._follow_catalog())
             yield
         finally:
+            if following is not None:
+                following.cancel()
+            if self.allowances is not None:
+                await self.allowances.close()
             await self.database.close()
+
+    async def _follow_catalog(self) -> None:
+        while True:
+            with suppress(StateUnavailableError):  # to be tried again
+                await self.mesh_catalog.keep_up()
+            await asyncio.sleep(_CATALOG_PERIOD_S)
 
     def announce_end(self) -> None:
         """Say that the service is not ready, so that no new clients are sent to it."""
@@ -173,6 +194,16 @@ class Service:
         self.announce_end()
         self.engine.drain()
         self.jobs.end_events()
+
+    @asynccontextmanager
+    async def counting_upload(self, caller: Caller) -> AsyncIterator[None]:
+        """Count the block as an upload of a caller, or refuse it with ``quota_exceeded``."""
+        if self.allowances is None:
+            with self._uploads.counting(caller):
+                yield
+        else:
+            async with self._uploads.counting_for_all(caller, self.allowances):
+                yield
 
     async def add_mesh(self, mesh_input: MeshInput, context: RequestContext) -> StoredMesh:
         """Have a worker read or make a mesh, and store it."""

@@ -32,6 +32,8 @@ class Database(Statements, Protocol):
 
     is_shared: bool
     """Whether several services may use it at the same time"""
+    clock: str
+    """The seconds since 1970 by the clock of the database, as an expression of its SQL"""
 
     def prepare(self) -> None:
         """Create the tables that are missing, and verify that the database can be used.

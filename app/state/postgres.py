@@ -34,6 +34,7 @@ class PostgresDatabase:
     """The database at a URL; see ``Database``."""
 
     is_shared = True
+    clock = "CAST(EXTRACT(EPOCH FROM clock_timestamp()) AS DOUBLE PRECISION)"
 
     def __init__(self, url: str) -> None:
         self._url = url

@@ -44,9 +44,17 @@ class Replicas:
                 "DELETE FROM replicas WHERE id = ? AND beats = ?", other, found[other]
             )
             del heard[other]
+        if dead:
+            await self._forget_work()
         self._heard = heard
         return frozenset(heard)
 
     async def leave(self) -> None:
         """Say that this replica is no more: others may take over what it left."""
         await self._database.run("DELETE FROM replicas WHERE id = ?", self.id)
+        await self._forget_work()
+
+    async def _forget_work(self) -> None:
+        await self._database.run(
+            "DELETE FROM running WHERE replica NOT IN (SELECT id FROM replicas)"
+        )

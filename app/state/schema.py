@@ -33,6 +33,25 @@ REVISIONS: Mapping[str, Sequence[str]] = {
         # Queries have a table of their own, since they may be large, and records change often.
         "CREATE TABLE IF NOT EXISTS queries (job_id TEXT PRIMARY KEY, query {bytes} NOT NULL)",
         "CREATE TABLE IF NOT EXISTS replicas (id TEXT PRIMARY KEY, beats BIGINT NOT NULL)",
+        """
+        CREATE TABLE IF NOT EXISTS meshes (
+            id TEXT PRIMARY KEY,
+            size BIGINT NOT NULL,
+            owner TEXT,
+            used DOUBLE PRECISION NOT NULL,
+            pinned DOUBLE PRECISION NOT NULL
+        )
+        """,
+        "CREATE TABLE IF NOT EXISTS rates (caller TEXT PRIMARY KEY, due DOUBLE PRECISION NOT NULL)",
+        """
+        CREATE TABLE IF NOT EXISTS running (
+            replica TEXT NOT NULL,
+            kind TEXT NOT NULL,
+            caller TEXT NOT NULL,
+            count BIGINT NOT NULL,
+            PRIMARY KEY (replica, kind, caller)
+        )
+        """,
     ),
 }
 

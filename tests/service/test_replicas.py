@@ -237,3 +237,43 @@ def test_starts_that_are_refused(postgres: Postgres, tmp_path: Path) -> None:
         assert "in use" in refused_start(tmp_path, "--state", postgres.new_database())
     with closing(Server(tmp_path, GEODESIC_STATE=postgres.new_database())):
         assert "in use" in refused_start(tmp_path)
+
+
+def test_a_mesh_of_one_is_known_to_the_other(pair: Pair) -> None:
+    first, second = pair
+    mesh_id = upload_sample(first.client, "plane", 300)  # type: ignore[arg-type]
+    link = f"/v1/meshes/{mesh_id}"
+    assert upload_sample(second.client, "plane", 300) == mesh_id  # type: ignore[arg-type]
+    answers = {server.client.get(f"{link}/path?from=v0&to=v9").text for server in pair}
+    assert len(answers) == 1
+    assert second.client.delete(link).status_code == 204
+    for server in pair:
+        check_problem(server.client.get(link), 404, "mesh_not_found")
+    assert upload_sample(first.client, "plane", 300) == mesh_id  # type: ignore[arg-type]
+
+
+def test_limits_of_a_caller_hold_for_both(postgres: Postgres, tmp_path: Path) -> None:
+    with ExitStack() as stack:
+        limits = {"GEODESIC_RATE_LIMIT": "30", "GEODESIC_QUOTA_UPLOADS": "1"}
+        first, second = pair_of(stack, postgres, tmp_path, **limits)
+        sample = {"sample": "plane", "faces": 50}
+        with ThreadPoolExecutor(1) as pool:
+            with stopped(first.both_workers()):
+                waiting = pool.submit(_upload_at_last, first, sample)
+                wait_until(lambda: _is_over_quota(second, sample))
+            assert waiting.result() in (200, 201)
+        wait_until(lambda: second.client.get("/v1/jobs").status_code == 429)
+        wait_until(lambda: first.client.get("/v1/jobs").status_code == 429)
+
+
+def _upload_at_last(server: Server, sample: dict[str, Any]) -> int:
+    """Upload once the rate and the uploads of the other replica allow it."""
+    status = 429
+    while status == 429:
+        status = server.client.post("/v1/meshes", params=sample).status_code
+    return status
+
+
+def _is_over_quota(server: Server, sample: dict[str, Any]) -> bool:
+    refused = server.client.post("/v1/meshes", params=sample)
+    return bool(refused.json().get("code") == "quota_exceeded")
