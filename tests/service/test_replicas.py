@@ -154,6 +154,19 @@ def test_jobs_of_a_replica_that_ends_are_run_by_the_other(
             assert second.client.get(f"{job}/results").status_code == 200
 
 
+def test_a_replica_that_was_held_up_gives_its_jobs_away(pair: Pair, small: str) -> None:
+    """It is taken for dead, and finds out once it goes on."""
+    first, second = pair
+    with stopped(first.both_workers()):
+        job = job_of(submit(first, small, 7.0))
+        with stopped([first.process.pid]):
+            wait_until(lambda: status_of(second, job) == "successful")
+        wait_until(lambda: status_of(first, job) == "successful")
+        wait_until(lambda: first.metric('geodesic_workers{state="busy"}') == 0)
+    answers = {server.client.get(f"{job}/results").content for server in pair}
+    assert len(answers) == 1
+
+
 def test_a_database_that_restarts_under_load(postgres: Postgres, tmp_path: Path) -> None:
     """Each request is answered rightly or with 503, and nothing that was accepted is lost."""
     accepted: dict[str, str] = {}
