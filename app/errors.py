@@ -109,6 +109,12 @@ CODES: Mapping[str, Code] = {
     "engine_unavailable": Code(
         503, "Engine unavailable", "No worker process can be started at the moment."
     ),
+    "state_unavailable": Code(
+        503,
+        "State unavailable",
+        "The database of jobs and quotas does not answer; see `Retry-After`. Whether a change was "
+        "made is not known: repeat it with the same `Idempotency-Key`.",
+    ),
     "draining": Code(503, "Draining", "The service is shutting down."),
     "deadline_exceeded": Code(
         504, "Deadline exceeded", "The answer was not ready in the time granted."
@@ -172,6 +178,10 @@ class ProblemError(Exception):
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem.detail)
         self.problem = problem
+
+
+class StateUnavailableError(OSError):
+    """The database that replicas share does not answer at the moment."""
 
 
 def draining() -> ProblemError:
@@ -258,6 +268,13 @@ _NO_DESCRIPTORS = Problem(
 )
 
 
+_NO_STATE = Problem(
+    "state_unavailable",
+    "the database of the service does not answer",
+    headers={"Retry-After": "1"},
+)
+
+
 def _internal_error(_error: BaseException) -> Problem:
     return Problem("internal_error", "the service failed at this request; its log says why")
 
@@ -273,6 +290,7 @@ EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (core.MemoryLimitExceeded, _over_memory),
     (core.InternalError, lambda error: Problem("internal_error", str(error))),
     (MemoryError, lambda _: Problem("memory_limit", "the worker ran out of memory")),
+    (StateUnavailableError, lambda _: _NO_STATE),
     (OSError, _system_error),
     (BaseException, _internal_error),
 )

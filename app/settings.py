@@ -106,7 +106,8 @@ _HOST = re.compile(r"(\*\.)?[a-z0-9_-]+(\.[a-z0-9_-]+)*|\[[0-9a-f:]+\]")
 class Settings(BaseSettings):
     """All settings, validated at the start; an unknown one, or a contradiction, is an error.
 
-    One store belongs to one service, which removes unfinished files from it at the start.
+    One store belongs to one service, or to all that have one ``state``. The first removes
+    unfinished files from it at the start.
     """
 
     model_config = SettingsConfigDict(
@@ -125,6 +126,8 @@ class Settings(BaseSettings):
     """Address of the head of the cluster, as `H:P`."""
     cluster_token: Annotated[SecretStr, Field(min_length=16)] | None = None
     """Secret of the cluster, the same on all its machines; who knows it runs any code there."""
+    state: SecretStr | None = None
+    """URL of a PostgreSQL database, for several services; SQLite in the store, unless set."""
     workers: PositiveInt = Field(default_factory=available_cores)
     """Worker processes; one for each core, unless set."""
     worker_memory_bytes: int = Field(ge=LEAST_WORKER_MEMORY, default_factory=_worker_memory)
@@ -201,6 +204,14 @@ class Settings(BaseSettings):
     """`json` or `text`; text on a terminal and JSON elsewhere, unless set."""
     log_probes: Literal["on", "off"] = "off"
     """`on` logs requests for `/livez` and `/readyz` too."""
+
+    @field_validator("state")
+    @classmethod
+    def _is_of_postgresql(cls, state: SecretStr | None) -> SecretStr | None:
+        schemes = ("postgresql://", "postgres://")
+        if state is not None and not state.get_secret_value().startswith(schemes):
+            raise ValueError("it is no URL such as postgresql://user:secret@host:5432/database")
+        return state
 
     @field_validator("cors_origins")
     @classmethod

@@ -12,7 +12,12 @@ from hypothesis import settings
 
 import geodesic_core as gc
 
-pytest_plugins = ["tests.support.logs", "tests.support.service"]
+pytest_plugins = [
+    "tests.support.databases",
+    "tests.support.logs",
+    "tests.support.postgres",
+    "tests.support.service",
+]
 
 WITHOUT_JIT = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 

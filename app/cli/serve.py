@@ -29,6 +29,9 @@ def serve(
     ] = None,
     address: Address = None,
     store: Store = None,
+    state: Annotated[
+        str | None, typer.Option(help="URL of a PostgreSQL database that several services share.")
+    ] = None,
 ) -> None:
     """Serve geodesics over HTTP until interrupted; settings are GEODESIC_… variables."""
     if not sys.stderr.isatty():
@@ -43,20 +46,21 @@ def serve(
     from app.http.protocol import BoundedHttpProtocol
     from app.http.reading import PacedReading
     from app.main import create_app
+    from app.state import StateError
     from app.store.layout import StoreError
 
-    settings = read_settings(engine=engine, address=address, store=store)
+    settings = read_settings(engine=engine, address=address, store=store, state=state)
     if not is_loopback(host) and not settings.api_keys and settings.auth == "on":
         raise typer.BadParameter(
             f"anybody who reaches {host} could use the service: set GEODESIC_API_KEYS, or "
             f"GEODESIC_AUTH=off where something before it asks for keys"
         )
     logs.install(settings.log_format)
-    app = create_app(settings)
     try:
+        app = create_app(settings)
         with app.state.service.owning_store():
             pass  # the server itself would show a refusal as a traceback
-    except StoreError as error:
+    except (StoreError, StateError) as error:
         raise Failure(str(error)) from error
 
     usual_s = 0.0 if is_loopback(host) else 5.0  # time for a load balancer to notice

@@ -38,6 +38,7 @@ WORK_PROBLEMS = (
     "queue_full",
     "engine_unavailable",
     "draining",
+    "state_unavailable",
     "deadline_exceeded",
     "storage_full",
 )

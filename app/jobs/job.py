@@ -51,6 +51,8 @@ class Job(BaseModel):
     """Stored as ``errand``, its name in this layout of the store"""
     status: JobStatus = "accepted"
     progress: float = 0.0
+    replica: str | None = None
+    """Id of the service that runs the job, where several share their state"""
     version: int = 1
     """Greater than that of each state before"""
     runs: int = 0
@@ -75,12 +77,20 @@ class Job(BaseModel):
             return self._next(status="running", progress=progress, **begun)
         return self._next(progress=progress)
 
-    def accepted_again(self) -> "Job":
-        """Return the state of a job that was under way when the service ended."""
-        # Not all states of the last run were stored, and clients may have seen them.
-        version = self.version + _STATES_OF_RUN
-        again = {"status": "accepted", "progress": 0.0, "started": None, "version": version}
-        return self.model_copy(update=again)
+    def accepted_again(self, replica: str | None = None) -> "Job":
+        """Return the state of a job that was under way when the service ended.
+
+        ``replica`` is the id of the one that runs it from now on.
+        """
+        again = {"status": "accepted", "progress": 0.0, "started": None, "replica": replica}
+        return self.beyond_run().model_copy(update=again)
+
+    def beyond_run(self) -> "Job":
+        """Return the stored state of a job, later than those that are not stored.
+
+        Another service may have shown those to clients.
+        """
+        return self.model_copy(update={"version": self.version + _STATES_OF_RUN})
 
     def successful(self, result: str) -> "Job":
         """Return the state of a job with a result."""

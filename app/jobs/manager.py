@@ -9,11 +9,21 @@ import structlog
 from structlog.contextvars import bound_contextvars
 
 from app.engine.interface import ProgressCallback
-from app.errors import Fault, Problem, ProblemError, over_limit, problem, problem_of
+from app.errors import (
+    Fault,
+    Problem,
+    ProblemError,
+    StateUnavailableError,
+    over_limit,
+    problem,
+    problem_of,
+)
 from app.jobs.job import Job, JobSpec
-from app.jobs.repository import JobRepository
+from app.jobs.repository import JobRecords, JobRepository
 from app.jobs.retention import FinishedJob, Retention
 from app.settings import variable_of
+from app.state import Replicas
+from app.state.replicas import BEAT_S
 from app.store.results import Result, ResultStore
 
 logger = structlog.get_logger(module=__name__)
@@ -87,6 +97,10 @@ class JobManager:
     """The jobs of a service. Each pins its answer in ``results`` until it is removed.
 
     An owner has at most ``quota`` jobs, finished ones included; None stands for no quota.
+
+    Where services share the repository, they are ``replicas``, and each job is run by one of them.
+    The others show its record, which is at most a second old, and dismiss it there. Jobs of a
+    replica that is dead are run again by another one.
     """
 
     def __init__(
@@ -95,37 +109,48 @@ class JobManager:
         results: ResultStore,
         ttl_s: float,
         quota: int | None,
+        replicas: Replicas | None = None,
     ) -> None:
         self._repository = repository
+        self._replicas = replicas
+        self._replica_id = None if replicas is None else replicas.id
         self._results = results
         self._tidy_period_s = min(_TIDY_PERIOD_S, ttl_s)
         self._retention = Retention(ttl_s)
         self._quota = quota
         self._live: dict[str, _LiveJob] = {}
-        self._submitting = asyncio.Lock()
+        self._doubtful: set[str] = set()
+        """Ids of jobs that may have been added to the repository, although an error said not"""
         self._is_stopping = False
 
     @asynccontextmanager
     async def running(self, solve_again: SolveAgain) -> AsyncIterator[None]:
-        """Open the repository, run jobs, and remove expired ones, inside the block.
+        """Run jobs, and remove expired ones, inside the block; the repository is open.
 
-        Jobs that are under way at its end are run again, by ``solve_again``, inside the next one.
+        Jobs that are under way at its end are run again, by ``solve_again``, inside the next one,
+        or by another replica.
         """
-        await self._repository.open()
-        for job in await self._repository.finished():
-            self._retention.add_older(job)
-            if job.result is not None:
-                self._results.pin(job.result)
-        for job in await self._repository.unfinished():
-            await self._resume(job.accepted_again(), solve_again)
-        tidying = asyncio.create_task(self._tidy())
+        await self._repository.tidy()
+        await self._note_finished()
+        if self._replicas is None:
+            for job in await self._repository.unfinished():
+                await self._resume(job, solve_again)
+        else:
+            await self._keep_up(self._replicas, solve_again)
+        tasks = [asyncio.create_task(self._tidy())]
+        if self._replicas is not None:
+            tasks.append(asyncio.create_task(self._beat(self._replicas, solve_again)))
         try:
             yield
         finally:
-            tidying.cancel()
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
             self.end_events()
             await self._interrupt()
-            await self._repository.close()
+            if self._replicas is not None:
+                with suppress(OSError):  # others find that out by themselves
+                    await self._replicas.leave()
 
     def end_events(self) -> None:
         """End every `watch`, since the service is about to stop."""
@@ -144,15 +169,20 @@ class JobManager:
         ProblemError
             The key belongs to another question, or the owner has as many jobs as it may.
         """
-        async with self._submitting:  # two requests with one key at the same time are one job, too
-            known = await self._find_by_key(spec)
-            if known is not None:
-                return known
-            await self._refuse_over_quota(spec.owner)
-            job = Job(spec=spec)
-            await self._repository.add(job, query)
-            self._begin(job, solve)
-            return job
+        job = Job(spec=spec, replica=self._replica_id)
+        try:
+            # Two requests with one key at the same time are one job, too.
+            async with self._repository.alone(spec.owner) as records:
+                known = await self._find_by_key(records, spec)
+                if known is not None:
+                    return known
+                await self._refuse_over_quota(records, spec.owner)
+                await records.add(job, query)
+        except (StateUnavailableError, asyncio.CancelledError):
+            self._doubtful.add(job.id)
+            raise
+        self._begin(job, solve)
+        return job
 
     async def find(self, owner: str | None, job_id: str) -> Job:
         """Return the present state of a job; raises ``ProblemError`` where the owner has none."""
@@ -186,6 +216,12 @@ class JobManager:
             live.cancel()
             await self._record_end(live)
             return live.job
+        if live is None and not job.is_finished:  # another replica runs it, and will notice
+            dismissed = job.beyond_run().dismissed()
+            if await self._repository.update(dismissed, job.replica):
+                self._retention.add(dismissed)
+                return dismissed
+            return await self.dismiss(owner, job_id)  # it has finished, or has been taken over
         await self._remove(job)
         return job
 
@@ -206,6 +242,8 @@ class JobManager:
         if job.result is None:
             detail = f"job {job_id} is {job.status}: {job.progress:.0%} done"
             raise problem("job_not_finished", detail, headers={"Retry-After": "1"})
+        if self._replicas is not None:
+            await self._results.index(job.result)
         result = await self._results.find(job.result)
         if result is None:
             hint = "send the query again"
@@ -220,15 +258,21 @@ class JobManager:
             if now.version > seen:
                 seen = now.version
                 yield now
-            if changed is None or now.is_finished or self._is_stopping:
+            if now.is_finished or self._is_stopping:
                 return
-            await changed.wait()
+            if changed is not None and self._live.get(job.id) is live:
+                await changed.wait()
+            elif self._replicas is not None:  # another one runs it
+                await asyncio.sleep(BEAT_S)
+                live, job = None, await self.find(job.spec.owner, job.id)
+            else:
+                return
 
-    async def _find_by_key(self, spec: JobSpec) -> Job | None:
+    async def _find_by_key(self, records: JobRecords, spec: JobSpec) -> Job | None:
         key = spec.idempotency_key
         if key is None:
             return None
-        job = await self._repository.find_by_key(spec.owner, key)
+        job = await records.find_by_key(spec.owner, key)
         if job is None or job.status in ("failed", "dismissed"):
             return None
         if job.spec.fingerprint != spec.fingerprint:
@@ -237,10 +281,10 @@ class JobManager:
             raise problem("invalid_request", message, errors=(fault,))
         return self._live[job.id].job if job.id in self._live else job
 
-    async def _refuse_over_quota(self, owner: str | None) -> None:
+    async def _refuse_over_quota(self, records: JobRecords, owner: str | None) -> None:
         if self._quota is None:
             return
-        count = await self._repository.count(owner)
+        count = await records.count(owner)
         if count < self._quota:
             return
         wait_s = self._retention.seconds_to_first(owner) or 1
@@ -254,12 +298,57 @@ class JobManager:
             headers={"Retry-After": str(wait_s)},
         )
 
+    async def _beat(self, replicas: Replicas, solve_again: SolveAgain) -> None:
+        """Keep up with the other replicas, again and again."""
+        while True:
+            await asyncio.sleep(BEAT_S)
+            try:
+                await self._keep_up(replicas, solve_again)
+            except OSError as error:
+                logger.warning("state of jobs not reached, to be tried again", error=str(error))
+            except Exception:
+                logger.exception("jobs of replicas not compared")
+
+    async def _keep_up(self, replicas: Replicas, solve_again: SolveAgain) -> None:
+        """Record progress, stop what others dismissed or took over, and take over what is left."""
+        living = await replicas.beat()
+        await self._record_ends()
+        live_jobs = list(self._live.values())
+        records = {job.id: job for job in await self._repository.unfinished()}
+        for live in live_jobs:
+            record = records.get(live.job.id)
+            if live.job.is_finished:
+                continue
+            if record is None or record.replica != replicas.id:
+                await self._let_go(live)
+            elif live.job.version > record.version:
+                async with live.recording:
+                    if not live.job.is_finished:
+                        await self._repository.update(live.job, replicas.id)
+        for job in records.values():
+            is_left = job.replica not in living
+            if is_left or (job.id in self._doubtful and job.id not in self._live):
+                self._doubtful.discard(job.id)
+                await self._resume(job, solve_again)
+
+    async def _let_go(self, live: _LiveJob) -> None:
+        """Stop a job that another replica has dismissed, removed, or taken over."""
+        record = await self._repository.find(live.job.spec.owner, live.job.id)
+        if live.job.is_finished:
+            return
+        self._live.pop(live.job.id, None)
+        live.cancel()
+        live.update(record or live.job.dismissed())
+        if record is not None and record.is_finished:
+            self._note_end(record)
+
     async def _resume(self, job: Job, solve_again: SolveAgain) -> None:
-        """Run a stored job, unless it has been run too often."""
+        """Run a stored job, unless it has been run too often, or another replica was faster."""
+        again = job.accepted_again(self._replica_id)
         if job.runs >= _MOST_RUNS:
-            last = job.failed(_STOPPED_TOO_OFTEN)
-            await self._repository.update(last)
-            self._retention.add(last)
+            last = again.failed(_STOPPED_TOO_OFTEN)
+            if await self._repository.update(last, job.replica):
+                self._retention.add(last)
             return
 
         async def solve(on_progress: ProgressCallback) -> Result:
@@ -268,9 +357,24 @@ class JobManager:
                 raise ProblemError(_STOPPED)
             return await solve_again(job.spec, query, on_progress)
 
-        await self._repository.update(job)
-        with bound_contextvars(request_id=job.spec.request_id):
-            self._begin(job, solve)
+        if await self._repository.update(again, job.replica):
+            with bound_contextvars(request_id=job.spec.request_id):
+                self._begin(again, solve)
+
+    async def _note_finished(self) -> None:
+        """Note the jobs that have finished, by whichever replica, and forget those removed."""
+        known = {job.id: job for job in self._retention.jobs}
+        finished = await self._repository.finished()
+        for job in finished:
+            if job.id not in known:
+                self._note_end(job)
+        for job_id in known.keys() - {job.id for job in finished}:
+            self._forget(known[job_id])
+
+    def _note_end(self, job: Job) -> None:
+        self._retention.add_older(job)
+        if job.result is not None:
+            self._results.pin(job.result)
 
     def _begin(self, job: Job, solve: Solve) -> None:
         live = self._live[job.id] = _LiveJob(job)
@@ -325,15 +429,32 @@ class JobManager:
             if live.job.is_finished:
                 return
             try:
-                await self._repository.update(live.job)
+                await self._repository.update(live.job, self._replica_id)
             except OSError:  # a run that is not counted does no harm, unless the service dies of it
                 logger.exception("start of a job not recorded", job_id=live.job.id)
 
     async def _record_end(self, live: _LiveJob) -> None:
         async with live.recording:
-            await self._repository.update(live.job)
-            self._live.pop(live.job.id, None)
-            self._retention.add(live.job)
+            last = live.job
+            if last.id not in self._live:
+                return  # recorded meanwhile
+            if not await self._repository.update(last, self._replica_id):
+                await self._yield_to_record(live)
+            self._live.pop(last.id, None)
+            if live.job.is_finished:
+                self._retention.add(live.job)
+
+    async def _yield_to_record(self, live: _LiveJob) -> None:
+        """Show a job as it is recorded: another replica was faster, or removed it."""
+        last = live.job
+        record = await self._repository.find(last.spec.owner, last.id)
+        if record is not None and (record.version, record.replica) == (last.version, last.replica):
+            return  # recorded before, although the database could not say so
+        if last.result is not None:
+            self._results.unpin(last.result)
+        live.update(record or last.dismissed())
+        if record is not None and record.result is not None:
+            self._results.pin(record.result)
 
     async def _record_ends(self) -> None:
         """Record the ends of jobs that could not be recorded when they came."""
@@ -346,6 +467,8 @@ class JobManager:
         while True:
             try:
                 await self._record_ends()
+                if self._replicas is not None:
+                    await self._note_finished()
                 for job in self._retention.due():
                     await self._remove(job)
             except OSError:  # such as a full disk: there may be room the next time
@@ -354,6 +477,9 @@ class JobManager:
 
     async def _remove(self, job: Job | FinishedJob) -> None:
         await self._repository.remove(job.id)
+        self._forget(job)
+
+    def _forget(self, job: Job | FinishedJob) -> None:
         self._live.pop(job.id, None)
         self._retention.discard(job.id)
         if job.result is not None:

@@ -46,6 +46,11 @@ class Retention:
         due = monotonic() + self._ttl_s - age_s
         self._finished[job.id] = FinishedJob(job.id, job.spec.owner, job.result, due)
 
+    @property
+    def jobs(self) -> list[FinishedJob]:
+        """All jobs."""
+        return list(self._finished.values())
+
     def discard(self, job_id: str) -> None:
         """Forget a job that has been removed."""
         self._finished.pop(job_id, None)

@@ -1,11 +1,12 @@
 """Concurrency of each caller: how much it may do at the same time."""
 
 from collections import Counter
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 
 from app.access import Caller
-from app.errors import over_limit
+from app.errors import ProblemError, over_limit
+from app.state import Allowances
 
 
 class ConcurrencyLimit:
@@ -36,8 +37,7 @@ class ConcurrencyLimit:
         name = caller.name
         running = self._running[name] + 1
         if self._limit is not None and running > self._limit:
-            what, headers = f"{self._what} at the same time", {"Retry-After": "1"}
-            raise over_limit(self._code, what, running, self._limit, self._setting, headers=headers)
+            raise self._refusal(running, self._limit)
         self._running[name] = running
         try:
             yield
@@ -45,3 +45,21 @@ class ConcurrencyLimit:
             self._running[name] -= 1
             if not self._running[name]:
                 del self._running[name]
+
+    @asynccontextmanager
+    async def counting_for_all(self, caller: Caller, allowances: Allowances) -> AsyncIterator[None]:
+        """Count the block in what all replicas count, or refuse it with a problem."""
+        if self._limit is None:
+            yield
+            return
+        running = await allowances.begin(self._setting, caller.name, self._limit)
+        if running > self._limit:
+            raise self._refusal(running, self._limit)
+        try:
+            yield
+        finally:
+            await allowances.end(self._setting, caller.name)
+
+    def _refusal(self, running: int, limit: int) -> ProblemError:
+        what, headers = f"{self._what} at the same time", {"Retry-After": "1"}
+        return over_limit(self._code, what, running, limit, self._setting, headers=headers)

@@ -8,7 +8,8 @@ from datetime import datetime
 from pathlib import Path
 
 from app.errors import ProblemError
-from app.jobs import Job, read_jobs, require_intact
+from app.jobs import Job, read_jobs
+from app.state import require_intact
 from app.store.fields import code_of_field, field_files, name_of_field
 from app.store.layout import FIELDS, JOB_DATABASE, MESHES, RESULTS, TEMPORARY, StoreError
 from app.store.meshes import MeshStore

@@ -32,8 +32,8 @@ from app.access import Caller
 from app.encoding import Representation
 from app.engine.interface import Engine, ProgressCallback
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
-from app.errors import ProblemError, problem
-from app.jobs import Job, JobManager, JobSpec, SqliteJobRepository, prepare_database
+from app.errors import ProblemError, StateUnavailableError, problem
+from app.jobs import Job, JobManager, JobRepository, JobSpec
 from app.queries import KINDS, Estimate, MeshSize, Query, fingerprint, result_key
 from app.service.concurrency import ConcurrencyLimit
 from app.service.maintenance import Damage
@@ -41,12 +41,16 @@ from app.service.resources import share_arenas
 from app.service.scrub import scrubbing
 from app.service.single_flight import SingleFlight
 from app.settings import Settings, variable_of
+from app.state import Allowances, Database, MeshRecords, Replicas, SqliteDatabase, StateError
 from app.store import layout
 from app.store.fields import FieldStore
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
-from app.store.ownership import owned
+from app.store.ownership import Share, owned, shared
 from app.store.results import Result, ResultStore, result_name
+
+_CATALOG_PERIOD_S = 2.0
+"""Seconds between two looks at what other services did to meshes, where they are shared"""
 
 Manifest = Mapping[str, Any]
 PhaseSeconds = Mapping[str, float]
@@ -76,6 +80,7 @@ class Service:
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
+        self.database = _database_of(settings)
         results = settings.store / layout.RESULTS
         self.meshes = MeshStore(settings.store)
         self.mesh_catalog = MeshCatalog(
@@ -84,21 +89,24 @@ class Service:
             settings.store_bytes,
             evicts=settings.store_evict == "lru",
             quota=settings.quota_bytes,
+            shared=MeshRecords(self.database) if self.database.is_shared else None,
         )
         self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
         self.fields = FieldStore(settings.store, settings.fields_bytes)
         self.engine = _engine(settings, results)
-        self._job_database = settings.store / layout.JOB_DATABASE
+        replicas = Replicas(self.database) if self.database.is_shared else None
+        self.allowances = Allowances(self.database, replicas.id) if replicas else None
+        """What callers have taken, where several services count together"""
         self.jobs = JobManager(
-            SqliteJobRepository(self._job_database),
+            JobRepository(self.database),
             self.results,
             settings.job_ttl,
             settings.quota_jobs,
+            replicas,
         )
-        self.uploads = ConcurrencyLimit(
+        self._uploads = ConcurrencyLimit(
             settings.quota_uploads, "quota_exceeded", "uploads", "quota_uploads"
         )
-        """Uploads that each caller has under way"""
         self.is_leaving = False
         """Whether the service is about to stop: it is not ready, whatever it still answers"""
         self.lookups = {"hit": 0, "miss": 0}
@@ -114,30 +122,67 @@ class Service:
     async def running(self) -> AsyncIterator[None]:
         """Own the store, supply workers and run jobs inside the block."""
         share_arenas()
-        with self.owning_store():
-            self.mesh_catalog.prepare()
-            self.results.prepare()
-            self.fields.prepare(self.mesh_catalog.ids)
-            await self.engine.start()
-            # Objects of the start live for ever; each full collection over them takes 90 ms.
-            collect()
-            freeze()
-            try:
-                async with (
-                    self.jobs.running(self._solve_again),
-                    scrubbing(self.settings.store, self._repair),
-                ):
-                    self.results.make_room()  # now it is known which are those of jobs
-                    yield
-            finally:
-                await self.engine.stop()
+        with self.owning_store() as share:
+            is_alone = share is None or share.is_first
+            self.mesh_catalog.prepare(is_alone=is_alone)
+            self.results.prepare(is_alone=is_alone)
+            if is_alone:
+                self.fields.prepare(self.mesh_catalog.ids)
+            async with self._open_database(share):
+                await self.engine.start()
+                # Objects of the start live for ever; each full collection over them takes 90 ms.
+                collect()
+                freeze()
+                try:
+                    async with (
+                        self.jobs.running(self._solve_again),
+                        scrubbing(self.settings.store, self._repair),
+                    ):
+                        self.results.make_room()  # now it is known which are those of jobs
+                        yield
+                finally:
+                    await self.engine.stop()
 
     @contextmanager
-    def owning_store(self) -> Iterator[None]:
-        """Own the store inside the block; raises ``StoreError`` where it is not usable."""
-        with owned(self.settings.store):
-            prepare_database(self._job_database)
+    def owning_store(self) -> Iterator[Share | None]:
+        """Own the store inside the block, or share it where the database is shared.
+
+        Raises ``StoreError`` where the store is not usable, and ``StateError`` where the database
+        is not.
+        """
+        if self.database.is_shared:
+            with shared(self.settings.store) as share:
+                self.database.prepare()
+                yield share
+        else:
+            with owned(self.settings.store):
+                self.database.prepare()
+                yield None
+
+    @asynccontextmanager
+    async def _open_database(self, share: Share | None) -> AsyncIterator[None]:
+        """Open the database inside the block; keep the catalogue up with other services there."""
+        await self.database.open()
+        following = None
+        try:
+            if share is not None:
+                if share.is_first:
+                    await self.mesh_catalog.reconcile()
+                    share.let_others_in()
+                following = asyncio.create_task(self._follow_catalog())
             yield
+        finally:
+            if following is not None:
+                following.cancel()
+            if self.allowances is not None:
+                await self.allowances.close()
+            await self.database.close()
+
+    async def _follow_catalog(self) -> None:
+        while True:
+            with suppress(StateUnavailableError):  # to be tried again
+                await self.mesh_catalog.keep_up()
+            await asyncio.sleep(_CATALOG_PERIOD_S)
 
     def announce_end(self) -> None:
         """Say that the service is not ready, so that no new clients are sent to it."""
@@ -148,6 +193,16 @@ class Service:
         self.announce_end()
         self.engine.drain()
         self.jobs.end_events()
+
+    @asynccontextmanager
+    async def counting_upload(self, caller: Caller) -> AsyncIterator[None]:
+        """Count the block as an upload of a caller, or refuse it with ``quota_exceeded``."""
+        if self.allowances is None:
+            with self._uploads.counting(caller):
+                yield
+        else:
+            async with self._uploads.counting_for_all(caller, self.allowances):
+                yield
 
     async def add_mesh(self, mesh_input: MeshInput, context: RequestContext) -> StoredMesh:
         """Have a worker read or make a mesh, and store it."""
@@ -390,3 +445,14 @@ def _engine(settings: Settings, results: Path) -> Engine:
 
 def ignore_progress(_share: float) -> None:
     """Do nothing: the progress callback of calls that nobody watches."""
+
+
+def _database_of(settings: Settings) -> Database:
+    if settings.state is None:
+        return SqliteDatabase(settings.store / layout.JOB_DATABASE)
+    try:
+        from app.state.postgres import PostgresDatabase  # an extra, and half a second
+    except ImportError as error:
+        extra = "pip install geodesic[cluster]"
+        raise StateError(f"{variable_of('state')} needs {error.name}: {extra}") from error
+    return PostgresDatabase(settings.state.get_secret_value())

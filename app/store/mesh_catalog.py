@@ -1,20 +1,21 @@
-"""The catalog of stored meshes: sizes, owners and order of use, known to one process.
+"""The catalog of stored meshes: sizes, owners and order of use.
 
-The directory is the source of truth. Each change is one rename, made together with its entry here:
-a crash leaves a mesh either there or not, and the next start counts anew. Workers write new meshes
-into a scratch folder, which is removed with everything left in it. The files of a damaged mesh are
-replaced one by one: until the last one is there, it is still damaged.
+One process knows it, or the catalogs of several services share a table. The directory is the source
+of truth. Each change is one rename, made together with its entry here: a crash leaves a mesh either
+there or not, and the next start counts anew. Workers write new meshes into a scratch folder, which
+is removed with everything left in it. The files of a damaged mesh are replaced one by one: until
+the last one is there, it is still damaged.
 """
 
 import asyncio
 import shutil
 import tempfile
 from collections import Counter, OrderedDict
-from collections.abc import AsyncIterator, Collection, Iterator, Sequence
-from contextlib import asynccontextmanager, contextmanager
+from collections.abc import AsyncIterator, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 from uuid import uuid4
 
 from app.errors import ProblemError, over_limit
@@ -35,12 +36,37 @@ class CatalogChange:
     """Ids of the meshes that were removed to make room"""
 
 
-class _Entry(NamedTuple):
+class MeshRecord(NamedTuple):
     """A mesh in the catalog."""
 
     size: int
     """Bytes on disk"""
     owner: str | None
+    is_pinned: bool = False
+    """Whether a service that shares the table needs it at the moment"""
+
+
+class MeshTable(Protocol):
+    """A table of meshes, which nobody else changes meanwhile."""
+
+    async def all(self) -> Mapping[str, MeshRecord]:
+        """Return all records by id, the least recently used first."""
+
+    async def add(self, mesh_id: str, record: MeshRecord) -> None:
+        """Insert a record, unless it is there."""
+
+    async def remove(self, mesh_id: str) -> None:
+        """Remove a record, if it is there."""
+
+
+class MeshTables(Protocol):
+    """The table that the catalogs of several services share."""
+
+    def alone(self) -> AbstractAsyncContextManager[MeshTable]:
+        """Yield the table for the block, which no other catalog changes meanwhile."""
+
+    async def note_uses(self, used: Iterable[str], pinned: Collection[str]) -> None:
+        """Note that meshes were used, the last one last, and that some are in use for a while."""
 
 
 class MeshCatalog:
@@ -48,6 +74,9 @@ class MeshCatalog:
 
     A mesh that finds no room is refused. With ``evicts``, the least recently used meshes are
     removed instead, but none that is pinned. None is removed to make room in a quota.
+
+    Where services share the meshes, ``shared`` is their table. What is here is a copy of it, as old
+    as the last change or `keep_up`.
     """
 
     def __init__(
@@ -58,26 +87,88 @@ class MeshCatalog:
         *,
         evicts: bool,
         quota: int | None = None,
+        shared: MeshTables | None = None,
     ) -> None:
         self._store = store
+        self._shared = shared
+        self._used: dict[str, None] = {}
+        """Meshes used since the shared table was told, the last one last"""
         self._temporary = root / TEMPORARY
         self._capacity = capacity
         self._evicts = evicts
         self._quota = quota
-        self._entries: OrderedDict[str, _Entry] = OrderedDict()  # the least recently used first
+        self._entries: OrderedDict[str, MeshRecord] = OrderedDict()  # the least recently used first
         self._pins: Counter[str] = Counter()
         self.evictions = 0
         """Meshes removed so far to make room"""
 
-    def prepare(self) -> None:
-        """Remove what a former service left unfinished, and measure the meshes."""
+    def prepare(self, *, is_alone: bool = True) -> None:
+        """Remove what a former service left unfinished, and measure the meshes.
+
+        Another service may be writing it, where this one is not alone.
+        """
         self._store.folder.mkdir(exist_ok=True)
         self._temporary.mkdir(exist_ok=True)
-        _remove(*self._temporary.iterdir())
+        if is_alone:
+            _remove(*self._temporary.iterdir())
         sizes = self._store.sizes().items()
         self._entries = OrderedDict(
-            (mesh_id, _Entry(size, self._owner(mesh_id))) for mesh_id, size in sizes
+            (mesh_id, MeshRecord(size, self._owner(mesh_id))) for mesh_id, size in sizes
         )
+
+    async def reconcile(self) -> None:
+        """Bring the shared table up to date with the directory, before other services come."""
+        if self._shared is not None:
+            found = self._entries.copy()
+            async with self._table():
+                self._entries = found
+
+    async def keep_up(self) -> None:
+        """Tell the shared table of uses, and take over what other services changed."""
+        if self._shared is not None:
+            await self._tell_uses(self._shared)
+            async with self._table():
+                pass
+
+    @asynccontextmanager
+    async def _table(self) -> AsyncIterator[None]:
+        """Be alone in changing meshes inside the block; the shared table follows."""
+        if self._shared is None:
+            yield
+            return
+        failure: BaseException | None = None
+        async with self._shared.alone() as table:
+            before = await table.all()
+            self._entries = OrderedDict(before)
+            for mesh_id in self._used:
+                if mesh_id in before:
+                    self._entries.move_to_end(mesh_id)
+            try:
+                yield
+            except BaseException as error:  # noqa: BLE001 - raised once the table knows what happened
+                failure = error
+            for mesh_id in before.keys() - self._entries.keys():
+                await table.remove(mesh_id)
+            for mesh_id, record in self._entries.items():
+                if mesh_id not in before:
+                    await table.add(mesh_id, record)
+        if failure is not None:
+            raise failure
+
+    async def _tell_uses(self, shared: MeshTables) -> None:
+        used, self._used = self._used, {}
+        try:
+            await shared.note_uses(used, list(self._pins))
+        except BaseException:
+            self._used = {**used, **self._used}
+            raise
+
+    def _find(self, mesh_id: str) -> None:
+        """Note a mesh that is in the directory, though the shared table was not told."""
+        if self._shared is not None and mesh_id not in self._entries:
+            size = self._store.size(mesh_id)
+            if size is not None:
+                self._entries[mesh_id] = MeshRecord(size, self._owner(mesh_id))
 
     def _owner(self, mesh_id: str) -> str | None:
         try:
@@ -123,14 +214,23 @@ class MeshCatalog:
         """
         mesh_id = written.mesh_id
         if written.folder is None:
+            if self._shared is not None:
+                async with self._table():
+                    self._find(mesh_id)
             return self._use_again(mesh_id)
         await asyncio.to_thread(sync_all, written.folder)
+        async with self._table():
+            return await self._add(written, written.folder)
+
+    async def _add(self, written: WrittenMesh, folder: Path) -> CatalogChange:
+        mesh_id = written.mesh_id
+        self._find(mesh_id)
         if await asyncio.to_thread(self._store.is_intact, mesh_id):  # another upload was faster
             change = self._use_again(mesh_id)
             if change is not None:
                 return change
         is_new, place = mesh_id not in self._entries, self._store.folder / mesh_id
-        entry = _Entry(written.size, written.manifest["owner"])
+        entry = MeshRecord(written.size, written.manifest["owner"])
         if is_new:  # one that is healed has its room already
             self._refuse_over_quota(entry)
         evicted = self._choose_evicted(mesh_id, entry.size)
@@ -138,9 +238,9 @@ class MeshCatalog:
         try:
             gone.extend(self._move_out(old) for old in evicted)
             if is_new:
-                written.folder.rename(place)
+                folder.rename(place)
             else:
-                _replace_files(place, written.folder)
+                _replace_files(place, folder)
             self._entries[mesh_id] = entry
             self.use(mesh_id)
             await asyncio.to_thread(sync, self._store.folder if is_new else place)
@@ -160,9 +260,11 @@ class MeshCatalog:
 
     async def delete(self, mesh_id: str) -> None:
         """Remove a mesh at once; processes that have it open can go on reading it."""
-        if mesh_id not in self._entries:
-            raise mesh_not_found(mesh_id)
-        gone = self._move_out(mesh_id)
+        async with self._table():
+            self._find(mesh_id)
+            if mesh_id not in self._entries:
+                raise mesh_not_found(mesh_id)
+            gone = self._move_out(mesh_id)
         await asyncio.to_thread(_remove, gone)
 
     def use(self, mesh_id: str) -> None:
@@ -170,6 +272,9 @@ class MeshCatalog:
         if mesh_id in self._entries:
             self._entries.move_to_end(mesh_id)
             self._store.note_use(mesh_id)
+            if self._shared is not None:
+                self._used.pop(mesh_id, None)
+                self._used[mesh_id] = None
 
     @contextmanager
     def pinned(self, mesh_id: str) -> Iterator[None]:
@@ -183,7 +288,7 @@ class MeshCatalog:
             if not self._pins[mesh_id]:
                 del self._pins[mesh_id]
 
-    def _refuse_over_quota(self, new: _Entry) -> None:
+    def _refuse_over_quota(self, new: MeshRecord) -> None:
         """Raise where its owner's quota has no room for a new mesh."""
         if self._quota is None:
             return
@@ -202,7 +307,11 @@ class MeshCatalog:
 
     def _choose_evicted(self, mesh_id: str, size: int) -> list[str]:
         """Return the meshes to evict for one of ``size`` bytes; raise where that is not enough."""
-        free = [old for old in self._entries if old not in self._pins and old != mesh_id]
+        free = [
+            old
+            for old, record in self._entries.items()
+            if old not in self._pins and not record.is_pinned and old != mesh_id
+        ]
         evicted: list[str] = []
         total = self.total + size
         if mesh_id in self._entries:
@@ -220,7 +329,8 @@ class MeshCatalog:
 
     def _move_out(self, mesh_id: str) -> Path:
         gone = self._new_name()
-        (self._store.folder / mesh_id).rename(gone)
+        with suppress(FileNotFoundError):  # a crash came before the shared table was told
+            (self._store.folder / mesh_id).rename(gone)
         del self._entries[mesh_id]
         return gone
 

@@ -271,6 +271,11 @@ class MeshStore:
                 found.append((order_of_use(folder.stat()), folder.name, _bytes_in(folder)))
         return {name: size for _, name, size in sorted(found)}
 
+    def size(self, mesh_id: str) -> int | None:
+        """Return the bytes of a mesh on disk; None where it is not there."""
+        folder = Path(self._path(mesh_id))
+        return _bytes_in(folder) if folder.is_dir() else None
+
     def last_used(self, mesh_id: str) -> datetime:
         """Return the time of a mesh's last use."""
         return datetime.fromtimestamp(self._folder(mesh_id).stat().st_mtime, UTC)

@@ -1,7 +1,13 @@
-"""Ownership of the store: it belongs to one process at a time, which brings it up to date."""
+"""Ownership of the store: it belongs to one service at a time, or to several that share state.
 
+Whoever comes first brings it up to date.
+"""
+
+import fcntl
+import os
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -33,7 +39,8 @@ def owned(root: Path) -> Iterator[None]:
         setting = variable_of("store")
         raise StoreError(
             f"the store {root} is in use by another process, which must end first; "
-            f"a second service needs a store of its own, see {setting}"
+            f"a second service needs a store of its own, see {setting}, or both need one database "
+            f"of PostgreSQL, see {variable_of('state')}"
         ) from None
     except OSError as error:
         raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
@@ -42,6 +49,65 @@ def owned(root: Path) -> Iterator[None]:
         yield
     finally:
         lock.release()
+
+
+class Share:
+    """The share of a service in a store that several use.
+
+    Until `let_others_in` the first one is alone: it brings the store up to date, and removes what
+    was left unfinished.
+    """
+
+    def __init__(self, lock: int, *, is_first: bool) -> None:
+        self._lock = lock
+        self.is_first = is_first
+
+    def let_others_in(self) -> None:
+        """Let other services use the store."""
+        fcntl.flock(self._lock, fcntl.LOCK_SH)
+
+
+@contextmanager
+def shared(root: Path) -> Iterator[Share]:
+    """Share the store in the folder ``root`` inside the block, with services that do so as well.
+
+    Raises
+    ------
+    StoreError
+        As `owned` does; or its owner does not share it.
+    """
+    try:
+        root.mkdir(parents=True, exist_ok=True)
+        lock = os.open(root / "lock", os.O_RDWR | os.O_CREAT, 0o644)
+    except OSError as error:
+        raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
+    try:
+        is_first = _is_locked(lock, fcntl.LOCK_EX)
+        if is_first:
+            _bring_up_to_date(root)
+        elif not _is_locked(lock, fcntl.LOCK_SH, wait_s=_OTHERS_START_S):
+            raise StoreError(
+                f"the store {root} is in use by another process, which must end first, "
+                f"or needs the same {variable_of('state')}"
+            )
+        yield Share(lock, is_first=is_first)
+    finally:
+        os.close(lock)
+
+
+_OTHERS_START_S = 20.0
+"""Seconds that a service waits for another one to bring the store up to date"""
+
+
+def _is_locked(number: int, kind: int, wait_s: float = 0.0) -> bool:
+    until = time.monotonic() + wait_s
+    while True:
+        with suppress(BlockingIOError):
+            fcntl.flock(number, kind | fcntl.LOCK_NB)
+            return True
+        if time.monotonic() >= until:
+            return False
+        time.sleep(0.05)
 
 
 def _bring_up_to_date(root: Path) -> None:

@@ -14,9 +14,16 @@ class Reserve:
         self._path = path
         self._size = size
 
+    def is_there(self) -> bool:
+        """Tell whether the file is there, and whole."""
+        try:
+            return self._path.stat().st_size == self._size
+        except OSError:
+            return False
+
     def restore(self) -> None:
         """Write the file, unless it is there; a failure is only logged."""
-        if self._path.is_file() and self._path.stat().st_size == self._size:
+        if self.is_there():
             return
         try:
             self._path.write_bytes(os.urandom(self._size))  # zeros could be stored as a hole

@@ -152,10 +152,11 @@ class ResultStore:
         self.memory_evictions = 0
         """Results dropped so far to make room in memory"""
 
-    def prepare(self) -> None:
+    def prepare(self, *, is_alone: bool = True) -> None:
         """Index the results of a former service, the oldest first, and remove incomplete ones.
 
-        `make_room` is to follow once those that must stay are pinned.
+        Where this service is not alone, another one may be writing those. `make_room` is to follow
+        once those that must stay are pinned.
         """
         self._root.mkdir(parents=True, exist_ok=True)
         bodies = sorted(self._root.glob("*/*.body"), key=lambda path: order_of_use(path.stat()))
@@ -163,9 +164,10 @@ class ResultStore:
             name = path.relative_to(self._root).with_suffix("").as_posix()
             if _manifest_path(self._root, name).exists():
                 self._count(name, path.stat().st_size)
-            else:
+            elif is_alone:
                 path.unlink()
-        remove_partial(self._root)
+        if is_alone:
+            remove_partial(self._root)
 
     @property
     def nbytes(self) -> int:
@@ -194,6 +196,13 @@ class ResultStore:
             self._decrement_use(name)
         self._remove(name)
         return None
+
+    async def index(self, name: str) -> None:
+        """Index a result that another service may have written."""
+        if name not in self._sizes:
+            size = await to_thread.run_sync(_size, self._root, name)
+            if size is not None:
+                self._count(name, size)
 
     def add(self, result: Result, *, is_reusable: bool = True) -> Result:
         """Acquire a result that a worker has just written."""
@@ -332,6 +341,16 @@ def _body_path(root: Path, name: str) -> Path:
 
 def _manifest_path(root: Path, name: str) -> Path:
     return root / f"{name}.json"
+
+
+def _size(root: Path, name: str) -> int | None:
+    """Return the size of the body of a result; None where it is missing."""
+    if not _manifest_path(root, name).exists():
+        return None
+    try:
+        return _body_path(root, name).stat().st_size
+    except FileNotFoundError:
+        return None
 
 
 def _read(root: Path, name: str) -> Result | None:

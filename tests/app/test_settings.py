@@ -14,6 +14,7 @@ LIBRARY = TESTS.parent / "geodesic_core"
 
 TEXTS = {
     "store": ("/somewhere", Path("/somewhere")),
+    "state": ("postgresql://a:b@c/d", SecretStr("postgresql://a:b@c/d")),
     "worker_memory_bytes": ("3000000000", 3_000_000_000),
     "deadline_s": ("0.5", 0.5),
     "cancel_grace_s": ("0.25", 0.25),

@@ -16,7 +16,8 @@ from starlette.routing import compile_path
 from starlette.testclient import TestClient
 
 from app.engine.slot import Slot
-from app.errors import CODES
+from app.errors import CODES, StateUnavailableError
+from app.jobs import JobRepository
 from app.main import create_app
 from app.settings import Settings
 from tests.support.disks import fill_disk
@@ -167,6 +168,14 @@ def damaged(site: Site) -> Any:
     return site.ask(mesh_id)
 
 
+def no_state(site: Site) -> Any:
+    async def away(_repository: JobRepository, *_arguments: Any) -> Any:
+        raise StateUnavailableError
+
+    site.patch.setattr(JobRepository, "page", away)
+    return site.client.get("/v1/jobs")
+
+
 def no_disk(site: Site) -> Any:
     fill_disk(site.patch, "upload")
     return site.client.post("/v1/meshes", json=TWO_TRIANGLES)
@@ -248,6 +257,7 @@ PROVOKED: dict[str, Callable[[Site], Any]] = {
         b"GET / HTTP/1.1\r\n\r\n", max_connections=1, max_caller_connections=1
     ),
     "engine_unavailable": not_started,
+    "state_unavailable": no_state,
     "draining": draining,
     "deadline_exceeded": late,
     "storage_full": no_disk,

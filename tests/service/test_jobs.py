@@ -13,8 +13,9 @@ import pytest
 from starlette.testclient import TestClient
 
 from app.jobs import Job, read_jobs
+from app.jobs.repository import JobRepository
 from app.jobs.retention import Retention
-from app.jobs.sqlite_repository import SqliteJobRepository
+from app.state import SqliteDatabase
 from tests.support.clocks import TEN_YEARS, Calendar, Clock
 from tests.support.processes import stopped
 from tests.support.service import (
@@ -366,15 +367,15 @@ def test_jobs_stay_as_long_as_ever_when_the_clock_is_moved(
 def test_jobs_are_forgotten_although_the_disk_was_full(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    remove, refused = SqliteJobRepository.remove, []
+    remove, refused = JobRepository.remove, []
 
-    async def remove_later(repository: SqliteJobRepository, job_id: str) -> None:
+    async def remove_later(repository: JobRepository, job_id: str) -> None:
         if len(refused) < 2:
             refused.append(job_id)
             raise OSError(errno.ENOSPC, "database or disk is full")
         await remove(repository, job_id)
 
-    monkeypatch.setattr(SqliteJobRepository, "remove", remove_later)
+    monkeypatch.setattr(JobRepository, "remove", remove_later)
     with serving(tmp_path, job_ttl=0.1) as client:
         job = job_of(submit(client, upload_sample(client, "plane", 50)))
         wait_until(lambda: client.get(job).status_code == 404)
@@ -384,14 +385,14 @@ def test_jobs_are_forgotten_although_the_disk_was_full(
 def test_the_end_of_a_job_is_recorded_once_the_disk_can_be_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    update, is_read_only = SqliteJobRepository.update, True
+    update, is_read_only = JobRepository.update, True
 
-    async def update_later(repository: SqliteJobRepository, job: Job) -> None:
+    async def update_later(repository: JobRepository, job: Job, holder: str | None) -> bool:
         if is_read_only:
             raise OSError(errno.EROFS, "attempt to write a readonly database")
-        await update(repository, job)
+        return await update(repository, job, holder)
 
-    monkeypatch.setattr(SqliteJobRepository, "update", update_later)
+    monkeypatch.setattr(JobRepository, "update", update_later)
     monkeypatch.setattr("app.jobs.manager._TIDY_PERIOD_S", 0.01)
     with serving(tmp_path) as client:
         job = job_of(submit(client, upload_sample(client, "plane", 50)))
@@ -407,17 +408,15 @@ def test_the_end_of_a_job_is_recorded_once_the_disk_can_be_written(
 @pytest.fixture
 def full_disk(monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
     """Fill the disk of a store, as its records of jobs see it, up to their reserve."""
-    run = SqliteJobRepository._run
+    run = SqliteDatabase._run
 
     def fill(store: Path) -> None:
-        async def run_if_there_is_room(
-            repository: SqliteJobRepository, sql: str, *values: Any
-        ) -> None:
+        async def run_if_there_is_room(database: SqliteDatabase, sql: str, *values: Any) -> int:
             if not sql.startswith("PRAGMA") and (store / "jobs.reserve").exists():
                 raise OSError(errno.ENOSPC, "database or disk is full")
-            await run(repository, sql, *values)
+            return await run(database, sql, *values)
 
-        monkeypatch.setattr(SqliteJobRepository, "_run", run_if_there_is_room)
+        monkeypatch.setattr(SqliteDatabase, "_run", run_if_there_is_room)
 
     return fill
 

@@ -1,7 +1,7 @@
 """Processes that are killed before the n-th change of files in a folder, or of records of jobs.
 
 Python tells audit hooks of each change of a file before it is made. What SQLite does itself is told
-by the repository of jobs: there is a step before each statement, and one after it.
+by the database: there is a step before each statement, and one after it.
 """
 
 import os
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from app.jobs.sqlite_repository import SqliteJobRepository
+from app.state.sqlite import SqliteDatabase
 
 _CHANGES = frozenset({"os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.utime", "os.truncate"})
 _WRITING = os.O_WRONLY | os.O_RDWR
@@ -24,14 +24,15 @@ class Killer:
         self._folder: str | None = None
         self._left = 0
         sys.addaudithook(self._hear)  # it cannot be removed
-        run = SqliteJobRepository._run
+        run = SqliteDatabase._run
 
-        async def run_in_steps(repository: SqliteJobRepository, sql: str, *values: Any) -> None:
+        async def run_in_steps(database: SqliteDatabase, sql: str, *values: Any) -> int:
             self.step()
-            await run(repository, sql, *values)
+            changed = await run(database, sql, *values)
             self.step()
+            return changed
 
-        SqliteJobRepository._run = run_in_steps  # type: ignore[method-assign]
+        SqliteDatabase._run = run_in_steps  # type: ignore[method-assign]
 
     def arm(self, folder: Path, steps: int) -> None:
         """Have the process killed before a change of files in ``folder``, the ``steps``-th."""

@@ -11,6 +11,7 @@ from app.http.middleware.probes import PROBES
 from app.http.middleware.rate_limits import MinuteRate, RateLimits
 from app.http.page import ASSETS
 from app.settings import Settings
+from app.state import Allowances
 
 _OPEN = PROBES | {"/", "/openapi.json"}
 _OPEN_FOLDERS = ("/problems/", f"{ASSETS}/")
@@ -28,10 +29,16 @@ def is_open(path: str) -> bool:
 
 
 class AdmissionMiddleware:
-    """Middleware that finds the caller (``request.state.caller``), and admits or refuses it."""
+    """Middleware that finds the caller (``request.state.caller``), and admits or refuses it.
 
-    def __init__(self, app: ASGIApp, settings: Settings) -> None:
+    With ``allowances`` the limits hold for all replicas together.
+    """
+
+    def __init__(
+        self, app: ASGIApp, settings: Settings, allowances: Allowances | None = None
+    ) -> None:
         self.app = app
+        self.allowances = allowances
         self.keys = settings.api_keys
         self.rate_limits = RateLimits(settings.rate_limit, settings.max_concurrent)
         self.wrong_keys = MinuteRate(WRONG_KEYS_A_MINUTE)
@@ -42,8 +49,12 @@ class AdmissionMiddleware:
             await self.app(scope, receive, send)
             return
         scope["state"]["caller"] = caller = await self._admit(scope)
-        with self.rate_limits.counting(caller):
-            await self.app(scope, receive, send)
+        if self.allowances is None:
+            with self.rate_limits.counting(caller):
+                await self.app(scope, receive, send)
+        else:
+            async with self.rate_limits.counting_for_all(caller, self.allowances):
+                await self.app(scope, receive, send)
 
     async def _admit(self, scope: Scope) -> Caller:
         host = scope["client"][0] if scope["client"] else None

@@ -48,7 +48,7 @@ JobDep = Annotated[Job, Depends(get_job_of_path)]
     response_model_exclude_unset=True,
     responses={
         200: {"description": "The jobs", "headers": documented("Cache-Control")},
-        **problems("invalid_request"),
+        **problems("invalid_request", "state_unavailable"),
     },
 )
 async def list_jobs(
@@ -73,7 +73,7 @@ async def list_jobs(
     response_model_exclude_unset=True,
     responses={
         200: {"description": "The job", "headers": documented("Cache-Control")},
-        **problems("job_not_found"),
+        **problems("job_not_found", "state_unavailable"),
     },
 )
 async def get_job(job: JobDep, response: Response) -> dict[str, Any]:
@@ -88,7 +88,7 @@ async def get_job(job: JobDep, response: Response) -> dict[str, Any]:
     summary="Stop a job, or remove one that has finished",
     response_model=JobDocument,
     response_model_exclude_unset=True,
-    responses=problems("job_not_found"),
+    responses=problems("job_not_found", "state_unavailable"),
 )
 async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> dict[str, Any]:
     """Stop a job that waits or runs; its state becomes `dismissed`.
@@ -143,7 +143,7 @@ async def get_job_results(
     response_class=EventSourceResponse,
     responses={
         200: {"description": "Events, the data of each of which is a `JobDocument`"},
-        **problems("job_not_found", "invalid_request"),
+        **problems("job_not_found", "invalid_request", "state_unavailable"),
     },
 )
 async def watch_job(

@@ -117,7 +117,7 @@ async def create_mesh(
     triangles keep the order they have in the file; polygons become triangles in their place, and
     `face_map` leads back to them.
     """
-    with service.uploads.counting(context.caller):
+    async with service.counting_upload(context.caller):
         if parameters.sample is None:
             stored = await _add_upload(service, parameters, request, context)
         else:

@@ -4,7 +4,7 @@ import pickle
 import pytest
 from starlette.testclient import TestClient
 
-from app.errors import CODES, Problem, ProblemError, pointer, problem_of
+from app.errors import CODES, Problem, ProblemError, StateUnavailableError, pointer, problem_of
 from geodesic_core import errors as core
 from tests.support.service import check_problem
 
@@ -25,7 +25,13 @@ CONTRACT = {
     429: {"rate_limited", "quota_exceeded"},
     431: {"header_too_large"},
     500: {"worker_died", "mesh_damaged", "internal_error"},
-    503: {"queue_full", "engine_unavailable", "draining", "too_many_connections"},
+    503: {
+        "queue_full",
+        "engine_unavailable",
+        "draining",
+        "too_many_connections",
+        "state_unavailable",
+    },
     504: {"deadline_exceeded"},
     507: {"storage_full", "quota_exceeded"},
 }
@@ -67,6 +73,7 @@ def test_unknown_code(client: TestClient) -> None:
         (core.DeadlineExceeded("late"), "deadline_exceeded"),
         (core.MemoryLimitExceeded(9, 7), "memory_limit"),
         (MemoryError(), "memory_limit"),
+        (StateUnavailableError("no server"), "state_unavailable"),
         (OSError(errno.ENOSPC, "full"), "storage_full"),
         (OSError(errno.EDQUOT, "no more for you"), "storage_full"),
         (OSError(errno.EIO, "broken"), "internal_error"),

@@ -1,29 +1,41 @@
-"""The records of jobs: counted by owner, and on a disk that is full, of 16 megabytes in memory."""
+"""The records of jobs in both databases; in SQLite also on a full disk, of 16 MB in memory."""
 
 import errno
 import sqlite3
 import sys
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 import anyio
 import pytest
 
-from app.jobs.sqlite_repository import SqliteJobRepository
+from app.jobs.job import Job
+from app.jobs.repository import JobRepository
+from app.state import Database, SqliteDatabase
+from tests.support.databases import opened
 from tests.support.disks import run_on_own_disk
-from tests.support.jobs import new_job
+from tests.support.jobs import SPEC, new_job
 
 QUERY = b'{"sources":[{"vertex":0}]}'
 
-
-def test_the_jobs_of_an_owner_are_counted_in_every_state(tmp_path: Path) -> None:
-    anyio.run(count_jobs, tmp_path / "jobs.sqlite3")
+Check = Callable[[JobRepository], Awaitable[None]]
 
 
-async def count_jobs(path: Path) -> None:
-    repository = SqliteJobRepository(path)
-    await repository.open()
+def run(database: Database, check: Check) -> None:
+    async def check_opened() -> None:
+        async with opened(database):
+            await check(JobRepository(database))
+
+    anyio.run(check_opened)
+
+
+def test_the_jobs_of_an_owner_are_counted_in_every_state(database: Database) -> None:
+    run(database, count_jobs)
+
+
+async def count_jobs(repository: JobRepository) -> None:
     mine = [new_job("alice") for _ in range(4)]
     for job in (*mine, new_job("bob"), new_job()):
         await repository.add(job, QUERY)
@@ -31,46 +43,137 @@ async def count_jobs(path: Path) -> None:
 
     ended = [job.dismissed() for job in mine[:3]]
     for job in ended:
-        await repository.update(job)
-    await repository.close()
-    await repository.open()
+        assert await repository.update(job, None)
     assert await repository.count("alice") == 4
     assert await repository.finished() == ended
+    assert await repository.count_finished() == {"dismissed": 3}
     await repository.remove(mine[1].id)
     assert await repository.count("alice") == 3
     assert await repository.count("bob") == await repository.count(None) == 1
     assert await repository.count("carol") == 0
-    await repository.close()
 
 
-def test_the_query_of_a_job_is_stored_until_the_job_has_finished(tmp_path: Path) -> None:
-    anyio.run(store_queries, tmp_path / "jobs.sqlite3")
+def test_jobs_are_found_by_owner_id_and_key(database: Database) -> None:
+    run(database, find_jobs)
 
 
-async def store_queries(path: Path) -> None:
-    repository = SqliteJobRepository(path)
-    await repository.open()
+async def find_jobs(repository: JobRepository) -> None:
+    keyed = [
+        Job(spec=SPEC.model_copy(update={"owner": owner, "idempotency_key": "a key"}))
+        for owner in (None, "alice", "alice")
+    ]
+    for job in keyed:
+        await repository.add(job, QUERY)
+    nobodys, first, second = keyed
+    assert await repository.find("alice", first.id) == first
+    assert await repository.find(None, nobodys.id) == nobodys
+    assert await repository.find(None, first.id) is None
+    assert await repository.find("bob", first.id) is None
+    assert await repository.find_by_key("alice", "a key") == second
+    assert await repository.find_by_key(None, "a key") == nobodys
+    assert await repository.find_by_key("alice", "another") is None
+
+
+def test_pages_begin_with_the_newest(database: Database) -> None:
+    run(database, turn_pages)
+
+
+async def turn_pages(repository: JobRepository) -> None:
+    jobs = [new_job("alice") for _ in range(5)]
+    for job in jobs:
+        await repository.add(job, QUERY)
+        await repository.add(new_job("bob"), QUERY)
+    seen, before = [], None
+    while True:
+        page, before = await repository.page("alice", 2, before)
+        seen.append(page)
+        if before is None:
+            break
+    assert seen == [jobs[4:2:-1], jobs[2:0:-1], jobs[:1]]
+    assert await repository.page("carol", 2, None) == ([], None)
+
+
+def test_a_job_is_changed_by_its_holder_until_it_has_finished(database: Database) -> None:
+    run(database, change_jobs)
+
+
+async def change_jobs(repository: JobRepository) -> None:
+    job = new_job("alice").accepted_again("first")
+    await repository.add(job, QUERY)
+    assert not await repository.update(job.running(0.5), None)
+    assert not await repository.update(job.running(0.5), "second")
+    assert await repository.update(job.running(0.5), "first")
+
+    taken = job.accepted_again("second")
+    assert await repository.update(taken, "first")
+    assert not await repository.update(job.successful("late"), "first")
+    last = taken.running(0.1).successful("a result")
+    assert await repository.update(last, "second")
+    assert not await repository.update(last.dismissed(), "second")
+    assert await repository.find("alice", job.id) == last
+    await repository.remove(job.id)
+    assert not await repository.update(last, "second")
+
+
+def test_of_two_who_take_over_a_job_one_gets_it(database: Database) -> None:
+    run(database, take_over)
+
+
+async def take_over(repository: JobRepository) -> None:
+    job = new_job()
+    await repository.add(job, QUERY)
+    taken = []
+
+    async def take(name: str) -> None:
+        if await repository.update(job.accepted_again(name), None):
+            taken.append(name)
+
+    async with anyio.create_task_group() as tasks:
+        for number in range(10):
+            tasks.start_soon(take, str(number))
+    assert len(taken) == 1
+    assert [each.replica for each in await repository.unfinished()] == taken
+
+
+def test_blocks_of_one_owner_come_one_after_the_other(database: Database) -> None:
+    run(database, submit_together)
+
+
+async def submit_together(repository: JobRepository) -> None:
+    async def add_if_first(owner: str) -> None:
+        async with repository.alone(owner) as records:
+            if not await records.count(owner):
+                await anyio.sleep(0)
+                await records.add(new_job(owner), QUERY)
+
+    async with anyio.create_task_group() as tasks:
+        for _ in range(6):
+            for owner in ("alice", "bob"):
+                tasks.start_soon(add_if_first, owner)
+    assert await repository.count("alice") == await repository.count("bob") == 1
+
+
+def test_the_query_of_a_job_is_stored_until_the_job_has_finished(database: Database) -> None:
+    run(database, partial(store_queries, database))
+
+
+async def store_queries(database: Database, repository: JobRepository) -> None:
     first, second, third = (new_job() for _ in range(3))
     for number, job in enumerate((first, second, third)):
         await repository.add(job, QUERY + bytes([number]))
-    await repository.update(first.running(0.0))
-    await repository.update(second.dismissed())
+    await repository.update(first.running(0.0), None)
+    await repository.update(second.dismissed(), None)
     assert await repository.query(first.id) == QUERY + b"\x00"
     assert await repository.query(second.id) is None
     assert [job.id for job in await repository.unfinished()] == [first.id, third.id]
-    await repository.close()
 
-    with sqlite3.connect(path) as database:  # as if killed between the record and its query
-        record = third.dismissed().model_dump_json()
-        database.execute("UPDATE jobs SET record = ? WHERE id = ?", (record, third.id))
-        database.execute("INSERT INTO queries VALUES ('of no job', 'x')")
-    database.close()
-    await repository.open()
+    # As if killed between the record and its query.
+    record = third.dismissed().model_dump_json()
+    await database.run("UPDATE jobs SET record = ? WHERE id = ?", record, third.id)
+    await database.run("INSERT INTO queries VALUES (?, ?)", "of no job", b"x")
+    await repository.tidy()
     assert await repository.query(first.id) == QUERY + b"\x00"
-    await repository.close()
-    with sqlite3.connect(path) as database:
-        assert database.execute("SELECT job_id FROM queries").fetchall() == [(first.id,)]
-    database.close()
+    assert await database.rows("SELECT job_id FROM queries") == [(first.id,)]
 
 
 def test_jobs_of_a_database_without_queries_are_read(tmp_path: Path) -> None:
@@ -89,14 +192,14 @@ async def read_older(path: Path) -> None:
         database.executescript(TABLES_OF_LAYOUT_6)
         database.execute("INSERT INTO jobs (record) VALUES (?)", (record,))
     database.close()
-    repository = SqliteJobRepository(path)
-    await repository.open()
-    (job,) = await repository.unfinished()
-    assert (job.id, job.spec.owner, job.runs) == ("1f", "alice", 0)
-    assert await repository.query(job.id) is None
-    await repository.update(job.dismissed())
-    assert await repository.unfinished() == []
-    await repository.close()
+    async with opened(SqliteDatabase(path)) as database:
+        repository = JobRepository(database)
+        (job,) = await repository.unfinished()
+        assert (job.id, job.spec.owner, job.runs) == ("1f", "alice", 0)
+        assert await repository.find("alice", "1f") == job
+        assert await repository.query(job.id) is None
+        await repository.update(job.dismissed(), None)
+        assert await repository.unfinished() == []
 
 
 TABLES_OF_LAYOUT_6 = """
@@ -119,7 +222,7 @@ def test_a_database_that_cannot_be_read_is_an_os_error(tmp_path: Path) -> None:
     (tmp_path / "jobs.sqlite3").write_bytes(b"no database" * 1000)
 
     with pytest.raises(OSError, match="not a database") as refusal:
-        anyio.run(SqliteJobRepository(tmp_path / "jobs.sqlite3").open)
+        anyio.run(SqliteDatabase(tmp_path / "jobs.sqlite3").open)
     assert refusal.value.errno == errno.EIO
 
 
@@ -138,26 +241,24 @@ def fill(path: Path) -> None:
 
 
 async def use_full_disk(folder: Path) -> None:
-    repository = SqliteJobRepository(folder / "jobs.sqlite3")
-    await repository.open()
-    try:
-        await use(repository, folder)
-    finally:
-        await repository.close()
+    database = SqliteDatabase(folder / "jobs.sqlite3")
+    async with opened(database):
+        await use(database, folder)
 
 
-async def use(repository: SqliteJobRepository, folder: Path) -> None:
+async def use(database: SqliteDatabase, folder: Path) -> None:
+    repository = JobRepository(database)
     jobs = [new_job() for _ in range(100)]
     for job in jobs:
         await repository.add(job, bytes(10_000))
-    await repository.close()  # empties SQLite's log
-    await repository.open()
+    await database.close()  # empties SQLite's log
+    await database.open()
     fill(folder / "others")
 
     with refused_for_want_of_room():
         await repository.add(new_job(), QUERY)
     for job in jobs:
-        await repository.update(job.dismissed())
+        await repository.update(job.dismissed(), None)
     assert await repository.count_finished() == {"dismissed": 100}
     for job in jobs:
         await repository.remove(job.id)

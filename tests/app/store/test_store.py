@@ -25,7 +25,7 @@ import geodesic_core as gc
 from app.engine.interface import ProgressCallback
 from app.engine.work import RunQuery, Task, TaskResult
 from app.errors import ProblemError
-from app.jobs import require_intact
+from app.state import require_intact
 from app.store import mesh_catalog, ownership
 from app.store.layout import LAYOUT, StoreError, require_layout
 from app.store.mesh_catalog import CatalogChange, MeshCatalog

@@ -1,0 +1,19 @@
+"""State that outlives a process: SQLite for one service, PostgreSQL for several that share it."""
+
+from app.state.allowances import Allowances
+from app.state.database import Database, StateError, Statements
+from app.state.mesh_records import MeshRecords
+from app.state.replicas import Replicas
+from app.state.sqlite import SqliteDatabase, read_database, require_intact
+
+__all__ = [
+    "Allowances",
+    "Database",
+    "MeshRecords",
+    "Replicas",
+    "SqliteDatabase",
+    "StateError",
+    "Statements",
+    "read_database",
+    "require_intact",
+]

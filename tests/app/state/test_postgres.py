@@ -1,0 +1,121 @@
+"""PostgreSQL: its tables, what is said where it cannot be used, and a server that goes away."""
+
+import socket
+import subprocess
+import sys
+from contextlib import suppress
+
+import anyio
+import pytest
+
+from app.errors import StateUnavailableError, problem_of
+from app.state import StateError
+from tests.support.databases import opened
+from tests.support.paths import ROOT
+from tests.support.postgres import SECRET, Server
+
+pytest.importorskip("psycopg", reason="needs the extra cluster")
+
+import psycopg
+
+from app.state.postgres import PostgresDatabase
+
+
+def refusal(url: str) -> str:
+    with pytest.raises(StateError) as refused:
+        PostgresDatabase(url).prepare()
+    message = str(refused.value)
+    assert "GEODESIC_STATE" in message
+    assert SECRET not in message
+    assert "\n" not in message
+    return message
+
+
+def test_a_wrong_secret(postgres: Server) -> None:
+    assert "password authentication failed" in refusal(postgres.url("postgres", "wrong"))
+
+
+def test_a_database_that_does_not_exist(postgres: Server) -> None:
+    assert 'database "nowhere" does not exist' in refusal(postgres.url("nowhere"))
+
+
+def test_a_server_that_does_not_exist() -> None:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    assert "Connection refused" in refusal(f"postgresql://geodesic@127.0.0.1:{port}/state")
+
+
+@pytest.mark.parametrize("rest", ["[", "host:port/x", f"u:{SECRET}@h/d?no=option"])
+def test_what_is_no_url(rest: str) -> None:
+    refusal(f"postgresql://{rest}")
+
+
+def test_rights_that_are_missing(postgres: Server) -> None:
+    url = postgres.new_database()
+    name = url.rpartition("/")[2]
+    with psycopg.connect(url, autocommit=True) as connection:
+        connection.execute(f"CREATE ROLE reader_{name} LOGIN PASSWORD '{SECRET}'")
+    assert "permission denied" in refusal(url.replace("//geodesic:", f"//reader_{name}:"))
+
+
+def test_services_that_start_together_create_the_tables_once(postgres: Server) -> None:
+    url = postgres.new_database()
+    prepare = (
+        "import sys; from app.state.postgres import PostgresDatabase as P; P(sys.argv[1]).prepare()"
+    )
+    command = [sys.executable, "-c", prepare, url]
+    started = [subprocess.Popen(command, cwd=ROOT) for _ in range(3)]  # noqa: S603 - this Python
+    assert [each.wait() for each in started] == [0, 0, 0]
+    with psycopg.connect(url) as connection:
+        assert connection.execute("SELECT version_num FROM alembic_version").fetchall() == [
+            ("0001",)
+        ]
+
+
+def test_the_tables_of_a_newer_release_are_refused(postgres: Server) -> None:
+    url = postgres.new_database()
+    PostgresDatabase(url).prepare()
+    with psycopg.connect(url) as connection:
+        connection.execute("UPDATE alembic_version SET version_num = '9999'")
+    with pytest.raises(StateError, match="newer release"):
+        PostgresDatabase(url).prepare()
+
+
+def test_a_server_that_goes_away_and_comes_back(postgres: Server) -> None:
+    database = PostgresDatabase(postgres.new_database())
+    database.prepare()
+
+    async def restart() -> None:
+        async with opened(database):
+            assert await database.rows("SELECT 1") == [(1,)]
+            await anyio.to_thread.run_sync(postgres.stop)
+            try:
+                for _ in range(2):
+                    with pytest.raises(StateUnavailableError) as refused:
+                        await database.rows("SELECT 1")
+                    assert problem_of(refused.value).status == 503
+            finally:
+                await anyio.to_thread.run_sync(postgres.start)
+            assert await database.rows("SELECT 1") == [(1,)]
+            await anyio.to_thread.run_sync(postgres.stop)  # while connections are idle
+            await anyio.to_thread.run_sync(postgres.start)
+            async with database.alone("a name") as statements:
+                assert await statements.rows("SELECT 1") == [(1,)]
+
+    anyio.run(restart)
+
+
+def test_a_transaction_that_fails_leaves_nothing(postgres: Server) -> None:
+    database = PostgresDatabase(postgres.new_database())
+    database.prepare()
+
+    async def fail() -> None:
+        async with opened(database):
+            with suppress(KeyError):
+                async with database.alone("a name") as statements:
+                    await statements.run("INSERT INTO replicas VALUES (?, ?)", "x", 1)
+                    raise KeyError
+            assert await database.rows("SELECT * FROM replicas") == []
+
+    anyio.run(fail)
