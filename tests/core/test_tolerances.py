@@ -14,6 +14,8 @@ from geodesic_core import tolerances
 from geodesic_core.control import Control
 from geodesic_core.fields.sources import nodes_of
 from geodesic_core.fields.sweep import run_sweep
+from geodesic_core.kernels.fast import state as fast_state
+from geodesic_core.kernels.fast.places import offer
 from geodesic_core.kernels.isolines.arcs import outer_arcs
 from geodesic_core.kernels.isolines.lines import united
 from geodesic_core.kernels.isolines.regions import (
@@ -63,6 +65,7 @@ from geodesic_core.tolerances import (
     DOUBLE_ROOT,
     EDGE_STEPS,
     FALSE_POSITION_STEPS,
+    FAR_NEARER,
     FLAT,
     FORKS,
     GAP,
@@ -73,6 +76,7 @@ from geodesic_core.tolerances import (
     LOCAL_SHARE,
     LOOSE_OVERLAP,
     LOWER_BOUND,
+    MOST_AT_LARGE,
     NO_AREA,
     ON_PATH,
     OVERLAP,
@@ -105,7 +109,7 @@ from tests.support.certificates import check_path
 from tests.support.invariants import windows_of
 from tests.support.oracles import closed_forms, graph
 from tests.support.searches import edge_paths, goal_at_vertex, random_pairs, spread
-from tests.support.stepping import started, steps, topology_of, view_of_arrays, window
+from tests.support.stepping import flat, started, steps, topology_of, view_of_arrays, window
 
 SCALES = pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 
@@ -599,6 +603,31 @@ def test_widest_error_is_the_most_that_is_used():
         assert field.error_bound.value == error
     narrower = gc.approximate_distance(mesh, 0, WIDEST_ERROR / 2)
     assert (narrower.distances != widest.distances).any()
+
+
+# Fast sweeps -------------------------------------------------------------------------------------
+
+
+def waiting(offers: int, sigma: float) -> int:
+    """How many of some equal windows wait; they win no place, and all else known is 10.2 there."""
+    topology = topology_of(zoo.Case("square", *gc.samples.plane(2)))
+    front = fast_state.new_wavefront(topology, NO_SITES, 1, 0)
+    front.distance[:], front.values[:] = 10.0, 10.0
+    bounds = fast_state.FastBounds(math.inf, 1, 1.0, (), (), 0)
+    sizes = fast_state.Sizes(len(front.distance), len(front.windows), 0, 0, 0)
+    view = flat(fast_state.View(topology, front, bounds, sizes))
+    for _ in range(offers):
+        offer(view, 0, -1, 1.0, window(0.1, 0.3, 0.2, 0.0, sigma))
+    return int(front.counters[fast_state.CREATED])
+
+
+@pytest.mark.parametrize(("share", "goes_on"), [(1.001, True), (0.999, False)])
+def test_far_nearer_lets_a_window_go_on_without_a_place(share, goes_on):
+    assert waiting(1, 10.2 / (FAR_NEARER * share)) == goes_on
+
+
+def test_most_at_large_bounds_the_windows_without_a_place():
+    assert waiting(MOST_AT_LARGE + 3, 9.9) == MOST_AT_LARGE
 
 
 # Searches between two points --------------------------------------------------------------------
