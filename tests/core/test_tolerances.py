@@ -26,6 +26,7 @@ from geodesic_core.kernels.isolines.regions import (
     put_segment_bands,
     span_on_line,
 )
+from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
@@ -109,7 +110,7 @@ from tests.support.certificates import check_path
 from tests.support.invariants import windows_of
 from tests.support.oracles import closed_forms, graph
 from tests.support.searches import edge_paths, goal_at_vertex, random_pairs, spread
-from tests.support.stepping import flat, started, steps, topology_of, view_of_arrays, window
+from tests.support.stepping import started, steps, topology_of, view_of_arrays, window
 
 SCALES = pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 
@@ -608,16 +609,20 @@ def test_widest_error_is_the_most_that_is_used():
 # Fast sweeps -------------------------------------------------------------------------------------
 
 
+@kernel
+def offer_to(topology, front, bounds, h, length, offered):
+    """Offer a window to a half-edge that nothing has left by."""
+    offer(fast_state.view_of(topology, front, bounds), h, -1, length, offered)
+
+
 def waiting(offers: int, sigma: float) -> int:
     """How many of some equal windows wait; they win no place, and all else known is 10.2 there."""
     topology = topology_of(zoo.Case("square", *gc.samples.plane(2)))
     front = fast_state.new_wavefront(topology, NO_SITES, 1, 0)
     front.distance[:], front.values[:] = 10.0, 10.0
     bounds = fast_state.FastBounds(math.inf, 1, 1.0, (), (), 0)
-    sizes = fast_state.Sizes(len(front.distance), len(front.windows), 0, 0, 0)
-    view = flat(fast_state.View(topology, front, bounds, sizes))
     for _ in range(offers):
-        offer(view, 0, -1, 1.0, window(0.1, 0.3, 0.2, 0.0, sigma))
+        offer_to(topology, front, bounds, 0, 1.0, window(0.1, 0.3, 0.2, 0.0, sigma))
     return int(front.counters[fast_state.CREATED])
 
 

@@ -63,7 +63,7 @@ def finished(topology, wave, limit=math.inf, budget=WHOLE) -> Wavefront:
 def view_of_arrays(topology, wave, bounds=exact_bounds(math.inf)) -> View:  # noqa: B008
     """The View that kernels see, of flat arrays in place of pointers: so that tests can hold it."""
     sizes = getattr(sizes_of, "py_func", sizes_of)(topology, wave, bounds)
-    return flat(View(mesh=topology, **wave._asdict(), bounds=bounds, sizes=sizes))
+    return _flat(View(mesh=topology, **wave._asdict(), bounds=bounds, sizes=sizes))
 
 
 def window(b0, b1, sx, sy, sigma, xi=0.0, root=0) -> Window:
@@ -76,8 +76,7 @@ def with_pool(wave: Wavefront, **arrays) -> Wavefront:
     return wave._replace(pool=wave.pool._replace(**arrays))
 
 
-def flat(group):
-    """A named tuple with flat arrays in place of its arrays, at any depth."""
+def _flat(group):
     if isinstance(group, np.ndarray):
         return group.reshape(-1)
-    return type(group)(*map(flat, group)) if hasattr(group, "_fields") else group
+    return type(group)(*map(_flat, group)) if hasattr(group, "_fields") else group
