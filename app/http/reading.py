@@ -13,6 +13,9 @@ CHUNKS_OF_READ = 500
 FEW_CHUNKS = 20
 """Chunks of a read that do not matter, and tell little about those to come"""
 
+REST_S = 0.001
+"""Seconds after a read with many chunks in which others are served"""
+
 
 class PacedReading(asyncio.BufferedProtocol):
     """What the event loop reads for: it passes on to the HTTP protocol what comes.
@@ -20,7 +23,7 @@ class PacedReading(asyncio.BufferedProtocol):
     A body takes as long to parse as it has chunks. An event loop reads a quarter of a mebibyte at a
     time, and several times in a row: a hundred thousand chunks of a few bytes, while nobody else is
     served. Here a read has as many bytes as had `CHUNKS_OF_READ` in the one before, and after one
-    with many chunks others have their turn.
+    with many chunks the connection rests.
     """
 
     def __init__(self, protocol: BoundedHttpProtocol) -> None:
@@ -50,7 +53,7 @@ class PacedReading(asyncio.BufferedProtocol):
             self._size = max(SMALLEST_READ, min(size * CHUNKS_OF_READ // chunks, LARGEST_READ))
             if self._size < LARGEST_READ:
                 self._transport.pause_reading()
-                protocol.loop.call_soon(self._go_on)
+                protocol.loop.call_later(REST_S, self._go_on)
         elif size == self._size:
             self._size = LARGEST_READ
 
