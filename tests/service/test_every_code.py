@@ -145,8 +145,8 @@ def full(site: Site) -> Any:
 
 
 def defect(site: Site) -> Any:
-    site.patch.setattr("app.http.routes.about.About", None)
-    return site.client.get("/v1")
+    site.patch.setattr("app.http.routes.about.Index", None)
+    return site.client.get("/")
 
 
 def killed(site: Site) -> Any:
