@@ -44,7 +44,7 @@ async def _scrub(root: Path, on_damage: OnDamage) -> None:
     while True:
         try:
             await _scrub_once(root, on_damage)
-        except OSError:  # such as too many open files: the next round may be luckier
+        except Exception:  # such as too many open files: the next round may be luckier
             logger.exception("store not verified to its end")
         await asyncio.sleep(_PERIOD_S)
 

@@ -1,7 +1,7 @@
 """A store whose files are damaged while a service runs on it."""
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -148,9 +148,17 @@ def scrubs_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(scrub, name, 0.0)
 
 
+@pytest.fixture
+def lines() -> Iterator[Sequence[Any]]:
+    """The log, whose end is shown where the test fails."""
+    with capture_logs() as lines:
+        yield lines
+    print(*lines[-20:], sep="\n")
+
+
 @pytest.mark.usefixtures("scrubs_at_once")
-def test_the_scrub_finds_what_is_damaged(tmp_path: Path) -> None:
-    with capture_logs() as lines, serving(tmp_path, results_memory_bytes=1) as client:
+def test_the_scrub_finds_what_is_damaged(tmp_path: Path, lines: Sequence[Any]) -> None:
+    with serving(tmp_path, results_memory_bytes=1) as client:
         damaged, whole = (upload_sample(client, "plane", faces) for faces in (45_000, 50_000))
         for mesh_id in (damaged, whole):
             assert distances(client, mesh_id).status_code == 200
