@@ -153,7 +153,7 @@ def lines() -> Iterator[Sequence[Any]]:
     """The log, whose end is shown where the test fails."""
     with capture_logs() as lines:
         yield lines
-    print(*lines[-20:], sep="\n")
+    print(*lines[-20:], sep="\n")  # noqa: T201 - pytest shows it
 
 
 @pytest.mark.usefixtures("scrubs_at_once")
