@@ -37,6 +37,7 @@ from geodesic_core.solvers import (
     kernel_digest,
     shortest_path,
 )
+from geodesic_core.tables.matrix_file import MatrixFile, write_matrix
 from geodesic_core.tolerances import WEIGHT_ERROR
 
 __all__ = [
@@ -48,6 +49,7 @@ __all__ = [
     "GeodesicError",
     "GeodesicPath",
     "Isoline",
+    "MatrixFile",
     "MeshReport",
     "Nearest",
     "Retain",
@@ -73,6 +75,7 @@ __all__ = [
     "shortest_path",
     "spaced_levels",
     "warm_up",
+    "write_matrix",
 ]
 
 

@@ -1,0 +1,1 @@
+"""Tables of distances of any size, written to files row by row."""

@@ -1,0 +1,54 @@
+"""Dense tables: blocks of rows, and the rows of the file made from them."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geodesic_core.arrays import Floats, Longs
+from geodesic_core.tables.blocks import Blocks
+from geodesic_core.tables.plan import Plan
+
+ARRAYS = ("rows",)
+
+
+def block_of(
+    plan: Plan, block: int, rows: Mapping[int, Floats], dtype: np.dtype[Any]
+) -> dict[str, NDArray[Any]]:
+    """Return the arrays of a block: (rows, targets from its first row on), mirrored in itself."""
+    sweeps = plan.rows_of(block)
+    first = sweeps[0] if plan.is_symmetric else 0
+    table = np.empty((len(sweeps), plan.width - first), dtype)
+    for place, sweep in enumerate(sweeps):
+        row = rows[sweep]
+        table[place, plan.width - first - len(row) :] = row
+        if plan.is_symmetric:
+            table[place:, place] = row[: len(sweeps) - place]
+    return {"rows": table}
+
+
+def file_rows(plan: Plan, blocks: Blocks) -> Iterator[tuple[Longs, NDArray[Any]]]:
+    """Yield rows of the file, (k,) their numbers and (k, targets) their values, all of them once.
+
+    Reads each block once for each block that comes after it, in parts.
+    """
+    if plan.is_flipped:
+        for first in range(0, plan.width, plan.block_rows):
+            part = slice(first, first + plan.block_rows)
+            columns = [blocks.get(k, "rows")[:, part] for k in range(plan.blocks)]
+            rows = np.concatenate(columns).T
+            yield np.arange(first, first + len(rows)), rows
+        return
+    places = np.empty_like(plan.order)
+    places[plan.order] = np.arange(plan.sweeps)
+    for block in range(plan.blocks):
+        sweeps = plan.rows_of(block)
+        rows = blocks.get(block, "rows")
+        if plan.is_symmetric:
+            before = [
+                blocks.get(k, "rows")[:, sweeps[0] - plan.rows_of(k)[0] :][:, : len(sweeps)].T
+                for k in range(block)
+            ]
+            rows = np.concatenate([*before, rows], axis=1)[:, places]
+        yield plan.order[sweeps[0] : sweeps[-1] + 1], rows

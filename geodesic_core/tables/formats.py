@@ -1,0 +1,130 @@
+"""Files of tables: npy and Zarr of dense ones, npz and Parquet of sparse ones."""
+
+import hashlib
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geodesic_core.extras import extra
+from geodesic_core.tables import dense, sparse
+from geodesic_core.tables.blocks import Blocks
+from geodesic_core.tables.plan import Plan
+
+DENSE, SPARSE = (".npy", ".zarr"), (".npz", ".parquet")
+SUFFIXES = (*DENSE, *SPARSE)
+
+Facts = Mapping[str, Any]
+"""What was asked, as the metadata of a file tell it"""
+
+_ZARR_CHUNK = 1 << 22  # bytes
+
+
+def require(suffix: str) -> None:
+    """Raise ``MissingExtra`` where the package that writes a format is not installed."""
+    with extra("tables", "zarr" if suffix == ".zarr" else "PyArrow", f"write_matrix to {suffix}"):
+        if suffix == ".zarr":
+            import zarr  # noqa: F401
+        elif suffix == ".parquet":
+            import pyarrow.parquet  # noqa: F401
+
+
+def write_table(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], facts: Facts, out: Path) -> None:
+    """Write the file of a table whose blocks are all there, as a whole or not at all."""
+    suffix = out.suffix.lower()
+    scratch = blocks.folder / f"whole{suffix}"
+    if scratch.is_dir():
+        shutil.rmtree(scratch)
+    if suffix in DENSE:
+        whole = scratch.with_suffix(".npy")
+        _write_npy(plan, blocks, dtype, whole)
+        if suffix == ".zarr":
+            _write_zarr(np.load(whole, mmap_mode="r"), facts, scratch)
+    elif suffix == ".npz":
+        _write_npz(plan, blocks, dtype, blocks.folder, scratch)
+    else:
+        _write_parquet(plan, blocks, dtype, facts, scratch)
+    if out.is_dir():
+        shutil.rmtree(out)
+    scratch.replace(out)
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file, hexadecimal; of a folder, of its files by their names."""
+    digest = hashlib.sha256()
+    files = sorted(each for each in path.rglob("*") if each.is_file()) if path.is_dir() else [path]
+    for each in files:
+        with each.open("rb") as file:
+            while part := file.read(1 << 20):
+                digest.update(part)
+    return digest.hexdigest()
+
+
+def _write_npy(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], path: Path) -> None:
+    # Written, not mapped: pages of a map would count as memory of the process.
+    with path.open("wb") as file:
+        header = {"descr": dtype.str, "fortran_order": False, "shape": plan.shape}
+        np.lib.format.write_array_header_1_0(file, header)
+        begin, row_bytes = file.tell(), plan.shape[1] * dtype.itemsize
+        for numbers, rows in dense.file_rows(plan, blocks):
+            for number, row in zip(numbers.tolist(), np.ascontiguousarray(rows), strict=True):
+                file.seek(begin + number * row_bytes)
+                file.write(row.data.cast("B"))
+
+
+def _write_zarr(table: NDArray[Any], facts: Facts, folder: Path) -> None:
+    import zarr
+
+    rows = max(1, min(len(table), _ZARR_CHUNK // (table.shape[1] * table.itemsize)))
+    array = zarr.create_array(
+        folder, shape=table.shape, chunks=(rows, table.shape[1]), dtype=table.dtype
+    )
+    array.attrs.update(dict(facts))
+    for first in range(0, len(table), rows):
+        array[first : first + rows] = table[first : first + rows]
+
+
+def _write_npz(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], scratch: Path, path: Path) -> None:
+    columns, data = scratch / "indices.raw", scratch / "data.raw"
+    counts = np.zeros(plan.shape[0] + 1, np.int64)
+    with columns.open("wb") as column_file, data.open("wb") as data_file:
+        for entries in sparse.file_rows(plan, blocks):
+            column_file.write(entries.column.astype(np.int64).data.cast("B"))
+            data_file.write(entries.distance.data.cast("B"))
+            counts += np.bincount(entries.row + 1, minlength=len(counts))
+    np.savez(
+        path,
+        format=np.array(b"csr"),
+        shape=np.array(plan.shape),
+        indices=_mapped(columns, np.int64),
+        indptr=np.cumsum(counts),
+        data=_mapped(data, dtype),
+        _is_array=np.array(True),
+    )
+
+
+def _mapped(path: Path, dtype: Any) -> NDArray[Any]:
+    return np.memmap(path, dtype, "r") if path.stat().st_size else np.empty(0, dtype)
+
+
+def _write_parquet(
+    plan: Plan, blocks: Blocks, dtype: np.dtype[Any], facts: Facts, path: Path
+) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    schema = pa.schema(
+        [
+            ("source", pa.int64()),
+            ("target", pa.int64()),
+            ("distance", pa.from_numpy_dtype(dtype)),
+        ],
+        metadata={"geodesic": json.dumps(dict(facts))},
+    )
+    with pq.ParquetWriter(path, schema) as writer:
+        for entries in sparse.file_rows(plan, blocks):
+            writer.write_table(pa.table(list(entries), schema=schema))

@@ -1,0 +1,281 @@
+"""Matrices of distances larger than memory, written to a file, and continued after a stop."""
+
+import hashlib
+import json
+import math
+import threading
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geodesic_core.arrays import Floats
+from geodesic_core.control import Control
+from geodesic_core.errors import InvalidArgument
+from geodesic_core.fields.distance_field import DistanceField
+from geodesic_core.fields.path import EXACT, ErrorBound
+from geodesic_core.fields.sources import as_points
+from geodesic_core.mesh.surface_point import Point, SurfacePoint
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.search.target_sweep import TargetSweep
+from geodesic_core.search.threads import available_cores, share_out
+from geodesic_core.solvers import Effort, approximate_distance, fast_distance, kernel_digest
+from geodesic_core.tables import dense, sparse
+from geodesic_core.tables.blocks import Blocks
+from geodesic_core.tables.formats import DENSE, SPARSE, SUFFIXES, require, sha256_of, write_table
+from geodesic_core.tables.plan import Plan
+from geodesic_core.tables.rows import ExactRows, FieldRows, Method, Rows, Solve
+from geodesic_core.validation import as_limit, check_choice, is_index
+
+Everywhere = Literal["all"]
+"""Every vertex of the mesh"""
+
+
+@dataclass(frozen=True)
+class MatrixFile:
+    """A matrix in a file, which `write_matrix` wrote.
+
+    Examples
+    --------
+    >>> from tempfile import mkdtemp
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> gc.write_matrix(mesh, f"{mkdtemp()}/square.npy", [0, 1], [2, 3]).shape
+    (2, 2)
+    """
+
+    path: Path
+    shape: tuple[int, int]
+    """Sources and targets"""
+    error_bound: ErrorBound
+    sha256: str
+    """Of the file's content, hexadecimal; of a Zarr folder, of its files in the order of names"""
+    swept: int
+    """Rows that this call computed; the others were there from an earlier one"""
+
+
+def write_matrix(
+    mesh: TriangleMesh,
+    out: str | Path,
+    sources: Sequence[Point] | Everywhere,
+    targets: Sequence[Point] | Everywhere | None = None,
+    *,
+    method: Method = "exact",
+    relative_error: float = 1e-3,
+    effort: Literal[1, 2, 4, 8] = 2,
+    max_distance: float | None = None,
+    barriers: Iterable[int] = (),
+    dtype: Literal["float64", "float32"] = "float64",
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> MatrixFile:
+    """Write the distances from each source to each target to a file, however many there are.
+
+    A call that was interrupted goes on where it stopped: rows that are finished lie in blocks, in a
+    hidden folder beside the file, until the file is whole. The file is the same to the bit however
+    often that happened, and however many threads there are.
+
+    Parameters
+    ----------
+    mesh
+        The surface.
+    out
+        ``.npy``: a dense matrix, which `numpy.load` can map into memory; ``.zarr``: the same in
+        chunks of rows; ``.npz``: a sparse one for `scipy.sparse.load_npz`, of the finite distances;
+        ``.parquet``: these as a table of source, target and distance.
+    sources, targets
+        N and M vertex indices or `SurfacePoint`, or ``"all"`` vertices. Without targets they are
+        the sources, and each pair is asked once.
+    method
+        ``"exact"``, ``"approximate"`` within a ``relative_error``, or ``"fast"`` with an
+        ``effort``; see the solvers of these names.
+    relative_error, effort
+        Of the method that has it.
+    max_distance
+        Limit of the sweeps, mesh units; None for no limit. Points beyond it count as unreachable.
+    barriers
+        Ids of faces that paths may not cross, see `TriangleMesh.with_barriers`.
+    dtype
+        Of the distances in the file.
+    threads
+        Largest number of threads; None for one per core that the process may use.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`; files do not count as memory.
+
+    Returns
+    -------
+    MatrixFile
+        The file, its shape and its error. The same, with what was asked, lies in ``out`` +
+        ``".json"``.
+
+    Raises
+    ------
+    InvalidArgument
+        Also where the suffix is none of these, the folder does not exist, or part of another
+        matrix for this file lies beside it.
+    InvalidPoint, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+    MissingExtra
+        The format needs a package that is not installed.
+    OSError
+        The file cannot be written; what was finished stays.
+
+    Notes
+    -----
+    Memory is a block of rows and the state of a sweep for each thread, whatever N and M. On disk
+    it takes twice the file's size until it is whole.
+
+    Examples
+    --------
+    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+    >>> from tempfile import mkdtemp
+    >>> written = gc.write_matrix(mesh, f"{mkdtemp()}/square.npy", "all")
+    >>> written.shape
+    (4, 4)
+    >>> np.load(written.path, mmap_mode="r")[0].round(3).tolist()
+    [0.0, 1.0, 1.0, 1.414]
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    limit = as_limit(max_distance)
+    check_choice("method", method, get_args(Method))
+    check_choice("dtype", dtype, ("float64", "float32"))
+    if threads is not None and not (is_index(threads) and threads >= 1):
+        raise InvalidArgument(f"threads is {threads!r}; it must be an integer, 1 or more, or None")
+    path = Path(out)
+    suffix = path.suffix.lower()
+    check_choice("the suffix of out", suffix, SUFFIXES)
+    if not path.parent.is_dir():
+        raise InvalidArgument(f"there is no folder {path.parent}")
+    require(suffix)
+    mesh = mesh.with_barriers(barriers)
+    solve, bound = _solver(mesh, method, relative_error, effort, limit)
+    starts = _points(mesh, sources, "source", control)
+    stops = None if targets is None else _points(mesh, targets, "target", control)
+    plan = Plan.of(mesh, starts, stops, control, in_order=suffix in SPARSE)
+    facts = {
+        "mesh": _digest(mesh.vertices, mesh.faces, mesh.barriers),
+        "sources": _written(starts),
+        "targets": None if stops is None else _written(stops),
+        "shape": plan.shape,
+        "method": method,
+        "error_bound": asdict(bound),
+        "max_distance": None if math.isinf(limit) else limit,
+        "dtype": dtype,
+        "kernels": kernel_digest(),
+    }
+    make = dense if suffix in DENSE else sparse
+    sweep = _Sweep(mesh, plan, limit, solve, np.dtype(dtype), make)
+    blocks = Blocks.beside(path)
+    with blocks.open(facts):
+        swept = sweep.run(blocks, threads or available_cores(), control)
+        write_table(plan, blocks, sweep.dtype, facts, path)
+        written = MatrixFile(path, plan.shape, bound, sha256_of(path), swept)
+        text = json.dumps(facts | {"sha256": written.sha256}, indent=1)
+        path.with_name(f"{path.name}.json").write_text(text + "\n")
+        blocks.remove()
+    if control.progress is not None:
+        control.progress(1.0)
+    return written
+
+
+def _points(
+    mesh: TriangleMesh, points: Sequence[Point] | Everywhere, name: str, control: Control
+) -> list[SurfacePoint]:
+    chosen = range(len(mesh.vertices)) if isinstance(points, str) and points == "all" else points
+    return as_points(mesh, chosen, name, control)
+
+
+def _written(points: Sequence[SurfacePoint]) -> str:
+    """Return a hash of points, hexadecimal."""
+    return hashlib.sha256(repr(points).encode()).hexdigest()
+
+
+def _digest(*arrays: NDArray[Any]) -> str:
+    digest = hashlib.sha256()
+    for array in arrays:
+        digest.update(np.ascontiguousarray(array).data.cast("B") if array.size else b"-")
+    return digest.hexdigest()
+
+
+def _solver(
+    mesh: TriangleMesh, method: Method, relative_error: float, effort: Effort, limit: float
+) -> tuple[Solve | None, ErrorBound]:
+    """Return the function that solves a row, None for an exact sweep; and its error."""
+    if method == "exact":
+        return None, EXACT
+
+    def solve(
+        source: SurfacePoint, targets: Sequence[SurfacePoint], control: Control
+    ) -> DistanceField:
+        solver = (
+            partial(fast_distance, effort=effort)
+            if method == "fast"
+            else partial(approximate_distance, relative_error=relative_error)
+        )
+        return solver(
+            mesh,
+            source,
+            max_distance=limit,
+            targets=targets,
+            retain="distances",
+            progress=control.progress,
+            cancel=control.cancel,
+            memory_limit=control.memory_limit,
+        )
+
+    return solve, solve(mesh.point(0), (), Control()).error_bound
+
+
+@dataclass(frozen=True)
+class _Sweep:
+    """The sweeps of a plan, in threads; each block is written once its rows are there."""
+
+    mesh: TriangleMesh
+    plan: Plan
+    limit: float
+    solve: Solve | None
+    dtype: np.dtype[Any]
+    layout: ModuleType
+
+    def run(self, blocks: Blocks, threads: int, control: Control) -> int:
+        """Write the blocks that are missing; return the number of their rows."""
+        missing = [
+            block
+            for block in control.watched(range(self.plan.blocks))
+            if not blocks.has(block, *self.layout.ARRAYS)
+        ]
+        sweeps = [sweep for block in missing for sweep in self.plan.rows_of(block)]
+        if not sweeps:
+            return 0
+        unfinished: dict[int, dict[int, Floats]] = {block: {} for block in missing}
+        lock = threading.Lock()
+
+        def put(sweep: int, row: Floats) -> None:
+            block = sweep // self.plan.block_rows
+            with lock:
+                rows = unfinished[block]
+                rows[sweep] = row
+                if len(rows) < len(self.plan.rows_of(block)):
+                    return
+                del unfinished[block]
+            blocks.put(block, **self.layout.block_of(self.plan, block, rows, self.dtype))
+
+        def work(rows: Rows, part: int, control: Control) -> None:
+            sweep = sweeps[part]
+            put(sweep, rows.distances(sweep, self.plan.targets_of(sweep), control))
+
+        workers = [partial(work, self._rows()) for _ in range(min(threads, len(sweeps)))]
+        share_out(len(sweeps), workers, control)
+        return len(sweeps)
+
+    def _rows(self) -> Rows:
+        if self.solve is None:
+            return ExactRows(self.plan.ends, self.limit, TargetSweep(self.mesh))
+        return FieldRows(self.plan.ends, self.solve)

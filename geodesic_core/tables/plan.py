@@ -1,0 +1,92 @@
+"""The plan of a table: which side is swept from, in which order, and what is a block."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from geodesic_core.arrays import Ints, Longs
+from geodesic_core.control import Control
+from geodesic_core.fields.sources import Ends, ends_of
+from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.tables.order import sweep_order
+
+_BLOCK_BYTES = 1 << 25
+"""Bytes of a block, at most: a process that is killed loses one or two"""
+_BLOCK_ROWS = 256
+"""Rows of a block, at most: its columns are as wide where a symmetric table is mirrored"""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Sweeps from the smaller side of a table; of a symmetric one, to what comes after."""
+
+    ends: Ends
+    """From the points that are swept from, in their order, to those of the other side"""
+    shape: tuple[int, int]
+    """Sources and targets, as the file has them"""
+    is_flipped: bool
+    """True where rows that are swept are columns of the file"""
+    is_symmetric: bool
+    order: Longs
+    """(sweeps,) row of the file for each sweep, or its column where flipped; of a symmetric table
+    its column too"""
+    block_rows: int
+
+    @classmethod
+    def of(
+        cls,
+        mesh: TriangleMesh,
+        sources: Sequence[SurfacePoint],
+        targets: Sequence[SurfacePoint] | None,
+        control: Control,
+        *,
+        in_order: bool,
+    ) -> "Plan":
+        """Return the plan of a table, symmetric where there are no targets.
+
+        Sweeps are ``in_order`` where their rows are to be, else in the one that sweeps least.
+        """
+        is_flipped = targets is not None and len(targets) < len(sources)
+        order = np.arange(min(len(sources), len(sources if targets is None else targets)))
+        if targets is None:
+            if not in_order:
+                order = sweep_order(np.array([mesh.position(point) for point in sources]))
+                sources = [sources[i] for i in order.tolist()]
+            starts, others = sources, sources
+        else:
+            starts, others = (targets, sources) if is_flipped else (sources, targets)
+        width = len(others)
+        return cls(
+            ends_of(mesh, starts, others, control),
+            (len(sources), len(sources if targets is None else targets)),
+            is_flipped,
+            targets is None,
+            order,
+            max(1, min(_BLOCK_ROWS, _BLOCK_BYTES // (8 * width))),
+        )
+
+    @property
+    def sweeps(self) -> int:
+        """Number of points that are swept from."""
+        return len(self.order)
+
+    @property
+    def width(self) -> int:
+        """Number of points on the other side."""
+        return len(self.ends.targets)
+
+    @property
+    def blocks(self) -> int:
+        """Number of blocks."""
+        return -(-self.sweeps // self.block_rows)
+
+    def rows_of(self, block: int) -> range:
+        """Return the sweeps of a block."""
+        first = block * self.block_rows
+        return range(first, min(first + self.block_rows, self.sweeps))
+
+    def targets_of(self, sweep: int) -> Ints:
+        """Return the targets of a sweep: of a symmetric table, itself and those after it."""
+        return np.arange(sweep if self.is_symmetric else 0, self.width, dtype=np.int32)
