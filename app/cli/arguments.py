@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
 
@@ -39,6 +39,13 @@ class Layout(StrEnum):
     DENSE = "dense"
     SPARSE = "sparse"
     PAIRS = "pairs"
+
+
+class Number(StrEnum):
+    """Types of numbers in files."""
+
+    FLOAT64 = "float64"
+    FLOAT32 = "float32"
 
 
 class SampleName(StrEnum):
@@ -114,7 +121,13 @@ class Position:
 
 
 def faces(text: str) -> Sequence[int]:
-    """Return the faces that an option lists: ids, and ranges with both ends."""
+    """Return the faces that an option lists, or those of ``@FILE``, one or more a line."""
+    if text.startswith("@"):
+        try:
+            lines = Path(text[1:]).read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise typer.BadParameter(f"cannot read {text[1:]}: {error}") from None
+        return [face for line in lines if line.strip() for face in faces(line.strip())]
     if not _FACES.fullmatch(text):
         raise typer.BadParameter(f"{text!r} is not a list of faces: write it as 3,7,40-59")
     found: list[int] = []
@@ -194,6 +207,7 @@ PointOrCurveSource = Annotated[
         help=f"The point to start from, {SPELLINGS}, {CURVES}.",
     ),
 ]
+SomeSources = Annotated[list[Point] | None, *get_args(Sources)[1:]]
 Source = Annotated[
     Point,
     typer.Option(
@@ -206,10 +220,11 @@ Targets = Annotated[
         "--target", parser=Point.parse, metavar="POINT", help="A target; may be given again."
     ),
 ]
+SomeTargets = Annotated[list[Point] | None, *get_args(Targets)[1:]]
 Barriers = Annotated[
     Sequence[int] | None,
     typer.Option(
-        parser=faces, metavar="FACES", help="Faces that are blocked, as 3,7,40-59: holes."
+        parser=faces, metavar="FACES", help="Faces that are blocked, as 3,7,40-59 or @FILE: holes."
     ),
 ]
 MethodOption = Annotated[

@@ -7,7 +7,7 @@ import typer
 from typer.exceptions import TyperException
 
 from app import __version__
-from app.cli import cluster, compilation, meshes, queries, serve
+from app.cli import cluster, compilation, meshes, queries, serve, tables
 from app.cli.steps import Failure
 from app.cli.store import store
 
@@ -71,7 +71,7 @@ for command in (
     queries.path,
     queries.paths,
     queries.isolines,
-    queries.matrix,
+    tables.matrix,
     queries.nearest,
     queries.locate,
     meshes.sample,

@@ -15,7 +15,6 @@ from app.cli.arguments import (
     BoundedMethod,
     BoundedMethodOption,
     EffortOption,
-    Layout,
     MaxDistance,
     Merge,
     MergeOption,
@@ -28,7 +27,6 @@ from app.cli.arguments import (
     Position,
     RelativeError,
     Source,
-    Sources,
     Targets,
     accuracy,
     writable,
@@ -40,6 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from app.encoding import Answer
+    from geodesic_core import TriangleMesh
 
 LINES = ".obj", ".csv", ".svg", ".geojson", ".json"
 """Suffixes of files that hold lines."""
@@ -95,11 +94,11 @@ def distance(
         files.write_answer(out, answered.answer)
     reached = np.isfinite(distances)
     farthest = int(np.argmax(np.where(reached, distances, -1.0)))
-    _print_size(answered)
+    print_size(answered.mesh)
     typer.echo(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
     typer.echo(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
     typer.echo(f"error bound {_bound_in_words(found['error_bound'])}")
-    _print_end(answered, out)
+    print_end(answered, out)
 
 
 def path(
@@ -149,7 +148,7 @@ def path(
     if found["status"] != "ok":
         raise Failure(_NO_PATH[found["reason"]].format(limit=max_distance))
     files.write_answer(out, answered.answer)
-    _print_size(answered)
+    print_size(answered.mesh)
     typer.echo(f"length      {found['length']!r}")
     typer.echo(f"points      {len(found['points'])}")
     typer.echo(f"error bound {_bound_in_words(found['error_bound'])}")
@@ -187,14 +186,14 @@ def paths(
     points: WrittenMembers = {"source": source, "targets": target}
     answered = ask("paths", mesh_file, merge, "Computing the paths", points, members)
     files.write_answer(out, answered.answer)
-    _print_size(answered)
+    print_size(answered.mesh)
     for written, path in zip(target, answered.answer.members["paths"], strict=True):
         if path["status"] == "ok":
             bound = _bound_in_words(path["error_bound"])
             typer.echo(f"path        to {written.text}: {path['length']!r}, error bound {bound}")
         else:
             typer.echo(f"no path     to {written.text}: {path['reason']}")
-    _print_end(answered, out)
+    print_end(answered, out)
 
 
 def isolines(
@@ -235,7 +234,7 @@ def isolines(
     points: WrittenMembers = {"sources": source}
     answered = ask("isolines", mesh_file, merge, "Drawing isolines", points, members)
     files.write_answer(out, answered.answer)
-    _print_size(answered)
+    print_size(answered.mesh)
     for each in answered.answer.members["isolines"]:
         lines = each["lines"]
         closed, length = (
@@ -247,51 +246,7 @@ def isolines(
             f"{float(length)!r} long"
         )
     typer.echo(f"error bound {_bound_in_words(answered.answer.members['error_bound'])}")
-    _print_end(answered, out)
-
-
-def matrix(
-    mesh_file: MeshFile,
-    source: Sources,
-    target: Targets,
-    out: Annotated[
-        Path,
-        typer.Option(
-            help="Where the distances go: .npy, .csv or .json; of a sparse matrix .npz, .csv or "
-            ".json.",
-            callback=writable(".npy", ".npz", ".csv", ".json"),
-        ),
-    ],
-    layout: Annotated[
-        Layout,
-        typer.Option(
-            help="'dense': from each source to each target; 'sparse': what can be reached; "
-            "'pairs': from each source to the target of the same number."
-        ),
-    ] = Layout.DENSE,
-    max_distance: MaxDistance = None,
-    barriers: Barriers = None,
-    merge: MergeOption = Merge.NONE,
-) -> None:
-    """Compute the distances from several points to several others."""
-    other = ".npy" if layout is Layout.SPARSE else ".npz"
-    if out.suffix.lower() == other:
-        raise typer.BadParameter(f"{other} does not go with --layout {layout.value}")
-    if layout is Layout.PAIRS and len(source) != len(target):
-        raise typer.BadParameter(
-            f"there are {len(source)} sources and {len(target)} targets; pairs need as many"
-        )
-    members = {"layout": layout.value, "max_distance": max_distance, "barriers": barriers or []}
-    points: WrittenMembers = {"sources": source, "targets": target}
-    answered = ask("matrix", mesh_file, merge, "Computing the matrix", points, members)
-    import numpy as np
-
-    files.write_answer(out, answered.answer)
-    reached = np.count_nonzero(np.isfinite(answered.answer.members["distances"]))
-    cells = len(source) if layout is Layout.PAIRS else len(source) * len(target)
-    _print_size(answered)
-    typer.echo(f"reached     {reached} of {cells} distances")
-    _print_end(answered, out)
+    print_end(answered, out)
 
 
 def nearest(
@@ -316,11 +271,11 @@ def nearest(
     found = answered.answer.members["nearest"]
     if out is not None:
         files.write_answer(out, answered.answer)
-    _print_size(answered)
+    print_size(answered.mesh)
     typer.echo(f"found       {len(found)} of {k}")
     for each in found:
         typer.echo(f"nearest     {candidate[each['candidate']].text} at {each['distance']!r}")
-    _print_end(answered, out)
+    print_end(answered, out)
 
 
 def locate(
@@ -356,8 +311,8 @@ def _array(array: Any) -> "Answer":
     return Answer({"array": array}, ("array",))
 
 
-def _print_size(answered: Answered) -> None:
-    mesh = answered.mesh
+def print_size(mesh: "TriangleMesh") -> None:
+    """Print the size of the mesh."""
     typer.echo(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
 
 
@@ -366,7 +321,8 @@ def _print_seconds(answered: Answered) -> None:
     typer.echo(f"took        {read:.3f} s to read, {solve:.3f} s to solve")
 
 
-def _print_end(answered: Answered, out: Path | None) -> None:
+def print_end(answered: Answered, out: Path | None) -> None:
+    """Print the seconds that a query took, and where its answer is."""
     _print_seconds(answered)
     if out is not None:
         typer.echo(f"written     {out}")

@@ -1,0 +1,194 @@
+"""Commands that write tables of distances."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from app.cli import files
+from app.cli.arguments import (
+    Barriers,
+    EffortOption,
+    Layout,
+    MaxDistance,
+    Merge,
+    MergeOption,
+    MeshFile,
+    Method,
+    MethodOption,
+    Number,
+    Point,
+    RelativeError,
+    SomeSources,
+    SomeTargets,
+    accuracy,
+    writable,
+)
+from app.cli.ask import WrittenMembers, ask
+from app.cli.queries import print_end, print_size
+from app.cli.steps import Failure, read, showing
+
+if TYPE_CHECKING:
+    from typing import Literal
+
+    from geodesic_core import SurfacePoint, TriangleMesh
+
+    Everywhere = Literal["all"]
+
+_OF_ANY_SIZE = (".npy", ".zarr", ".npz", ".parquet")
+_FILE = "POINTS"
+
+
+def matrix(
+    mesh_file: MeshFile,
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Where the distances go: .npy, .csv or .json; of a sparse matrix .npz, .csv or "
+            ".json. Of points from files .npy or .zarr; only the finite ones .npz or .parquet.",
+            callback=writable(".npy", ".npz", ".csv", ".json", ".zarr", ".parquet"),
+        ),
+    ],
+    source: SomeSources = None,
+    target: SomeTargets = None,
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            metavar=_FILE,
+            help="A file of points, one a line, or 'all' for every vertex: the distances between "
+            "all of them. A command that was stopped goes on where it was.",
+        ),
+    ] = None,
+    sources: Annotated[
+        Path | None, typer.Option(metavar=_FILE, help="The same, from these points; --targets.")
+    ] = None,
+    targets: Annotated[
+        Path | None, typer.Option(metavar=_FILE, help="The same, to these points; --sources.")
+    ] = None,
+    layout: Annotated[
+        Layout,
+        typer.Option(
+            help="'dense': from each source to each target; 'sparse': what can be reached; "
+            "'pairs': from each source to the target of the same number."
+        ),
+    ] = Layout.DENSE,
+    method: MethodOption = Method.EXACT,
+    relative_error: RelativeError = None,
+    effort: EffortOption = None,
+    dtype: Annotated[
+        Number, typer.Option(help="Of the distances, for points from files.")
+    ] = Number.FLOAT64,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="At most so many; one for each core if not named.")
+    ] = None,
+    max_distance: MaxDistance = None,
+    barriers: Barriers = None,
+    merge: MergeOption = Merge.NONE,
+) -> None:
+    """Compute the distances from several points to several others, or between all of a file."""
+    by_files = {"--points": points, "--sources": sources, "--targets": targets}
+    given = [name for name, value in by_files.items() if value is not None]
+    if not given:
+        if not source or not target:
+            raise typer.BadParameter("give --source and --target, or --points with a file")
+        if method is not Method.EXACT or dtype is not Number.FLOAT64 or threads is not None:
+            raise typer.BadParameter("--method, --dtype and --threads go with points from files")
+        _ask_matrix(mesh_file, out, source, target, layout, max_distance, barriers, merge)
+        return
+    if given not in (["--points"], ["--sources", "--targets"]):
+        raise typer.BadParameter("give --points, or both --sources and --targets")
+    if source or target or layout is not Layout.DENSE:
+        raise typer.BadParameter(f"--source, --target and --layout do not go with {given[0]}")
+    if out.suffix.lower() not in _OF_ANY_SIZE:
+        raise typer.BadParameter(f"{out} must end in .npy, .zarr, .npz or .parquet")
+    options = accuracy(method, relative_error, None, effort) | {"dtype": dtype.value}
+    opened, read_seconds = read(mesh_file, merge)
+    import geodesic_core as gc
+
+    mesh = opened.mesh
+    starts = _points_of(mesh, points or sources)
+    stops = None if targets is None else _points_of(mesh, targets)
+    with showing("Computing the matrix") as step:
+        written = gc.write_matrix(
+            mesh,
+            out,
+            starts,
+            stops,
+            **options,
+            max_distance=max_distance,
+            barriers=barriers or (),
+            threads=threads,
+            progress=step.progress,
+            cancel=step.cancel,
+        )
+    print_size(mesh)
+    rows = min(written.shape)
+    typer.echo(f"matrix      {written.shape[0]} by {written.shape[1]}")
+    if written.swept < rows:
+        typer.echo(f"continued   {rows - written.swept} of {rows} sweeps were done before")
+    bound = written.error_bound
+    typer.echo(f"error bound {bound.value!r} ({bound.type}, {bound.kind})")
+    typer.echo(f"sha256      {written.sha256}")
+    typer.echo(f"took        {read_seconds:.3f} s to read")
+    typer.echo(f"written     {out}")
+
+
+def _points_of(mesh: "TriangleMesh", file: Path | None) -> "list[SurfacePoint] | Everywhere":
+    """Return the points of a file, one a line; those of all vertices for the name ``all``."""
+    if file is None or str(file) == "all":
+        return "all"
+    from app.queries.points import resolve_point
+    from geodesic_core.errors import InvalidPoint
+
+    try:
+        lines = file.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise Failure(f"cannot read {file}: {getattr(error, 'strerror', None) or error}") from None
+    points: list[SurfacePoint] = []
+    for number, line in enumerate(lines, 1):
+        text = line.strip()
+        if not text or text.startswith("#"):
+            continue
+        try:
+            points.append(resolve_point(mesh, Point.parse(text).point))
+        except (InvalidPoint, typer.BadParameter) as error:
+            raise Failure(f"{file}, line {number}: {error}") from None
+    if not points:
+        raise Failure(f"{file} has no points: write one a line")
+    return points
+
+
+def _ask_matrix(
+    mesh_file: Path,
+    out: Path,
+    source: list[Point],
+    target: list[Point],
+    layout: Layout,
+    max_distance: float | None,
+    barriers: Any,
+    merge: Merge,
+) -> None:
+    """Ask for a matrix as the service would be asked."""
+    wanted = (".npz" if layout is Layout.SPARSE else ".npy", ".csv", ".json")
+    if out.suffix.lower() not in wanted:
+        raise typer.BadParameter(f"{out.suffix} does not go with --layout {layout.value}")
+    if layout is Layout.PAIRS and len(source) != len(target):
+        raise typer.BadParameter(
+            f"there are {len(source)} sources and {len(target)} targets; pairs need as many"
+        )
+    members: Mapping[str, Any] = {
+        "layout": layout.value,
+        "max_distance": max_distance,
+        "barriers": barriers or [],
+    }
+    points: WrittenMembers = {"sources": source, "targets": target}
+    answered = ask("matrix", mesh_file, merge, "Computing the matrix", points, members)
+    import numpy as np
+
+    files.write_answer(out, answered.answer)
+    reached = np.count_nonzero(np.isfinite(answered.answer.members["distances"]))
+    cells = len(source) if layout is Layout.PAIRS else len(source) * len(target)
+    print_size(answered.mesh)
+    typer.echo(f"reached     {reached} of {cells} distances")
+    print_end(answered, out)
