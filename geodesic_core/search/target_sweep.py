@@ -93,11 +93,15 @@ def _limit_of(
 
     A distance known so far is that of a path: nothing beyond it can be nearer.
     """
+    others = np.flatnonzero(reaches.any(axis=1))  # than vertices, whose corner is the vertex itself
+    corners, reaches = corners[others], reaches[others]
 
     def limit(wave: Wavefront) -> float:
-        known = np.minimum(
-            wave.vertices.distance[nodes], (wave.vertices.distance[corners] + reaches).min(axis=1)
-        )
-        return float(np.partition(known, count - 1)[count - 1]) * (1.0 + SEARCH_SLACK)
+        known = wave.vertices.distance[nodes]
+        if len(others):
+            past_corners = (wave.vertices.distance[corners] + reaches).min(axis=1)
+            known[others] = np.minimum(known[others], past_corners)
+        last = known.max() if count == len(known) else np.partition(known, count - 1)[count - 1]
+        return float(last) * (1.0 + SEARCH_SLACK)
 
     return limit
