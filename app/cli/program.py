@@ -7,7 +7,7 @@ import typer
 from typer.exceptions import TyperException
 
 from app import __version__
-from app.cli import cluster, compilation, meshes, queries, serve, tables
+from app.cli import batch, cluster, compilation, meshes, queries, serve, tables
 from app.cli.steps import Failure
 from app.cli.store import store
 
@@ -72,6 +72,7 @@ for command in (
     queries.paths,
     queries.isolines,
     tables.matrix,
+    batch.batch,
     queries.nearest,
     queries.locate,
     meshes.sample,

@@ -1,0 +1,270 @@
+"""The command that asks the same questions of many meshes, several at a time."""
+
+import csv
+import json
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import asdict, dataclass, fields, replace
+from functools import partial
+from io import StringIO
+from pathlib import Path
+from time import perf_counter
+from typing import Annotated, Any, Literal, get_args, get_type_hints
+
+import typer
+
+from app.cli import files
+from app.cli.arguments import (
+    EffortOption,
+    MaxDistance,
+    Merge,
+    MergeOption,
+    Method,
+    MethodOption,
+    Point,
+    RelativeError,
+    SomeTargets,
+    Sources,
+    accuracy,
+    writable,
+)
+from app.cli.steps import showing
+
+_FAILED = 1
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the table: a question to a mesh, or a mesh that failed."""
+
+    mesh: str
+    vertices: int | None = None
+    faces: int | None = None
+    source: str | None = None
+    target: str | None = None
+    """None where the row is of all vertices"""
+    distance: float | None = None
+    """From source to target, mesh units; None where there is no path"""
+    farthest: float | None = None
+    """Largest distance of a vertex from the source, mesh units"""
+    mean: float | None = None
+    """Mean distance of the vertices"""
+    unreachable: int | None = None
+    """Vertices that were not reached"""
+    error_bound: str | None = None
+    read_s: float | None = None
+    """Seconds of reading the mesh"""
+    solve_s: float | None = None
+    error: str | None = None
+    """Why the mesh, or the question, has no answer"""
+
+
+@dataclass(frozen=True)
+class Questions:
+    """The questions to each mesh."""
+
+    sources: Sequence[Point]
+    targets: Sequence[Point]
+    options: dict[str, Any]
+    """Of the solver, its method among them"""
+    merge: Literal["none", "exact"]
+
+
+def batch(
+    meshes: Annotated[
+        list[Path], typer.Argument(metavar="MESHES...", help="OBJ, OFF, PLY, STL or GLB files.")
+    ],
+    source: Sources,
+    out: Annotated[
+        Path,
+        typer.Option(
+            help="Where the table goes: .csv or .parquet.", callback=writable(".csv", ".parquet")
+        ),
+    ],
+    target: SomeTargets = None,
+    method: MethodOption = Method.EXACT,
+    relative_error: RelativeError = None,
+    effort: EffortOption = None,
+    max_distance: MaxDistance = None,
+    processes: Annotated[
+        int | None,
+        typer.Option(min=1, help="Meshes at a time; one for each core if not named."),
+    ] = None,
+    merge: MergeOption = Merge.NONE,
+) -> None:
+    """Ask the same questions of many meshes; one that fails does not stop the others.
+
+    For each mesh and source the table has a row with the largest and the mean distance of all
+    vertices, or, with targets, a row for each with its distance. Exit code 1 if any has failed.
+    """
+    options = accuracy(method, relative_error, None, effort) | {"max_distance": max_distance}
+    questions = Questions(source, target or [], options, merge.value)
+    from app.settings import available_cores
+    from geodesic_core import warm_up
+
+    count = min(processes or available_cores(), len(meshes))
+    rows: dict[Path, list[Row]] = {}
+    with showing("Loading kernels (compiled on the first run)"):
+        warm_up(["exact", "paths"])
+    start = perf_counter()
+    with showing(f"Solving {len(meshes)} meshes") as step:
+        for mesh, answers in _answers(meshes, questions, count):
+            rows[mesh] = answers
+            step.progress(len(rows) / len(meshes))
+            if step.cancel():
+                break
+    seconds = perf_counter() - start
+    ordered = [row for mesh in meshes for row in rows[mesh]]
+    _write(out, ordered)
+    failed = {row.mesh: row.error for row in ordered if row.error is not None}
+    busy = sum(_seconds(answers) for answers in rows.values()) / (count * seconds)
+    typer.echo(f"meshes      {len(meshes)}, {len(failed)} of them failed")
+    typer.echo(f"rows        {len(ordered)}")
+    typer.echo(f"took        {seconds:.3f} s, {busy:.0%} of {count} processes' time busy")
+    typer.echo(f"written     {out}")
+    for name, error in failed.items():
+        typer.echo(f"{name}: {error}", err=True)
+    if failed:
+        raise typer.Exit(_FAILED)
+
+
+def _answers(
+    meshes: Sequence[Path], questions: Questions, processes: int
+) -> Iterator[tuple[Path, list[Row]]]:
+    """Yield the rows of each mesh, as they come.
+
+    A process that dies takes all that run with it: those are asked again, each by itself.
+    """
+    ask = partial(_QUESTION, questions)
+    alone: list[Path] = []
+    with _pool(processes) as pool:
+        waiting: dict[Future[list[Row]], Path] = {pool.submit(ask, mesh): mesh for mesh in meshes}
+        try:
+            while waiting:
+                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                    mesh = waiting.pop(future)
+                    try:
+                        yield mesh, future.result()
+                    except BrokenProcessPool:
+                        alone.append(mesh)
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+    for mesh in alone:
+        with _pool(1) as pool:
+            try:
+                yield mesh, pool.submit(ask, mesh).result()
+            except BrokenProcessPool:
+                yield mesh, [Row(str(mesh), error="the process died: memory may be short")]
+
+
+def _pool(processes: int) -> ProcessPoolExecutor:
+    # Ctrl-C is for the command: processes end with the question that they are at.
+    return ProcessPoolExecutor(
+        processes,
+        multiprocessing.get_context("spawn"),
+        signal.signal,
+        (signal.SIGINT, signal.SIG_IGN),
+    )
+
+
+def _ask(questions: Questions, file: Path) -> list[Row]:
+    """Return the rows of a mesh."""
+    import geodesic_core as gc
+
+    start = perf_counter()
+    try:
+        mesh = gc.load_mesh(file, merge=questions.merge)
+    except (gc.GeodesicError, OSError) as error:
+        return [Row(str(file), error=_line(error))]
+    read = Row(str(file), len(mesh.vertices), len(mesh.faces), read_s=perf_counter() - start)
+    return [
+        row for source in questions.sources for row in _rows_from(questions, source, mesh, read)
+    ]
+
+
+def _rows_from(questions: Questions, source: Point, mesh: Any, read: Row) -> list[Row]:
+    """Return the rows of a source."""
+    import numpy as np
+
+    import geodesic_core as gc
+    from app.queries.points import resolve_point
+
+    solvers: dict[str, Callable[..., gc.DistanceField]] = {
+        "exact": gc.exact_distance,
+        "approximate": gc.approximate_distance,
+        "fast": gc.fast_distance,
+    }
+    options = dict(questions.options)
+    solve = solvers[options.pop("method")]
+    read, start = replace(read, source=source.text), perf_counter()
+    try:
+        targets = [resolve_point(mesh, target.point) for target in questions.targets]
+        point = resolve_point(mesh, source.point)
+        field = solve(mesh, point, targets=targets, retain="distances", **options)
+    except gc.GeodesicError as error:
+        return [replace(read, error=_line(error))]
+    found = replace(read, error_bound=json.dumps(asdict(field.error_bound)))
+    if not targets:
+        reached = field.distances[np.isfinite(field.distances)]
+        return [
+            replace(
+                found,
+                farthest=float(reached.max()),
+                mean=float(reached.mean()),
+                unreachable=len(field.distances) - len(reached),
+                solve_s=perf_counter() - start,
+            )
+        ]
+    distances = [field.distance_at(target) for target in targets]
+    seconds = perf_counter() - start
+    return [
+        replace(
+            found,
+            target=target.text,
+            distance=distance if np.isfinite(distance) else None,
+            solve_s=seconds / len(targets),
+        )
+        for target, distance in zip(questions.targets, distances, strict=True)
+    ]
+
+
+_QUESTION = _ask
+"""What a process is asked for each mesh"""
+
+
+def _seconds(rows: Sequence[Row]) -> float:
+    """Return the seconds that a mesh took."""
+    return (rows[0].read_s or 0.0) + sum(row.solve_s or 0.0 for row in rows)
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _write(path: Path, rows: Sequence[Row]) -> None:
+    names = [field.name for field in fields(Row)]
+    if path.suffix.lower() == ".csv":
+        text = StringIO(newline="")
+        table = csv.DictWriter(text, names, lineterminator="\n")
+        table.writeheader()
+        table.writerows(map(asdict, rows))
+        files.write_file(path, [text.getvalue().encode()])
+        return
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ModuleNotFoundError as error:
+        from geodesic_core.errors import MissingExtra
+
+        raise MissingExtra("a table in Parquet", "PyArrow", "tables") from error
+    types = {float: pa.float64(), int: pa.int64(), str: pa.string()}
+    columns = [
+        (name, types[(*get_args(kind), kind)[0]]) for name, kind in get_type_hints(Row).items()
+    ]
+    schema = pa.schema(columns)
+    sink = pa.BufferOutputStream()
+    pq.write_table(pa.Table.from_pylist([asdict(row) for row in rows], schema), sink)
+    files.write_file(path, [memoryview(sink.getvalue())])
