@@ -167,7 +167,10 @@ def writable(*suffixes: str) -> Callable[[Path | None], Path | None]:
 SPELLINGS = "as 12 (a vertex), e12-13:0.3 (edge), f7:0.2,0.3,0.5 (face) or p1,2,3 (position)"
 
 MeshFile = Annotated[
-    Path, typer.Argument(metavar="MESH", help="An OBJ, OFF, PLY, STL or GLB file.")
+    Path,
+    typer.Argument(
+        metavar="MESH", help="An OBJ, OFF, PLY, STL, GLB, GIFTI, FreeSurfer or VTK file."
+    ),
 ]
 MergeOption = Annotated[
     Merge, typer.Option("--merge", help="'exact' joins vertices at equal positions.")

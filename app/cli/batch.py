@@ -75,7 +75,7 @@ class Questions:
 
 def batch(
     meshes: Annotated[
-        list[Path], typer.Argument(metavar="MESHES...", help="OBJ, OFF, PLY, STL or GLB files.")
+        list[Path], typer.Argument(metavar="MESHES...", help="Files that `geodesic info` reads.")
     ],
     source: Sources,
     out: Annotated[

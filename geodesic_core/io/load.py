@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
-from geodesic_core.errors import InvalidMesh
+from geodesic_core.errors import InvalidMesh, MissingExtra
+from geodesic_core.io.brain import FREESURFER_MAGIC, read_freesurfer, read_gifti
 from geodesic_core.io.contents import FileContents
 from geodesic_core.io.glb import read_glb
 from geodesic_core.io.limits import check_face_count
@@ -22,6 +23,7 @@ from geodesic_core.io.obj import read_obj
 from geodesic_core.io.off import read_off
 from geodesic_core.io.ply import read_ply
 from geodesic_core.io.stl import read_stl
+from geodesic_core.io.vtk import read_vtk, read_vtu
 from geodesic_core.mesh.triangle_mesh import Merge, TriangleMesh
 
 _Reader = Callable[[bytes, int | None], FileContents]
@@ -31,6 +33,10 @@ _READERS: dict[str, _Reader] = {
     "ply": read_ply,
     "stl": read_stl,
     "glb": read_glb,
+    "gii": read_gifti,
+    "freesurfer": read_freesurfer,
+    "vtk": read_vtk,
+    "vtu": read_vtu,
 }
 
 
@@ -41,7 +47,7 @@ def load_mesh(
     *,
     max_faces: int | None = None,
 ) -> TriangleMesh:
-    r"""Read a mesh file: OBJ, OFF, PLY, STL or GLB.
+    r"""Read a mesh file: OBJ, OFF, PLY, STL or GLB; GIFTI, FreeSurfer or VTK.
 
     Vertices keep the file's numbering and faces its order. Polygons become triangles, in place, and
     ``mesh.face_map`` leads from these to the polygon. Lines, points and curves are left out, and
@@ -54,7 +60,9 @@ def load_mesh(
     source
         A path, or the bytes of a file.
     file_type
-        ``"obj"``, ``"off"``, ``"ply"``, ``"stl"`` or ``"glb"``; by default the suffix of the path.
+        ``"obj"``, ``"off"``, ``"ply"``, ``"stl"``, ``"glb"``, ``"gii"``, ``"freesurfer"``,
+        ``"vtk"`` or ``"vtu"``; by default the suffix of the path. A triangle surface of FreeSurfer,
+        such as ``lh.pial``, is known by its first bytes.
     merge
         ``"exact"`` merges vertices at equal positions, as `TriangleMesh` does.
     max_faces
@@ -73,6 +81,8 @@ def load_mesh(
     InvalidMesh
         The file cannot be read, is no such file, is damaged, declares more than it holds, or holds
         a mesh that `TriangleMesh` refuses.
+    MissingExtra
+        GIFTI needs nibabel, the extra ``brain``; VTK's files need meshio, the extra ``vtk``.
 
     Notes
     -----
@@ -85,8 +95,13 @@ def load_mesh(
     TriangleMesh(3 vertices, 1 faces)
     """
     if isinstance(source, str | Path):
-        kind = _known_kind(file_type or Path(source).suffix)
-        data = _bytes_of(Path(source))
+        path = Path(source)
+        if file_type or path.suffix.lower().removeprefix(".") in _READERS:
+            kind = _known_kind(file_type or path.suffix)  # before a large file is read
+            data = _bytes_of(path)
+        else:
+            data = _bytes_of(path)
+            kind = "freesurfer" if data.startswith(FREESURFER_MAGIC) else _known_kind(path.suffix)
     else:
         kind = _known_kind(file_type or "")
         data = bytes(source)
@@ -94,7 +109,7 @@ def load_mesh(
         raise InvalidMesh(f"the {kind.upper()} file is empty")
     try:
         read = _READERS[kind](data.removeprefix(codecs.BOM_UTF8), max_faces)
-    except InvalidMesh:
+    except (InvalidMesh, MissingExtra):
         raise
     except MemoryError:
         raise
