@@ -8,6 +8,7 @@ from benchmarks import (
     attacks,
     exact,
     fast,
+    large_matrix,
     load,
     matrix,
     page,
@@ -16,6 +17,7 @@ from benchmarks import (
     topology,
 )
 from benchmarks.inputs import Inputs
+from benchmarks.paper import experiments as paper
 from benchmarks.soak import measurement as soak
 from benchmarks.tables import write
 
@@ -30,15 +32,16 @@ BENCHMARKS = {
     "path-peers": path.run_peers,
     "landmarks": path.run_landmarks,
     "matrix": matrix.run,
+    "large-matrix": large_matrix.run,
     "service": service.run,
     "load": load.run,
     "attacks": attacks.run,
     "large-answers": service.run_large,
     "page": page.run,
 }
-SOAK = "soak"
-"""Runs only where it is named, and writes a report of its own"""
-NAMES = (*BENCHMARKS, SOAK)
+SOAK, PAPER = "soak", "paper"
+"""Run only where they are named, and write reports of their own"""
+NAMES = (*BENCHMARKS, SOAK, PAPER)
 ROOT = Path(__file__).parents[1]
 
 
@@ -62,6 +65,10 @@ def main() -> None:
     for name in arguments.names or BENCHMARKS:
         if name == SOAK:
             print(soak.run(arguments.minutes, Path(__file__).with_name("results") / "soak.md"))
+            continue
+        if name == PAPER:
+            for text in paper.run(inputs, arguments.runs):
+                print(text, flush=True)
             continue
         section = BENCHMARKS[name](inputs, arguments.runs)
         print(section.text())
