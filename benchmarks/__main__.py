@@ -1,6 +1,7 @@
 """Run benchmarks, print their tables and write them to ``RESULTS.md``."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from benchmarks import (
@@ -8,6 +9,7 @@ from benchmarks import (
     attacks,
     exact,
     fast,
+    gate,
     large_matrix,
     load,
     matrix,
@@ -18,6 +20,7 @@ from benchmarks import (
 )
 from benchmarks.inputs import Inputs
 from benchmarks.paper import experiments as paper
+from benchmarks.peers import report as peers
 from benchmarks.soak import measurement as soak
 from benchmarks.tables import write
 
@@ -39,9 +42,9 @@ BENCHMARKS = {
     "large-answers": service.run_large,
     "page": page.run,
 }
-SOAK, PAPER = "soak", "paper"
+SOAK, PAPER, PEERS, GATE = "soak", "paper", "peers", "gate"
 """Run only where they are named, and write reports of their own"""
-NAMES = (*BENCHMARKS, SOAK, PAPER)
+NAMES = (*BENCHMARKS, SOAK, PAPER, PEERS, GATE)
 ROOT = Path(__file__).parents[1]
 
 
@@ -57,6 +60,14 @@ def main() -> None:
         default=ROOT / "../shared/meshes",
         help="folder of real meshes; those it lacks are left out",
     )
+    parser.add_argument("--new", action="store_true", help="commit the ratios of the gate anew")
+    parser.add_argument(
+        "--peer",
+        action="append",
+        default=[],
+        metavar="NAME=COMMAND",
+        help="another peer: COMMAND mesh.obj SOURCE prints a distance for each vertex",
+    )
     arguments = parser.parse_args()
     unknown = set(arguments.names) - set(NAMES)
     if unknown:
@@ -65,6 +76,16 @@ def main() -> None:
     for name in arguments.names or BENCHMARKS:
         if name == SOAK:
             print(soak.run(arguments.minutes, Path(__file__).with_name("results") / "soak.md"))
+            continue
+        if name == GATE:
+            text, is_good = gate.run(is_new=arguments.new)
+            print(text)
+            if not is_good:
+                sys.exit(1)
+            continue
+        if name == PEERS:
+            executables = dict(each.split("=", 1) for each in arguments.peer)
+            print(peers.run(inputs, executables))
             continue
         if name == PAPER:
             for text in paper.run(inputs, arguments.runs):

@@ -1,0 +1,1 @@
+"""Other libraries of geodesic distances, side by side with this one."""
