@@ -51,7 +51,7 @@ def running_head(host: str, port: int, folder: Path, settings: Settings) -> Iter
     records = folder / "records"
     environment = {"RAY_gcs_storage": "rocksdb", "RAY_gcs_storage_path": str(records)}
     options = ["--head", f"--node-ip-address={host}", f"--port={port}"]
-    options += ["--include-dashboard=false"]
+    options += ["--include-dashboard=false", "--no-monitor"]  # which would scale a cluster
     with _running(options, folder, settings, environment) as processes:
         yield processes
 

@@ -35,6 +35,9 @@ PATIENT = {"GEODESIC_DRAIN_S": str(10 * LONG_S), "GEODESIC_CANCEL_GRACE_S": str(
 
 PLY = {"Content-Type": "model/ply"}
 
+LARGE_FACES = 60_000
+"""No small work: all of it waits for the same worker"""
+
 ENDED_WELL = (0, -signal.SIGTERM)
 
 
@@ -173,9 +176,9 @@ class Restart:
 def restart(started: list[Server], tmp_path_factory: pytest.TempPathFactory) -> Restart:
     """Kill a service while a body arrives and a job keeps a worker busy, and start another."""
     first = latest_server(started, tmp_path_factory)
-    small, slow = (
+    small, large = (
         upload_sample(first.client, name, faces)
-        for name, faces in (("plane", 200), ("sphere", SLOW_FACES))
+        for name, faces in (("plane", 200), ("sphere", LARGE_FACES))
     )
     meshes = first.client.get("/v1/meshes").json()
     done = submit(first, small)
@@ -187,9 +190,9 @@ def restart(started: list[Server], tmp_path_factory: pytest.TempPathFactory) -> 
         with pytest.raises(StoreError, match="in use by another process"):
             owned(first.store).__enter__()
         with stopped(workers):
-            interrupted = submit(first, slow, 5)
+            interrupted = submit(first, large, 5)
             wait_until(lambda: status_of(first, interrupted) == "running")
-            waiting = submit(first, slow, 6)
+            waiting = submit(first, large, 6)
             assert status_of(first, waiting) == "accepted"
             ((seen, state),) = islice(events_of(first, interrupted), 1)
             assert state["status"] == "running"
@@ -214,7 +217,7 @@ def test_a_job_that_had_finished_has_its_answer_after_a_restart(restart: Restart
 
 
 def test_jobs_that_were_under_way_are_run_again_after_a_restart(restart: Restart) -> None:
-    mesh = gc.TriangleMesh(*gc.samples.sphere(SLOW_FACES))
+    mesh = gc.TriangleMesh(*gc.samples.sphere(LARGE_FACES))
     for job, source in ((restart.interrupted, 5), (restart.waiting, 6)):
         wait_until(lambda job=job: status_of(restart.server, job) == "successful")
         answer = restart.server.client.get(f"{job}/results").json()

@@ -97,6 +97,10 @@ class ProcessCluster:
         self.nodes.append(node)
         return node
 
+    def living(self) -> list[Command]:
+        """Return the nodes that run."""
+        return [node for node in self.nodes if node.process.poll() is None]
+
     def serve(self) -> Server:
         server = Server(self.store, **self.settings, GEODESIC_ENGINE="ray")
         self.servers.append(server)

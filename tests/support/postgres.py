@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.waiting import LONG_S
+
 USER = "geodesic"
 SECRET = "only-for-tests"  # noqa: S105 - of a server on loopback that ends with the tests
 
@@ -48,7 +50,8 @@ class Server:
 
     def _run(self, program: str, *arguments: str) -> None:
         command = [*self._as_user, str(self._bin / program), "-D", str(self._data), *arguments]
-        subprocess.run(command, check=True, capture_output=True, cwd="/")  # noqa: S603 - of the system
+        patience = {"PGCTLTIMEOUT": str(int(LONG_S))}
+        subprocess.run(command, check=True, capture_output=True, cwd="/", env=os.environ | patience)  # noqa: S603 - of the system
 
     def start(self) -> None:
         log = self._data.with_name("log")
