@@ -150,6 +150,7 @@ def run_killed(out: Path, blocks: int) -> int:
     return process.wait()
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("suffix", [".npy", ".npz"])
 def test_a_process_that_is_killed_goes_on_where_it_was(suffix, tmp_path):
     whole, out = tmp_path / f"whole{suffix}", tmp_path / f"killed{suffix}"
@@ -188,6 +189,7 @@ def test_a_stop_loses_no_block_and_a_damaged_block_is_made_again(
     assert sha256_of(out) == sha256_of(whole)
 
 
+@pytest.mark.jit
 @pytest.mark.usefixtures("small_blocks")
 def test_files_do_not_depend_on_the_number_of_threads(mesh, tmp_path):
     digests = {
