@@ -27,7 +27,8 @@ CORES, AT_MOST_S = 16, 90.0
 
 def cortex() -> gc.TriangleMesh:
     """Return a sphere in folds about as deep as they are wide, one region of it blocked."""
-    vertices, faces = gc.samples.sphere(FACES)
+    ball = gc.samples.sphere(FACES)
+    vertices, faces = ball.vertices, ball.faces
     rng = np.random.default_rng(7)
     waves = rng.normal(size=(40, 3))
     waves *= (rng.uniform(8, 16, 40) / np.linalg.norm(waves, axis=1))[:, None]

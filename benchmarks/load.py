@@ -81,7 +81,7 @@ def _row(
 
 
 def _solve_seconds(rest_s: float = 0.0) -> float:
-    solver = gc.Solver(gc.TriangleMesh(*gc.samples.sphere(SMALL_FACES)))
+    solver = gc.Solver(gc.samples.sphere(SMALL_FACES))
     pairs = _pairs(0)
 
     def solve_rested() -> float:

@@ -1,13 +1,14 @@
 """Geodesic distances and shortest paths on triangle meshes, exact or within a chosen error.
 
 The methods of Surazhsky, Surazhsky, Kirsanov, Gortler and Hoppe, *Fast Exact and Approximate
-Geodesics on Meshes* (2005). Start at `load_mesh` or `TriangleMesh`, then `exact_distance` or
-`approximate_distance`. Examples in docstrings assume ``import geodesic_core as gc`` and
+Geodesics on Meshes* (2005). Start at `exact_distance` or `shortest_path`. Each function takes a
+mesh as a `TriangleMesh`, as arrays, as the path of a file, or as an object of another library
+(`as_mesh`). Examples in docstrings assume ``import geodesic_core as gc`` and
 ``import numpy as np``.
 
 Examples
 --------
->>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+>>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
 >>> gc.exact_distance(mesh, 0).distances.round(3).tolist()
 [0.0, 1.0, 1.0, 1.414]
 """
@@ -21,6 +22,8 @@ from geodesic_core.fields.isolines import Isoline, resolve_chord_error, spaced_l
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, SearchStep
 from geodesic_core.fields.repeatable_sweep import SweepStats
 from geodesic_core.fields.sources import Source
+from geodesic_core.fields.stored_field import load_field
+from geodesic_core.io.as_mesh import as_mesh
 from geodesic_core.io.load import load_mesh
 from geodesic_core.mesh.curve import Curve, share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
@@ -61,12 +64,14 @@ __all__ = [
     "SweepStats",
     "TriangleMesh",
     "approximate_distance",
+    "as_mesh",
     "compile_kernels",
     "distance_matrix",
     "errors",
     "exact_distance",
     "fast_distance",
     "kernel_digest",
+    "load_field",
     "load_mesh",
     "nearest",
     "resolve_chord_error",

@@ -26,7 +26,7 @@ _INSIDE = SurfacePoint.face(0, (0.2, 0.3, 0.5))
 
 
 def _mesh() -> TriangleMesh:
-    return TriangleMesh(*samples.plane(8))
+    return samples.plane(8)
 
 
 def _curve(mesh: TriangleMesh) -> Curve:

@@ -57,7 +57,7 @@ class Control:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> shares = []
     >>> field = gc.exact_distance(mesh, 0, progress=shares.append, deadline_s=60)
     >>> shares[-1]

@@ -23,7 +23,7 @@ class GeodesicError(Exception):
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> try:
     ...     gc.exact_distance(mesh, 7)
     ... except gc.GeodesicError as error:
@@ -90,7 +90,7 @@ class InvalidPoint(GeodesicError):  # noqa: N818
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> mesh.point(-1)
     Traceback (most recent call last):
         ...
@@ -103,7 +103,7 @@ class InvalidArgument(GeodesicError):  # noqa: N818
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> gc.exact_distance(mesh, 0, max_distance=-1.0)
     Traceback (most recent call last):
         ...
@@ -123,7 +123,7 @@ class NoPath(GeodesicError):  # noqa: N818
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> gc.shortest_path(mesh, 0, 3, max_distance=1.0)
     Traceback (most recent call last):
         ...
@@ -140,7 +140,7 @@ class Cancelled(GeodesicError):  # noqa: N818
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> gc.exact_distance(mesh, 0, cancel=lambda: True)
     Traceback (most recent call last):
         ...
@@ -153,7 +153,7 @@ class DeadlineExceeded(GeodesicError):  # noqa: N818
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> gc.exact_distance(mesh, 0, deadline_s=1e-9)
     Traceback (most recent call last):
         ...
@@ -173,7 +173,7 @@ class MemoryLimitExceeded(GeodesicError):  # noqa: N818
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> try:
     ...     gc.exact_distance(mesh, 0, memory_limit=1)
     ... except gc.errors.MemoryLimitExceeded as error:

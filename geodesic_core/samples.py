@@ -1,4 +1,7 @@
-"""Samples: procedural meshes of any number of faces, to begin with without a file."""
+"""Samples: procedural meshes of any number of faces, to begin with without a file.
+
+Faces are counter-clockwise seen from outside, or from above.
+"""
 
 from collections.abc import Callable
 from itertools import combinations
@@ -8,9 +11,7 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument
-
-Sample = tuple[Floats, Ints]
-"""(V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside."""
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 MOST_FACES = 50_000_000
 
@@ -25,7 +26,7 @@ _WALLS = ((1.0, 0.0), (0.0, 1.0), (0.8, 0.6), (-0.6, 0.8), (0.6, 0.8), (-0.8, 0.
 """Directions that the longer holes have."""
 
 
-def knot(faces: int) -> Sample:
+def knot(faces: int) -> TriangleMesh:
     """Return a tube along a trefoil knot: closed, smooth, of genus 1; about 6 units wide.
 
     Parameters
@@ -35,9 +36,8 @@ def knot(faces: int) -> Sample:
 
     Returns
     -------
-    tuple of numpy.ndarray
-        (V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside or
-        above.
+    TriangleMesh
+        Faces are counter-clockwise seen from outside, or from above.
 
     Raises
     ------
@@ -46,9 +46,8 @@ def knot(faces: int) -> Sample:
 
     Examples
     --------
-    >>> vertices, faces = gc.samples.knot(500)
-    >>> vertices.shape, faces.shape
-    ((250, 3), (500, 3))
+    >>> gc.samples.knot(500)
+    TriangleMesh(250 vertices, 500 faces)
     """
     _refuse_count(faces, fewest=500)
     around = ceil(sqrt(0.5 * faces * 2.0 * pi * _TUBE_RADIUS / _KNOT_LENGTH))
@@ -73,10 +72,10 @@ def knot(faces: int) -> Sample:
     vertices = (centre[:, None] + _TUBE_RADIUS * across).reshape(-1, 3)
     ids: Longs = np.arange(along * around, dtype=np.int64).reshape(along, around)
     ids = np.pad(ids, ((0, 1), (0, 1)), mode="wrap")
-    return vertices, _split_quads(ids.T)
+    return TriangleMesh(vertices, _split_quads(ids.T))
 
 
-def sphere(faces: int) -> Sample:
+def sphere(faces: int) -> TriangleMesh:
     """Return the unit sphere as an icosahedron whose faces are cut into n² each; 20 n² faces.
 
     Parameters
@@ -86,9 +85,8 @@ def sphere(faces: int) -> Sample:
 
     Returns
     -------
-    tuple of numpy.ndarray
-        (V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside or
-        above.
+    TriangleMesh
+        Faces are counter-clockwise seen from outside, or from above.
 
     Raises
     ------
@@ -97,9 +95,8 @@ def sphere(faces: int) -> Sample:
 
     Examples
     --------
-    >>> vertices, faces = gc.samples.sphere(80)
-    >>> vertices.shape, faces.shape
-    ((42, 3), (80, 3))
+    >>> gc.samples.sphere(80)
+    TriangleMesh(42 vertices, 80 faces)
     """
     _refuse_count(faces, fewest=20)
     n = max(1, round(sqrt(faces / 20)))
@@ -124,10 +121,10 @@ def sphere(faces: int) -> Sample:
     vertices = np.einsum("vk,vkd->vd", weights[point].astype(float), corners[triangles[face]])
     vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
     all_faces = ids.reshape(20, -1)[:, grid].reshape(-1, 3)
-    return vertices, all_faces.astype(np.int32)
+    return TriangleMesh(vertices, all_faces)
 
 
-def plane(faces: int) -> Sample:
+def plane(faces: int) -> TriangleMesh:
     """Return the unit square in the plane z = 0, as a grid with a boundary, seen from above.
 
     Parameters
@@ -137,9 +134,8 @@ def plane(faces: int) -> Sample:
 
     Returns
     -------
-    tuple of numpy.ndarray
-        (V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside or
-        above.
+    TriangleMesh
+        Faces are counter-clockwise seen from outside, or from above.
 
     Raises
     ------
@@ -148,8 +144,7 @@ def plane(faces: int) -> Sample:
 
     Examples
     --------
-    >>> vertices, faces = gc.samples.plane(2)
-    >>> faces.tolist()
+    >>> gc.samples.plane(2).faces.tolist()
     [[0, 1, 3], [0, 3, 2]]
     """
     _refuse_count(faces, fewest=2)
@@ -160,10 +155,10 @@ def plane(faces: int) -> Sample:
     )
     vertices = np.stack([x, y, np.zeros_like(x)], axis=2).reshape(-1, 3)
     ids: Longs = np.arange(len(vertices), dtype=np.int64).reshape(x.shape)
-    return vertices, _split_quads(ids.T)
+    return TriangleMesh(vertices, _split_quads(ids.T))
 
 
-def terrain(faces: int) -> Sample:
+def terrain(faces: int) -> TriangleMesh:
     """Return mountains and valleys over a square, 10 units wide, seen from above.
 
     Ridges of noise on ever finer lattices, as fine as the grid of vertices has room for. Heights
@@ -176,9 +171,8 @@ def terrain(faces: int) -> Sample:
 
     Returns
     -------
-    tuple of numpy.ndarray
-        (V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside or
-        above.
+    TriangleMesh
+        Faces are counter-clockwise seen from outside, or from above.
 
     Raises
     ------
@@ -187,9 +181,8 @@ def terrain(faces: int) -> Sample:
 
     Examples
     --------
-    >>> vertices, faces = gc.samples.terrain(200)
-    >>> vertices.shape, faces.shape
-    ((121, 3), (200, 3))
+    >>> gc.samples.terrain(200)
+    TriangleMesh(121 vertices, 200 faces)
     """
     _refuse_count(faces, fewest=200)
     rows = round(sqrt(faces / 2))
@@ -210,10 +203,11 @@ def terrain(faces: int) -> Sample:
         amplitude, frequency, octave = 0.42 * amplitude, 2.1 * frequency, octave + 1
     vertices = np.stack([x, y, height - height.min()], axis=2)
     ids: Longs = np.arange(x.size, dtype=np.int64).reshape(x.shape)
-    return vertices.reshape(-1, 3), _split_quads_short(vertices.swapaxes(0, 1), ids.T)
+    faces_of_cells = _split_quads_short(vertices.swapaxes(0, 1), ids.T)
+    return TriangleMesh(vertices.reshape(-1, 3), faces_of_cells)
 
 
-def obstacles(faces: int) -> Sample:
+def obstacles(faces: int) -> TriangleMesh:
     """Return a gently curved sheet with 16 holes, pillars and walls to pass; 8 units wide.
 
     Parameters
@@ -223,9 +217,8 @@ def obstacles(faces: int) -> Sample:
 
     Returns
     -------
-    tuple of numpy.ndarray
-        (V, 3) float64 positions and (F, 3) int32 faces, counter-clockwise seen from outside or
-        above.
+    TriangleMesh
+        Faces are counter-clockwise seen from outside, or from above.
 
     Raises
     ------
@@ -234,9 +227,8 @@ def obstacles(faces: int) -> Sample:
 
     Examples
     --------
-    >>> vertices, faces = gc.samples.obstacles(500)
-    >>> vertices.shape, faces.shape
-    ((321, 3), (512, 3))
+    >>> gc.samples.obstacles(500)
+    TriangleMesh(321 vertices, 512 faces)
     """
     _refuse_count(faces, fewest=500)
     side, rings = _tile_counts(faces)
@@ -271,10 +263,10 @@ def obstacles(faces: int) -> Sample:
         axis=1,
     )
     around = np.pad(ids.reshape(keys.shape), ((0, 0), (0, 0), (0, 1)), mode="wrap")
-    return vertices, np.concatenate([_split_quads(tile.T) for tile in around])
+    return TriangleMesh(vertices, np.concatenate([_split_quads(tile.T) for tile in around]))
 
 
-SAMPLES: dict[str, Callable[[int], Sample]] = {
+SAMPLES: dict[str, Callable[[int], TriangleMesh]] = {
     "knot": knot,
     "sphere": sphere,
     "terrain": terrain,

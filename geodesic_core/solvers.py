@@ -16,11 +16,19 @@ from geodesic_core.fields.distance_field import DistanceField, field_of
 from geodesic_core.fields.fast_sweep import FastSweep
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep, stats_of
-from geodesic_core.fields.sources import Source, Sources, as_sources, component_of, disconnected
+from geodesic_core.fields.sources import (
+    Source,
+    Sources,
+    as_sources,
+    component_of,
+    disconnected,
+    each_of,
+)
+from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.mesh.curve import Polyline
-from geodesic_core.mesh.surface_point import Point, SurfacePoint
+from geodesic_core.mesh.surface_point import Point, Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.call_lock import CallLock
 from geodesic_core.search.matrix import Layout, find_matrix
@@ -41,10 +49,10 @@ Effort = Literal[1, 2, 4, 8]
 
 
 def exact_distance(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     sources: Sources,
     max_distance: float | None = None,
-    targets: Sequence[Point] = (),
+    targets: Points = (),
     barriers: Iterable[int] = (),
     *,
     retain: Retain = "paths",
@@ -58,15 +66,16 @@ def exact_distance(
     Parameters
     ----------
     mesh
-        The surface.
+        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     sources
         A vertex index, a `SurfacePoint`, a `Curve`, a `Source` with a start distance, or several
         of these.
     max_distance
         Limit of the sweep, mesh units; None for no limit. Vertices beyond it count as unreachable.
     targets
-        Points whose distances the same sweep finds, so that `DistanceField.distance_at` and
-        `DistanceField.path_to` know them without a search of their own.
+        A point or several, whose distances the same sweep finds, so that
+        `DistanceField.distance_at` and `DistanceField.path_to` know them without a search of their
+        own.
     barriers
         Ids of faces that act as holes, for this call. The field is that of
         `TriangleMesh.with_barriers`, which prepares the blocked mesh once for many calls.
@@ -103,26 +112,28 @@ def exact_distance(
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+    >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
     >>> field = gc.exact_distance(mesh, 0)
     >>> field.distances.round(3).tolist()
+    [0.0, 1.0, 1.0, 1.414]
+    >>> gc.exact_distance((mesh.vertices, mesh.faces), 0).distances.round(3).tolist()
     [0.0, 1.0, 1.0, 1.414]
     >>> gc.exact_distance(mesh, [0, gc.Source(3, start_distance=0.25)]).nearest_source.tolist()
     [0, 0, 0, 1]
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     bounds = exact_bounds(as_limit(max_distance))
-    mesh, control = _with_barriers(mesh, barriers, control)
+    mesh, control = _with_barriers(as_mesh(mesh), barriers, control)
     return _solve(mesh, sources, targets, bounds, EXACT, retain, control)
 
 
 def approximate_distance(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     sources: Sources,
     relative_error: float | None = 1e-3,
     absolute_error: float | None = None,
     max_distance: float | None = None,
-    targets: Sequence[Point] = (),
+    targets: Points = (),
     barriers: Iterable[int] = (),
     *,
     retain: Retain = "distances",
@@ -169,7 +180,7 @@ def approximate_distance(
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> field = gc.approximate_distance(mesh, 0, relative_error=0.01)
     >>> field.error_bound
     ErrorBound(type='relative', value=0.01, kind='guaranteed')
@@ -180,7 +191,7 @@ def approximate_distance(
     relative, absolute = _as_errors(relative_error, absolute_error)
     limit = as_limit(max_distance)
     bounds = merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
-    mesh, control = _with_barriers(mesh, barriers, control)
+    mesh, control = _with_barriers(as_mesh(mesh), barriers, control)
     if math.isfinite(relative):
         promise = ErrorBound("relative", relative, "guaranteed")
     else:
@@ -189,11 +200,11 @@ def approximate_distance(
 
 
 def fast_distance(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     sources: Sources,
     effort: Effort = 2,
     max_distance: float | None = None,
-    targets: Sequence[Point] = (),
+    targets: Points = (),
     barriers: Iterable[int] = (),
     *,
     retain: Literal["distances", "paths"] = "paths",
@@ -239,7 +250,7 @@ def fast_distance(
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.sphere(320))
+    >>> mesh = gc.samples.sphere(320)
     >>> field = gc.fast_distance(mesh, 0)
     >>> field.error_bound.kind
     'estimated'
@@ -252,7 +263,7 @@ def fast_distance(
         raise InvalidArgument(f"effort is {effort!r}; it must be 1, 2, 4 or 8")
     check_choice("retain", retain, ("distances", "paths"))
     bounds = exact_bounds(as_limit(max_distance))
-    mesh, control = _with_barriers(mesh, barriers, control)
+    mesh, control = _with_barriers(as_mesh(mesh), barriers, control)
     starts, polylines, ends, exact = _as_question(mesh, sources, targets, bounds, control)
     sweep = FastSweep(exact, int(effort))
     front = sweep.run(control)
@@ -262,10 +273,10 @@ def fast_distance(
 
 
 def shortest_path(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     source: Point,
     target: Point,
-    waypoints: Sequence[Point] = (),
+    waypoints: Points = (),
     max_distance: float | None = None,
     *,
     explain: bool = False,
@@ -281,7 +292,7 @@ def shortest_path(
     Parameters
     ----------
     mesh
-        The surface.
+        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     source, target
         Vertex indices or `SurfacePoint`.
     waypoints
@@ -313,7 +324,7 @@ def shortest_path(
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> path = gc.shortest_path(mesh, 1, 2)  # across the edge between the triangles
     >>> path.points.tolist()
     [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0]]
@@ -324,8 +335,9 @@ def shortest_path(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     limit = as_limit(max_distance)
-    stops = _as_stops(mesh, source, target, waypoints, control)
-    return _shortest_through(PathSearch(mesh), stops, limit, control, explain=explain)
+    surface = as_mesh(mesh)
+    stops = _as_stops(surface, source, target, waypoints, control)
+    return _shortest_through(PathSearch(surface), stops, limit, control, explain=explain)
 
 
 class Solver:
@@ -339,17 +351,17 @@ class Solver:
     Parameters
     ----------
     mesh
-        The surface of all calls, also found as ``solver.mesh``.
+        The surface of all calls, which `as_mesh` takes; a `TriangleMesh` as ``solver.mesh``.
 
     Examples
     --------
-    >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+    >>> solver = gc.Solver(gc.samples.plane(2))
     >>> [round(solver.shortest_path(0, target).length, 3) for target in (1, 2, 3)]
     [1.0, 1.0, 1.414]
     """
 
-    def __init__(self, mesh: TriangleMesh) -> None:
-        self.mesh = mesh
+    def __init__(self, mesh: MeshLike) -> None:
+        self.mesh = as_mesh(mesh)
         self._search: PathSearch | None = None
         self._sweep: TargetSweep | None = None
         self._lock = CallLock()
@@ -357,6 +369,9 @@ class Solver:
     def __reduce__(self) -> tuple[type["Solver"], tuple[TriangleMesh]]:
         """Copy and pickle the mesh alone: memory and landmarks are found again."""
         return Solver, (self.mesh,)
+
+    def __repr__(self) -> str:
+        return f"Solver({self.mesh!r})"
 
     @property
     def nbytes(self) -> int:
@@ -367,7 +382,7 @@ class Solver:
         self,
         sources: Sources,
         max_distance: float | None = None,
-        targets: Sequence[Point] = (),
+        targets: Points = (),
         barriers: Iterable[int] = (),
         *,
         retain: Retain = "paths",
@@ -397,7 +412,7 @@ class Solver:
 
         Examples
         --------
-        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver = gc.Solver(gc.samples.plane(2))
         >>> solver.exact_distance([0, 3]).distances.tolist()
         [0.0, 1.0, 1.0, 0.0]
         """
@@ -420,7 +435,7 @@ class Solver:
         relative_error: float | None = 1e-3,
         absolute_error: float | None = None,
         max_distance: float | None = None,
-        targets: Sequence[Point] = (),
+        targets: Points = (),
         barriers: Iterable[int] = (),
         *,
         retain: Retain = "distances",
@@ -450,7 +465,7 @@ class Solver:
 
         Examples
         --------
-        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver = gc.Solver(gc.samples.plane(2))
         >>> solver.approximate_distance(0, None, absolute_error=0.1).error_bound
         ErrorBound(type='absolute', value=0.1, kind='guaranteed')
         """
@@ -474,7 +489,7 @@ class Solver:
         sources: Sources,
         effort: Effort = 2,
         max_distance: float | None = None,
-        targets: Sequence[Point] = (),
+        targets: Points = (),
         barriers: Iterable[int] = (),
         *,
         retain: Literal["distances", "paths"] = "paths",
@@ -504,7 +519,7 @@ class Solver:
 
         Examples
         --------
-        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver = gc.Solver(gc.samples.plane(2))
         >>> solver.fast_distance([0, 3]).distances.tolist()
         [0.0, 1.0, 1.0, 0.0]
         """
@@ -526,7 +541,7 @@ class Solver:
         self,
         source: Point,
         target: Point,
-        waypoints: Sequence[Point] = (),
+        waypoints: Points = (),
         max_distance: float | None = None,
         *,
         explain: bool = False,
@@ -559,7 +574,7 @@ class Solver:
 
         Examples
         --------
-        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver = gc.Solver(gc.samples.plane(2))
         >>> solver.shortest_path(1, 2).faces.tolist()
         [0, 1]
         """
@@ -574,8 +589,8 @@ class Solver:
 
     def distance_matrix(
         self,
-        sources: Sequence[Point],
-        targets: Sequence[Point],
+        sources: Points,
+        targets: Points,
         max_distance: float | None = None,
         layout: Layout = "dense",
         *,
@@ -609,7 +624,7 @@ class Solver:
 
         Examples
         --------
-        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver = gc.Solver(gc.samples.plane(2))
         >>> solver.distance_matrix([0, 1], [2, 3]).round(3).tolist()
         [[1.0, 1.414], [1.414, 1.0]]
         """
@@ -623,7 +638,7 @@ class Solver:
     def nearest(
         self,
         source: Point,
-        candidates: Sequence[Point],
+        candidates: Points,
         k: int = 1,
         max_distance: float | None = None,
         *,
@@ -655,7 +670,7 @@ class Solver:
 
         Examples
         --------
-        >>> solver = gc.Solver(gc.TriangleMesh(*gc.samples.plane(2)))
+        >>> solver = gc.Solver(gc.samples.plane(2))
         >>> solver.nearest(0, [3, 2], k=2).indices.tolist()
         [1, 0]
         """
@@ -741,7 +756,7 @@ def _with_barriers(
 def _solve(
     mesh: TriangleMesh,
     sources: Sources,
-    targets: Sequence[Point],
+    targets: Points,
     bounds: Bounds,
     promise: ErrorBound,
     retain: Retain,
@@ -760,14 +775,15 @@ def _solve(
 def _as_question(
     mesh: TriangleMesh,
     sources: Sources,
-    targets: Sequence[Point],
+    targets: Points,
     bounds: Bounds,
     control: Control,
 ) -> tuple[tuple[Source, ...], tuple[Polyline, ...], tuple[SurfacePoint, ...], RepeatableSweep]:
     """Check sources and targets; return them, canonical points included, and their sweep."""
     starts, polylines = as_sources(mesh, sources, control)
     ends = tuple(
-        mesh.point(point, f"target {i}") for i, point in enumerate(control.watched(targets))
+        mesh.point(point, f"target {i}")
+        for i, point in enumerate(control.watched(each_of(targets, "target")))
     )
     distances = np.array([start.start_distance for start in starts])
     sweep = RepeatableSweep.between(mesh, polylines, distances, ends, bounds, control)
@@ -778,13 +794,14 @@ def _as_stops(
     mesh: TriangleMesh,
     source: Point,
     target: Point,
-    waypoints: Sequence[Point],
+    waypoints: Points,
     control: Control,
 ) -> list[SurfacePoint]:
     """Return the stops of a path, which must be connected."""
     stops = [mesh.point(source, "source")]
     stops += [
-        mesh.point(point, f"waypoint {i}") for i, point in enumerate(control.watched(waypoints))
+        mesh.point(point, f"waypoint {i}")
+        for i, point in enumerate(control.watched(each_of(waypoints, "waypoint")))
     ]
     stops.append(mesh.point(target, "target"))
     for here, there in control.watched(pairwise(stops)):

@@ -37,9 +37,9 @@ def sample(
     from app.encoding import Surface
     from app.encoding.ply_mesh import ply_of
 
-    vertices, triangles = gc.samples.SAMPLES[name](faces)
-    files.write_file(out, ply_of(Surface(vertices, triangles)))
-    typer.echo(f"mesh        {len(vertices)} vertices, {len(triangles)} faces")
+    mesh = gc.samples.SAMPLES[name](faces)
+    files.write_file(out, ply_of(Surface(mesh.vertices, mesh.faces)))
+    typer.echo(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
     typer.echo(f"written     {out}")
 
 

@@ -278,7 +278,10 @@ def _make_mesh(mesh_input: MeshInput, max_faces: int) -> gc.TriangleMesh:
     faces: NDArray[np.int32] | NDArray[np.int64]
     match mesh_input:
         case MeshFromSample():
-            vertices, faces = gc.samples.SAMPLES[mesh_input.name](mesh_input.faces)
+            sample = gc.samples.SAMPLES[mesh_input.name](mesh_input.faces)
+            if len(sample.faces) <= max_faces and mesh_input.merge == "none":
+                return sample
+            vertices, faces = sample.vertices, sample.faces
         case MeshFromFile(file_type="json"):
             refuse_beyond_limit(_JSON_GROWS * mesh_input.path.stat().st_size)
             vertices, faces = read_json_mesh(mesh_input.path.read_bytes())

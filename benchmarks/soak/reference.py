@@ -58,13 +58,13 @@ def make_plan(scale: Scale) -> Plan:
     random = Random(21)  # noqa: S311 - the same questions in each run
     meshes, queries, opened = [], [], []
     for name, faces in scale.meshes.items():
-        vertices, triangles = gc.samples.SAMPLES[name](faces)
-        body = {"vertices": vertices.tolist(), "faces": triangles.tolist()}
-        mesh = OpenMesh.of(gc.TriangleMesh(vertices, triangles))
+        sample = gc.samples.SAMPLES[name](faces)
+        body = {"vertices": sample.vertices.tolist(), "faces": sample.faces.tolist()}
+        mesh = OpenMesh.of(sample)
         opened.append(mesh)
         meshes.append(_upload(mesh, "", json.dumps(body).encode(), JSON_BODY, random))
         queries += [each for _ in range(scale.rounds) for each in _queries(mesh, random)]
-    large = OpenMesh.of(gc.TriangleMesh(*gc.samples.sphere(scale.large_faces)))
+    large = OpenMesh.of(gc.samples.sphere(scale.large_faces))
     path = f"?sample=sphere&faces={scale.large_faces}"
     meshes.append(_upload(large, path, b"", {}, random))
     return Plan(
@@ -93,9 +93,9 @@ def _upload(
 def _variant(number: int, random: Random) -> Upload:
     """Return a mesh of its own, in one of several file formats, every other one compressed."""
     name = random.choice(sorted(gc.samples.SAMPLES))
-    vertices, faces = gc.samples.SAMPLES[name](int(500 * 2 ** random.uniform(0, 5)))
+    sample = gc.samples.SAMPLES[name](int(500 * 2 ** random.uniform(0, 5)))
     kind = FILES[number % len(FILES)]
-    mesh = trimesh.Trimesh((1.0 + number / 128) * vertices, faces, process=False)
+    mesh = trimesh.Trimesh((1.0 + number / 128) * sample.vertices, sample.faces, process=False)
     written = mesh.export(file_type=kind)
     body = written.encode() if isinstance(written, str) else bytes(written)
     opened, headers = OpenMesh.of(gc.load_mesh(body, kind)), {}

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,10 @@ from numpy.typing import NDArray
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import InternalError, NoPath
+from geodesic_core.facts import as_table
+from geodesic_core.fields import picture
 from geodesic_core.fields.fast_sweep import FastSweep
+from geodesic_core.fields.field_file import write_field_file
 from geodesic_core.fields.gradient import gradient_at_vertices
 from geodesic_core.fields.isolines import (
     Drawing,
@@ -55,7 +59,7 @@ class DistanceField:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> field = gc.exact_distance(mesh, 0)
 
     >>> field.distances.round(3).tolist()
@@ -105,7 +109,7 @@ class DistanceField:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> mesh = gc.samples.plane(2)
         >>> field = gc.exact_distance(mesh, 0)
 
         >>> again = gc.DistanceField.from_arrays(mesh, field.arrays())
@@ -146,7 +150,7 @@ class DistanceField:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> mesh = gc.samples.plane(2)
         >>> field = gc.exact_distance(mesh, 0)
 
         >>> field.arrays()["distance"].round(3).tolist()  # in the order of the topology
@@ -166,6 +170,121 @@ class DistanceField:
             **self._result.arrays(),
             "counts": np.array(counts, np.int64),
             "seconds": np.array(stats.seconds),
+        }
+
+    def save(self, path: str | Path) -> None:
+        """Write the field into a file, for `load_field`.
+
+        The file is an archive of numpy arrays. ``numpy.load(path)`` reads ``distances`` and
+        ``nearest_source`` without this library; the rest is for `load_field` in the same version of
+        the library, and binds the file to its mesh, which is not in it.
+
+        Parameters
+        ----------
+        path
+            The file, which ends in ``.npz``.
+
+        Raises
+        ------
+        InvalidArgument
+            It does not, or cannot be written.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "field.npz"
+        >>> gc.exact_distance(gc.samples.plane(2), 0).save(file)
+        >>> np.load(file)["distances"].round(3).tolist()
+        [0.0, 1.0, 1.0, 1.414]
+        """
+        shown: dict[str, NDArray[Any]] = {
+            "distances": self.distances,
+            "nearest_source": self.nearest_source,
+        }
+        write_field_file(path, self.mesh, shown, self.arrays())
+
+    def to_pyvista(self) -> Any:
+        """Return the mesh as one of PyVista, with the distances at its points.
+
+        Returns
+        -------
+        pyvista.PolyData
+            With ``distance``, float64 in mesh units, infinite where unreachable, and
+            ``nearest_source`` at its points.
+
+        Raises
+        ------
+        MissingExtra
+            PyVista is not installed; the extra ``plot`` brings it.
+
+        Examples
+        --------
+        >>> surface = gc.exact_distance(gc.samples.plane(2), 0).to_pyvista()
+        >>> surface.point_data["distance"].round(3).tolist()
+        [0.0, 1.0, 1.0, 1.414]
+        """
+        surface = self.mesh.to_pyvista()
+        surface.point_data["nearest_source"] = self.nearest_source
+        surface.point_data["distance"] = self.distances
+        surface.set_active_scalars("distance")
+        return surface
+
+    def plot(self, screenshot: str | Path | None = None) -> None:
+        """Draw the surface, coloured by distance: in a window, in a notebook, or into a file.
+
+        Sources are marked. What is unreachable is grey.
+
+        Parameters
+        ----------
+        screenshot
+            A file to draw into, without a window: ``.png``, ``.jpg``, ``.tif`` or ``.bmp``.
+
+        Raises
+        ------
+        MissingExtra
+            PyVista is not installed; the extra ``plot`` brings it.
+        InvalidArgument
+            The file is no picture by its suffix, or cannot be written.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "field.png"
+        >>> gc.exact_distance(gc.samples.sphere(80), 0).plot(screenshot=file)
+        >>> file.exists()
+        True
+        """
+        with picture.picture(screenshot, "DistanceField.plot") as plotter:
+            surface = self.to_pyvista()
+            reached = np.where(np.isfinite(self.distances), self.distances, np.nan)
+            surface.point_data["distance"] = reached
+            plotter.add_mesh(surface, scalars="distance", cmap="viridis", nan_color=picture.SURFACE)
+            plotter.add_points(
+                np.array([self.mesh.position(p) for line in self._polylines for p in line]),
+                color=picture.LINE,
+                point_size=picture.POINT_SIZE,
+                render_points_as_spheres=True,
+            )
+
+    def __repr__(self) -> str:
+        facts = (f"{fact} {name}" for name, fact in self._counts().items())
+        return f"DistanceField({', '.join(facts)}, {self.error_bound})"
+
+    def _repr_html_(self) -> str:
+        return as_table("DistanceField", self._counts() | {"accuracy": self.error_bound})
+
+    def _counts(self) -> dict[str, object]:
+        """Return facts by name, as both reprs tell them."""
+        finite = np.isfinite(self.distances)
+        unreached = len(finite) - int(np.count_nonzero(finite))
+        farthest = f"{self.distances[finite].max(initial=0.0):.6g}"
+        return {
+            "vertices" if len(finite) != 1 else "vertex": len(finite),
+            "source" if len(self.sources) == 1 else "sources": len(self.sources),
+            **({"unreached": unreached} if unreached else {}),
+            "farthest": farthest,
         }
 
     @property
@@ -239,7 +358,7 @@ class DistanceField:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> mesh = gc.samples.plane(2)
         >>> field = gc.exact_distance(mesh, 0)
 
         >>> round(field.distance_at(gc.SurfacePoint.face(0, (0.5, 0.25, 0.25))), 6)
@@ -288,7 +407,7 @@ class DistanceField:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> mesh = gc.samples.plane(2)
         >>> field = gc.exact_distance(mesh, [0, 3])
         >>> field.nearest_source_at(gc.SurfacePoint.edge(0, 1, 0.75))  # near 3
         1
@@ -341,7 +460,7 @@ class DistanceField:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> mesh = gc.samples.plane(2)
         >>> field = gc.exact_distance(mesh, 0)
 
         >>> field.path_to(2).points.tolist()
@@ -378,7 +497,7 @@ class DistanceField:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> mesh = gc.samples.plane(2)
         >>> field = gc.exact_distance(mesh, 0)
 
         >>> field.gradient.round(3).tolist()[1:]
@@ -406,7 +525,7 @@ class DistanceField:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> mesh = gc.samples.plane(2)
         >>> field = gc.exact_distance(mesh, 0)
 
         >>> field.levels(3).round(3).tolist()
@@ -465,7 +584,7 @@ class DistanceField:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> mesh = gc.samples.plane(2)
         >>> field = gc.exact_distance(mesh, 0)
 
         >>> near, far = field.isolines([0.5, 1.2])
@@ -508,7 +627,7 @@ class DistanceField:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> mesh = gc.samples.plane(2)
         >>> field = gc.exact_distance(mesh, 0)
 
         >>> [len(lines) for lines in field.each_isoline([0.5, 1.2, 9.0])]

@@ -36,7 +36,7 @@ class Isoline:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> (line,) = gc.exact_distance(mesh, 0).isolines([0.5])[0]  # a quarter of a circle
     >>> line.closed
     False
@@ -52,6 +52,10 @@ class Isoline:
     """True where the last point is joined to the first, which is not repeated."""
     faces: Ints
     """(K,) int32 of a closed line, (K - 1,) of an open one: the face behind each point."""
+
+    def __repr__(self) -> str:
+        kind = "closed" if self.closed else "open"
+        return f"Isoline({len(self.points)} points, {kind}, length {self.length:.6g})"
 
     @property
     def length(self) -> float:

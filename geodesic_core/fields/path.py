@@ -1,14 +1,19 @@
 """Paths over the surface, and how they are made from backtraced crossings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InternalError
+from geodesic_core.extras import extra
+from geodesic_core.facts import as_table
+from geodesic_core.fields import picture
+from geodesic_core.fields.path_file import PathRecord, write_path_file
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths import backtracing, locations
@@ -29,7 +34,7 @@ class ErrorBound:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> gc.exact_distance(mesh, 0).error_bound
     ErrorBound(type='relative', value=0.0, kind='guaranteed')
     """
@@ -37,6 +42,11 @@ class ErrorBound:
     type: Literal["relative", "absolute"]
     value: float
     kind: Literal["guaranteed", "estimated"]
+
+    def __str__(self) -> str:
+        if self.value == 0.0 and self.kind == "guaranteed":
+            return "exact"
+        return f"{self.kind} {self.type} error {self.value:g}"
 
 
 EXACT = ErrorBound("relative", 0.0, "guaranteed")
@@ -52,7 +62,7 @@ class SearchStep:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> [step.name for step in gc.shortest_path(mesh, 0, 3, explain=True).steps]
     ['dijkstra', 'shorten', 'approximate', 'backtrace', 'exact', 'path']
     """
@@ -80,7 +90,7 @@ class GeodesicPath:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> path = gc.shortest_path(mesh, 1, 2)
     >>> path.points.tolist()
     [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0]]
@@ -90,6 +100,9 @@ class GeodesicPath:
     'the point (0.5, 0.0, 0.5) of face 0'
     """
 
+    mesh: TriangleMesh | None
+    """The surface, with the barriers of the call; None of a copy or a pickle, which leaves it
+    behind."""
     points: Floats
     """(K, 3) positions, mesh units."""
     faces: Ints
@@ -114,6 +127,110 @@ class GeodesicPath:
                 self._location_vertices.tolist(),
                 strict=True,
             )
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the path into a file, in the format that its suffix names.
+
+        Parameters
+        ----------
+        path
+            ``.obj`` or ``.ply``: a polyline; ``.csv``: a row for each point, with its face and
+            weights; ``.json``: all of this, with length and error bound; ``.geojson``: a feature in
+            the coordinates of the mesh; ``.npy``: `points` alone.
+
+        Raises
+        ------
+        InvalidArgument
+            The suffix is none of these, or the file cannot be written.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "path.obj"
+        >>> gc.shortest_path(gc.samples.plane(2), 0, 3).save(file)
+        >>> file.read_text().splitlines()
+        ['v 0.0 0.0 0.0', 'v 1.0 1.0 0.0', 'l 1 2']
+        """
+        properties = {"length": self.length, "error_bound": asdict(self.error_bound)}
+        locations = self._location_faces, self._location_weights
+        write_path_file(path, PathRecord(self.points, *locations, self.faces, properties))
+
+    def to_pyvista(self) -> Any:
+        """Return the path as a line of PyVista.
+
+        Returns
+        -------
+        pyvista.PolyData
+            A polyline, or a point where source and target are one; with the length in
+            ``field_data["length"]``.
+
+        Raises
+        ------
+        MissingExtra
+            PyVista is not installed; the extra ``plot`` brings it.
+
+        Examples
+        --------
+        >>> gc.shortest_path(gc.samples.plane(2), 1, 2).to_pyvista().n_points
+        3
+        """
+        with extra("plot", "PyVista", "GeodesicPath.to_pyvista"):
+            import pyvista
+        count = len(self.points)
+        joined = [count, *range(count)] if count > 1 else None
+        line = pyvista.PolyData(self.points.copy(), lines=joined)
+        line.field_data["length"] = [self.length]
+        return line
+
+    def plot(self, screenshot: str | Path | None = None) -> None:
+        """Draw the path on its surface: in a window, in a notebook, or into a file.
+
+        Parameters
+        ----------
+        screenshot
+            A file to draw into, without a window: ``.png``, ``.jpg``, ``.tif`` or ``.bmp``.
+
+        Raises
+        ------
+        MissingExtra
+            PyVista is not installed; the extra ``plot`` brings it.
+        InvalidArgument
+            The file is no picture by its suffix, or cannot be written.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> from tempfile import mkdtemp
+        >>> file = Path(mkdtemp()) / "path.png"
+        >>> gc.shortest_path(gc.samples.sphere(80), 0, 9).plot(screenshot=file)
+        >>> file.exists()
+        True
+        """
+        with picture.picture(screenshot, "GeodesicPath.plot") as plotter:
+            if self.mesh is not None:
+                plotter.add_mesh(self.mesh.to_pyvista(), color=picture.SURFACE)
+            plotter.add_mesh(self.to_pyvista(), color=picture.LINE, line_width=picture.LINE_WIDTH)
+            plotter.add_points(
+                self.points[[0, -1]],
+                color=picture.LINE,
+                point_size=picture.POINT_SIZE,
+                render_points_as_spheres=True,
+            )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the mesh behind: it takes ten thousand times the memory of a path."""
+        return self.__dict__ | {"mesh": None}
+
+    def __repr__(self) -> str:
+        points = "1 point" if len(self.points) == 1 else f"{len(self.points)} points"
+        return f"GeodesicPath({points}, length {self.length:.6g}, {self.error_bound})"
+
+    def _repr_html_(self) -> str:
+        ends = {"from": self.locations[0], "to": self.locations[-1], "length": self.length}
+        return as_table(
+            "GeodesicPath", ends | {"points": len(self.points), "accuracy": self.error_bound}
         )
 
 
@@ -142,6 +259,7 @@ def traced_path(
     """Return the path from its source to node v; O(faces crossed)."""
     located, faces = located_path(mesh, winners, nodes_of_sweep, v)
     return GeodesicPath(
+        mesh=mesh,
         points=located.points + mesh.origin,
         faces=faces,
         length=length_of(located.points),
@@ -215,6 +333,7 @@ def joined(legs: Sequence[GeodesicPath]) -> GeodesicPath:
 
     steps = [replace(step, leg=i) for i, leg in enumerate(legs) for step in (leg.steps or ())]
     return GeodesicPath(
+        mesh=legs[0].mesh,
         points=chained("points"),
         faces=np.concatenate([leg.faces for leg in legs]),
         length=sum(leg.length for leg in legs),

@@ -31,7 +31,7 @@ class SweepStats:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.sphere(80))
+    >>> mesh = gc.samples.sphere(80)
     >>> stats = gc.exact_distance(mesh, 0).stats
     >>> stats.windows_created >= stats.windows_kept > 0
     True
@@ -73,7 +73,7 @@ class SweepStats:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # of five edges
+        >>> mesh = gc.samples.plane(2)  # of five edges
         >>> gc.SweepStats.of(mesh, 10, 5, 3, 1024, 0.1).windows_per_edge_created
         2.0
         """
@@ -90,7 +90,7 @@ class SweepStats:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+        >>> mesh = gc.samples.plane(2)
         >>> gc.exact_distance(mesh, 0).stats.as_dict()["windows_peak"]
         0
         """

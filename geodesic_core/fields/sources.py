@@ -20,7 +20,7 @@ from geodesic_core.mesh.curve import (
     segments_of,
     weights_by_face,
 )
-from geodesic_core.mesh.surface_point import UNPLACED, Point, SurfacePoint
+from geodesic_core.mesh.surface_point import UNPLACED, Point, Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.validation import is_number
 
@@ -38,7 +38,7 @@ class Source:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> gc.exact_distance(mesh, gc.Source(0, start_distance=0.5)).distances.round(3).tolist()
     [0.5, 1.5, 1.5, 1.914]
     """
@@ -273,8 +273,23 @@ def as_sources(
     return tuple(checked), tuple(polylines)
 
 
+def each_of(points: Points, name: str) -> Iterable[Point]:
+    """Return one point or several as several; ``name`` is how messages call one of them.
+
+    Raises
+    ------
+    InvalidArgument
+        They are neither.
+    """
+    if isinstance(points, SurfacePoint | int | np.integer) and not isinstance(points, bool):
+        return [points]
+    if isinstance(points, str | bytes) or not isinstance(points, Iterable):
+        raise InvalidArgument(f"{name}s is {points!r}; it must be a point, or a sequence of points")
+    return points
+
+
 def as_points(
-    mesh: TriangleMesh, points: Iterable[int | SurfacePoint], name: str, control: Control
+    mesh: TriangleMesh, points: Points, name: str, control: Control
 ) -> list[SurfacePoint]:
     """Return canonical points; ``name`` is how messages call one of them.
 
@@ -287,10 +302,9 @@ def as_points(
     Cancelled, DeadlineExceeded
         As the control says.
     """
-    if isinstance(points, str | bytes) or not isinstance(points, Iterable):
-        raise InvalidArgument(f"{name}s is {points!r}; it must be a sequence of points")
     canonical = [
-        mesh.point(point, f"{name} {i}") for i, point in enumerate(control.watched(points))
+        mesh.point(point, f"{name} {i}")
+        for i, point in enumerate(control.watched(each_of(points, name)))
     ]
     if not canonical:
         raise InvalidArgument(f"there are no {name}s: give at least one")

@@ -37,7 +37,7 @@ class Curve:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> side = gc.Curve([0, 1])  # the lower edge of the square
     >>> gc.exact_distance(mesh, side).distances.tolist()
     [0.0, 0.0, 1.0, 1.0]

@@ -65,7 +65,7 @@ class MeshReport:
 
     Examples
     --------
-    >>> report = gc.TriangleMesh(*gc.samples.sphere(80)).report
+    >>> report = gc.samples.sphere(80).report
     >>> report.components, report.boundary_loops, report.euler_characteristic
     (1, 0, 2)
     """
@@ -125,7 +125,7 @@ class MeshReport:
 
         Examples
         --------
-        >>> gc.TriangleMesh(*gc.samples.sphere(80)).report.as_dict()["isolated_vertices"]
+        >>> gc.samples.sphere(80).report.as_dict()["isolated_vertices"]
         {'count': 0, 'ids': ()}
         """
         return asdict(self)

@@ -1,5 +1,6 @@
 """Points of the surface: at a vertex, on an edge or inside a face."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from geodesic_core.errors import InvalidPoint
@@ -30,7 +31,7 @@ class SurfacePoint:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> mesh.position(gc.SurfacePoint(0, (0.5, 0.25, 0.25))).tolist()
     [0.5, 0.25, 0.0]
     """
@@ -138,3 +139,6 @@ class SurfacePoint:
 
 Point = int | SurfacePoint
 """Either way to write a point: a vertex by its index."""
+
+Points = Point | Sequence[Point]
+"""One point or several."""

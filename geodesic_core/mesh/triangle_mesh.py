@@ -9,6 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
+from geodesic_core.extras import extra
+from geodesic_core.facts import as_table
 from geodesic_core.kernels.mesh import build
 from geodesic_core.kernels.mesh.half_edges import TAIL, Topology
 from geodesic_core.kernels.outcome import Outcome
@@ -194,7 +196,7 @@ class TriangleMesh:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+        >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
 
         >>> gc.TriangleMesh.from_arrays(mesh.arrays())
         TriangleMesh(4 vertices, 2 faces)
@@ -220,7 +222,7 @@ class TriangleMesh:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+        >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
 
         >>> mesh.arrays()["faces"].tolist()
         [[0, 1, 3], [0, 3, 2]]
@@ -263,7 +265,7 @@ class TriangleMesh:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+        >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
 
         >>> gc.exact_distance(mesh.with_barriers([0]), 0).distances.round(3).tolist()
         [0.0, inf, 1.0, 1.414]
@@ -356,7 +358,7 @@ class TriangleMesh:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+        >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
 
         >>> str(mesh.locate([0.25, 0.5, 1.0]))
         'the point (0.5, 0.25, 0.25) of face 1'
@@ -405,7 +407,7 @@ class TriangleMesh:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+        >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
 
         >>> mesh.point(gc.SurfacePoint.edge(1, 0, 1.0)) == mesh.point(3)  # the end of an edge
         True
@@ -460,7 +462,7 @@ class TriangleMesh:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+        >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
 
         >>> mesh.point_on_edge(0, 1, 0.25) == mesh.point_on_edge(1, 0, 0.75)
         True
@@ -496,7 +498,7 @@ class TriangleMesh:
 
         Examples
         --------
-        >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+        >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
 
         >>> mesh.position(mesh.point_on_edge(0, 1, 0.25)).tolist()
         [0.25, 0.0, 0.0]
@@ -562,9 +564,55 @@ class TriangleMesh:
             self.__dict__[name] = _frozen(value) if isinstance(value, np.ndarray) else value
         self.topology = Topology(*(_frozen(array) for array in self.topology))
 
+    def to_trimesh(self) -> Any:
+        """Return the mesh as one of trimesh, with the same numbers of vertices and faces.
+
+        Returns
+        -------
+        trimesh.Trimesh
+            With copies of the arrays.
+
+        Examples
+        --------
+        >>> gc.samples.sphere(80).to_trimesh().is_watertight
+        True
+        """
+        import trimesh
+
+        return trimesh.Trimesh(self.vertices.copy(), self.faces.copy(), process=False)
+
+    def to_pyvista(self) -> Any:
+        """Return the mesh as one of PyVista, with the same numbers of vertices and faces.
+
+        Returns
+        -------
+        pyvista.PolyData
+            With copies of the arrays.
+
+        Raises
+        ------
+        MissingExtra
+            PyVista is not installed; the extra ``plot`` brings it.
+
+        Examples
+        --------
+        >>> gc.samples.sphere(80).to_pyvista().n_points
+        42
+        """
+        with extra("plot", "PyVista", "TriangleMesh.to_pyvista"):
+            import pyvista
+        return pyvista.PolyData.from_regular_faces(self.vertices.copy(), self.faces.copy())
+
     def __repr__(self) -> str:
         blocked = f", {len(self.barriers)} of them blocked" if len(self.barriers) else ""
         return f"TriangleMesh({len(self.vertices)} vertices, {len(self.faces)} faces{blocked})"
+
+    def _repr_html_(self) -> str:
+        sides = " × ".join(f"{side:.6g}" for side in np.ptp(self.vertices, axis=0))
+        facts = {"vertices": len(self.vertices), "faces": len(self.faces), "size": sides}
+        if len(self.barriers):
+            facts["blocked faces"] = len(self.barriers)
+        return as_table("TriangleMesh", facts | {"memory": f"{self.nbytes / 1e6:.1f} MB"})
 
 
 def _frozen(array: NDArray[Any]) -> NDArray[Any]:

@@ -13,7 +13,8 @@ from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.extras import extra
 from geodesic_core.fields.sources import as_points, component_of, ends_of
-from geodesic_core.mesh.surface_point import Point, SurfacePoint
+from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.mesh.surface_point import Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.target_sweep import TargetSweep
@@ -36,9 +37,9 @@ _GROWTH = 2
 
 
 def distance_matrix(
-    mesh: TriangleMesh,
-    sources: Sequence[Point],
-    targets: Sequence[Point],
+    mesh: MeshLike,
+    sources: Points,
+    targets: Points,
     max_distance: float | None = None,
     layout: Layout = "dense",
     *,
@@ -53,9 +54,9 @@ def distance_matrix(
     Parameters
     ----------
     mesh
-        The surface.
+        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     sources, targets
-        N and M vertex indices or `SurfacePoint`.
+        N and M vertex indices or `SurfacePoint`; of one alone no list is needed.
     max_distance
         Limit of the sweeps, mesh units; None for no limit. Points beyond it count as unreachable.
     layout
@@ -90,7 +91,7 @@ def distance_matrix(
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+    >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
 
     >>> gc.distance_matrix(mesh, [0, 1], [2, 3]).round(3).tolist()
     [[1.0, 1.414], [1.414, 1.0]]
@@ -100,16 +101,17 @@ def distance_matrix(
     4
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    make = partial(TargetSweep, mesh), partial(PathSearch, mesh)
-    return find_matrix(mesh, *make, sources, targets, max_distance, layout, threads, control)
+    surface = as_mesh(mesh)
+    make = partial(TargetSweep, surface), partial(PathSearch, surface)
+    return find_matrix(surface, *make, sources, targets, max_distance, layout, threads, control)
 
 
 def find_matrix(
     mesh: TriangleMesh,
     target_sweep: Callable[[], TargetSweep],
     search: Callable[[], PathSearch],
-    sources: Sequence[Point],
-    targets: Sequence[Point],
+    sources: Points,
+    targets: Points,
     max_distance: float | None,
     layout: Layout,
     threads: int | None,

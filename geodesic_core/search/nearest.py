@@ -1,6 +1,6 @@
 """Nearest candidates: those with the shortest geodesic distance to a point."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,8 @@ from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.sources import as_points, ends_of
-from geodesic_core.mesh.surface_point import Point
+from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.mesh.surface_point import Point, Points
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.tolerances import TIE
@@ -22,7 +23,7 @@ class Nearest:
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> near = gc.nearest(mesh, 0, [3, 2], k=2)
     >>> near.indices.tolist(), near.distances.round(3).tolist()
     ([1, 0], [1.0, 1.414])
@@ -35,9 +36,9 @@ class Nearest:
 
 
 def nearest(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     source: Point,
-    candidates: Sequence[Point],
+    candidates: Points,
     k: int = 1,
     max_distance: float | None = None,
     *,
@@ -53,7 +54,7 @@ def nearest(
     Parameters
     ----------
     mesh
-        The surface.
+        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     source, candidates
         Vertex indices or `SurfacePoint`.
     k
@@ -81,14 +82,15 @@ def nearest(
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+    >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
 
     >>> gc.nearest(mesh, 0, [3, 2]).indices.tolist()
     [1]
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
+    surface = as_mesh(mesh)
     return find_nearest(
-        mesh, lambda: TargetSweep(mesh), source, candidates, k, max_distance, control
+        surface, lambda: TargetSweep(surface), source, candidates, k, max_distance, control
     )
 
 
@@ -96,7 +98,7 @@ def find_nearest(
     mesh: TriangleMesh,
     target_sweep: Callable[[], TargetSweep],
     source: Point,
-    candidates: Sequence[Point],
+    candidates: Points,
     k: int,
     max_distance: float | None,
     control: Control,

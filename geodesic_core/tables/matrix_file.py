@@ -20,6 +20,7 @@ from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.distance_field import DistanceField
 from geodesic_core.fields.path import EXACT, ErrorBound
 from geodesic_core.fields.sources import as_points
+from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.target_sweep import TargetSweep
@@ -43,7 +44,7 @@ class MatrixFile:
     Examples
     --------
     >>> from tempfile import mkdtemp
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    >>> mesh = gc.samples.plane(2)
     >>> gc.write_matrix(mesh, f"{mkdtemp()}/square.npy", [0, 1], [2, 3]).shape
     (2, 2)
     """
@@ -59,7 +60,7 @@ class MatrixFile:
 
 
 def write_matrix(
-    mesh: TriangleMesh,
+    mesh: MeshLike,
     out: str | Path,
     sources: Sequence[Point] | Everywhere,
     targets: Sequence[Point] | Everywhere | None = None,
@@ -85,7 +86,7 @@ def write_matrix(
     Parameters
     ----------
     mesh
-        The surface.
+        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     out
         ``.npy``: a dense matrix, which `numpy.load` can map into memory; ``.zarr``: the same in
         chunks of rows; ``.npz``: a sparse one for `scipy.sparse.load_npz`, of the finite distances;
@@ -134,7 +135,7 @@ def write_matrix(
 
     Examples
     --------
-    >>> mesh = gc.TriangleMesh(*gc.samples.plane(2))  # the unit square, in two triangles
+    >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
     >>> from tempfile import mkdtemp
     >>> written = gc.write_matrix(mesh, f"{mkdtemp()}/square.npy", "all")
     >>> written.shape
@@ -154,7 +155,7 @@ def write_matrix(
     if not path.parent.is_dir():
         raise InvalidArgument(f"there is no folder {path.parent}")
     require(suffix)
-    mesh = mesh.with_barriers(barriers)
+    mesh = as_mesh(mesh).with_barriers(barriers)
     solve, bound = _solver(mesh, method, relative_error, effort, limit)
     starts = _points(mesh, sources, "source", control)
     stops = None if targets is None else _points(mesh, targets, "target", control)

@@ -39,7 +39,8 @@ def plane(run: Run) -> Path:
 def test_a_sample_is_written_as_it_is(run: Run, name: str) -> None:
     assert run("sample", name, "--faces", 600, "mesh.ply").code == 0
     mesh = gc.load_mesh("mesh.ply")
-    vertices, faces = gc.samples.SAMPLES[name](600)
+    sample = gc.samples.SAMPLES[name](600)
+    vertices, faces = sample.vertices, sample.faces
     assert mesh.vertices.tolist() == vertices.tolist()
     assert mesh.faces.tolist() == faces.tolist()
 
@@ -276,7 +277,8 @@ def test_path_writes_a_polyline_and_json(run: Run, plane: Path) -> None:
 
 def test_a_georeferenced_mesh_is_answered_where_it_lies(run: Run) -> None:
     """A path goes by way of its own points, given by the positions that it was told with."""
-    vertices, faces = gc.samples.terrain(800)
+    sample = gc.samples.terrain(800)
+    vertices, faces = sample.vertices, sample.faces
     moved = 0.005 * vertices + (3e6, 6.4e6, 100.0)
     rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in moved.tolist()]
     rows += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]

@@ -136,7 +136,7 @@ def test_a_processor_below_the_levels_compiles_and_says_so(question, answer, tmp
     """For itself: of what the package or the cache have for a level, it can use nothing."""
     program = f"""
 import geodesic_core as gc
-mesh = gc.TriangleMesh(*gc.samples.plane(2))
+mesh = gc.samples.plane(2)
 print({question})
 """
     environment = {

@@ -9,10 +9,10 @@ from tests.support.fresh import told_by
 
 WITHOUT = """
 import sys
-sys.modules["scipy"] = sys.modules["igl"] = None
+sys.modules["scipy"] = sys.modules["igl"] = sys.modules["pyvista"] = None
 import numpy as np
 import geodesic_core as gc
-mesh = gc.TriangleMesh(*gc.samples.plane(8))
+mesh = gc.samples.plane(8)
 """
 REFUSED = [
     (
@@ -24,6 +24,15 @@ REFUSED = [
         "locate",
         "mesh.locate([0.5, 0.5, 1.0])",
         "TriangleMesh.locate needs libigl: pip install 'geodesic-core[locate]'",
+    ),
+    *(
+        ("plot", f"{thing}()", f"{call} needs PyVista: pip install 'geodesic-core[plot]'")
+        for thing, call in (
+            ("gc.exact_distance(mesh, 0).plot", "DistanceField.plot"),
+            ("gc.shortest_path(mesh, 0, 8).plot", "GeodesicPath.plot"),
+            ("gc.shortest_path(mesh, 0, 8).to_pyvista", "GeodesicPath.to_pyvista"),
+            ("mesh.to_pyvista", "TriangleMesh.to_pyvista"),
+        )
     ),
 ]
 ANSWERED = """
@@ -47,7 +56,7 @@ print("answered")
 pytestmark = pytest.mark.slow  # a process each
 
 
-@pytest.mark.parametrize(("name", "call", "message"), REFUSED, ids=["sparse", "locate"])
+@pytest.mark.parametrize(("name", "call", "message"), REFUSED, ids=[call for _, call, _ in REFUSED])
 def test_what_is_missing_is_named(name: str, call: str, message: str) -> None:
     catch = "except gc.errors.MissingExtra as error: print(error, error.extra)"
     told = told_by(f"{WITHOUT}\ntry: {call}\n{catch}")

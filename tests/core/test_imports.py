@@ -6,8 +6,8 @@ from tests.support.fresh import told_by
 
 pytestmark = pytest.mark.slow  # a process each
 
-SLOW = {"scipy", "igl", "trimesh", "manifold3d"}
-MESH = "mesh = gc.TriangleMesh(*gc.samples.plane(8))\n"
+SLOW = {"scipy", "igl", "trimesh", "manifold3d", "pyvista"}
+MESH = "mesh = gc.samples.plane(8)\n"
 EXACT = MESH + "assert gc.exact_distance(mesh, 0).path_to(8).length > 0.0"
 
 

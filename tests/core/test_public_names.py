@@ -16,7 +16,7 @@ def test_dir_lists_the_public_names_and_nothing_else():
 
 def test_errors_and_samples_are_reachable_by_name():
     assert issubclass(gc.errors.InvalidMesh, gc.GeodesicError)
-    assert len(gc.samples.plane(2)[1]) == 2
+    assert len(gc.samples.plane(2).faces) == 2
 
 
 def test_a_solver_has_each_question_on_one_mesh():

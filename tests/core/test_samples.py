@@ -7,7 +7,6 @@ import pytest
 
 from geodesic_core import samples, shortest_path
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 EULER = {"knot": 0, "sphere": 2, "terrain": 1, "obstacles": -15, "plane": 1}
 BOUNDARIES = {"knot": 0, "sphere": 0, "terrain": 1, "obstacles": 17, "plane": 1}
@@ -22,11 +21,12 @@ def test_the_registry_names_all_samples() -> None:
 @pytest.mark.parametrize("faces", [500, 3_000, 20_000])
 @pytest.mark.parametrize("name", samples.SAMPLES)
 def test_a_sample_is_one_sound_mesh_of_about_the_asked_size(name: str, faces: int) -> None:
-    vertices, triangles = samples.SAMPLES[name](faces)
+    sample = samples.SAMPLES[name](faces)
+    vertices, triangles = sample.vertices, sample.faces
     assert (vertices.dtype, triangles.dtype) == (np.float64, np.int32)
     assert len(triangles) == pytest.approx(faces, rel=0.08)
     assert len(np.unique(vertices, axis=0)) == len(vertices)
-    report = TriangleMesh(vertices, triangles).report
+    report = sample.report
     assert report.components == 1
     assert report.euler_characteristic == EULER[name]
     assert report.boundary_loops == BOUNDARIES[name]
@@ -39,21 +39,24 @@ def _volume(vertices: np.ndarray, faces: np.ndarray) -> float:
 
 
 def test_the_sphere_is_the_unit_sphere_seen_from_outside() -> None:
-    vertices, faces = samples.sphere(20_000)
+    sample = samples.sphere(20_000)
+    vertices, faces = sample.vertices, sample.faces
     np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 1.0, atol=1e-15)
     assert _volume(vertices, faces) == pytest.approx(4.0 / 3.0 * np.pi, rel=1e-3)
     assert len(faces) == 20 * round(np.sqrt(1_000)) ** 2
 
 
 def test_the_smallest_sphere_is_an_icosahedron() -> None:
-    vertices, faces = samples.sphere(20)
+    sample = samples.sphere(20)
+    vertices, faces = sample.vertices, sample.faces
     lengths = np.linalg.norm(vertices[faces] - vertices[np.roll(faces, 1, axis=1)], axis=2)
     np.testing.assert_allclose(lengths, lengths[0, 0], rtol=1e-14)
     assert (np.linalg.det(vertices[faces]) > 0).all()
 
 
 def test_the_knot_is_a_tube_seen_from_outside() -> None:
-    vertices, faces = samples.knot(20_000)
+    sample = samples.knot(20_000)
+    vertices, faces = sample.vertices, sample.faces
     length, radius = 31.9, 0.45
     assert _volume(vertices, faces) == pytest.approx(length * np.pi * radius**2, rel=0.02)
     edges = np.linalg.norm(vertices[faces] - vertices[np.roll(faces, 1, axis=1)], axis=2)
@@ -61,7 +64,8 @@ def test_the_knot_is_a_tube_seen_from_outside() -> None:
 
 
 def test_the_plane_is_the_unit_square_seen_from_above() -> None:
-    vertices, faces = samples.plane(2_000)
+    sample = samples.plane(2_000)
+    vertices, faces = sample.vertices, sample.faces
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     assert (normals[:, 2] > 0).all()
@@ -91,9 +95,9 @@ def test_a_size_out_of_the_domain_is_refused(name: str, faces: int) -> None:
 def test_any_size_from_the_fewest_on_is_a_sound_mesh(name: str) -> None:
     fewest = FEWEST[name]
     for faces in [*range(fewest, fewest + 40), *range(fewest + 40, 5_000, 171)]:
-        vertices, triangles = samples.SAMPLES[name](faces)
-        assert len(triangles) == pytest.approx(faces, rel=0.12 if faces < 3_000 else 0.06)
-        report = TriangleMesh(vertices, triangles).report
+        sample = samples.SAMPLES[name](faces)
+        assert len(sample.faces) == pytest.approx(faces, rel=0.12 if faces < 3_000 else 0.06)
+        report = sample.report
         assert (report.components, report.euler_characteristic) == (1, EULER[name])
         assert report.degenerate_faces.count == report.misoriented_edges.count == 0
 
@@ -105,7 +109,8 @@ def test_any_size_from_the_fewest_on_is_a_sound_mesh(name: str) -> None:
 def test_a_sample_made_by_arithmetic_is_the_same_to_the_bit_anywhere(
     name: str, digest: str
 ) -> None:
-    vertices, triangles = samples.SAMPLES[name](2_000)
+    sample = samples.SAMPLES[name](2_000)
+    vertices, triangles = sample.vertices, sample.faces
     assert blake2b(vertices.tobytes() + triangles.tobytes(), digest_size=8).hexdigest() == digest
 
 
@@ -116,7 +121,8 @@ def _normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("faces", [200, 3_000, 50_000])
 def test_the_terrain_is_a_height_field_with_hills_and_valleys(faces: int) -> None:
-    vertices, triangles = samples.terrain(faces)
+    sample = samples.terrain(faces)
+    vertices, triangles = sample.vertices, sample.faces
     normals = _normals(vertices, triangles)
     assert (normals[:, 2] > 0).all()
     assert 0.5 * normals[:, 2].sum() == pytest.approx(100.0)
@@ -127,7 +133,8 @@ def test_the_terrain_is_a_height_field_with_hills_and_valleys(faces: int) -> Non
 
 
 def test_the_terrain_s_faces_have_the_shorter_diagonals_of_their_cells() -> None:
-    vertices, faces = samples.terrain(3_000)
+    sample = samples.terrain(3_000)
+    vertices, faces = sample.vertices, sample.faces
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     flat = np.linalg.norm(vertices[edges[:, 0], :2] - vertices[edges[:, 1], :2], axis=1)
     diagonals = np.unique(edges[flat > 1.2 * np.median(flat)], axis=0)
@@ -141,10 +148,10 @@ def test_the_terrain_s_faces_have_the_shorter_diagonals_of_their_cells() -> None
 
 @pytest.mark.jit
 def test_the_obstacles_are_seen_from_above_and_have_holes_to_walk_around() -> None:
-    vertices, faces = samples.obstacles(20_000)
+    sample = samples.obstacles(20_000)
+    vertices, faces = sample.vertices, sample.faces
     assert (_normals(vertices, faces)[:, 2] > 0).all()
-    mesh = TriangleMesh(vertices, faces)
-    path = shortest_path(mesh, *_ends(vertices))
+    path = shortest_path(sample, *_ends(vertices))
     straight = np.linalg.norm(path.points[0] - path.points[-1])
     assert path.length > 1.005 * straight
     edges = np.linalg.norm(vertices[faces] - vertices[np.roll(faces, 1, axis=1)], axis=2)

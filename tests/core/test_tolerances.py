@@ -554,7 +554,7 @@ def test_runs_are_more_than_winding_about_a_tip_takes():
 @pytest.mark.usefixtures("worn_out")
 def test_a_sweep_whose_runs_are_used_up_begins_anew_exactly():
     """With all that was asked for: paths, windows, targets, curves; progress does not go back."""
-    mesh = gc.TriangleMesh(*gc.samples.knot(500))
+    mesh = gc.samples.knot(500)
     sources = [3, gc.SurfacePoint.face(50, (0.2, 0.3, 0.5)), gc.Curve(mesh.faces[100, :2].tolist())]
     target = gc.SurfacePoint.face(200, (0.5, 0.25, 0.25))
     shares = []
@@ -579,7 +579,7 @@ def test_a_sweep_whose_runs_are_used_up_begins_anew_exactly():
 @pytest.mark.jit
 @pytest.mark.usefixtures("worn_out")
 def test_searches_whose_runs_are_used_up_find_the_shortest_path():
-    mesh = gc.TriangleMesh(*gc.samples.knot(500))
+    mesh = gc.samples.knot(500)
     exact = gc.exact_distance(mesh, 3)
     solver = gc.Solver(mesh)
     for target in [*range(10, 250, 24), 10]:
@@ -596,7 +596,7 @@ def test_searches_whose_runs_are_used_up_find_the_shortest_path():
 
 @pytest.mark.jit
 def test_widest_error_is_the_most_that_is_used():
-    mesh = gc.TriangleMesh(*gc.samples.knot(2000))
+    mesh = gc.samples.knot(2000)
     widest = gc.approximate_distance(mesh, 0, WIDEST_ERROR)
     for error in (2 * WIDEST_ERROR, 0.5):
         field = gc.approximate_distance(mesh, 0, error)
@@ -617,7 +617,8 @@ def offer_to(topology, front, bounds, h, length, offered):
 
 def waiting(offers: int, sigma: float) -> int:
     """How many of some equal windows wait; they win no place, and all else known is 10.2 there."""
-    topology = topology_of(zoo.Case("square", *gc.samples.plane(2)))
+    square = gc.samples.plane(2)
+    topology = topology_of(zoo.Case("square", square.vertices, square.faces))
     front = fast_state.new_wavefront(topology, NO_SITES, 1, 0)
     front.distance[:], front.values[:] = 10.0, 10.0
     bounds = fast_state.FastBounds(math.inf, 1, 1.0, (), (), 0)

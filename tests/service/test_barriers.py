@@ -204,7 +204,7 @@ def test_blocked_meshes_are_kept_while_they_fit(tmp_path: Path) -> None:
                     for i, wall in enumerate(walls)
                 ]
             )
-    mesh = gc.TriangleMesh(*gc.samples.plane(200))
+    mesh = gc.samples.plane(200)
     assert found[0] == found[1]
     for distances_found, wall in zip(found[0], walls, strict=True):
         field = gc.exact_distance(mesh, 0, barriers=wall)
@@ -214,7 +214,7 @@ def test_blocked_meshes_are_kept_while_they_fit(tmp_path: Path) -> None:
 
 
 def test_an_open_mesh_with_barriers_keeps_its_warnings() -> None:
-    opened = OpenMesh(("", b""), gc.Solver(gc.TriangleMesh(*gc.samples.plane(200))), ["look out"])
+    opened = OpenMesh(("", b""), gc.Solver(gc.samples.plane(200)), ["look out"])
 
     blocked = opened.with_barriers(np.array(WALL))
 

@@ -24,7 +24,8 @@ AS_APPROXIMATE = "--method approximate --relative-error 0.01"
 @pytest.fixture
 def knot_file(tmp_path: Path) -> Path:
     """A curved mesh, on which windows merge, with an isolated vertex, of which warnings tell."""
-    vertices, faces = gc.samples.SAMPLES["knot"](3000)
+    sample = gc.samples.SAMPLES["knot"](3000)
+    vertices, faces = sample.vertices, sample.faces
     lonely = np.vstack([vertices, [9.0, 9.0, 9.0]])
     path = tmp_path / "knot.ply"
     path.write_bytes(b"".join(ply_of(Surface(lonely, faces))))

@@ -57,7 +57,8 @@ def check_array(client: Any, mesh_id: str, name: str, array: Any) -> None:
 @pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS.keys())
 def test_a_damaged_array_is_not_served_and_an_upload_heals_it(client: Any, fault: Fault) -> None:
     mesh_id = upload(client)
-    vertices, faces = gc.samples.plane(FACES)
+    sample = gc.samples.plane(FACES)
+    vertices, faces = sample.vertices, sample.faces
     check_array(client, mesh_id, "vertices", vertices)
     expected = distances(client, mesh_id, NPY, **SOURCE).content
 

@@ -131,7 +131,7 @@ def test_lines_end_at_max_distance(client: TestClient, plane: str) -> None:
 def test_the_grant_is_in_force_throughout(
     method: dict, sweeps: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    opened = OpenMesh(("", b""), gc.Solver(gc.TriangleMesh(*gc.samples.knot(3000))), [])
+    opened = OpenMesh(("", b""), gc.Solver(gc.samples.knot(3000)), [])
     request = IsolinesQuery.model.model_validate({"sources": [INSIDE], "count": 4, **method})
     query = IsolinesQuery("m", IsolinesQuery.normalized(request))
     watched: list[dict[str, Any]] = []

@@ -165,7 +165,7 @@ def test_points_are_limited_by_the_size_of_their_answer(tmp_path: Path) -> None:
 
 def test_the_search_tree_is_made_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """By the first of many positions; queries on the same open mesh share it."""
-    opened = OpenMesh(("", b""), gc.Solver(gc.TriangleMesh(*gc.samples.knot(500))), [])
+    opened = OpenMesh(("", b""), gc.Solver(gc.samples.knot(500)), [])
     made: list[NearestFace] = []
     build = NearestFace.__init__
 

@@ -90,7 +90,8 @@ def test_samples_have_the_same_names_everywhere(client: TestClient) -> None:
 def test_samples(client: TestClient, name: str) -> None:
     mesh_id = upload_sample(client, name, 500)
 
-    vertices, faces = samples.SAMPLES[name](500)
+    sample = samples.SAMPLES[name](500)
+    vertices, faces = sample.vertices, sample.faces
     mesh = stored_mesh(client, mesh_id)
     np.testing.assert_array_equal(mesh.vertices, vertices)
     np.testing.assert_array_equal(mesh.faces, faces)

@@ -299,7 +299,7 @@ def test_keys_tell_points_apart() -> None:
 
 
 def test_looking_for_points_can_be_stopped() -> None:
-    mesh = gc.TriangleMesh(*gc.samples.plane(200))
+    mesh = gc.samples.plane(200)
     point = VertexPoint(vertex=1)
     queries: list[Query[Any]] = [
         DistancesQuery("m", DistancesRequest(sources=[VertexSource(vertex=1)])),

@@ -217,7 +217,7 @@ def test_a_job_that_had_finished_has_its_answer_after_a_restart(restart: Restart
 
 
 def test_jobs_that_were_under_way_are_run_again_after_a_restart(restart: Restart) -> None:
-    mesh = gc.TriangleMesh(*gc.samples.sphere(LARGE_FACES))
+    mesh = gc.samples.sphere(LARGE_FACES)
     for job, source in ((restart.interrupted, 5), (restart.waiting, 6)):
         wait_until(lambda job=job: status_of(restart.server, job) == "successful")
         answer = restart.server.client.get(f"{job}/results").json()

@@ -12,7 +12,7 @@ from pathlib import Path
 import geodesic_core as gc
 from geodesic_core.kernels.jit.dispatcher import compiled_here
 
-MESH = gc.TriangleMesh(*gc.samples.terrain(2000))
+MESH = gc.samples.terrain(2000)
 LAST = len(MESH.vertices) - 1
 POINT = gc.SurfacePoint.face(3, (0.2, 0.3, 0.5))
 ON_EDGE = MESH.point_on_edge(*MESH.faces[7, :2].tolist(), 0.4)

@@ -36,7 +36,7 @@ from tests.support.killing import Killer, in_child
 from tests.support.service import store_mesh
 from tests.support.workers import new_worker
 
-MESH = geodesic_core.TriangleMesh(*geodesic_core.samples.plane(50))
+MESH = geodesic_core.samples.plane(50)
 SIZE = MeshSize(len(MESH.vertices), len(MESH.faces), MESH.report.mean_edge_length)
 CONTEXT = RequestContext(Caller("127.0.0.1", has_key=False), 60.0, "a request")
 EXPECTED = geodesic_core.exact_distance(MESH, 3).distances

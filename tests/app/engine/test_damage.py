@@ -30,7 +30,7 @@ each_fault = pytest.mark.parametrize("fault", FAULTS.values(), ids=FAULTS.keys()
 
 
 def plane() -> TriangleMesh:
-    return TriangleMesh(*samples.plane(200))
+    return samples.plane(200)
 
 
 @pytest.fixture

@@ -32,7 +32,7 @@ from tests.support.workers import (
 
 
 def planes(*faces: int) -> list[TriangleMesh]:
-    return [TriangleMesh(*samples.plane(count)) for count in faces]
+    return [samples.plane(count) for count in faces]
 
 
 def path_query(mesh_id: str, target: int, **members: Any) -> PathQuery:
@@ -184,7 +184,7 @@ def test_caches_are_emptied_where_memory_runs_out(
 def test_a_field_that_took_long_is_stored_for_other_workers(
     tmp_path: Path, sweeps: list[int], accuracy: dict[str, Any]
 ) -> None:
-    mesh_id = store_mesh(tmp_path, TriangleMesh(*samples.knot(2000)))
+    mesh_id = store_mesh(tmp_path, samples.knot(2000))
     query = distances_query(mesh_id, 5, 6, vertex=3, **accuracy)
     first, second = new_worker(tmp_path), new_worker(tmp_path)
 
@@ -276,7 +276,7 @@ def test_a_defect_is_logged_and_becomes_a_problem(
 def test_work_that_is_asked_to_stop_stops(tmp_path: Path, accuracy: dict[str, Any]) -> None:
     signals = Signals(stop_number=2)
     worker = Worker(worker_config(tmp_path), signals)
-    mesh_id = store_mesh(tmp_path, TriangleMesh(*samples.sphere(2000)))
+    mesh_id = store_mesh(tmp_path, samples.sphere(2000))
     work = run_query(path_query(mesh_id, 700, **accuracy))
 
     assert worker.do(2, work) is None

@@ -18,7 +18,7 @@ FAST = {"method": "fast", "effort": 1}
 
 @pytest.fixture
 def opened() -> OpenMesh:
-    return OpenMesh(("id", b""), gc.Solver(gc.TriangleMesh(*gc.samples.knot(2000))), [])
+    return OpenMesh(("id", b""), gc.Solver(gc.samples.knot(2000)), [])
 
 
 def ask(opened: OpenMesh, fields: FieldCache, kind: Any, **body: Any) -> bytes:
@@ -133,7 +133,7 @@ def test_fields_go_when_there_is_no_more_room(opened: OpenMesh, sweeps: list[int
 
 
 def test_the_size_of_a_field_is_that_of_its_arrays() -> None:
-    mesh = gc.TriangleMesh(*gc.samples.knot(2000))
+    mesh = gc.samples.knot(2000)
     plain = gc.exact_distance(mesh, 0)
     kept = gc.exact_distance(mesh, 0, retain="windows")
 

@@ -32,7 +32,8 @@ class Replica:
 
     async def add(self, scale: int, owner: str | None = None) -> tuple[str, CatalogChange | None]:
         """Add a mesh; those of all scales take equally much."""
-        vertices, faces = gc.samples.plane(50)
+        sample = gc.samples.plane(50)
+        vertices, faces = sample.vertices, sample.faces
         mesh = gc.TriangleMesh(vertices * scale, faces)
         async with self.catalog.scratch_folder() as folder:
             written = self.store.write_aside(mesh, folder / "mesh", owner)

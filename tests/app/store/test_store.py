@@ -44,7 +44,7 @@ from tests.support.waiting import LONG_S, wait_until
 
 
 def plane(faces: int = 50) -> gc.TriangleMesh:
-    return gc.TriangleMesh(*gc.samples.plane(faces))
+    return gc.samples.plane(faces)
 
 
 def files_in(root: Path) -> set[str]:

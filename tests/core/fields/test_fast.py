@@ -158,7 +158,8 @@ def test_barriers_and_limits(effort):
 @pytest.mark.parametrize("gap", [1e3, 1e9, 1e300])
 def test_start_distances_far_beyond_the_ring_of_buckets(gap):
     """Two components, the second of which starts when the first has long been done."""
-    vertices, faces = gc.samples.plane(50)
+    sample = gc.samples.plane(50)
+    vertices, faces = sample.vertices, sample.faces
     both = np.vstack([vertices, vertices + np.array([0.0, 0.0, 5.0])])
     mesh = gc.TriangleMesh(both, np.vstack([faces, faces + len(vertices)]))
     field = gc.fast_distance(mesh, [0, gc.Source(len(vertices) + 3, gap)])
@@ -169,7 +170,7 @@ def test_start_distances_far_beyond_the_ring_of_buckets(gap):
 
 
 def test_ties_go_to_the_lower_source():
-    mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    mesh = gc.samples.plane(2)
     assert gc.fast_distance(mesh, [0, 3]).nearest_source.tolist() == [0, 0, 0, 1]
 
 
@@ -243,19 +244,19 @@ def test_it_can_be_cancelled_on_the_way():
 
 @pytest.mark.parametrize("effort", [0, 3, 16, -1, 2.5, True, "2", None, math.nan])
 def test_efforts_that_are_none(effort):
-    mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    mesh = gc.samples.plane(2)
     with pytest.raises(gc.errors.InvalidArgument, match=r"effort is .*; it must be 1, 2, 4 or 8"):
         gc.fast_distance(mesh, 0, effort)
 
 
 def test_windows_are_not_retained():
-    mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    mesh = gc.samples.plane(2)
     with pytest.raises(gc.errors.InvalidArgument, match="retain is 'windows'"):
         gc.fast_distance(mesh, 0, retain="windows")
 
 
 def test_the_error_is_estimated_by_effort():
-    mesh = gc.TriangleMesh(*gc.samples.plane(2))
+    mesh = gc.samples.plane(2)
     bounds = [gc.fast_distance(mesh, 0, effort).error_bound for effort in (1, 2, 4, 8)]
     assert {(bound.type, bound.kind) for bound in bounds} == {("relative", "estimated")}
     assert [bound.value for bound in bounds] == sorted({b.value for b in bounds}, reverse=True)

@@ -9,7 +9,7 @@ import pytest
 
 import geodesic_core as gc
 
-MESH = gc.TriangleMesh(*gc.samples.terrain(1500))
+MESH = gc.samples.terrain(1500)
 FREE = (3, (0.2, 0.3, 0.5))
 POINTS = [
     7,

@@ -219,7 +219,7 @@ def test_windows_and_what_is_drawn_count_as_memory(mesh):
 
 
 def test_isolines_keep_the_windows_of_the_faces_that_they_pass():
-    mesh = gc.TriangleMesh(*gc.samples.plane(20_000))
+    mesh = gc.samples.plane(20_000)
     kept, field = gc.exact_distance(mesh, 0, retain="windows"), gc.exact_distance(mesh, 0)
     (level,) = field.levels(1)
     assert kept.stats.peak_bytes > 4 * field.stats.peak_bytes

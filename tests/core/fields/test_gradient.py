@@ -89,7 +89,7 @@ def test_it_is_that_of_the_path_where_the_face_has_no_area():
 
 
 def test_it_is_nan_where_a_curve_starts_beyond_the_limit():
-    mesh = gc.TriangleMesh(*gc.samples.knot(500))
+    mesh = gc.samples.knot(500)
     curve = gc.Curve(mesh.faces[100].tolist())
     field = gc.exact_distance(mesh, [0, gc.Source(curve, 0.5)], max_distance=0.4)
     assert np.isinf(field.distances[mesh.faces[100]]).all()

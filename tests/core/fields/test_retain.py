@@ -6,7 +6,7 @@ import pytest
 import geodesic_core as gc
 
 WORDS = "distances", "paths", "windows"
-MESH = gc.TriangleMesh(*gc.samples.knot(500))
+MESH = gc.samples.knot(500)
 
 
 @pytest.mark.jit

@@ -86,7 +86,7 @@ def test_windows_keep_to_max_distance(case):
 
 
 def test_what_is_kept_changes_nothing_else():
-    mesh = gc.TriangleMesh(*gc.samples.knot(500))
+    mesh = gc.samples.knot(500)
     kept, plain = kept_field(mesh, [3, 50]), gc.exact_distance(mesh, [3, 50])
     np.testing.assert_array_equal(kept.distances, plain.distances)
     np.testing.assert_array_equal(kept.nearest_source, plain.nearest_source)
@@ -98,7 +98,7 @@ def test_what_is_kept_changes_nothing_else():
 
 @pytest.mark.parametrize("solve", [gc.exact_distance, gc.approximate_distance])
 def test_kept_windows_count_against_the_memory_limit(solve):
-    mesh = gc.TriangleMesh(*gc.samples.knot(500))
+    mesh = gc.samples.knot(500)
     lean = solve(mesh, 0).stats.peak_bytes
     solve(mesh, 0, memory_limit=lean)
     with pytest.raises(MemoryLimitExceeded):
@@ -108,7 +108,7 @@ def test_kept_windows_count_against_the_memory_limit(solve):
 
 
 def test_points_of_an_approximate_field_mean_the_same_whether_it_kept_windows_or_not():
-    mesh = gc.TriangleMesh(*gc.samples.knot(500))
+    mesh = gc.samples.knot(500)
     source, *targets = random_points(mesh, 8, seed=25)
     fields = [
         gc.approximate_distance(mesh, source, 0.05, retain=retain)

@@ -10,7 +10,8 @@ from nibabel.gifti import GiftiDataArray, GiftiImage
 
 import geodesic_core as gc
 
-VERTICES, FACES = gc.samples.sphere(320)
+BALL = gc.samples.sphere(320)
+VERTICES, FACES = BALL.vertices, BALL.faces
 SINGLE = VERTICES.astype(np.float32).astype(np.float64)
 
 

@@ -83,6 +83,7 @@ def check_on_the_surface(both, path, source, target, distance):
     np.testing.assert_array_equal(path.points[[0, -1]], [mesh.position(end) for end in ends])
     without = {int(face): i for i, face in enumerate(both.place)}
     moved = gc.GeodesicPath(
+        mesh=clean,
         points=path.points,
         faces=np.array([without[face] for face in path.faces.tolist()], np.int32),
         length=path.length,

@@ -44,7 +44,8 @@ def test_windows_grow_as_n_to_the_power_of_three_halves(surface, levels):
 
 def test_noise_reduces_windows():
     """Figure 7: on a rough knot adjacent windows annihilate each other."""
-    vertices, faces = gc.samples.knot(20_000)
+    sample = gc.samples.knot(20_000)
+    vertices, faces = sample.vertices, sample.faces
     edge = np.linalg.norm(vertices[faces[:, 0]] - vertices[faces[:, 1]], axis=1).mean()
     per_edge = [
         windows(zoo.crumpled(vertices, noise * edge, seed=1), faces).windows_per_edge_created

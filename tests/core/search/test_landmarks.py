@@ -147,7 +147,7 @@ def test_no_landmark_before_as_much_was_searched():
 @pytest.mark.jit
 def test_landmarks_thin_the_search():
     """On a knot, where straight distances say little; the region of the last step stays."""
-    mesh = gc.TriangleMesh(*gc.samples.knot(20_000))
+    mesh = gc.samples.knot(20_000)
     solver = gc.Solver(mesh)
     buy_landmarks(solver, LANDMARKS)
     faces = np.zeros((2, 6))

@@ -55,7 +55,7 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def mesh() -> gc.TriangleMesh:
-    return gc.TriangleMesh(*gc.samples.sphere(320))
+    return gc.samples.sphere(320)
 
 
 @pytest.mark.slice(4)
@@ -136,7 +136,7 @@ from geodesic_core.tables.blocks import Blocks
 from geodesic_core.tables.formats import sha256_of
 
 plan._BLOCK_ROWS = 2
-mesh = gc.TriangleMesh(*gc.samples.sphere(1280))
+mesh = gc.samples.sphere(1280)
 print(gc.write_matrix(mesh, sys.argv[1], range(0, 640, 10), threads=2).swept)
 """
 

@@ -1,0 +1,108 @@
+"""Files of distance fields: arrays in numpy's format npz, bound to their mesh.
+
+A file holds, each in a member of its own:
+
+- ``distances`` and ``nearest_source``, in the order of the mesh's vertices, for any reader;
+- ``barriers``, the blocked faces;
+- ``mesh``, the SHA-256 of the mesh's vertices and faces;
+- ``kernels``, the digest of the code that wrote the file;
+- ``sweep.…``, the arrays of `DistanceField.arrays`, whose layout belongs to that code.
+"""
+
+from collections.abc import Mapping
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geodesic_core.errors import InvalidArgument
+from geodesic_core.files import as_output, written
+from geodesic_core.kernels.jit.cache import sources_digest
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+
+_SWEEP = "sweep."
+
+
+def write_field_file(
+    path: str | Path,
+    mesh: TriangleMesh,
+    shown: Mapping[str, NDArray[Any]],
+    arrays: Mapping[str, NDArray[Any]],
+) -> None:
+    """Write the arrays of a field, and those that any reader is shown.
+
+    Raises
+    ------
+    InvalidArgument
+        The path does not end in ``.npz``, or cannot be written.
+    """
+    with written(as_output(path, ".npz")) as file:
+        np.savez(
+            file,
+            allow_pickle=False,
+            **shown,
+            barriers=mesh.barriers,
+            mesh=np.array(_digest_of(mesh)),
+            kernels=np.array(sources_digest()),
+            **{_SWEEP + name: array for name, array in arrays.items()},
+        )
+
+
+def read_field_file(
+    path: str | Path, mesh: TriangleMesh
+) -> tuple[TriangleMesh, dict[str, NDArray[Any]]]:
+    """Return the mesh of a field, with its barriers, and the arrays of the field.
+
+    Raises
+    ------
+    InvalidArgument
+        The file cannot be read, is of another mesh, or was written by another version.
+    """
+    members = _members_of(path)
+    if str(members["mesh"]) != _digest_of(mesh):
+        raise InvalidArgument(
+            f"{path} holds a field of another mesh: give the one that it was found on, with the "
+            f"same vertices and faces in the same order"
+        )
+    if str(members["kernels"]) != sources_digest():
+        raise InvalidArgument(
+            f"{path} was written by another version of this library: find the field again. Its "
+            f"distances are still there, as numpy.load(path)['distances']"
+        )
+    blocked = mesh.with_barriers(members["barriers"])
+    if not np.array_equal(blocked.barriers, members["barriers"]):
+        raise InvalidArgument(
+            f"{path} holds a field with other barriers than the mesh: give the mesh without any"
+        )
+    sweep = {
+        name.removeprefix(_SWEEP): array
+        for name, array in members.items()
+        if name.startswith(_SWEEP)
+    }
+    return blocked, sweep
+
+
+def _members_of(path: str | Path) -> dict[str, NDArray[Any]]:
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            members = dict(file)
+    except OSError as error:
+        reason = error.strerror or "it is no file of numpy"
+        raise InvalidArgument(f"cannot read {path}: {reason}") from error
+    except (BadZipFile, EOFError, TypeError, ValueError) as error:
+        raise InvalidArgument(
+            f"{path} is damaged, or no field that DistanceField.save wrote"
+        ) from error
+    if not members.keys() >= {"mesh", "kernels", "barriers"}:
+        raise InvalidArgument(f"{path} is no field that DistanceField.save wrote")
+    return members
+
+
+def _digest_of(mesh: TriangleMesh) -> str:
+    digest = sha256(f"{len(mesh.vertices)} {len(mesh.faces)} ".encode())
+    for array in (mesh.vertices, mesh.faces):
+        digest.update(array.data)
+    return digest.hexdigest()
