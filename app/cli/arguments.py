@@ -147,12 +147,15 @@ def effort(text: str) -> int:
     return int(text)
 
 
+STANDARD_OUTPUT = Path("-")
+
+
 def writable(*suffixes: str) -> Callable[[Path | None], Path | None]:
     """Return a check of an output path that is made before any work begins."""
 
     def check(path: Path | None) -> Path | None:
-        if path is None:
-            return None
+        if path is None or path == STANDARD_OUTPUT:
+            return path
         if path.suffix.lower() not in suffixes:
             *others, last = suffixes
             ends = f"{', '.join(others)} or {last}" if others else last

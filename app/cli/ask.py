@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from app.cli.arguments import Merge, Point, PointOrCurve, Position
 from app.cli.steps import Failure, read, showing
+from app.cli.words import words_of
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -25,6 +26,7 @@ _OPTIONS = {
     "waypoints": "--via",
     "candidates": "--candidate",
     "points": "--at",
+    "levels": "--level",
 }
 """Options whose names differ from their members."""
 
@@ -86,8 +88,11 @@ def _as_json(written: Written | Sequence[Written]) -> Any:
 def _first_fault(error: "ValidationError") -> str:
     """Return the message for the first member that a model refuses."""
     fault = error.errors(include_url=False)[0]
-    name = " ".join(map(str, fault["loc"]))
-    return f"{name} is {fault['input']!r}; {fault['msg'].replace('Input', 'it', 1)}"
+    return f"{_option_of(str(fault['loc'][0]))} is {fault['input']!r}: {words_of(fault)}"
+
+
+def _option_of(member: str) -> str:
+    return _OPTIONS.get(member, "--" + member.replace("_", "-"))
 
 
 def _message(problem: "Problem", points: WrittenMembers) -> str:
@@ -96,7 +101,7 @@ def _message(problem: "Problem", points: WrittenMembers) -> str:
         return problem.detail
     fault = problem.errors[0]
     name, *parts = fault.pointer.removeprefix("/").split("/")
-    option = _OPTIONS.get(name, "--" + name.replace("_", "-"))
+    option = _option_of(name)
     if name in points:
         option += f" {_text_at(points[name], parts)}"
     return f"{option}: {fault.message}"

@@ -18,6 +18,7 @@ import typer
 
 from app.cli import files
 from app.cli.arguments import (
+    STANDARD_OUTPUT,
     EffortOption,
     MaxDistance,
     Merge,
@@ -31,7 +32,9 @@ from app.cli.arguments import (
     accuracy,
     writable,
 )
+from app.cli.output import AsJson, Output, print_json, print_parts
 from app.cli.steps import showing
+from app.cli.words import with_options
 
 _FAILED = 1
 
@@ -79,11 +82,12 @@ def batch(
     ],
     source: Sources,
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option(
-            help="Where the table goes: .csv or .parquet.", callback=writable(".csv", ".parquet")
+            help="Where the table goes: .csv or .parquet; - prints .csv. Not needed with --json.",
+            callback=writable(".csv", ".parquet"),
         ),
-    ],
+    ] = None,
     target: SomeTargets = None,
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
@@ -94,12 +98,16 @@ def batch(
         typer.Option(min=1, help="Meshes at a time; one for each core if not named."),
     ] = None,
     merge: MergeOption = Merge.NONE,
+    as_json: AsJson = False,
 ) -> None:
     """Ask the same questions of many meshes; one that fails does not stop the others.
 
     For each mesh and source the table has a row with the largest and the mean distance of all
     vertices, or, with targets, a row for each with its distance. Exit code 1 if any has failed.
     """
+    output = Output(out, as_json)
+    if out is None and not as_json:
+        raise typer.BadParameter("give --out with a file, or --json")
     options = accuracy(method, relative_error, None, effort) | {"max_distance": max_distance}
     questions = Questions(source, target or [], options, merge.value)
     from app.settings import available_cores
@@ -118,13 +126,18 @@ def batch(
                 break
     seconds = perf_counter() - start
     ordered = [row for mesh in meshes for row in rows[mesh]]
-    _write(out, ordered)
+    if as_json:
+        print_json([asdict(row) for row in ordered])
+    if out == STANDARD_OUTPUT:
+        print_parts([_csv(ordered)])
+    elif out is not None:
+        _write(out, ordered)
     failed = {row.mesh: row.error for row in ordered if row.error is not None}
     busy = sum(_seconds(answers) for answers in rows.values()) / (count * seconds)
-    typer.echo(f"meshes      {len(meshes)}, {len(failed)} of them failed")
-    typer.echo(f"rows        {len(ordered)}")
-    typer.echo(f"took        {seconds:.3f} s, {busy:.0%} of {count} processes' time busy")
-    typer.echo(f"written     {out}")
+    output.say(f"meshes      {len(meshes)}, {len(failed)} of them failed")
+    output.say(f"rows        {len(ordered)}")
+    output.say(f"took        {seconds:.3f} s, {busy:.0%} of {count} processes' time busy")
+    output.say_written()
     for name, error in failed.items():
         typer.echo(f"{name}: {error}", err=True)
     if failed:
@@ -241,17 +254,20 @@ def _seconds(rows: Sequence[Row]) -> float:
 
 
 def _line(error: Exception) -> str:
-    return " ".join(str(error).split())
+    return with_options(" ".join(str(error).split()))
+
+
+def _csv(rows: Sequence[Row]) -> bytes:
+    text = StringIO(newline="")
+    table = csv.DictWriter(text, [field.name for field in fields(Row)], lineterminator="\n")
+    table.writeheader()
+    table.writerows(map(asdict, rows))
+    return text.getvalue().encode()
 
 
 def _write(path: Path, rows: Sequence[Row]) -> None:
-    names = [field.name for field in fields(Row)]
     if path.suffix.lower() == ".csv":
-        text = StringIO(newline="")
-        table = csv.DictWriter(text, names, lineterminator="\n")
-        table.writeheader()
-        table.writerows(map(asdict, rows))
-        files.write_file(path, [text.getvalue().encode()])
+        files.write_file(path, [_csv(rows)])
         return
     try:
         import pyarrow as pa

@@ -4,6 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from app.cli.words import words_of
+
 if TYPE_CHECKING:
     from app.settings import Settings
 
@@ -19,8 +21,8 @@ def read_settings(**options: Any) -> "Settings":
         return Settings(**given)
     except ValidationError as error:
         faults = [
-            ": ".join([*(variable_of(str(name)) for name in fault["loc"][:1]), fault["msg"]])
+            ": ".join([*(variable_of(str(name)) for name in fault["loc"][:1]), words_of(fault)])
             for fault in error.errors()
             if fault["type"] != "default_factory_not_called"  # for another fault's sake
         ]
-        raise typer.BadParameter("; ".join(faults).replace("Value error, ", "")) from error
+        raise typer.BadParameter("; ".join(faults)) from error

@@ -13,10 +13,14 @@ if TYPE_CHECKING:
 
 def write_answer(path: Path, answer: "Answer") -> None:
     """Write an answer in the format that the suffix of a path names."""
+    write_file(path, encoded(answer, path.suffix.lower().removeprefix(".")))
+
+
+def encoded(answer: "Answer", name: str) -> Iterable[bytes | memoryview]:
+    """Return the parts of an answer in the format of a name."""
     from app.encoding import FORMATS, Representation, encode
 
-    media_type = FORMATS[path.suffix.lower().removeprefix(".")]
-    write_file(path, encode(answer, Representation(media_type)).parts)
+    return encode(answer, Representation(FORMATS[name])).parts
 
 
 def write_file(path: Path, parts: Iterable[bytes | memoryview]) -> None:

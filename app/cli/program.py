@@ -8,15 +8,15 @@ from typer.exceptions import TyperException
 
 from app import __version__
 from app.cli import batch, cluster, compilation, meshes, queries, serve, tables
-from app.cli.steps import Failure
+from app.cli.steps import Failure, show_help_without_command
 from app.cli.store import store
+from app.cli.words import with_options
 
 FAILED, INTERRUPTED = 1, 130
 """Exit codes: the work failed, Ctrl-C; typer's own for a wrong command line is 2."""
 
 cli = typer.Typer(
     help="Geodesic distances and shortest paths on triangle meshes, exact or within an error.",
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -33,7 +33,7 @@ def main() -> None:
 
         if not isinstance(error, GeodesicError | Failure) or isinstance(error, InternalError):
             raise
-        code = _say_error(str(error), FAILED)
+        code = _say_error(with_options(str(error)), FAILED)
     if code == INTERRUPTED:
         _say_error("interrupted", code)
     sys.exit(code)
@@ -50,8 +50,9 @@ def _show_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@cli.callback()
+@cli.callback(invoke_without_command=True)
 def _options(
+    context: typer.Context,
     _version: Annotated[
         bool,
         typer.Option(
@@ -59,7 +60,7 @@ def _options(
         ),
     ] = False,
 ) -> None:
-    pass
+    show_help_without_command(context)
 
 
 for command in (

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.cli import files
 from app.cli.arguments import (
     AbsoluteError,
     Barriers,
@@ -32,6 +31,7 @@ from app.cli.arguments import (
     writable,
 )
 from app.cli.ask import Answered, WrittenMembers, ask
+from app.cli.output import AsJson, Output
 from app.cli.steps import Failure
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ LINES = ".obj", ".csv", ".svg", ".geojson", ".json"
 PointsOut = Annotated[
     Path | None,
     typer.Option(
-        help="Where the points go as well: .csv, .geojson or .json.",
+        help="Where the points go as well: .csv, .geojson or .json; - prints .csv.",
         callback=writable(".csv", ".geojson", ".json"),
     ),
 ]
@@ -56,12 +56,13 @@ def distance(
     mesh_file: MeshFile,
     source: PointOrCurveSources,
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option(
-            help="Where the distances go: .npy, .csv, .json or .ply (the mesh, coloured).",
+            help="Where the distances go: .npy, .csv, .json or .ply (the mesh, coloured); - "
+            "prints .csv.",
             callback=writable(".npy", ".csv", ".json", ".ply"),
         ),
-    ],
+    ] = None,
     gradient: Annotated[
         bool,
         typer.Option(
@@ -77,8 +78,10 @@ def distance(
     effort: EffortOption = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
+    as_json: AsJson = False,
 ) -> None:
     """Compute the distance of every vertex from the nearest source."""
+    output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error, effort)
     members["include"] = ["nearest_source", *(["gradient"] if gradient else [])]
     members |= {"max_distance": max_distance, "barriers": barriers or []}
@@ -88,17 +91,17 @@ def distance(
 
     found = answered.answer.members
     distances = found["distances"]
-    if gradient and out.suffix.lower() == ".npy":
-        files.write_answer(out, _array(np.column_stack([distances, found["gradient"]])))
-    else:
-        files.write_answer(out, answered.answer)
+    columns = None
+    if gradient and out is not None and out.suffix.lower() == ".npy":
+        columns = _array(np.column_stack([distances, found["gradient"]]))
+    output.write(answered.answer, in_file=columns)
     reached = np.isfinite(distances)
     farthest = int(np.argmax(np.where(reached, distances, -1.0)))
-    print_size(answered.mesh)
-    typer.echo(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
-    typer.echo(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
-    typer.echo(f"error bound {_bound_in_words(found['error_bound'])}")
-    print_end(answered, out)
+    print_size(output, answered.mesh)
+    output.say(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
+    output.say(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
+    output.say(f"error bound {_bound_in_words(found['error_bound'])}")
+    print_end(output, answered)
 
 
 def path(
@@ -109,13 +112,13 @@ def path(
         typer.Option(parser=Point.parse, metavar="POINT", help="The point to go to."),
     ],
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option(
             help="Where the path goes: .obj (a polyline), .csv, .svg, .geojson or .json; its "
-            "points alone to .npy.",
+            "points alone to .npy. - prints .csv.",
             callback=writable(*LINES, ".npy"),
         ),
-    ],
+    ] = None,
     via: Annotated[
         list[Point] | None,
         typer.Option(
@@ -135,8 +138,10 @@ def path(
     effort: EffortOption = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
+    as_json: AsJson = False,
 ) -> None:
     """Compute a shortest path over the surface between two points."""
+    output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error, effort)
     if method is not Method.EXACT and (via or explain):
         name = "--via" if via else "--explain"
@@ -147,18 +152,18 @@ def path(
     found = answered.answer.members
     if found["status"] != "ok":
         raise Failure(_NO_PATH[found["reason"]].format(limit=max_distance))
-    files.write_answer(out, answered.answer)
-    print_size(answered.mesh)
-    typer.echo(f"length      {found['length']!r}")
-    typer.echo(f"points      {len(found['points'])}")
-    typer.echo(f"error bound {_bound_in_words(found['error_bound'])}")
-    _print_seconds(answered)
+    output.write(answered.answer)
+    print_size(output, answered.mesh)
+    output.say(f"length      {found['length']!r}")
+    output.say(f"points      {len(found['points'])}")
+    output.say(f"error bound {_bound_in_words(found['error_bound'])}")
+    _print_seconds(output, answered)
     for step in found.get("steps", ()):
-        typer.echo(
+        output.say(
             f"leg {step.leg}, {step.name:12} {1e3 * step.seconds:8.2f} ms, bound {step.bound!r}, "
             f"{step.windows} windows, {len(step.faces)} faces"
         )
-    typer.echo(f"written     {out}")
+    output.say_written()
 
 
 def paths(
@@ -166,12 +171,13 @@ def paths(
     source: PointOrCurveSource,
     target: Targets,
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option(
-            help="Where the paths go: .obj (a polyline each), .csv, .svg, .geojson or .json.",
+            help="Where the paths go: .obj (a polyline each), .csv, .svg, .geojson or .json; - "
+            "prints .csv.",
             callback=writable(*LINES),
         ),
-    ],
+    ] = None,
     max_distance: MaxDistance = None,
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
@@ -179,33 +185,36 @@ def paths(
     effort: EffortOption = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
+    as_json: AsJson = False,
 ) -> None:
     """Compute shortest paths from one point to several others, in one sweep."""
+    output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error, effort)
     members |= {"max_distance": max_distance, "barriers": barriers or []}
     points: WrittenMembers = {"source": source, "targets": target}
     answered = ask("paths", mesh_file, merge, "Computing the paths", points, members)
-    files.write_answer(out, answered.answer)
-    print_size(answered.mesh)
+    output.write(answered.answer)
+    print_size(output, answered.mesh)
     for written, path in zip(target, answered.answer.members["paths"], strict=True):
         if path["status"] == "ok":
             bound = _bound_in_words(path["error_bound"])
-            typer.echo(f"path        to {written.text}: {path['length']!r}, error bound {bound}")
+            output.say(f"path        to {written.text}: {path['length']!r}, error bound {bound}")
         else:
-            typer.echo(f"no path     to {written.text}: {path['reason']}")
-    print_end(answered, out)
+            output.say(f"no path     to {written.text}: {path['reason']}")
+    print_end(output, answered)
 
 
 def isolines(
     mesh_file: MeshFile,
     source: PointOrCurveSources,
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option(
-            help="Where the lines go: .obj (polylines), .csv, .svg, .geojson or .json.",
+            help="Where the lines go: .obj (polylines), .csv, .svg, .geojson or .json; - "
+            "prints .csv.",
             callback=writable(*LINES),
         ),
-    ],
+    ] = None,
     level: Annotated[
         list[float] | None,
         typer.Option(help="A distance at which to draw lines; may be given again."),
@@ -224,8 +233,10 @@ def isolines(
     absolute_error: AbsoluteError = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
+    as_json: AsJson = False,
 ) -> None:
     """Draw lines of equal distance from the nearest source."""
+    output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error)
     if (count is None) == (level is None):
         raise typer.BadParameter("give --count, or --level at least once, and not both")
@@ -233,20 +244,20 @@ def isolines(
     members |= {"max_distance": max_distance, "barriers": barriers or []}
     points: WrittenMembers = {"sources": source}
     answered = ask("isolines", mesh_file, merge, "Drawing isolines", points, members)
-    files.write_answer(out, answered.answer)
-    print_size(answered.mesh)
+    output.write(answered.answer)
+    print_size(output, answered.mesh)
     for each in answered.answer.members["isolines"]:
         lines = each["lines"]
         closed, length = (
             sum(line["closed"] for line in lines),
             sum(line["length"] for line in lines),
         )
-        typer.echo(
+        output.say(
             f"level       {each['level']!r}: {closed} closed, {len(lines) - closed} open, "
             f"{float(length)!r} long"
         )
-    typer.echo(f"error bound {_bound_in_words(answered.answer.members['error_bound'])}")
-    print_end(answered, out)
+    output.say(f"error bound {_bound_in_words(answered.answer.members['error_bound'])}")
+    print_end(output, answered)
 
 
 def nearest(
@@ -261,21 +272,22 @@ def nearest(
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
+    as_json: AsJson = False,
 ) -> None:
     """Find the candidates that are nearest to a point along the surface."""
+    output = Output(out, as_json)
     if k > len(candidate):
         raise typer.BadParameter(f"-k is {k}, but there are only {len(candidate)} candidates")
     members = {"k": k, "max_distance": max_distance, "barriers": barriers or []}
     points: WrittenMembers = {"source": source, "candidates": candidate}
     answered = ask("nearest", mesh_file, merge, "Looking for the nearest", points, members)
     found = answered.answer.members["nearest"]
-    if out is not None:
-        files.write_answer(out, answered.answer)
-    print_size(answered.mesh)
-    typer.echo(f"found       {len(found)} of {k}")
+    output.write(answered.answer)
+    print_size(output, answered.mesh)
+    output.say(f"found       {len(found)} of {k}")
     for each in found:
-        typer.echo(f"nearest     {candidate[each['candidate']].text} at {each['distance']!r}")
-    print_end(answered, out)
+        output.say(f"nearest     {candidate[each['candidate']].text} at {each['distance']!r}")
+    print_end(output, answered)
 
 
 def locate(
@@ -286,22 +298,22 @@ def locate(
     ],
     out: PointsOut = None,
     merge: MergeOption = Merge.NONE,
+    as_json: AsJson = False,
 ) -> None:
     """Find the point of the surface that is nearest to a position."""
+    output = Output(out, as_json)
     answered = ask("locate", mesh_file, merge, "Looking for the point", {"points": [at]}, {})
     (point,) = answered.answer.members["points"]
-    if out is not None:
-        files.write_answer(out, answered.answer)
-    typer.echo(f"point       {_as_option(point)}")
-    typer.echo(f"position    {','.join(map(repr, point['position']))}")
-    typer.echo(f"distance    {point['distance']!r}")
-    if out is not None:
-        typer.echo(f"written     {out}")
+    output.write(answered.answer)
+    output.say(f"point       {_as_option(point)}")
+    output.say(f"position    {','.join(map(repr, point['position']))}")
+    output.say(f"distance    {point['distance']!r}")
+    output.say_written()
 
 
 _NO_PATH = {
     "disconnected": "there is no path: the points are in different connected components",
-    "beyond_max_distance": "there is no path within max_distance = {limit:g}",
+    "beyond_max_distance": "there is no path within --max-distance {limit:g}",
 }
 
 
@@ -311,21 +323,20 @@ def _array(array: Any) -> "Answer":
     return Answer({"array": array}, ("array",))
 
 
-def print_size(mesh: "TriangleMesh") -> None:
+def print_size(output: Output, mesh: "TriangleMesh") -> None:
     """Print the size of the mesh."""
-    typer.echo(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
+    output.say(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
 
 
-def _print_seconds(answered: Answered) -> None:
+def _print_seconds(output: Output, answered: Answered) -> None:
     read, solve = answered.read_seconds, answered.solve_seconds
-    typer.echo(f"took        {read:.3f} s to read, {solve:.3f} s to solve")
+    output.say(f"took        {read:.3f} s to read, {solve:.3f} s to solve")
 
 
-def print_end(answered: Answered, out: Path | None) -> None:
+def print_end(output: Output, answered: Answered) -> None:
     """Print the seconds that a query took, and where its answer is."""
-    _print_seconds(answered)
-    if out is not None:
-        typer.echo(f"written     {out}")
+    _print_seconds(output, answered)
+    output.say_written()
 
 
 def _bound_in_words(bound: "Mapping[str, Any]") -> str:

@@ -8,6 +8,8 @@ from time import perf_counter
 from types import FrameType
 from typing import TYPE_CHECKING, NamedTuple
 
+import typer
+
 from app.cli.arguments import Merge
 
 if TYPE_CHECKING:
@@ -16,6 +18,12 @@ if TYPE_CHECKING:
 
 class Failure(Exception):  # noqa: N818 - not an error of this program
     """A failure that the user can do something about, told in one line."""
+
+
+def show_help_without_command(context: typer.Context) -> None:
+    """Print the help of a group of commands where none of them was named."""
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
 
 
 def read(mesh_file: Path, merge: Merge) -> "tuple[OpenMesh, float]":

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.cli.steps import Failure, showing
+from app.cli.output import AsJson, print_json
+from app.cli.steps import Failure, show_help_without_command, showing
 
 if TYPE_CHECKING:
     from app.service.maintenance import Contents
@@ -38,9 +39,11 @@ Root = Annotated[
         parser=_folder,
     ),
 ]
-AsJson = Annotated[bool, typer.Option("--json", help="Print JSON, for programs.")]
 
 _DEFAULT = Path("geodesic-store")
+
+
+store.callback(invoke_without_command=True)(show_help_without_command)
 
 
 @store.command()
@@ -51,7 +54,7 @@ def ls(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
     with _store_at(root):
         found = contents(root)
     if as_json:
-        _print_json(_document(found))
+        print_json(_document(found))
         return
     if found.meshes:
         typer.echo(_ROW.format("id", "faces", "bytes", "created", "last used", "owner"))
@@ -77,7 +80,7 @@ def check(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
     with _store_at(root), showing("Reading"):
         found = [damage.detail for damage in inspect(root) if damage is not None]
     if as_json:
-        _print_json({"damaged": found})
+        print_json({"damaged": found})
     else:
         for fault in found:
             typer.echo(fault)
@@ -112,7 +115,7 @@ def prune(
             {"reason": leftover.reason, "paths": list(map(str, leftover.paths)), "bytes": size}
             for leftover, size in going
         ]
-        _print_json({"dry_run": dry_run, "removed": removed})
+        print_json({"dry_run": dry_run, "removed": removed})
         return
     for leftover, size in going:
         typer.echo(f"{leftover.reason}: {leftover.paths[0].relative_to(root)}, {size} bytes")
@@ -153,9 +156,3 @@ def _document(found: "Contents") -> dict[str, Any]:
             for job in found.jobs
         ],
     }
-
-
-def _print_json(document: dict[str, Any]) -> None:
-    import orjson
-
-    typer.echo(orjson.dumps(document, option=orjson.OPT_INDENT_2))

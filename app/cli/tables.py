@@ -1,12 +1,12 @@
 """Commands that write tables of distances."""
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.cli import files
 from app.cli.arguments import (
     Barriers,
     EffortOption,
@@ -26,6 +26,7 @@ from app.cli.arguments import (
     writable,
 )
 from app.cli.ask import WrittenMembers, ask
+from app.cli.output import AsJson, Output, print_json
 from app.cli.queries import print_end, print_size
 from app.cli.steps import Failure, read, showing
 
@@ -43,13 +44,14 @@ _FILE = "POINTS"
 def matrix(
     mesh_file: MeshFile,
     out: Annotated[
-        Path,
+        Path | None,
         typer.Option(
-            help="Where the distances go: .npy, .csv or .json; of a sparse matrix .npz, .csv or "
-            ".json. Of points from files .npy or .zarr; only the finite ones .npz or .parquet.",
+            help="Where the distances go: .npy, .csv or .json, - prints .csv; of a sparse matrix "
+            ".npz, .csv or .json. Of points from files .npy or .zarr; only the finite ones .npz or "
+            ".parquet.",
             callback=writable(".npy", ".npz", ".csv", ".json", ".zarr", ".parquet"),
         ),
-    ],
+    ] = None,
     source: SomeSources = None,
     target: SomeTargets = None,
     points: Annotated[
@@ -85,6 +87,7 @@ def matrix(
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
+    as_json: AsJson = False,
 ) -> None:
     """Compute the distances from several points to several others, or between all of a file."""
     by_files = {"--points": points, "--sources": sources, "--targets": targets}
@@ -94,19 +97,22 @@ def matrix(
             raise typer.BadParameter("give --source and --target, or --points with a file")
         if method is not Method.EXACT or dtype is not Number.FLOAT64 or threads is not None:
             raise typer.BadParameter("--method, --dtype and --threads go with points from files")
-        _ask_matrix(mesh_file, out, source, target, layout, max_distance, barriers, merge)
+        output = Output(out, as_json)
+        _ask_matrix(mesh_file, output, source, target, layout, max_distance, barriers, merge)
         return
     if given not in (["--points"], ["--sources", "--targets"]):
         raise typer.BadParameter("give --points, or both --sources and --targets")
     if source or target or layout is not Layout.DENSE:
         raise typer.BadParameter(f"--source, --target and --layout do not go with {given[0]}")
-    if out.suffix.lower() not in _OF_ANY_SIZE:
-        raise typer.BadParameter(f"{out} must end in .npy, .zarr, .npz or .parquet")
+    if out is None or out.suffix.lower() not in _OF_ANY_SIZE:
+        raise typer.BadParameter(
+            f"{given[0]} needs --out, which must end in .npy, .zarr, .npz or .parquet"
+        )
     options = accuracy(method, relative_error, None, effort) | {"dtype": dtype.value}
     opened, read_seconds = read(mesh_file, merge)
     import geodesic_core as gc
 
-    mesh = opened.mesh
+    mesh, output = opened.mesh, Output(None, as_json)
     starts = _points_of(mesh, points or sources)
     stops = None if targets is None else _points_of(mesh, targets)
     with showing("Computing the matrix") as step:
@@ -122,16 +128,19 @@ def matrix(
             progress=step.progress,
             cancel=step.cancel,
         )
-    print_size(mesh)
     rows = min(written.shape)
-    typer.echo(f"matrix      {written.shape[0]} by {written.shape[1]}")
-    if written.swept < rows:
-        typer.echo(f"continued   {rows - written.swept} of {rows} sweeps were done before")
     bound = written.error_bound
-    typer.echo(f"error bound {bound.value!r} ({bound.type}, {bound.kind})")
-    typer.echo(f"sha256      {written.sha256}")
-    typer.echo(f"took        {read_seconds:.3f} s to read")
-    typer.echo(f"written     {out}")
+    if as_json:
+        facts = {"shape": written.shape, "error_bound": asdict(bound), "sha256": written.sha256}
+        print_json({**facts, "continued": rows - written.swept, "written": str(out)})
+    print_size(output, mesh)
+    output.say(f"matrix      {written.shape[0]} by {written.shape[1]}")
+    if written.swept < rows:
+        output.say(f"continued   {rows - written.swept} of {rows} sweeps were done before")
+    output.say(f"error bound {bound.value!r} ({bound.type}, {bound.kind})")
+    output.say(f"sha256      {written.sha256}")
+    output.say(f"took        {read_seconds:.3f} s to read")
+    output.say(f"written     {out}")
 
 
 def _points_of(mesh: "TriangleMesh", file: Path | None) -> "list[SurfacePoint] | Everywhere":
@@ -161,7 +170,7 @@ def _points_of(mesh: "TriangleMesh", file: Path | None) -> "list[SurfacePoint] |
 
 def _ask_matrix(
     mesh_file: Path,
-    out: Path,
+    output: Output,
     source: list[Point],
     target: list[Point],
     layout: Layout,
@@ -170,9 +179,10 @@ def _ask_matrix(
     merge: Merge,
 ) -> None:
     """Ask for a matrix as the service would be asked."""
-    wanted = (".npz" if layout is Layout.SPARSE else ".npy", ".csv", ".json")
-    if out.suffix.lower() not in wanted:
-        raise typer.BadParameter(f"{out.suffix} does not go with --layout {layout.value}")
+    wanted = (".npz" if layout is Layout.SPARSE else ".npy", ".csv", ".json", "")
+    suffix = "" if output.out is None else output.out.suffix.lower()
+    if suffix not in wanted:
+        raise typer.BadParameter(f"{suffix} does not go with --layout {layout.value}")
     if layout is Layout.PAIRS and len(source) != len(target):
         raise typer.BadParameter(
             f"there are {len(source)} sources and {len(target)} targets; pairs need as many"
@@ -186,9 +196,9 @@ def _ask_matrix(
     answered = ask("matrix", mesh_file, merge, "Computing the matrix", points, members)
     import numpy as np
 
-    files.write_answer(out, answered.answer)
+    output.write(answered.answer)
     reached = np.count_nonzero(np.isfinite(answered.answer.members["distances"]))
     cells = len(source) if layout is Layout.PAIRS else len(source) * len(target)
-    print_size(answered.mesh)
-    typer.echo(f"reached     {reached} of {cells} distances")
-    print_end(answered, out)
+    print_size(output, answered.mesh)
+    output.say(f"reached     {reached} of {cells} distances")
+    print_end(output, answered)

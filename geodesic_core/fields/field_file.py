@@ -87,11 +87,10 @@ def read_field_file(
 
 def _members_of(path: str | Path) -> dict[str, NDArray[Any]]:
     try:
-        with np.load(path, allow_pickle=False) as file:
+        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             members = dict(file)
     except OSError as error:
-        reason = error.strerror or "it is no file of numpy"
-        raise InvalidArgument(f"cannot read {path}: {reason}") from error
+        raise InvalidArgument(f"cannot read {path}: {error.strerror}") from error
     except (BadZipFile, EOFError, TypeError, ValueError) as error:
         raise InvalidArgument(
             f"{path} is damaged, or no field that DistanceField.save wrote"

@@ -6,9 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from geodesic_core.extras import extra
-from geodesic_core.files import as_output
+from geodesic_core.files import as_output, written
 
-_PICTURES = ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp"
+_PICTURES = {
+    ".png": "PNG",
+    ".jpg": "JPEG",
+    ".jpeg": "JPEG",
+    ".tif": "TIFF",
+    ".tiff": "TIFF",
+    ".bmp": "BMP",
+}
+"""Formats by suffix, as Pillow calls them, which PyVista requires."""
 
 SURFACE = "#d9d9d9"
 LINE = "#d7301f"
@@ -29,6 +37,7 @@ def picture(screenshot: str | Path | None, call: str) -> Iterator[Any]:
     """
     with extra("plot", "PyVista", call):
         import pyvista
+        from PIL import Image
     if screenshot is None:
         plotter = pyvista.Plotter()
         yield plotter
@@ -38,6 +47,8 @@ def picture(screenshot: str | Path | None, call: str) -> Iterator[Any]:
     plotter = pyvista.Plotter(off_screen=True)
     try:
         yield plotter
-        plotter.screenshot(file)
+        pixels: Any = plotter.screenshot(return_img=True)
     finally:
         plotter.close()
+    with written(file) as stream:
+        Image.fromarray(pixels).save(stream, _PICTURES[file.suffix.lower()])

@@ -1,0 +1,40 @@
+"""Faults in the words of the command line: options, where models and the library have names."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+_WORDS = {
+    "bool_parsing": "it must be true or false",
+    "enum": "it must be {expected}",
+    "extra_forbidden": "there is no such setting",
+    "finite_number": "it must be a finite number",
+    "float_parsing": "it must be a number",
+    "greater_than": "it must be above {gt:g}",
+    "greater_than_equal": "it must be {ge:g} or more",
+    "int_from_float": "it must be a whole number",
+    "int_parsing": "it must be a whole number",
+    "int_parsing_size": "it has too many digits",
+    "less_than": "it must be below {lt:g}",
+    "less_than_equal": "it must be {le:g} or less",
+    "literal_error": "it must be {expected}",
+}
+"""What is wrong, by the kinds of faults that pydantic finds; other kinds have words of ours."""
+
+
+def words_of(fault: Mapping[str, Any]) -> str:
+    """Return what is wrong with a value that a model refuses."""
+    words = _WORDS.get(fault["type"])
+    if words is not None:
+        return words.format(**fault.get("ctx", {}))
+    message: str = fault["msg"]
+    return message.removeprefix("Value error, ")
+
+
+def with_options(message: str) -> str:
+    """Return a message of the library with options in the place of its arguments."""
+    message = message.replace("merge='exact'", "--merge exact")
+    return _ARGUMENTS.sub(lambda found: "--" + found[0].replace("_", "-"), message)
+
+
+_ARGUMENTS = re.compile(r"\b(max_distance|relative_error|absolute_error|chord_error)\b")
