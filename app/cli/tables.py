@@ -104,10 +104,10 @@ def matrix(
         raise typer.BadParameter("give --points, or both --sources and --targets")
     if source or target or layout is not Layout.DENSE:
         raise typer.BadParameter(f"--source, --target and --layout do not go with {given[0]}")
-    if out is None or out.suffix.lower() not in _OF_ANY_SIZE:
-        raise typer.BadParameter(
-            f"{given[0]} needs --out, which must end in .npy, .zarr, .npz or .parquet"
-        )
+    if out is None:
+        raise typer.BadParameter(f"{given[0]} needs --out, a file for the matrix")
+    if out.suffix.lower() not in _OF_ANY_SIZE:
+        raise typer.BadParameter(f"{out} must end in .npy, .zarr, .npz or .parquet")
     options = accuracy(method, relative_error, None, effort) | {"dtype": dtype.value}
     opened, read_seconds = read(mesh_file, merge)
     import geodesic_core as gc

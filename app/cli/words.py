@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from typing import Any
 
 _WORDS = {
-    "bool_parsing": "it must be true or false",
     "enum": "it must be {expected}",
     "extra_forbidden": "there is no such setting",
     "finite_number": "it must be a finite number",

@@ -288,9 +288,3 @@ def test_a_store_by_its_url(run: Run, tmp_path: Path) -> None:
     refused = run("store", "ls", "s3://bucket/store")
     assert refused.code == 2
     assert "names no folder of this machine" in " ".join(refused.err.split())
-
-
-def test_the_command_has_to_be_named(run: Run) -> None:
-    ran = run("store")
-    assert ran.code == 2
-    assert "Missing command" in error_line(ran)

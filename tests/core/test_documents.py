@@ -114,9 +114,10 @@ def test_docstrings_of_modules_begin_with_a_noun_or_a_verb(folder: str) -> None:
     assert not openings & {"What", "Who", "Which", "Where", "How"}
 
 
-def test_the_worked_sweep_is_what_the_code_does() -> None:
+@pytest.mark.parametrize("name", ["algorithm.md", "sharing.md"])
+def test_the_examples_of_documents_run(name: str) -> None:
     results = doctest.testfile(
-        str(ROOT / "docs" / "algorithm.md"),
+        str(ROOT / "docs" / name),
         module_relative=False,
         optionflags=doctest.NORMALIZE_WHITESPACE,
     )
