@@ -18,7 +18,7 @@ from app.http.middleware.cross_site import CrossSiteMiddleware
 from app.http.middleware.observation import ObservationMiddleware
 from app.http.middleware.probes import PROBES
 from app.http.middleware.request_id import RequestIdMiddleware
-from app.http.openapi import complete
+from app.http.openapi import SERVERS, TAGS, complete
 from app.http.routes import about, jobs, meshes, queries
 from app.service.service import Service
 from app.settings import Settings
@@ -42,6 +42,8 @@ def create_app(settings: Settings) -> FastAPI:
         version=__version__,
         summary="Geodesic distances and paths on triangle meshes, exact or within a chosen error",
         lifespan=lifespan,
+        servers=SERVERS,
+        openapi_tags=TAGS,
         docs_url=None,  # FastAPI's page loads scripts from elsewhere
         redoc_url=None,
         telemetry={

@@ -71,16 +71,13 @@ class Point:
         from app.queries.point_text import parse
 
         try:
-            return cls(text, parse(f"v{text}" if _INDEX.fullmatch(text) else text))
+            return cls(text, parse(text))
         except ValueError as error:
             raise typer.BadParameter(str(error)) from None
 
     def as_json(self) -> dict[str, Any]:
         """Return the point as a member of a request."""
         return dict(vars(self.point))
-
-
-_INDEX = re.compile(r"-?[0-9]+")
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,18 @@
 """The OpenAPI document: FastAPI's, completed with problems, headers and examples."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
+from pydantic import BaseModel
+from pydantic.json_schema import models_json_schema
+
+from app.encoding import JSON
 from app.errors import PROBLEM_JSON
 from app.http.middleware.admission import is_open
 from app.http.responses import documented, problems
+from app.schemas.geojson import FeatureCollection
 
 _PACKAGED = Path(__file__).parents[1] / "examples"
 EXAMPLES = _PACKAGED if _PACKAGED.is_dir() else Path(__file__).parents[2] / "openapi" / "examples"
@@ -16,6 +21,7 @@ EXAMPLES = _PACKAGED if _PACKAGED.is_dir() else Path(__file__).parents[2] / "ope
 In a wheel it is inside the package, in a checkout beside the document.
 """
 
+_EVENT_STREAM = "text/event-stream"
 _FASTAPI_VALIDATION = "Validation Error"  # FastAPI adds it to each operation with parameters
 _TEXT, _NUMBER = {"type": "string"}, {"type": "integer"}
 _EVERYWHERE = (
@@ -29,6 +35,41 @@ _EVERYWHERE = (
 )
 """Codes of the problems that any request can meet"""
 _PROBLEM = {"schema": {"$ref": "#/components/schemas/ProblemDocument"}}
+SERVERS = [
+    {"url": "/", "description": "The service that this document comes from"},
+    {"url": "http://127.0.0.1:8000", "description": "`geodesic serve` on this machine"},
+]
+"""Addresses of the service"""
+TAGS = [
+    {
+        "name": "queries",
+        "description": "Distances, paths, isolines, matrices and nearest points on a stored mesh. "
+        "Each answers in JSON, and in other formats by `Accept` or `format`. With `estimate=true` "
+        "it answers with its expected cost instead; `kind` tells the two apart. With "
+        "`Prefer: respond-async` it becomes a job.",
+    },
+    {
+        "name": "meshes",
+        "description": "Upload, list, describe and remove meshes. The id of a mesh is a hash of "
+        "its content, so that no mesh is stored twice.",
+    },
+    {
+        "name": "jobs",
+        "description": "Queries that are answered in the background: their state and progress, "
+        "their answers, and how to stop them.",
+    },
+    {
+        "name": "service",
+        "description": "The service itself: health, limits, metrics, and the meaning of errors.",
+    },
+]
+"""What the operations are grouped by"""
+_EVENTS = {
+    "type": "string",
+    "contentMediaType": _EVENT_STREAM,
+    "description": "Server-sent events. The `id` of each counts the states of the job; its `data` "
+    "is a `JobDocument` in JSON. Comments keep the connection open.",
+}
 _SECURITY_SCHEME = {
     "type": "http",
     "scheme": "bearer",
@@ -95,17 +136,47 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
                 operation["security"] = [{"apiKey": []}, {}]
             for parameter in operation.get("parameters", []):
                 _leave_out_null(parameter["schema"])
+            _put_json_first(operation["responses"].values())
             for status, parameter in (("206", _RANGE), ("304", _CONDITION)):
                 if status in operation["responses"]:
                     operation.setdefault("parameters", []).append(dict(parameter))
             for name, example in _examples(operation["operationId"]).items():
                 _add_example(operation, name, example)
     components = document["components"]
-    for name in ("HTTPValidationError", "ValidationError"):
+    for name in ("HTTPValidationError", "ValidationError", "BareVertex", "BareVertexSource"):
         components["schemas"].pop(name, None)
+    components["schemas"] |= _schemas_of(FeatureCollection)
+    for schema in components["schemas"].values():
+        for member in schema.get("properties", {}).values():
+            _describe_default(member)
     components["securitySchemes"] = {"apiKey": _SECURITY_SCHEME}
     components["headers"] = _HEADERS
     return document
+
+
+def _put_json_first(responses: Iterable[dict[str, Any]]) -> None:
+    """Put JSON before other media types: generators of clients take the first."""
+    for response in responses:
+        content = response.get("content", {})
+        if JSON in content:
+            response["content"] = {JSON: content[JSON], **content}
+
+
+def _describe_default(member: dict[str, Any]) -> None:
+    """Turn the default of a member into words: generators make members with one required."""
+    if "default" in member:
+        default = json.dumps(member.pop("default")).strip('"')
+        texts = [member.get("description"), f"Default: `{default}`"]
+        member["description"] = ". ".join(filter(None, texts))
+
+
+def _schemas_of(*models: type[BaseModel]) -> dict[str, Any]:
+    """Return the schemas of models that no route names, and of all that they contain."""
+    modes: list[tuple[type[BaseModel], Literal["serialization"]]]
+    modes = [(model, "serialization") for model in models]
+    _, schemas = models_json_schema(modes, ref_template="#/components/schemas/{model}")
+    definitions: dict[str, Any] = schemas["$defs"]
+    return definitions
 
 
 def _leave_out_null(schema: dict[str, Any]) -> None:
@@ -147,6 +218,7 @@ def _responses(
         for content in response.get("content", {}).values():
             if "itemSchema" in content:  # belongs to OpenAPI 3.2, and the document to 3.1
                 content.clear()
+                content["schema"] = dict(_EVENTS)
         yield status, response
 
 

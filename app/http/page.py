@@ -1,6 +1,10 @@
-"""The page at ``/``, as Vite built it from ``app/web``, and its caching and security headers."""
+"""The pages, as Vite built them from ``app/web``, and their caching and security headers.
+
+There are two: the page at ``/``, and the reference of the interface at ``/docs``.
+"""
 
 from pathlib import Path
+from typing import Literal
 
 from starlette.datastructures import Headers
 from starlette.responses import Response
@@ -9,15 +13,16 @@ from starlette.types import Scope
 
 DIST = Path(__file__).parents[1] / "web" / "dist"
 ASSETS = "/assets"
+Page = Literal["index.html", "docs.html"]
 
-# The page loads nothing from elsewhere, and runs no inline scripts.
+# The pages load nothing from elsewhere, and run no inline scripts.
 _POLICY = "; ".join(
     (
         "default-src 'none'",
         "script-src 'self'",
         "worker-src 'self'",
         "style-src 'self'",
-        "img-src 'self' blob:",
+        "img-src 'self' blob: data:",  # icons of the reference are in its style sheet
         "connect-src 'self'",
         "base-uri 'none'",
         "form-action 'none'",
@@ -42,9 +47,9 @@ def wants_page(headers: Headers) -> bool:
     return "text/html" in headers.get("accept", "")
 
 
-def page_response(scope: Scope) -> Response:
-    """Return the page, or a 304."""
-    path = DIST / "index.html"
+def page_response(scope: Scope, name: Page = "index.html") -> Response:
+    """Return a page, or a 304."""
+    path = DIST / name
     response = StaticFiles(directory=DIST).file_response(path, path.stat(), scope)
     response.headers.update(_INDEX)
     return response

@@ -110,7 +110,7 @@ def estimate_response(
     mesh_id: str, estimate: Estimate, media_type: str, seconds: PhaseSeconds
 ) -> Response:
     """Return an estimate, which no client should store: it depends on this machine."""
-    members = {"mesh_id": mesh_id, "is_estimate": True, **vars(estimate), "media_type": media_type}
+    members = {"kind": "estimate", "mesh_id": mesh_id, **vars(estimate), "media_type": media_type}
     return Response(orjson.dumps(members), 200, {**UNSTORED, **server_timing(seconds)}, JSON)
 
 

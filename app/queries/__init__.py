@@ -24,7 +24,7 @@ from app.queries.matrix import MatrixQuery
 from app.queries.nearest import NearestQuery
 from app.queries.path import PathQuery, naming_parameters, written_request
 from app.queries.paths import PathsQuery
-from app.queries.validation import MeshSize
+from app.queries.validation import MeshSize, check_lengths
 
 KINDS: Mapping[str, type[Query[Any]]] = {
     kind.kind: kind
@@ -56,6 +56,7 @@ __all__ = [
     "PathsQuery",
     "Query",
     "Unwritten",
+    "check_lengths",
     "code_version",
     "estimate",
     "fingerprint",

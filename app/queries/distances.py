@@ -177,6 +177,7 @@ class DistancesQuery(Query[DistancesRequest]):
         mesh = opened.mesh
         sources, targets = self._parted(points)
         members: dict[str, Any] = {
+            "kind": self.kind,
             "mesh_id": self.mesh_id,
             **method_of(self.request),
             "error_bound": error_bound,

@@ -181,6 +181,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
     ) -> Answer:
         return Answer(
             {
+                "kind": self.kind,
                 "mesh_id": self.mesh_id,
                 **method_of(self.request),
                 "error_bound": error_bound,

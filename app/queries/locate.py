@@ -64,7 +64,12 @@ class LocateQuery(Query[LocateRequest]):
 
     def _answer(self, opened: OpenMesh, found: Sequence[Mapping[str, Any] | None]) -> Answer:
         return Answer(
-            {"mesh_id": self.mesh_id, "points": found, "warnings": opened.warnings},
+            {
+                "kind": self.kind,
+                "mesh_id": self.mesh_id,
+                "points": found,
+                "warnings": opened.warnings,
+            },
             shown=("points",),
             table=table_of_points("point", found),
             points=lambda: point_features("point", found),

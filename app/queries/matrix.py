@@ -142,6 +142,7 @@ class MatrixQuery(Query[MatrixRequest]):
         sources, targets = self._parted(points)
         starts, ends = components_of(mesh, sources), components_of(mesh, targets)
         members: dict[str, Any] = {
+            "kind": self.kind,
             "mesh_id": self.mesh_id,
             "method": "exact",
             "exact": True,

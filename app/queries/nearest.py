@@ -103,6 +103,7 @@ class NearestQuery(Query[NearestRequest]):
             for i, distance in zip(indices.tolist(), distances.tolist(), strict=True)
         ]
         members = {
+            "kind": self.kind,
             "mesh_id": self.mesh_id,
             "method": "exact",
             "exact": True,

@@ -145,6 +145,7 @@ class PathQuery(Query[PathRequest]):
     def _answer(self, opened: OpenMesh, points: SurfacePoints, found: dict[str, Any]) -> Answer:
         source, target, *waypoints = (describe_point(opened.mesh, point) for point in points)
         members = {
+            "kind": self.kind,
             "mesh_id": self.mesh_id,
             **method_of(self.request),
             "source": source,

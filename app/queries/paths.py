@@ -150,6 +150,7 @@ class PathsQuery(Query[PathsRequest]):
         ]
         return Answer(
             {
+                "kind": self.kind,
                 "mesh_id": self.mesh_id,
                 **method_of(self.request),
                 "source": describe_point_or_curve(mesh, start),

@@ -2,7 +2,7 @@
 
 ::
 
-    v12               a vertex
+    12 or v12         a vertex
     e12-13:0.3        on the edge between two vertices, at this share of the way
     f7:0.2,0.3,0.5    in a face, by the weights of its corners
     p1,2,3            the point nearest to a position
@@ -14,7 +14,7 @@ from app.schemas.points import EdgePoint, FacePoint, Point, PositionPoint, Verte
 
 _INDEX, _NUMBER = r"(-?[0-9]{1,18})", r"([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
 _THREE = ",".join([_NUMBER] * 3)
-_VERTEX = re.compile(f"v{_INDEX}")
+_VERTEX = re.compile(f"v?{_INDEX}")
 _EDGE = re.compile(f"e{_INDEX}-{_INDEX}:{_NUMBER}")
 _FACE = re.compile(f"f{_INDEX}:{_THREE}")
 _POSITION = re.compile(f"p{_THREE}")
@@ -40,8 +40,8 @@ def parse(text: str) -> Point:
         return PositionPoint(position=(x, y, z))
     shown = text if len(text) <= _SHOWN else text[:_SHOWN] + "…"
     raise ValueError(
-        f"{shown!r} is not a point: write a vertex as v12, a point of an edge as e12-13:0.3, of a "
-        f"face as f7:0.2,0.3,0.5, and a position as p1,2,3"
+        f"{shown!r} is not a point: write a vertex as 12 or v12, a point of an edge as e12-13:0.3, "
+        f"of a face as f7:0.2,0.3,0.5, and a position as p1,2,3"
     )
 
 

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import islice
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import geodesic_core as gc
 from app.errors import Fault, ProblemError, over_limit, problem
-from app.schemas.points import EdgePoint, FacePoint, Point, VertexPoint
+from app.schemas.points import BareVertex, EdgePoint, FacePoint, Point, VertexPoint
 from app.settings import Settings
 
 FAULTS_SHOWN = 10
@@ -38,6 +38,17 @@ def check_count(what: str, count: int, settings: Settings, setting: str) -> None
     limit = getattr(settings, setting)
     if count > limit:
         raise over_limit("limit_exceeded", what, count, limit, setting)
+
+
+def check_lengths(body: Any, settings: Settings) -> None:
+    """Refuse a body with a list of too many elements, before any of them is looked at."""
+    if isinstance(body, dict):
+        for name, setting in _LIMIT_OF_LIST.items():
+            if isinstance(elements := body.get(name), list):
+                check_count(name, len(elements), settings, setting)
+
+
+_LIMIT_OF_LIST = {"sources": "max_sources", "waypoints": "max_waypoints", "levels": "max_levels"}
 
 
 def check_json_size(values: int, limit: int, hint: str) -> None:
@@ -79,6 +90,8 @@ def _invalid_request(faults: Sequence[Fault]) -> ProblemError:
 
 def _faults(pointer: str, point: Point, size: MeshSize) -> Iterator[Fault]:
     match point:
+        case BareVertex(vertex=vertex):
+            yield from _out_of_range(pointer, "vertex", vertex, size.vertices)
         case VertexPoint(vertex=vertex):
             yield from _out_of_range(f"{pointer}/vertex", "vertex", vertex, size.vertices)
         case EdgePoint(edge=ends, t=t):

@@ -63,6 +63,7 @@ class Unreachable(BaseModel):
 class DistancesAnswer(BaseModel):
     """Distances in mesh units, ``null`` where unreachable."""
 
+    kind: Literal["distances"]
     mesh_id: str
     method: Method
     exact: bool
@@ -107,6 +108,7 @@ class IsolineLevel(BaseModel):
 class IsolinesAnswer(BaseModel):
     """The lines of each level, in the order of the levels."""
 
+    kind: Literal["isolines"]
     mesh_id: str
     method: Method
     exact: bool
@@ -158,6 +160,7 @@ class Outline(BaseModel):
 class PathAnswer(Outline):
     """A path from source to target, or the reason why there is none."""
 
+    kind: Literal["path"]
     mesh_id: str
     method: Method
     exact: bool
@@ -179,6 +182,7 @@ class PathTo(Outline):
 class PathsAnswer(BaseModel):
     """The paths from a source, in the order of their targets."""
 
+    kind: Literal["paths"]
     mesh_id: str
     method: Method
     exact: bool
@@ -200,6 +204,7 @@ class MatrixEnd(ResolvedPoint):
 class MatrixAnswer(BaseModel):
     """Distances in mesh units between many points."""
 
+    kind: Literal["matrix"]
     mesh_id: str
     method: Method
     exact: bool
@@ -232,6 +237,7 @@ class NearestPoint(ResolvedPoint):
 class NearestAnswer(BaseModel):
     """The nearest candidates, nearest first; of equal distances the lower index goes first."""
 
+    kind: Literal["nearest"]
     mesh_id: str
     method: Method
     exact: bool
@@ -247,8 +253,8 @@ class NearestAnswer(BaseModel):
 class Estimate(BaseModel):
     """The expected cost of an answer, without computing it."""
 
+    kind: Literal["estimate"]
     mesh_id: str
-    is_estimate: Literal[True]
     seconds: float = Field(
         description="On a free worker; meshes and machines differ from it by a factor of 3 and more"
     )
@@ -273,6 +279,7 @@ class LocatedPoint(ResolvedPoint):
 class LocateAnswer(BaseModel):
     """The nearest points, ``null`` for each position that is farther away than allowed."""
 
+    kind: Literal["locate"]
     mesh_id: str
     points: list[LocatedPoint | None]
     warnings: list[str]

@@ -52,6 +52,10 @@ class VertexPoint(StrictModel):
     vertex: StrictInt = Field(description="Index of a vertex, from 0", examples=[0])
 
 
+class BareVertex(VertexPoint):
+    """A vertex, written as its index alone."""
+
+
 class EdgePoint(StrictModel):
     """A point of an edge."""
 
@@ -94,6 +98,10 @@ class VertexSource(VertexPoint, Start):
     """A source at a vertex."""
 
 
+class BareVertexSource(BareVertex, Start):
+    """A source at a vertex, written as its index alone."""
+
+
 class EdgeSource(EdgePoint, Start):
     """A source on an edge."""
 
@@ -108,10 +116,14 @@ class PositionSource(PositionPoint, Start):
 
 POINT_TAGS = {name: f"by {name}" for name in ("vertex", "edge", "face", "position", "polyline")}
 """The tag of each spelling of a point, and of curves, by the member that only it has."""
+BARE_TAG = "by index"
+"""The tag of a vertex that is written as its index alone"""
 
 
 def _tag(value: Any) -> str | None:
     # Called for every point that is validated or serialized; a query may have 100 000.
+    if type(value) is int or isinstance(value, BareVertex):
+        return BARE_TAG
     fields = value if isinstance(value, dict) else getattr(value, "__dict__", ())
     if len(fields) > MOST_MEMBERS:
         return None
@@ -120,6 +132,13 @@ def _tag(value: Any) -> str | None:
             return tag
     return None
 
+
+def _with_name(value: Any) -> Any:
+    return {"vertex": value} if type(value) is int else value
+
+
+_INDEX = Annotated[StrictInt, Field(description="Index of a vertex, from 0", examples=[0])]
+_FROM_INDEX = BeforeValidator(_with_name, json_schema_input_type=_INDEX)
 
 _WAYS = "vertex, edge and t, face and barycentric, or position"
 _BY_FIELD = Discriminator(
@@ -131,13 +150,14 @@ _BY_FIELD_OR_CURVE = Discriminator(
     custom_error_message=f"A point has {_WAYS}; a curve has polyline",
 )
 Point = Annotated[
-    Annotated[VertexPoint, Tag(POINT_TAGS["vertex"])]
+    Annotated[BareVertex, _FROM_INDEX, Tag(BARE_TAG)]
+    | Annotated[VertexPoint, Tag(POINT_TAGS["vertex"])]
     | Annotated[EdgePoint, Tag(POINT_TAGS["edge"])]
     | Annotated[FacePoint, Tag(POINT_TAGS["face"])]
     | Annotated[PositionPoint, Tag(POINT_TAGS["position"])],
     _BY_FIELD,
 ]
-"""A point of the surface, in one of four spellings."""
+"""A point of the surface, in one of five spellings."""
 
 
 class Polyline(StrictModel):
@@ -155,7 +175,8 @@ class CurveSource(Polyline, Start):
 
 
 PointOrCurve = Annotated[
-    Annotated[VertexPoint, Tag(POINT_TAGS["vertex"])]
+    Annotated[BareVertex, _FROM_INDEX, Tag(BARE_TAG)]
+    | Annotated[VertexPoint, Tag(POINT_TAGS["vertex"])]
     | Annotated[EdgePoint, Tag(POINT_TAGS["edge"])]
     | Annotated[FacePoint, Tag(POINT_TAGS["face"])]
     | Annotated[PositionPoint, Tag(POINT_TAGS["position"])]
@@ -164,7 +185,8 @@ PointOrCurve = Annotated[
 ]
 """A point or a curve where paths start."""
 Source = Annotated[
-    Annotated[VertexSource, Tag(POINT_TAGS["vertex"])]
+    Annotated[BareVertexSource, _FROM_INDEX, Tag(BARE_TAG)]
+    | Annotated[VertexSource, Tag(POINT_TAGS["vertex"])]
     | Annotated[EdgeSource, Tag(POINT_TAGS["edge"])]
     | Annotated[FaceSource, Tag(POINT_TAGS["face"])]
     | Annotated[PositionSource, Tag(POINT_TAGS["position"])]

@@ -288,15 +288,15 @@ class PathAnswerParameters(AnswerParameters):
 
 
 _SPELLINGS = (
-    "A vertex as `v12`, a point of the edge between two vertices as `e12-13:0.3`, of a face as "
-    "`f7:0.2,0.3,0.5`, or the point nearest to a position as `p1,2,3`"
+    "A vertex as `12` or `v12`, a point of the edge between two vertices as `e12-13:0.3`, of a "
+    "face as `f7:0.2,0.3,0.5`, or the point nearest to a position as `p1,2,3`"
 )
 
 
 class PathParameters(PathAnswerParameters, AccuracyOrEffort):
     """The stops of a path.
 
-    Each is a vertex as ``v12``, a point of an edge as ``e12-13:0.3``, of a face as
+    Each is a vertex as ``12`` or ``v12``, a point of an edge as ``e12-13:0.3``, of a face as
     ``f7:0.2,0.3,0.5``, or a position as ``p1,2,3``.
     """
 

@@ -104,7 +104,7 @@ def test_bytes_of_the_response(
 
         assert real.status_code == 200
         assert estimated["media_type"] == real.headers["content-type"].partition(";")[0]
-        assert estimated["is_estimate"] is True
+        assert estimated["kind"] == "estimate"
         assert estimated["mesh_id"] == ids[mesh]
         assert 1 / factor <= estimated["response_bytes"] / len(real.content) <= factor
 

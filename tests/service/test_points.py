@@ -1,5 +1,7 @@
 """Points anywhere on the surface over HTTP: the library's answers, and one for all spellings."""
 
+import json
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -228,6 +230,37 @@ def test_all_spellings_of_a_point_give_one_answer(
     assert len(tags) == len({text_of(point) for point in written})
 
 
+def test_the_index_of_a_vertex_is_a_point(client: TestClient, knot: str) -> None:
+    for name, bare in (
+        ("distances", {"sources": [3, {"polyline": [0, 1]}], "targets": [5, INSIDE]}),
+        ("path", {"source": 3, "target": 5, "waypoints": [4]}),
+        ("paths", {"source": 3, "targets": [5]}),
+        ("isolines", {"sources": [3], "count": 2}),
+        ("matrix", {"sources": [3], "targets": [5]}),
+        ("nearest", {"source": 3, "candidates": [5, 4]}),
+    ):
+        link = f"/v1/meshes/{knot}/{name}"
+        answer = client.post(link, json=bare)
+        assert answer.status_code == 200
+        named = json.loads(re.sub(r"(?<=[\[ ])(\d)(?=[,\]}])", r'{"vertex": \1}', json.dumps(bare)))
+        named |= {"count": 2} if name == "isolines" else {}
+        again = client.post(link, json=named)
+        assert again.content == answer.content
+        assert again.headers["server-timing"] == "kept"
+    assert get_path(client, knot, "3", "5").content == get_path(client, knot, "v3", "v5").content
+
+
+def test_an_index_that_is_out_of_range_is_named_where_it_stands(
+    client: TestClient, apart: str
+) -> None:
+    problem = check_problem(distances(client, apart, sources=[0, 6, -1]), 422, "invalid_point")
+    assert [fault["pointer"] for fault in problem["errors"]] == ["/sources/1", "/sources/2"]
+    body = {"source": {"polyline": [0, 6]}, "targets": [0]}
+    response = client.post(f"/v1/meshes/{apart}/paths", json=body)
+    problem = check_problem(response, 422, "invalid_point")
+    assert [fault["pointer"] for fault in problem["errors"]] == ["/source/polyline/1"]
+
+
 def test_a_position_inside_a_face_agrees_with_its_weights(
     client: TestClient, knot: str, mesh: gc.TriangleMesh
 ) -> None:
@@ -323,7 +356,8 @@ NO_POINT = "A point has vertex"
 BAD_POINTS = [
     # What is no point in itself
     ({}, "invalid_request", "", NO_POINT),
-    (7, "invalid_request", "", NO_POINT),
+    (7.0, "invalid_request", "", NO_POINT),
+    (True, "invalid_request", "", NO_POINT),
     ("v7", "invalid_request", "", NO_POINT),
     ([1, 2, 3], "invalid_request", "", NO_POINT),
     (None, "invalid_request", "", NO_POINT),
@@ -397,7 +431,7 @@ def test_points_that_are_refused(
 TEXTS = [text_of(point) for point, code, _, _ in BAD_POINTS if code == "invalid_point"][:-2]
 
 
-@pytest.mark.parametrize("text", ["7", "e0-1", "f0:1,0", "p1,2,1e999", "p0,0,1e60", *TEXTS])
+@pytest.mark.parametrize("text", ["7.0", "e0-1", "f0:1,0", "p1,2,1e999", "p0,0,1e60", *TEXTS])
 def test_texts_that_are_refused(client: TestClient, apart: str, text: str) -> None:
     for parameters, place in (
         ({"from": text, "to": "v0"}, "/query/from"),

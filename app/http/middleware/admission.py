@@ -13,7 +13,7 @@ from app.http.page import ASSETS
 from app.settings import Settings
 from app.state import Allowances
 
-_OPEN = PROBES | {"/", "/openapi.json"}
+_OPEN = PROBES | {"/", "/docs", "/openapi.json"}
 _OPEN_FOLDERS = ("/problems/", f"{ASSETS}/")
 _BEARER = re.compile(rb"bearer +([A-Za-z0-9._~+/-]+=*)", re.IGNORECASE)
 

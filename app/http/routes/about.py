@@ -62,9 +62,23 @@ async def get_index(request: Request, response: Response) -> Response | Index:
     if page.is_built() and page.wants_page(request.headers):
         return page.page_response(request.scope)
     response.headers["Vary"] = "Accept"
-    links = {"about": "/v1", "meshes": "/v1/meshes", "openapi": "/openapi.json"}
+    links = {
+        "about": "/v1",
+        "meshes": "/v1/meshes",
+        "openapi": "/openapi.json",
+        "docs": "/docs",
+    }
     shown = "for browsers" if page.is_built() else "left out when this package was built"
     return Index(service="geodesic", version=__version__, page=shown, links=links)
+
+
+@router.get("/docs", include_in_schema=False)
+async def get_reference(request: Request) -> Response:
+    """Return the page that shows the interface document."""
+    if not page.is_built():
+        detail = "the reference was left out when this package was built; /openapi.json has it all"
+        raise problem("not_found", detail)
+    return page.page_response(request.scope, "docs.html")
 
 
 @router.get("/livez", operation_id="getLiveness", summary="Liveness")

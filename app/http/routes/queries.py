@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
+from pydantic import Field
 
 from app.encoding import CSV, GEOJSON, JSON, NPY, NPZ, OBJ, OCTETS, PLY, SVG
 from app.encoding.representation import ARRAYS, TEXTS
@@ -61,7 +62,7 @@ def _answers(model: type, description: str, *others: str) -> dict[int | str, dic
         described |= documented("Geodesic-Dtype", "Geodesic-Shape")
     return {
         200: {
-            "model": model | Estimate,
+            "model": Annotated[model | Estimate, Field(discriminator="kind")],
             "content": content,
             "description": description,
             "headers": described,
@@ -81,14 +82,13 @@ def _answers(model: type, description: str, *others: str) -> dict[int | str, dic
 
 _TEXT = {"type": "string"}
 _BINARY = {"type": "string", "format": "binary"}
-_OBJECT = {"type": "object"}
 _LINES = OBJ, CSV, SVG, GEOJSON
 _PATH = "The path; its points in binary"
 
 
 def _schema(media_type: str) -> dict[str, str]:
     if media_type == GEOJSON:
-        return _OBJECT
+        return {"$ref": "#/components/schemas/FeatureCollection"}
     return _TEXT if media_type in TEXTS else _BINARY
 
 
@@ -164,7 +164,7 @@ async def compute_path(
 async def get_path(
     parameters: Annotated[PathParameters, Query()], query_request: QueryRequestDep
 ) -> Response:
-    """Return the same as `POST`, for points written as `v12` or `f7:0.2,0.3,0.5`."""
+    """Return the same as `POST`, for points written as `12`, `v12` or `f7:0.2,0.3,0.5`."""
     with naming_parameters():
         return await query_request.answer(PathQuery, written_request(parameters), parameters)
 

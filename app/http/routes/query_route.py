@@ -20,6 +20,7 @@ from app.http.routes.query_request import (
     offload_if_large,
     parse_json,
 )
+from app.queries import check_lengths
 from app.settings import Settings
 
 
@@ -63,12 +64,13 @@ def read(model: type[BaseModel], head: dict[str, Any], body: bytes, settings: Se
     Raises
     ------
     ProblemError
-        The body is not JSON, or has too many values.
+        The body is not JSON, or has too many values, or too long a list.
     RequestValidationError
         A value does not fit the model.
     """
     if body:
         head = {**head, "body": parse_json(body, settings)}
+        check_lengths(head["body"], settings)
     try:
         return model.model_validate(head)
     except ValidationError as error:

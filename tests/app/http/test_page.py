@@ -14,6 +14,7 @@ def built(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A page of one word, with a script."""
     (tmp_path / "assets").mkdir()
     (tmp_path / "index.html").write_text("<p>page</p>")
+    (tmp_path / "docs.html").write_text("<p>reference</p>")
     (tmp_path / "assets" / "index-1a2b.js").write_text("1")
     monkeypatch.setattr(page, "DIST", tmp_path)
 
@@ -32,6 +33,24 @@ def test_browsers_get_the_page(client: TestClient) -> None:
     assert "http" not in policy
     etag = {"If-None-Match": response.headers["etag"]}
     assert client.get("/", headers=BROWSER | etag).status_code == 304
+
+
+@pytest.mark.usefixtures("built")
+def test_the_reference_is_a_page_of_its_own(client: TestClient) -> None:
+    response = client.get("/docs")
+
+    assert response.text == "<p>reference</p>"
+    assert "unsafe" not in response.headers["content-security-policy"]
+
+
+def test_without_a_page_there_is_no_reference(
+    client: TestClient, tmp_path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(page, "DIST", tmp_path)
+
+    problem = check_problem(client.get("/docs"), 404, "not_found")
+
+    assert "/openapi.json" in problem["detail"]
 
 
 @pytest.mark.usefixtures("built")

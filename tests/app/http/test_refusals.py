@@ -85,8 +85,30 @@ def with_sources(count: int) -> bytes:
 
 def test_a_body_of_half_a_million_values_is_refused_with_one_fault() -> None:
     with pytest.raises(RequestValidationError) as refused:
-        read(DISTANCES, {}, with_sources(MOST_VALUES), SETTINGS)
-    assert [error["loc"] for error in refused.value.errors()] == [("body", "sources", 0)]
+        read(DISTANCES, {}, with_sources(MOST_VALUES).replace(b"sources", b"targets"), SETTINGS)
+    assert [error["loc"] for error in refused.value.errors()] == [("body", "sources")]
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "setting"),
+    [
+        ("distances", "sources", "max_sources"),
+        ("isolines", "sources", "max_sources"),
+        ("isolines", "levels", "max_levels"),
+        ("matrix", "sources", "max_sources"),
+        ("path", "waypoints", "max_waypoints"),
+    ],
+)
+def test_the_length_of_a_list_is_checked_before_its_elements(
+    kind: str, name: str, setting: str
+) -> None:
+    limit = getattr(SETTINGS, setting)
+    body = f'{{"{name}":[{",".join(["null"] * (limit + 1))}]}}'.encode()
+    model: Any = create_model("Request", body=(KINDS[kind].model, ...))
+    with pytest.raises(ProblemError) as refused:
+        read(model, {}, body, SETTINGS)
+    problem = refused.value.problem
+    assert (problem.code, problem.actual, problem.limit) == ("limit_exceeded", limit + 1, limit)
 
 
 @pytest.mark.parametrize("count", [MOST_VALUES + 1, 2_000_000])

@@ -10,6 +10,8 @@ from app.schemas.points import EdgePoint, FacePoint, PositionPoint, VertexPoint
     ("text", "point"),
     [
         ("v0", VertexPoint(vertex=0)),
+        ("0", VertexPoint(vertex=0)),
+        ("-7", VertexPoint(vertex=-7)),
         ("v-7", VertexPoint(vertex=-7)),
         ("e12-13:0.3", EdgePoint(edge=(12, 13), t=0.3)),
         ("e12--13:1", EdgePoint(edge=(12, -13), t=1.0)),
@@ -26,7 +28,7 @@ def test_points(text: str, point: object) -> None:
 @pytest.mark.parametrize(
     "text",
     [
-        *("", "0", "v", "v1.0", "v 1", " v1", "v1\n", "V1", "v1,2", "v" + "9" * 19, "v١"),
+        *("", "0.0", "٧", "v", "v1.0", "v 1", " v1", "v1\n", "V1", "v1,2", "v" + "9" * 19, "v١"),
         *("e1-2", "e1-2:", "e1:0.3", "e1-2-3:0.3", "e1,2:0.3", "e1-2:nan", "e1-2:0.3,0.7"),
         *("f7", "f7:1,0", "f7:1,0,0,0", "f7:a,b,c", "f7:1,0,inf", "f7:1,,0", "f1.5:1,0,0"),
         *("p1,2", "p1,2,3,4", "p1;2;3", "p1, 2, 3", "p1,2,nan", "p1,2,0x10", "p1,2,1_0"),
@@ -34,7 +36,7 @@ def test_points(text: str, point: object) -> None:
     ],
 )
 def test_what_is_no_point(text: str) -> None:
-    with pytest.raises(ValueError, match="write a vertex as v12") as caught:
+    with pytest.raises(ValueError, match="write a vertex as 12 or v12") as caught:
         parse(text)
     assert len(str(caught.value)) < 300
 
