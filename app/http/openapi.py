@@ -21,7 +21,6 @@ EXAMPLES = _PACKAGED if _PACKAGED.is_dir() else Path(__file__).parents[2] / "ope
 In a wheel it is inside the package, in a checkout beside the document.
 """
 
-_EVENT_STREAM = "text/event-stream"
 _FASTAPI_VALIDATION = "Validation Error"  # FastAPI adds it to each operation with parameters
 _TEXT, _NUMBER = {"type": "string"}, {"type": "integer"}
 _EVERYWHERE = (
@@ -64,11 +63,21 @@ TAGS = [
     },
 ]
 """What the operations are grouped by"""
-_EVENTS = {
-    "type": "string",
-    "contentMediaType": _EVENT_STREAM,
-    "description": "Server-sent events. The `id` of each counts the states of the job; its `data` "
-    "is a `JobDocument` in JSON. Comments keep the connection open.",
+_JOB_EVENT = {
+    "type": "object",
+    "title": "JobEvent",
+    "description": "One of the server-sent events of a stream. Comments between them keep the "
+    "connection open.",
+    "required": ["id", "data"],
+    "properties": {
+        "id": {"type": "string", "description": "Counts the states of the job"},
+        "data": {
+            "type": "string",
+            "description": "The job, as `getJob` answers it",
+            "contentMediaType": JSON,
+            "contentSchema": {"$ref": "#/components/schemas/JobDocument"},
+        },
+    },
 }
 _SECURITY_SCHEME = {
     "type": "http",
@@ -145,7 +154,7 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
     components = document["components"]
     for name in ("HTTPValidationError", "ValidationError", "BareVertex", "BareVertexSource"):
         components["schemas"].pop(name, None)
-    components["schemas"] |= _schemas_of(FeatureCollection)
+    components["schemas"] |= _schemas_of(FeatureCollection) | {"JobEvent": _JOB_EVENT}
     for schema in components["schemas"].values():
         for member in schema.get("properties", {}).values():
             _describe_default(member)
@@ -218,7 +227,7 @@ def _responses(
         for content in response.get("content", {}).values():
             if "itemSchema" in content:  # belongs to OpenAPI 3.2, and the document to 3.1
                 content.clear()
-                content["schema"] = dict(_EVENTS)
+                content["schema"] = {"$ref": "#/components/schemas/JobEvent"}
         yield status, response
 
 

@@ -111,7 +111,7 @@ def test_barriers_part_a_curve_from_what_is_behind(client: TestClient, plane: st
         ([], "invalid_request", [""]),
         (None, "invalid_request", [""]),
         ({"vertex": 0}, "invalid_request", [""]),
-        ([0], "invalid_request", ["/0"]),
+        ([0.0], "invalid_request", ["/0"]),
         ([{"vertex": 0, "start_distance": 1}], "invalid_request", ["/0/start_distance"]),
         ([{"polyline": [{"vertex": 0}]}], "invalid_request", ["/0"]),
         ([{"vertex": 0}, {"vertex": 121}], "invalid_point", ["/1/vertex"]),

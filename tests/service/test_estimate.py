@@ -267,7 +267,7 @@ def test_a_get_is_estimated_as_its_post(client: TestClient, ids: dict[str, str])
         ("from=v3&to=v-7&estimate=true", "invalid_point", "/query/to"),
         ("from=v3&to=e0-1400:0.5&estimate=true", "invalid_point", "/query/to"),
         ("from=v3&to=v7&estimate=perhaps", "invalid_request", "/query/estimate"),
-        ("from=v3&to=v7&estimate=true&via=7", "invalid_point", "/query/via/0"),
+        ("from=v3&to=v7&estimate=true&via=7.0", "invalid_point", "/query/via/0"),
     ):
         problem = check_problem(client.get(f"{link}?{query}"), 422, code)
         assert [fault["pointer"] for fault in problem["errors"]] == [place]

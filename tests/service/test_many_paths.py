@@ -98,7 +98,7 @@ def test_the_same_paths_are_not_found_again(client: TestClient, knot: str) -> No
     [
         ({"targets": []}, "/targets"),
         ({"targets": None}, "/targets"),
-        ({"targets": [3]}, "/targets/0"),
+        ({"targets": [3.0]}, "/targets/0"),
         ({"source": None}, "/source"),
         ({"source": {"vertex": 0, "start_distance": 1}}, "/source/start_distance"),
         ({"sources": []}, "/sources"),

@@ -1,0 +1,47 @@
+"""A client of the service geodesic: `Client` for threads, `AsyncClient` for coroutines."""
+
+from geodesic_client.answers import (
+    Distances,
+    ErrorBound,
+    Estimate,
+    Isoline,
+    IsolineLevel,
+    Isolines,
+    Job,
+    LocatedPoint,
+    Matrix,
+    Mesh,
+    Neighbour,
+    Path,
+)
+from geodesic_client.async_client import AsyncClient
+from geodesic_client.bars import progress_bar
+from geodesic_client.client import Client
+from geodesic_client.errors import GeodesicClientError, ProblemError, UnreachableError
+from geodesic_client.points import curve, edge, face, position, starting_at
+
+__all__ = [
+    "AsyncClient",
+    "Client",
+    "Distances",
+    "ErrorBound",
+    "Estimate",
+    "GeodesicClientError",
+    "Isoline",
+    "IsolineLevel",
+    "Isolines",
+    "Job",
+    "LocatedPoint",
+    "Matrix",
+    "Mesh",
+    "Neighbour",
+    "Path",
+    "ProblemError",
+    "UnreachableError",
+    "curve",
+    "edge",
+    "face",
+    "position",
+    "progress_bar",
+    "starting_at",
+]

@@ -1,0 +1,291 @@
+"""Answers, as values with numpy arrays, and how they are decoded."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import Any
+
+import httpx2
+import numpy as np
+from numpy.typing import NDArray
+
+NPY = "application/x-npy"
+NPZ = "application/x-npz"
+JSON = "application/json"
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class ErrorBound:
+    """The most by which an answer differs from the exact one; 0 for exact ones."""
+
+    type: str
+    """``relative`` or ``absolute``"""
+    value: float
+    kind: str
+    """``guaranteed`` or ``estimated``"""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A mesh in the store of the service."""
+
+    id: str
+    vertices: int
+    faces: int
+    warnings: Sequence[str]
+    report: Mapping[str, Any] = field(repr=False)
+    """All that the service found out about it"""
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Distances of all vertices, or of the targets; infinite where they cannot be reached."""
+
+    mesh_id: str
+    method: str
+    distances: Floats
+    error_bound: ErrorBound
+    unreachable: Mapping[str, int]
+    """Number of missing distances, by reason"""
+    nearest_source: Integers | None
+    """Index of the nearest source, −1 where unreachable; where it was asked for"""
+    gradient: Floats | None
+    """The direction in which distance grows, (V, 3); where it was asked for"""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A shortest path, or the reason why there is none."""
+
+    length: float
+    """Infinite where there is no path"""
+    points: Floats
+    """(K, 3), from source to target; (0, 3) where there is no path"""
+    faces: Integers
+    """The face of each piece, (K − 1,)"""
+    locations: Sequence[Mapping[str, Any]]
+    """The points again, each as a face and the weights of its corners"""
+    error_bound: ErrorBound
+    reason: str | None
+    """``disconnected`` or ``beyond_max_distance``; None for a path"""
+
+
+@dataclass(frozen=True)
+class Isoline:
+    """A line of points at one distance."""
+
+    points: Floats
+    faces: Integers
+    closed: bool
+    length: float
+
+
+@dataclass(frozen=True)
+class IsolineLevel:
+    """The lines at one distance."""
+
+    level: float
+    lines: Sequence[Isoline]
+
+
+@dataclass(frozen=True)
+class Isolines:
+    """Lines of equal distance."""
+
+    levels: Sequence[IsolineLevel]
+    chord_error: float
+    error_bound: ErrorBound
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Distances between many points; infinite where they cannot be reached.
+
+    Dense, a row for each source; of pairs, one distance for each. Sparse, the finite distances
+    only, with the source (``rows``) and the target (``columns``) of each.
+    """
+
+    distances: Floats
+    error_bound: ErrorBound
+    rows: Integers | None = None
+    columns: Integers | None = None
+
+
+@dataclass(frozen=True)
+class Neighbour:
+    """One of the nearest candidates."""
+
+    candidate: int
+    """Index into the candidates"""
+    distance: float
+
+
+@dataclass(frozen=True)
+class LocatedPoint:
+    """The point of the surface that is nearest to a position."""
+
+    point: Mapping[str, Any]
+    """As a source or target of a query"""
+    position: tuple[float, float, float]
+    distance: float
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The expected cost of an answer."""
+
+    seconds: float
+    memory_bytes: int
+    response_bytes: int
+
+
+@dataclass(frozen=True)
+class Job:
+    """A query that is answered in the background."""
+
+    id: str
+    kind: str
+    mesh_id: str
+    status: str
+    progress: float
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether nothing will change."""
+        return self.status not in ("accepted", "running")
+
+
+def to_array(response: httpx2.Response) -> NDArray[Any]:
+    """Return the array of a response in numpy's format."""
+    array: NDArray[Any] = np.load(BytesIO(response.content), allow_pickle=False)
+    return array
+
+
+def to_mesh(document: Mapping[str, Any]) -> Mesh:
+    """Return a mesh, from its report."""
+    members = {name: document[name] for name in ("id", "vertices", "faces", "warnings")}
+    return Mesh(**members, report=document)
+
+
+def to_job(document: Mapping[str, Any]) -> Job:
+    """Return a job, from its document."""
+    names = ("id", "kind", "mesh_id", "status", "progress")
+    return Job(*(document[name] for name in names))
+
+
+def to_estimate(response: httpx2.Response) -> Estimate:
+    """Return an estimate."""
+    names = ("seconds", "memory_bytes", "response_bytes")
+    document = response.json()
+    return Estimate(*(document[name] for name in names))
+
+
+def to_distances(response: httpx2.Response) -> Distances:
+    """Return distances, from numpy's format or from JSON."""
+    if _media_type(response) == NPY:
+        members = _members_of_headers(response)
+        distances = to_array(response).astype(np.float64, copy=False)
+    else:
+        members = response.json()
+        distances = _with_infinity(members["distances"])
+    nearest, gradient = members.get("nearest_source"), members.get("gradient")
+    return Distances(
+        mesh_id=members["mesh_id"],
+        method=members["method"],
+        distances=distances,
+        error_bound=ErrorBound(**members["error_bound"]),
+        unreachable=members["unreachable"],
+        nearest_source=None if nearest is None else _with_minus_one(nearest),
+        gradient=None if gradient is None else np.array(gradient, np.float64),
+    )
+
+
+def to_path(response: httpx2.Response) -> Path:
+    """Return a path, from JSON."""
+    return _to_path(response.json())
+
+
+def to_paths(response: httpx2.Response) -> list[Path]:
+    """Return paths, from JSON, in the order of their targets."""
+    return [_to_path(each) for each in response.json()["paths"]]
+
+
+def _to_path(document: Mapping[str, Any]) -> Path:
+    length = document.get("length")
+    return Path(
+        length=np.inf if length is None else length,
+        points=np.array(document["points"] or [], np.float64).reshape(-1, 3),
+        faces=np.array(document.get("faces") or [], np.int64),
+        locations=document.get("locations") or [],
+        error_bound=ErrorBound(**document["error_bound"]),
+        reason=document.get("reason"),
+    )
+
+
+def to_isolines(response: httpx2.Response) -> Isolines:
+    """Return isolines."""
+    document = response.json()
+    levels = [
+        IsolineLevel(each["level"], [_to_isoline(line) for line in each["lines"]])
+        for each in document["isolines"]
+    ]
+    return Isolines(levels, document["chord_error"], ErrorBound(**document["error_bound"]))
+
+
+def to_matrix(response: httpx2.Response) -> Matrix:
+    """Return a matrix, from numpy's formats."""
+    bound = ErrorBound(**_members_of_headers(response)["error_bound"])
+    if _media_type(response) == NPY:
+        return Matrix(to_array(response).astype(np.float64, copy=False), bound)
+    with np.load(BytesIO(response.content), allow_pickle=False) as table:  # as SciPy writes it
+        rows = np.repeat(np.arange(len(table["indptr"]) - 1), np.diff(table["indptr"]))
+        return Matrix(table["data"], bound, rows, table["indices"].astype(np.int64))
+
+
+def to_neighbours(response: httpx2.Response) -> list[Neighbour]:
+    """Return the nearest candidates, nearest first."""
+    return [Neighbour(each["candidate"], each["distance"]) for each in response.json()["nearest"]]
+
+
+def to_located(response: httpx2.Response) -> list[LocatedPoint | None]:
+    """Return the nearest points, None for positions that are too far away."""
+    return [None if each is None else _to_located(each) for each in response.json()["points"]]
+
+
+def _to_isoline(line: Mapping[str, Any]) -> Isoline:
+    points = np.array(line["points"], np.float64).reshape(-1, 3)
+    return Isoline(points, np.array(line["faces"], np.int64), line["closed"], line["length"])
+
+
+def _to_located(each: Mapping[str, Any]) -> LocatedPoint:
+    names = ("vertex",) if "vertex" in each else ("face", "barycentric")
+    point = {name: each[name] for name in names}
+    return LocatedPoint(point, tuple(each["position"]), each["distance"])
+
+
+def _media_type(response: httpx2.Response) -> str:
+    return str(response.headers["content-type"]).partition(";")[0]
+
+
+def _members_of_headers(response: httpx2.Response) -> dict[str, Any]:
+    """Return the members of an answer that an array has no room for."""
+    members: dict[str, Any] = {}
+    for name, value in response.headers.items():
+        if name.startswith("geodesic-"):
+            member = name.removeprefix("geodesic-").replace("-", "_")
+            members[member] = json.loads(value) if value[:1] in "[{" else value
+    return members
+
+
+def _with_infinity(values: Sequence[float | None]) -> Floats:
+    numbers = np.array(values, np.float64)
+    numbers[np.isnan(numbers)] = np.inf  # null
+    return numbers
+
+
+def _with_minus_one(values: Sequence[int | None]) -> Integers:
+    return np.array([-1 if value is None else value for value in values], np.int64)

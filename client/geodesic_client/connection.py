@@ -1,0 +1,25 @@
+"""What both clients tell httpx2 and stamina."""
+
+from typing import Any
+
+import stamina
+
+from geodesic_client.errors import pause_before_retry
+
+ADDRESS = "http://127.0.0.1:8000"
+"""Where ``geodesic serve`` listens"""
+TIMEOUT_S = 180.0
+"""Seconds to wait for an answer: longer than the service computes one that is no job"""
+ATTEMPTS, PATIENCE_S = 8, 120.0
+"""Attempts of a request, and seconds after which there are no more"""
+
+
+def settings(address: str, api_key: str | None) -> dict[str, Any]:
+    """Return the arguments of a client of httpx2."""
+    headers = {} if api_key is None else {"Authorization": f"Bearer {api_key}"}
+    return {"base_url": address, "headers": headers, "timeout": TIMEOUT_S}
+
+
+def attempts() -> Any:
+    """Return the attempts of a request, for ``for`` and for ``async for``."""
+    return stamina.retry_context(pause_before_retry, attempts=ATTEMPTS, timeout=PATIENCE_S)

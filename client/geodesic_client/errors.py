@@ -1,0 +1,101 @@
+"""Errors of the client.
+
+::
+
+    GeodesicClientError
+    ├── ProblemError        the service refused, or failed
+    └── UnreachableError    no service answered
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import httpx2
+
+
+class GeodesicClientError(Exception):
+    """The base of all errors of this package."""
+
+
+class UnreachableError(GeodesicClientError):
+    """No service answered: there is none at the address, or the connection broke."""
+
+    def __init__(self, message: str, *, may_retry: bool) -> None:
+        super().__init__(message)
+        self.may_retry = may_retry
+
+
+class ProblemError(GeodesicClientError):
+    """A problem that the service answered with (RFC 9457).
+
+    Attributes
+    ----------
+    status
+        The HTTP status.
+    code
+        The kind of problem, such as ``invalid_point``; ``/problems/{code}`` of the service has its
+        meaning.
+    detail
+        What is wrong.
+    hint
+        What to do, where the service knows it.
+    errors
+        The elements of the request at fault: each has ``pointer`` and ``message``.
+    limit, actual, setting
+        Of what exceeds a limit: the limit, the number, and the setting of the service.
+    request_id
+        The id of the request in the log of the service.
+    retry_after
+        Seconds after which the request may succeed, where the service said so.
+    document
+        The whole problem.
+    """
+
+    def __init__(self, status: int, document: Mapping[str, Any], retry_after: float | None) -> None:
+        self.status = status
+        self.document = document
+        self.code = str(document.get("code", "unknown"))
+        self.detail = str(document.get("detail", f"the service answered {status}"))
+        self.hint: str | None = document.get("hint")
+        self.errors: list[Mapping[str, str]] = document.get("errors") or []
+        self.limit: float | None = document.get("limit")
+        self.actual: float | None = document.get("actual")
+        self.setting: str | None = document.get("setting")
+        self.request_id: str | None = document.get("request_id")
+        self.retry_after = retry_after
+        hint = f" ({self.hint})" if self.hint else ""
+        super().__init__(f"{self.code}: {self.detail}{hint}")
+
+
+def check(response: httpx2.Response) -> httpx2.Response:
+    """Return a response that is an answer; raise `ProblemError` for any other."""
+    if response.status_code < 400:
+        return response
+    try:
+        document = response.json()
+    except ValueError:  # a proxy on the way, for example
+        document = {"detail": f"the answer has status {response.status_code}, and is no problem"}
+    seconds = response.headers.get("retry-after", "")
+    retry_after = float(seconds) if seconds.isdecimal() else None
+    raise ProblemError(response.status_code, document, retry_after)
+
+
+def unreachable(error: httpx2.TransportError) -> UnreachableError:
+    """Return the error for a request that was not answered."""
+    broken = httpx2.NetworkError, httpx2.RemoteProtocolError, httpx2.ConnectTimeout
+    message = f"no answer from {error.request.url}: {error or type(error).__name__}"
+    return UnreachableError(message, may_retry=isinstance(error, broken))
+
+
+def pause_before_retry(error: Exception) -> bool | float:
+    """Tell whether to send a request again: True, or the seconds that the service asks to wait.
+
+    Every request may be sent twice: meshes are named by their content, jobs by a key, and queries
+    change nothing.
+    """
+    match error:
+        case ProblemError(status=429 | 503, retry_after=seconds):
+            return True if seconds is None else seconds
+        case UnreachableError(may_retry=may_retry):
+            return may_retry
+    return False

@@ -1,0 +1,107 @@
+"""Conversations with the service, without a connection: a generator yields what is to be done.
+
+`Client` and `AsyncClient` do it, each in its way, and send back the responses. So each question is
+written once for both.
+"""
+
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Any, Generic, TypeVar
+from uuid import uuid4
+
+import httpx2
+
+from geodesic_client.answers import to_estimate, to_job
+from geodesic_client.errors import GeodesicClientError, ProblemError
+
+T = TypeVar("T")
+
+JOB_FROM_S = 1.0
+"""Seconds of expected work from which a query runs as a job"""
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.05, 2.0
+"""Seconds between two looks at a job, which grow from the first to the longest"""
+
+Progress = Callable[[float], object]
+"""Is called with the share of the work that is done, 0 to 1; what it raises stops the work."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """A request that is to be sent."""
+
+    method: str
+    path: str
+    params: Mapping[str, str | int] = field(default_factory=dict)
+    headers: Mapping[str, str] = field(default_factory=dict)
+    content: bytes | Callable[[], Iterator[bytes]] = b""
+    """The body, or what begins to read it: it is read again for each attempt"""
+
+
+@dataclass(frozen=True)
+class Pause:
+    """A time to wait."""
+
+    seconds: float
+
+
+Flow = Generator[Request | Pause, Any, T]
+
+
+@dataclass(frozen=True)
+class Query(Generic[T]):
+    """A request for work, and how its answer is decoded."""
+
+    request: Request
+    decode: Callable[[httpx2.Response], T]
+
+
+def ignore_progress(_share: float) -> None:
+    """Do nothing."""
+
+
+def send(request: Request) -> Flow[httpx2.Response]:
+    """Send a request, and return its response, which is no problem."""
+    response: httpx2.Response = yield request
+    return response
+
+
+def estimate(request: Request) -> Flow[float]:
+    """Return the seconds that the answer to a query will take."""
+    response = yield from send(replace(request, params={**request.params, "estimate": "true"}))
+    return to_estimate(response).seconds
+
+
+def answer(query: Query[T], progress: Progress) -> Flow[T]:
+    """Return the answer to a query: at once, or as a job where it takes long."""
+    if (yield from estimate(query.request)) < JOB_FROM_S:
+        try:
+            return query.decode((yield from send(query.request)))
+        except ProblemError as error:
+            if error.code != "deadline_exceeded":  # it took longer than expected
+                raise
+    return query.decode((yield from as_job(query.request, progress)))
+
+
+def as_job(request: Request, progress: Progress) -> Flow[httpx2.Response]:
+    """Run a query as a job, and return its response. Whatever ends the wait early, ends the job."""
+    headers = {"Prefer": "respond-async", "Idempotency-Key": uuid4().hex}
+    submitted = yield from send(replace(request, headers={**request.headers, **headers}))
+    job = to_job(submitted.json())
+    link = f"/v1/jobs/{job.id}"
+    pause = FIRST_PAUSE_S
+    try:
+        while not job.is_finished:
+            progress(job.progress)
+            yield Pause(pause)
+            pause = min(1.5 * pause, LONGEST_PAUSE_S)
+            job = to_job((yield from send(Request("GET", link))).json())
+    except GeneratorExit:
+        raise
+    except BaseException:
+        with suppress(GeodesicClientError):
+            yield from send(Request("DELETE", link))
+        raise
+    response = yield from send(Request("GET", f"{link}/results"))
+    progress(1.0)
+    return response

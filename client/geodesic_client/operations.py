@@ -1,0 +1,374 @@
+"""The operations of the service, each as a conversation, and as a method of both clients."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, TypeVar
+
+import httpx2
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from geodesic_client import uploads
+from geodesic_client.answers import (
+    JSON,
+    NPY,
+    NPZ,
+    Distances,
+    Estimate,
+    Isolines,
+    Job,
+    LocatedPoint,
+    Matrix,
+    Mesh,
+    Neighbour,
+    Path,
+    to_array,
+    to_distances,
+    to_estimate,
+    to_isolines,
+    to_job,
+    to_located,
+    to_matrix,
+    to_mesh,
+    to_neighbours,
+    to_path,
+    to_paths,
+)
+from geodesic_client.flow import Flow, Progress, Query, Request, answer, ignore_progress, send
+from geodesic_client.method import Method
+from geodesic_client.points import Point
+
+T = TypeVar("T")
+Accuracy = Literal["exact", "approximate", "fast"]
+Kind = Literal["distances", "path", "paths", "isolines", "matrix", "nearest", "locate"]
+ArrayName = Literal["vertices", "faces", "vertex_map", "face_map", "components"]
+
+_PAGE = 1000
+"""Meshes or jobs that are listed at a time"""
+
+
+def about() -> Flow[Mapping[str, Any]]:
+    """Return version, formats and limits of the service."""
+    return (yield from _read("/v1"))
+
+
+def upload(
+    mesh: uploads.Source,
+    *,
+    format: str | None = None,  # noqa: A002 - the service's name for it
+    merge: Literal["none", "exact"] = "none",
+    progress: Progress = ignore_progress,
+) -> Flow[Mesh]:
+    """Store a mesh, and return it. The same mesh is never stored twice.
+
+    Parameters
+    ----------
+    mesh
+        The path of an OBJ, OFF, PLY, STL or GLB file, its bytes, or a pair of arrays: vertices
+        (V, 3) and triangles (F, 3).
+    format
+        The format, where the end of the file's name does not tell it.
+    merge
+        ``exact`` joins vertices at the same position.
+    progress
+        Called with the share that is sent.
+    """
+    size, read = uploads.body_of(mesh, progress)
+    parameters = {"format": uploads.format_of(mesh, format), "merge": merge}
+    headers = {"Content-Type": "application/octet-stream", "Content-Length": str(size)}
+    request = Request("POST", "/v1/meshes", parameters, headers, read)
+    return to_mesh((yield from send(request)).json())
+
+
+def sample(name: str, faces: int = 20_000) -> Flow[Mesh]:
+    """Have a sample made, and return it; `about` has their names."""
+    parameters: dict[str, str | int] = {"sample": name, "faces": faces}
+    return to_mesh((yield from send(Request("POST", "/v1/meshes", parameters))).json())
+
+
+def meshes() -> Flow[list[Mesh]]:
+    """Return all meshes in the store, by their ids."""
+    return [to_mesh(each) for each in (yield from _list("meshes"))]
+
+
+def mesh(mesh_id: str) -> Flow[Mesh]:
+    """Return a mesh of the store, with its report."""
+    return to_mesh((yield from _read(f"/v1/meshes/{mesh_id}")))
+
+
+def delete_mesh(mesh: Mesh | str) -> Flow[None]:
+    """Remove a mesh and its results from the store."""
+    yield from send(Request("DELETE", _link(mesh)))
+
+
+def array(mesh: Mesh | str, name: ArrayName) -> Flow[NDArray[Any]]:
+    """Return an array of a mesh: its vertices, or its faces, for example."""
+    return to_array((yield from send(Request("GET", f"{_link(mesh)}/arrays/{name}"))))
+
+
+def distances(
+    mesh: Mesh | str,
+    sources: Sequence[Point],
+    *,
+    targets: Sequence[Point] | None = None,
+    method: Accuracy = "exact",
+    relative_error: float | None = None,
+    absolute_error: float | None = None,
+    effort: Literal[1, 2, 4, 8] | None = None,
+    max_distance: float | None = None,
+    barriers: Sequence[int] = (),
+    include: Sequence[Literal["nearest_source", "gradient"]] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Distances]:
+    """Return the distance of each vertex, or of each target, from the nearest source."""
+    body = _body(
+        sources=sources,
+        targets=targets,
+        method=method,
+        relative_error=relative_error,
+        absolute_error=absolute_error,
+        effort=effort,
+        max_distance=max_distance,
+        barriers=barriers,
+        include=include,
+    )
+    media_type = JSON if len(include) else NPY
+    return (yield from _ask(mesh, "distances", body, to_distances, progress, media_type))
+
+
+def path(
+    mesh: Mesh | str,
+    source: Point,
+    target: Point,
+    *,
+    waypoints: Sequence[Point] = (),
+    method: Accuracy = "exact",
+    relative_error: float | None = None,
+    absolute_error: float | None = None,
+    effort: Literal[1, 2, 4, 8] | None = None,
+    max_distance: float | None = None,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Path]:
+    """Return the shortest path from source to target, past waypoints in their order."""
+    body = _body(
+        source=source,
+        target=target,
+        waypoints=waypoints,
+        method=method,
+        relative_error=relative_error,
+        absolute_error=absolute_error,
+        effort=effort,
+        max_distance=max_distance,
+        barriers=barriers,
+    )
+    return (yield from _ask(mesh, "path", body, to_path, progress))
+
+
+def paths(
+    mesh: Mesh | str,
+    source: Point,
+    targets: Sequence[Point],
+    *,
+    method: Accuracy = "exact",
+    relative_error: float | None = None,
+    absolute_error: float | None = None,
+    effort: Literal[1, 2, 4, 8] | None = None,
+    max_distance: float | None = None,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[list[Path]]:
+    """Return the shortest path from a source to each of the targets."""
+    body = _body(
+        source=source,
+        targets=targets,
+        method=method,
+        relative_error=relative_error,
+        absolute_error=absolute_error,
+        effort=effort,
+        max_distance=max_distance,
+        barriers=barriers,
+    )
+    return (yield from _ask(mesh, "paths", body, to_paths, progress))
+
+
+def isolines(
+    mesh: Mesh | str,
+    sources: Sequence[Point],
+    *,
+    levels: Sequence[float] | None = None,
+    count: int | None = None,
+    method: Literal["exact", "approximate"] = "exact",
+    relative_error: float | None = None,
+    absolute_error: float | None = None,
+    max_distance: float | None = None,
+    chord_error: float | None = None,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Isolines]:
+    """Return the lines at some distances (``levels``), or at ``count`` evenly spaced ones."""
+    body = _body(
+        sources=sources,
+        levels=levels,
+        count=count,
+        method=method,
+        relative_error=relative_error,
+        absolute_error=absolute_error,
+        max_distance=max_distance,
+        chord_error=chord_error,
+        barriers=barriers,
+    )
+    return (yield from _ask(mesh, "isolines", body, to_isolines, progress))
+
+
+def matrix(
+    mesh: Mesh | str,
+    sources: Sequence[Point],
+    targets: Sequence[Point],
+    *,
+    max_distance: float | None = None,
+    layout: Literal["dense", "sparse", "pairs"] = "dense",
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[Matrix]:
+    """Return exact distances from each source to each target, or for pairs of them."""
+    body = _body(
+        sources=sources,
+        targets=targets,
+        max_distance=max_distance,
+        layout=layout,
+        barriers=barriers,
+    )
+    media_type = NPZ if layout == "sparse" else NPY
+    return (yield from _ask(mesh, "matrix", body, to_matrix, progress, media_type))
+
+
+def nearest(
+    mesh: Mesh | str,
+    source: Point,
+    candidates: Sequence[Point],
+    *,
+    k: int = 1,
+    max_distance: float | None = None,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[list[Neighbour]]:
+    """Return the ``k`` candidates that are nearest along the surface, nearest first."""
+    body = _body(
+        source=source, candidates=candidates, k=k, max_distance=max_distance, barriers=barriers
+    )
+    return (yield from _ask(mesh, "nearest", body, to_neighbours, progress))
+
+
+def locate(
+    mesh: Mesh | str,
+    positions: Sequence[Sequence[float]] | ArrayLike,
+    *,
+    max_distance: float | None = None,
+    progress: Progress = ignore_progress,
+) -> Flow[list[LocatedPoint | None]]:
+    """Return the point of the surface nearest to each position (N, 3); None where too far."""
+    body = _body(points=positions, max_distance=max_distance)
+    return (yield from _ask(mesh, "locate", body, to_located, progress))
+
+
+def estimate(mesh: Mesh | str, kind: Kind, body: Mapping[str, Any]) -> Flow[Estimate]:
+    """Return the expected cost of a query, from its body as the interface document has it."""
+    request = _request(mesh, kind, body, JSON, {"estimate": "true"})
+    return to_estimate((yield from send(request)))
+
+
+def jobs() -> Flow[list[Job]]:
+    """Return all jobs of this caller, the newest first."""
+    return [to_job(each) for each in (yield from _list("jobs"))]
+
+
+def job(job_id: str) -> Flow[Job]:
+    """Return the state of a job."""
+    return to_job((yield from _read(f"/v1/jobs/{job_id}")))
+
+
+def dismiss_job(job: Job | str) -> Flow[Job]:
+    """Stop a job that waits or runs; remove one that has finished."""
+    job_id = job.id if isinstance(job, Job) else job
+    return to_job((yield from send(Request("DELETE", f"/v1/jobs/{job_id}"))).json())
+
+
+def _ask(
+    mesh: Mesh | str,
+    kind: Kind,
+    body: Mapping[str, Any],
+    decode: Callable[[httpx2.Response], T],
+    progress: Progress,
+    media_type: str = JSON,
+) -> Flow[T]:
+    return (yield from answer(Query(_request(mesh, kind, body, media_type), decode), progress))
+
+
+def _request(
+    mesh: Mesh | str,
+    kind: Kind,
+    body: Mapping[str, Any],
+    media_type: str,
+    parameters: Mapping[str, str] | None = None,
+) -> Request:
+    content = json.dumps(body, default=_as_json, allow_nan=False).encode()
+    headers = {"Content-Type": JSON, "Accept": media_type}
+    return Request("POST", f"{_link(mesh)}/{kind}", parameters or {}, headers, content)
+
+
+def _body(**members: Any) -> dict[str, Any]:
+    return {name: value for name, value in members.items() if value is not None}
+
+
+def _as_json(value: Any) -> Any:
+    """Return what numpy's numbers and arrays, and ranges, are in JSON."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    if isinstance(value, Sequence):
+        return list(value)
+    raise TypeError(f"{value!r} is no part of a query")
+
+
+def _link(mesh: Mesh | str) -> str:
+    return f"/v1/meshes/{mesh.id if isinstance(mesh, Mesh) else mesh}"
+
+
+def _read(path: str) -> Flow[dict[str, Any]]:
+    response: httpx2.Response = yield from send(Request("GET", path))
+    document: dict[str, Any] = response.json()
+    return document
+
+
+def _list(name: Literal["meshes", "jobs"]) -> Flow[list[dict[str, Any]]]:
+    found: list[dict[str, Any]] = []
+    parameters: dict[str, str | int] = {"limit": _PAGE}
+    while True:
+        part = (yield from send(Request("GET", f"/v1/{name}", dict(parameters)))).json()
+        found += part[name]
+        if part.get("next_cursor") is None:
+            return found
+        parameters["cursor"] = part["next_cursor"]
+
+
+class Operations:
+    """The methods of both clients."""
+
+    about = Method(about)
+    upload = Method(upload)
+    sample = Method(sample)
+    meshes = Method(meshes)
+    mesh = Method(mesh)
+    delete_mesh = Method(delete_mesh)
+    array = Method(array)
+    distances = Method(distances)
+    path = Method(path)
+    paths = Method(paths)
+    isolines = Method(isolines)
+    matrix = Method(matrix)
+    nearest = Method(nearest)
+    locate = Method(locate)
+    estimate = Method(estimate)
+    jobs = Method(jobs)
+    job = Method(job)
+    dismiss_job = Method(dismiss_job)

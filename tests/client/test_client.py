@@ -1,0 +1,236 @@
+"""The client with a service that runs, against the library."""
+
+from pathlib import Path
+
+import anyio
+import httpx2
+import numpy as np
+import pytest
+from geodesic_client import (
+    AsyncClient,
+    Client,
+    Mesh,
+    ProblemError,
+    curve,
+    edge,
+    face,
+    flow,
+    position,
+    progress_bar,
+    starting_at,
+)
+from starlette.testclient import TestClient
+
+import geodesic_core as gc
+from tests.support.service import NPY, TWO_TRIANGLES, stored_mesh
+
+SOURCES = [0, edge(1, 2, 0.3), starting_at(face(5, (0.2, 0.3, 0.5)), 0.5), curve([0, 1])]
+
+
+@pytest.fixture(scope="module")
+def service(client: TestClient) -> Client:
+    return Client(http=client)
+
+
+@pytest.fixture(scope="module")
+def mesh(service: Client) -> Mesh:
+    return service.sample("knot", 3000)
+
+
+@pytest.fixture(scope="module")
+def same(client: TestClient, mesh: Mesh) -> gc.TriangleMesh:
+    """The mesh, as the library has it."""
+    return stored_mesh(client, mesh.id)
+
+
+@pytest.fixture(scope="module")
+def apart(service: Client) -> Mesh:
+    """A mesh of two components."""
+    return service.upload((TWO_TRIANGLES["vertices"], TWO_TRIANGLES["faces"]))
+
+
+def test_distances_are_the_library_s_to_the_bit(
+    service: Client, mesh: Mesh, same: gc.TriangleMesh
+) -> None:
+    found = service.distances(mesh, [0, 7])
+    field = gc.exact_distance(same, [0, 7])
+    np.testing.assert_array_equal(found.distances, field.distances)
+    assert (found.method, found.error_bound.kind, found.error_bound.value) == (
+        "exact",
+        "guaranteed",
+        0.0,
+    )
+    assert found.nearest_source is None
+    rich = service.distances(mesh.id, np.array([0, 7]), include=["nearest_source", "gradient"])
+    np.testing.assert_array_equal(rich.distances, field.distances)
+    np.testing.assert_array_equal(rich.nearest_source, field.nearest_source)
+    np.testing.assert_allclose(rich.gradient, field.gradient, equal_nan=True)
+
+
+def test_what_cannot_be_reached_is_infinite(service: Client, apart: Mesh) -> None:
+    for include in ((), ("nearest_source",)):
+        found = service.distances(apart, [0], include=include)
+        assert np.isinf(found.distances).tolist() == [False] * 3 + [True] * 3
+        assert found.unreachable == {"disconnected": 3, "beyond_max_distance": 0}
+    assert found.nearest_source is not None
+    assert found.nearest_source.tolist() == [0] * 3 + [-1] * 3
+    missing = service.path(apart, 0, 4)
+    assert (missing.reason, missing.length, missing.points.shape) == (
+        "disconnected",
+        np.inf,
+        (0, 3),
+    )
+
+
+def test_all_kinds_of_sources(service: Client, mesh: Mesh) -> None:
+    found = service.distances(mesh, SOURCES, targets=[9, position((3, 1, 0))], method="fast")
+    assert found.distances.shape == (2,)
+    assert found.error_bound.kind == "estimated"
+
+
+def test_paths_are_the_library_s(service: Client, mesh: Mesh, same: gc.TriangleMesh) -> None:
+    path = gc.shortest_path(same, 3, 700)
+    found = service.path(mesh, 3, 700)
+    assert found.length == path.length
+    np.testing.assert_array_equal(found.points, path.points)
+    np.testing.assert_array_equal(found.faces, path.faces)
+    assert len(found.locations) == len(found.points)
+    one, other = service.paths(mesh, 3, [700, 5])
+    assert one.length == pytest.approx(path.length)
+    assert other.reason is None
+
+
+def test_isolines_matrices_and_candidates(
+    service: Client, mesh: Mesh, same: gc.TriangleMesh
+) -> None:
+    lines = service.isolines(mesh, [0], levels=[0.5, 1.0])
+    assert [each.level for each in lines.levels] == [0.5, 1.0]
+    assert lines.levels[0].lines[0].points.shape[1] == 3
+
+    table = gc.distance_matrix(same, [0, 1], [7, 8, 9]).distances
+    np.testing.assert_array_equal(service.matrix(mesh, [0, 1], [7, 8, 9]).distances, table)
+    sparse = service.matrix(mesh, [0, 1], [7, 8, 9], layout="sparse")
+    assert sparse.rows is not None
+    dense = np.zeros((2, 3))
+    dense[sparse.rows, sparse.columns] = sparse.distances
+    np.testing.assert_array_equal(dense, table)
+    pairs = service.matrix(mesh, range(2), [7, 8], layout="pairs")
+    np.testing.assert_array_equal(pairs.distances, table.diagonal())
+
+    near = service.nearest(mesh, 0, [7, 8, 9], k=2)
+    assert [each.distance for each in near] == np.sort(table[0])[:2].tolist()
+
+
+def test_points_that_were_located_are_points(service: Client, mesh: Mesh) -> None:
+    found, missed = service.locate(mesh, np.array([[3, 1, 0.5], [99, 0, 0]]), max_distance=9)
+    assert missed is None
+    assert found is not None
+    (distance,) = service.distances(
+        mesh, [found.point], targets=[position(found.position)]
+    ).distances
+    assert distance == pytest.approx(0, abs=1e-9)
+
+
+def test_a_mesh_is_stored_read_listed_and_removed(service: Client, tmp_path: Path) -> None:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1 / 3, 0]])
+    shares: list[float] = []
+    mesh = service.upload((vertices, [[0, 1, 2]]), progress=shares.append)
+    assert shares == [1.0]
+    assert (mesh.vertices, mesh.faces, mesh.report["boundary_loops"]) == (3, 1, 1)
+    np.testing.assert_array_equal(service.array(mesh, "vertices"), vertices)
+    assert service.mesh(mesh.id) == mesh
+    assert mesh.id in [each.id for each in service.meshes()]
+    file = tmp_path / "one.obj"
+    file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+    assert service.upload(file).vertices == 3
+    assert service.upload(file.read_bytes(), format="obj") == service.upload(str(file))
+    service.delete_mesh(mesh)
+    with pytest.raises(ProblemError) as caught:
+        service.distances(mesh, [0])
+    assert caught.value.code == "mesh_not_found"
+
+
+@pytest.mark.parametrize(
+    ("mesh", "message"),
+    [
+        (b"OFF", "say the format"),
+        (([[0, 0]], [[0, 0, 0]]), "vertices have the shape"),
+        (([[0, 0, 0]], [[0, 0]]), "faces have the shape"),
+        (([[0, 0, 0]], [[0.0, 0, 0]]), "integers are needed"),
+        (([[0, 0, 0]], [[0, 0, 1]]), "outside of 0 to 0"),
+    ],
+)
+def test_meshes_that_are_none(service: Client, mesh: object, message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=message):
+        service.upload(mesh)  # type: ignore[arg-type]
+
+
+def test_a_refusal_names_the_element(service: Client, apart: Mesh) -> None:
+    with pytest.raises(ProblemError, match="vertex 9 is not one of 0 to 5") as caught:
+        service.distances(apart, [0, 9])
+    error = caught.value
+    assert (error.status, error.code, error.errors[0]["pointer"]) == (
+        422,
+        "invalid_point",
+        "/sources/1",
+    )
+    assert error.request_id
+
+
+def test_jobs(
+    service: Client, mesh: Mesh, same: gc.TriangleMesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flow, "JOB_FROM_S", 0.0)
+    shares: list[float] = []
+    found = service.distances(mesh, [11], progress=shares.append)
+    np.testing.assert_array_equal(found.distances, gc.exact_distance(same, 11).distances)
+    assert shares[-1] == 1.0
+    job = service.jobs()[0]
+    assert service.job(job.id) == job
+    assert (job.kind, job.status, job.is_finished) == ("distances", "successful", True)
+    assert service.dismiss_job(job).id == job.id
+    with pytest.raises(ProblemError, match="job_not_found"):
+        service.job(job.id)
+
+
+def test_about_and_estimates(service: Client, mesh: Mesh) -> None:
+    assert "exact" in service.about()["methods"]
+    assert service.estimate(mesh, "distances", {"sources": [0]}).seconds > 0
+
+
+def test_coroutines(client: TestClient, mesh: Mesh, tmp_path: Path) -> None:
+    """With the application itself instead of a connection; it runs already, for the other tests."""
+    expected = client.post(f"/v1/meshes/{mesh.id}/distances", json={"sources": [0]}, headers=NPY)
+    file = tmp_path / "one.off"
+    file.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+
+    def answer(request: httpx2.Request) -> httpx2.Response:
+        response = client.request(
+            request.method, str(request.url), content=request.content, headers=request.headers
+        )
+        return httpx2.Response(
+            response.status_code, headers=response.headers, content=response.content
+        )
+
+    async def reply(request: httpx2.Request) -> httpx2.Response:
+        await request.aread()
+        return await anyio.to_thread.run_sync(answer, request)
+
+    async def ask() -> None:
+        transport = httpx2.MockTransport(reply)
+        async with httpx2.AsyncClient(transport=transport, base_url="http://127.0.0.1") as http:
+            service = AsyncClient(http=http)
+            found = await service.distances(mesh, [0])
+            np.testing.assert_array_equal(
+                found.distances, np.frombuffer(expected.content[-8 * len(found.distances) :])
+            )
+            assert (await service.upload(file)).faces == 1
+
+    anyio.run(ask)
+
+
+def test_a_bar_moves(capsys: pytest.CaptureFixture[str]) -> None:
+    with progress_bar("upload") as show:
+        show(0.5)
+        show(1.0)
+    assert "upload 100%" in capsys.readouterr().err

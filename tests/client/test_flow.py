@@ -1,0 +1,207 @@
+"""Conversations of the client, without a service: retries, jobs, errors, and stopping."""
+
+import asyncio
+import json
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import httpx2
+import pytest
+import stamina
+from geodesic_client import AsyncClient, Client, ProblemError, UnreachableError
+from geodesic_client.flow import JOB_FROM_S
+
+JOB = {"id": "7", "kind": "nearest", "mesh_id": "m", "status": "running", "progress": 0.5}
+ANSWER = {"nearest": [{"candidate": 1, "distance": 2.5}]}
+Reply = Callable[[httpx2.Request], httpx2.Response]
+
+
+def estimated(seconds: float) -> httpx2.Response:
+    document = {"seconds": seconds, "memory_bytes": 1, "response_bytes": 1}
+    return httpx2.Response(200, json=document)
+
+
+def problem(status: int, code: str, **headers: str) -> httpx2.Response:
+    document = {"code": code, "detail": "no", "hint": "wait"}
+    return httpx2.Response(status, json=document, headers=headers)
+
+
+class Service:
+    """A service that answers with some replies, one after the other, and keeps the requests."""
+
+    def __init__(self, *replies: httpx2.Response | Exception) -> None:
+        self._replies = iter(replies)
+        self.requests: list[httpx2.Request] = []
+
+    def __call__(self, request: httpx2.Request) -> httpx2.Response:
+        request.read()
+        self.requests.append(request)
+        reply = next(self._replies)
+        if isinstance(reply, Exception):
+            raise reply
+        return reply
+
+    async def answer(self, request: httpx2.Request) -> httpx2.Response:
+        await request.aread()
+        self.requests.append(request)
+        reply = next(self._replies)
+        if isinstance(reply, Exception):
+            raise reply
+        return reply
+
+    @property
+    def sent(self) -> list[str]:
+        return [f"{each.method} {each.url.path}" for each in self.requests]
+
+    def client(self) -> Client:
+        http = httpx2.Client(transport=httpx2.MockTransport(self), base_url="http://service")
+        return Client(http=http)
+
+    def async_client(self) -> AsyncClient:
+        transport = httpx2.MockTransport(self.answer)
+        http = httpx2.AsyncClient(transport=transport, base_url="http://service")
+        return AsyncClient(http=http)
+
+
+@pytest.fixture(autouse=True)
+def pauses(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
+    """The pauses that were made, without making them."""
+    made: list[float] = []
+
+    async def pause(seconds: float) -> None:
+        made.append(seconds)
+
+    monkeypatch.setattr("geodesic_client.client.time.sleep", made.append)
+    monkeypatch.setattr("geodesic_client.async_client.anyio.sleep", pause)
+    with stamina.set_testing(False):
+        yield made
+
+
+def test_what_takes_little_is_one_request_after_its_estimate() -> None:
+    service = Service(estimated(JOB_FROM_S / 2), httpx2.Response(200, json=ANSWER))
+    (found,) = service.client().nearest("m", 0, [1, 2])
+    assert (found.candidate, found.distance) == (1, 2.5)
+    assert [dict(each.url.params) for each in service.requests] == [{"estimate": "true"}, {}]
+    assert json.loads(service.requests[1].content)["candidates"] == [1, 2]
+
+
+def long_replies() -> list[httpx2.Response | Exception]:
+    half = httpx2.Response(202, json=JOB)
+    done = httpx2.Response(200, json=JOB | {"status": "successful", "progress": 1.0})
+    return [estimated(JOB_FROM_S), half, done, httpx2.Response(200, json=ANSWER)]
+
+
+def check_long(service: Service, progress: list[float], pauses: list[float]) -> None:
+    assert service.sent[1:] == [
+        "POST /v1/meshes/m/nearest",
+        "GET /v1/jobs/7",
+        "GET /v1/jobs/7/results",
+    ]
+    assert service.requests[1].headers["prefer"] == "respond-async"
+    assert service.requests[1].headers["idempotency-key"]
+    assert progress == [0.5, 1.0]
+    assert len(pauses) == 1
+
+
+def test_what_takes_long_runs_as_a_job(pauses: list[float]) -> None:
+    service, progress = Service(*long_replies()), []  # type: ignore[var-annotated]
+    assert service.client().nearest("m", 0, [1], progress=progress.append)[0].candidate == 1
+    check_long(service, progress, pauses)
+
+
+def test_coroutines_have_the_same_conversation(pauses: list[float]) -> None:
+    service, progress = Service(*long_replies()), []  # type: ignore[var-annotated]
+    ask = service.async_client().nearest("m", 0, [1], progress=progress.append)
+    assert asyncio.run(ask)[0].candidate == 1
+    check_long(service, progress, pauses)
+
+
+def test_what_takes_longer_than_expected_runs_as_a_job_after_all() -> None:
+    late = problem(504, "deadline_exceeded")
+    service = Service(estimated(0.1), late, *long_replies()[1:])
+    assert service.client().nearest("m", 0, [1])[0].candidate == 1
+
+
+def test_a_callback_that_raises_stops_the_job() -> None:
+    def stop(_share: float) -> None:
+        raise KeyboardInterrupt
+
+    service = Service(*long_replies()[:2], httpx2.Response(200, json=JOB))
+    with pytest.raises(KeyboardInterrupt):
+        service.client().nearest("m", 0, [1], progress=stop)
+    assert service.sent[-1] == "DELETE /v1/jobs/7"
+
+
+def test_a_cancelled_task_stops_its_job(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(*long_replies()[:2], httpx2.Response(200, json=JOB))
+
+    async def cancel_while_it_waits() -> None:
+        waiting = asyncio.Event()
+
+        async def wait(_seconds: float) -> None:
+            waiting.set()
+            await asyncio.Event().wait()
+
+        monkeypatch.setattr("geodesic_client.async_client.anyio.sleep", wait)
+        task = asyncio.ensure_future(service.async_client().nearest("m", 0, [1]))
+        await waiting.wait()
+        task.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await task
+
+    asyncio.run(cancel_while_it_waits())
+    assert service.sent[-1] == "DELETE /v1/jobs/7"
+
+
+@pytest.mark.parametrize(("status", "code"), [(429, "rate_limited"), (503, "queue_full")])
+def test_a_busy_service_is_asked_again_when_it_says(
+    status: int, code: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waits: list[float] = []
+    monkeypatch.setattr("tenacity.nap.time.sleep", waits.append)
+    busy = problem(status, code, **{"Retry-After": "7"})
+    service = Service(busy, busy, httpx2.Response(200, json={"version": "1"}))
+    assert service.client().about() == {"version": "1"}
+    assert waits == [7.0, 7.0]
+
+
+def test_a_broken_connection_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tenacity.nap.time.sleep", lambda _: None)
+    broken = httpx2.ConnectError("refused")
+    service = Service(broken, httpx2.Response(200, json={}))
+    assert service.client().about() == {}
+    late = Service(httpx2.ReadTimeout("late"))
+    with pytest.raises(UnreachableError, match="no answer from http://service/v1: late"):
+        late.client().about()
+    assert len(late.requests) == 1
+
+
+def test_a_problem_is_an_error_with_all_that_it_says() -> None:
+    service = Service(problem(404, "mesh_not_found"))
+    with pytest.raises(ProblemError, match=r"^mesh_not_found: no \(wait\)$") as caught:
+        service.client().mesh("m")
+    error = caught.value
+    assert (error.status, error.code, error.detail, error.hint) == (404, *str_of(error))
+    with pytest.raises(ProblemError, match="status 502") as caught:
+        Service(httpx2.Response(502, text="<html>")).client().about()
+    assert caught.value.code == "unknown"
+
+
+def str_of(error: ProblemError) -> tuple[Any, ...]:
+    return "mesh_not_found", "no", "wait"
+
+
+def test_lists_are_read_to_their_end() -> None:
+    jobs = [JOB | {"id": str(i)} for i in range(3)]
+    service = Service(
+        httpx2.Response(200, json={"jobs": jobs[:2], "next_cursor": "2"}),
+        httpx2.Response(200, json={"jobs": jobs[2:], "next_cursor": None}),
+    )
+    assert [job.id for job in service.client().jobs()] == ["0", "1", "2"]
+    assert service.requests[1].url.params["cursor"] == "2"
+
+
+@pytest.mark.parametrize("name", ["distances", "upload", "path"])
+def test_methods_are_documented(name: str) -> None:
+    assert getattr(Client, name).__doc__
+    assert getattr(Service().client(), name).__name__ == name
