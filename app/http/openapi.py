@@ -63,21 +63,11 @@ TAGS = [
     },
 ]
 """What the operations are grouped by"""
-_JOB_EVENT = {
-    "type": "object",
-    "title": "JobEvent",
-    "description": "One of the server-sent events of a stream. Comments between them keep the "
-    "connection open.",
-    "required": ["id", "data"],
-    "properties": {
-        "id": {"type": "string", "description": "Counts the states of the job"},
-        "data": {
-            "type": "string",
-            "description": "The job, as `getJob` answers it",
-            "contentMediaType": JSON,
-            "contentSchema": {"$ref": "#/components/schemas/JobDocument"},
-        },
-    },
+_JOB_EVENTS = {
+    "type": "string",
+    "title": "JobEvents",
+    "description": "Server-sent events. The `id` of each counts the states of the job, and its "
+    "`data` is a `JobDocument` in JSON. Comments between them keep the connection open.",
 }
 _SECURITY_SCHEME = {
     "type": "http",
@@ -154,7 +144,7 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
     components = document["components"]
     for name in ("HTTPValidationError", "ValidationError", "BareVertex", "BareVertexSource"):
         components["schemas"].pop(name, None)
-    components["schemas"] |= _schemas_of(FeatureCollection) | {"JobEvent": _JOB_EVENT}
+    components["schemas"] |= _schemas_of(FeatureCollection) | {"JobEvents": _JOB_EVENTS}
     for schema in components["schemas"].values():
         for member in schema.get("properties", {}).values():
             _describe_default(member)
@@ -227,7 +217,7 @@ def _responses(
         for content in response.get("content", {}).values():
             if "itemSchema" in content:  # belongs to OpenAPI 3.2, and the document to 3.1
                 content.clear()
-                content["schema"] = {"$ref": "#/components/schemas/JobEvent"}
+                content["schema"] = {"$ref": "#/components/schemas/JobEvents"}
         yield status, response
 
 

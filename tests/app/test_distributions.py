@@ -1,21 +1,24 @@
-"""The two distributions of this repository: one version, and each its own folder."""
+"""The distributions of this repository: one version, and each its own folder."""
 
 import re
 import subprocess
 import tomllib
 import zipfile
+from importlib.metadata import distribution
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from app import __version__
 from geodesic_core.kernels.jit.cache import PRECOMPILED
 from tests.support.fresh import told_by
 from tests.support.paths import ROOT
 
-LIBRARY, SERVICE = ROOT / "geodesic_core", ROOT
+LIBRARY, SERVICE, CLIENT = ROOT / "geodesic_core", ROOT, ROOT / "client"
 
 
 def project(folder: Path) -> dict[str, Any]:
@@ -30,21 +33,42 @@ def requirements(folder: Path) -> dict[str, str]:
     return dict(re.fullmatch(r"([\w.-]+(?:\[.*\])?)(.*)", each).groups() for each in listed)
 
 
-def test_both_have_one_version_and_the_service_requires_that_of_the_library() -> None:
+def test_all_have_one_version_and_the_service_requires_that_of_the_library() -> None:
     assert project(LIBRARY)["version"] == project(SERVICE)["version"] == __version__
+    assert project(CLIENT)["version"] == __version__
     assert requirements(SERVICE)["geodesic-core[all]"] == f"=={__version__}"
 
 
-def test_both_ask_for_the_same_of_python_and_of_what_both_require() -> None:
+def test_all_ask_for_the_same_of_python_and_of_what_they_share() -> None:
     library, service = requirements(LIBRARY), requirements(SERVICE)
     shared = library.keys() & service.keys()
     assert shared >= {"numpy", "scipy", "filelock"}
     assert {name: library[name] for name in shared} == {name: service[name] for name in shared}
-    assert project(LIBRARY)["requires-python"] == project(SERVICE)["requires-python"]
+    assert requirements(CLIENT)["numpy"] == library["numpy"]
+    pythons = {project(folder)["requires-python"] for folder in (LIBRARY, SERVICE, CLIENT)}
+    assert len(pythons) == 1
 
 
-def test_both_have_the_license() -> None:
-    assert (LIBRARY / "LICENSE").read_bytes() == (SERVICE / "LICENSE").read_bytes()
+def test_the_client_brings_neither_compiler_nor_web_framework() -> None:
+    brought, waiting = set[str](), {"geodesic-client"}
+    while waiting:
+        name = waiting.pop()
+        brought.add(name)
+        required = map(Requirement, distribution(name).requires or ())
+        names = {
+            canonicalize_name(each.name)
+            for each in required
+            if each.marker is None or each.marker.evaluate({"extra": ""})
+        }
+        waiting |= names - brought
+    assert {"httpx2", "numpy", "stamina"} < brought
+    assert not brought & {"numba", "llvmlite", "fastapi", "starlette", "pydantic", "geodesic-core"}
+    assert len(brought) < 20
+
+
+def test_all_have_the_license() -> None:
+    licenses = {(folder / "LICENSE").read_bytes() for folder in (LIBRARY, SERVICE, CLIENT)}
+    assert len(licenses) == 1
 
 
 def test_all_extras_of_the_library_are_in_one() -> None:
@@ -54,7 +78,10 @@ def test_all_extras_of_the_library_are_in_one() -> None:
     assert extras.pop("all") == [f"geodesic-core[{','.join(extras)}]"]
 
 
-@pytest.mark.parametrize(("folder", "package"), [(LIBRARY, "geodesic_core"), (SERVICE, "app")])
+@pytest.mark.parametrize(
+    ("folder", "package"),
+    [(LIBRARY, "geodesic_core"), (SERVICE, "app"), (CLIENT, "geodesic_client")],
+)
 def test_a_wheel_has_the_sources_of_its_package_and_nothing_else(
     folder: Path, package: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -63,14 +90,18 @@ def test_a_wheel_has_the_sources_of_its_package_and_nothing_else(
     builder = wheels.WheelBuilder(str(folder))
     (wheel,) = builder.build(directory=str(tmp_path), versions=["standard"])
     names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
+    root = CLIENT if folder == CLIENT else ROOT
     sources = {
-        path.relative_to(ROOT).as_posix()
-        for path in (ROOT / package).rglob("*.py")
+        path.relative_to(root).as_posix()
+        for path in (root / package).rglob("*.py")
         if "node_modules" not in path.parts
     }
     sources.discard("geodesic_core/hatch_build.py")
-    examples = {f"app/examples/{path.name}" for path in (ROOT / "openapi/examples").iterdir()}
-    assert names == (sources if package == "geodesic_core" else sources | examples)
+    others: dict[str, set[str]] = {
+        "app": {f"app/examples/{path.name}" for path in (ROOT / "openapi/examples").iterdir()},
+        "geodesic_client": {"geodesic_client/py.typed"},
+    }
+    assert names == sources | others.get(package, set())
 
 
 def test_compiled_kernels_lie_in_the_wheel_where_the_library_looks_for_them(

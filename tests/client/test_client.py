@@ -22,7 +22,7 @@ from geodesic_client import (
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
-from tests.support.service import NPY, TWO_TRIANGLES, stored_mesh
+from tests.support.service import TWO_TRIANGLES, stored_mesh
 
 SOURCES = [0, edge(1, 2, 0.3), starting_at(face(5, (0.2, 0.3, 0.5)), 0.5), curve([0, 1])]
 
@@ -75,11 +75,8 @@ def test_what_cannot_be_reached_is_infinite(service: Client, apart: Mesh) -> Non
     assert found.nearest_source is not None
     assert found.nearest_source.tolist() == [0] * 3 + [-1] * 3
     missing = service.path(apart, 0, 4)
-    assert (missing.reason, missing.length, missing.points.shape) == (
-        "disconnected",
-        np.inf,
-        (0, 3),
-    )
+    assert (missing.reason, missing.length) == ("disconnected", np.inf)
+    assert missing.points.shape == (0, 3)
 
 
 def test_all_kinds_of_sources(service: Client, mesh: Mesh) -> None:
@@ -107,7 +104,7 @@ def test_isolines_matrices_and_candidates(
     assert [each.level for each in lines.levels] == [0.5, 1.0]
     assert lines.levels[0].lines[0].points.shape[1] == 3
 
-    table = gc.distance_matrix(same, [0, 1], [7, 8, 9]).distances
+    table = gc.distance_matrix(same, [0, 1], [7, 8, 9])
     np.testing.assert_array_equal(service.matrix(mesh, [0, 1], [7, 8, 9]).distances, table)
     sparse = service.matrix(mesh, [0, 1], [7, 8, 9], layout="sparse")
     assert sparse.rows is not None
@@ -125,10 +122,8 @@ def test_points_that_were_located_are_points(service: Client, mesh: Mesh) -> Non
     found, missed = service.locate(mesh, np.array([[3, 1, 0.5], [99, 0, 0]]), max_distance=9)
     assert missed is None
     assert found is not None
-    (distance,) = service.distances(
-        mesh, [found.point], targets=[position(found.position)]
-    ).distances
-    assert distance == pytest.approx(0, abs=1e-9)
+    there = service.distances(mesh, [found.point], targets=[position(found.position)])
+    assert there.distances == pytest.approx(0, abs=1e-9)
 
 
 def test_a_mesh_is_stored_read_listed_and_removed(service: Client, tmp_path: Path) -> None:
@@ -169,11 +164,8 @@ def test_a_refusal_names_the_element(service: Client, apart: Mesh) -> None:
     with pytest.raises(ProblemError, match="vertex 9 is not one of 0 to 5") as caught:
         service.distances(apart, [0, 9])
     error = caught.value
-    assert (error.status, error.code, error.errors[0]["pointer"]) == (
-        422,
-        "invalid_point",
-        "/sources/1",
-    )
+    assert (error.status, error.code) == (422, "invalid_point")
+    assert error.errors[0]["pointer"] == "/sources/1"
     assert error.request_id
 
 
@@ -198,33 +190,26 @@ def test_about_and_estimates(service: Client, mesh: Mesh) -> None:
     assert service.estimate(mesh, "distances", {"sources": [0]}).seconds > 0
 
 
-def test_coroutines(client: TestClient, mesh: Mesh, tmp_path: Path) -> None:
-    """With the application itself instead of a connection; it runs already, for the other tests."""
-    expected = client.post(f"/v1/meshes/{mesh.id}/distances", json={"sources": [0]}, headers=NPY)
+def test_coroutines(client: TestClient, mesh: Mesh, service: Client, tmp_path: Path) -> None:
+    expected = service.distances(mesh, [0]).distances
     file = tmp_path / "one.off"
     file.write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
 
     def answer(request: httpx2.Request) -> httpx2.Response:
-        response = client.request(
-            request.method, str(request.url), content=request.content, headers=request.headers
-        )
-        return httpx2.Response(
-            response.status_code, headers=response.headers, content=response.content
-        )
+        body, headers = request.content, request.headers
+        found = client.request(request.method, str(request.url), content=body, headers=headers)
+        return httpx2.Response(found.status_code, headers=found.headers, content=found.content)
 
-    async def reply(request: httpx2.Request) -> httpx2.Response:
+    async def pass_on(request: httpx2.Request) -> httpx2.Response:
         await request.aread()
         return await anyio.to_thread.run_sync(answer, request)
 
     async def ask() -> None:
-        transport = httpx2.MockTransport(reply)
+        transport = httpx2.MockTransport(pass_on)
         async with httpx2.AsyncClient(transport=transport, base_url="http://127.0.0.1") as http:
-            service = AsyncClient(http=http)
-            found = await service.distances(mesh, [0])
-            np.testing.assert_array_equal(
-                found.distances, np.frombuffer(expected.content[-8 * len(found.distances) :])
-            )
-            assert (await service.upload(file)).faces == 1
+            asking = AsyncClient(http=http)
+            np.testing.assert_array_equal((await asking.distances(mesh, [0])).distances, expected)
+            assert (await asking.upload(file)).faces == 1
 
     anyio.run(ask)
 

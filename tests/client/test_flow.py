@@ -2,12 +2,10 @@
 
 import asyncio
 import json
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
 
 import httpx2
 import pytest
-import stamina
 from geodesic_client import AsyncClient, Client, ProblemError, UnreachableError
 from geodesic_client.flow import JOB_FROM_S
 
@@ -64,7 +62,7 @@ class Service:
 
 
 @pytest.fixture(autouse=True)
-def pauses(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
+def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """The pauses that were made, without making them."""
     made: list[float] = []
 
@@ -73,8 +71,7 @@ def pauses(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[float]]:
 
     monkeypatch.setattr("geodesic_client.client.time.sleep", made.append)
     monkeypatch.setattr("geodesic_client.async_client.anyio.sleep", pause)
-    with stamina.set_testing(False):
-        yield made
+    return made
 
 
 def test_what_takes_little_is_one_request_after_its_estimate() -> None:
@@ -181,14 +178,15 @@ def test_a_problem_is_an_error_with_all_that_it_says() -> None:
     with pytest.raises(ProblemError, match=r"^mesh_not_found: no \(wait\)$") as caught:
         service.client().mesh("m")
     error = caught.value
-    assert (error.status, error.code, error.detail, error.hint) == (404, *str_of(error))
+    assert (error.status, error.code, error.detail, error.hint) == (
+        404,
+        "mesh_not_found",
+        "no",
+        "wait",
+    )
     with pytest.raises(ProblemError, match="status 502") as caught:
         Service(httpx2.Response(502, text="<html>")).client().about()
     assert caught.value.code == "unknown"
-
-
-def str_of(error: ProblemError) -> tuple[Any, ...]:
-    return "mesh_not_found", "no", "wait"
 
 
 def test_lists_are_read_to_their_end() -> None:
