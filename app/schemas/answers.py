@@ -219,7 +219,7 @@ class MatrixAnswer(BaseModel):
     columns: list[int] | None = Field(
         default=None, description="Of a sparse matrix: the target of each distance"
     )
-    distances: list[list[float | None]] | list[float | None] = Field(
+    distances: list[list[float | None] | float | None] = Field(
         description="Dense: a row for each source. Pairs: one for each. Both `null` where "
         "unreachable. Sparse: the finite ones, zeros too"
     )

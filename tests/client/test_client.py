@@ -112,7 +112,7 @@ def test_isolines_matrices_and_candidates(
     dense[sparse.rows, sparse.columns] = sparse.distances
     np.testing.assert_array_equal(dense, table)
     pairs = service.matrix(mesh, range(2), [7, 8], layout="pairs")
-    np.testing.assert_array_equal(pairs.distances, table.diagonal())
+    np.testing.assert_allclose(pairs.distances, table.diagonal(), rtol=1e-12)
 
     near = service.nearest(mesh, 0, [7, 8, 9], k=2)
     assert [each.distance for each in near] == np.sort(table[0])[:2].tolist()

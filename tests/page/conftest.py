@@ -1,20 +1,15 @@
 """The page in a real browser, drawn by software, over a real service."""
 
-import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
 
 import httpx2
 import pytest
-from filelock import FileLock
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
-from tests.support.paths import ROOT
+from tests.support.node import alone, build_page, miss
 from tests.support.processes import Server
 from tests.support.viewing import View
 from tests.support.waiting import LONG_S
@@ -31,24 +26,8 @@ FLAGS = [
 @pytest.fixture(scope="session")
 def _built(tmp_path_factory: pytest.TempPathFactory, testrun_uid: str) -> None:
     """The page, built by one of the processes where its sources have changed."""
-    shared = tmp_path_factory.getbasetemp().parent / f"page-{testrun_uid}.lock"
-    with FileLock(shared):
-        built = subprocess.run(
-            [sys.executable, "hatch_build.py"],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-    if built.returncode:
-        miss(f"the page could not be built, scripts/page tells why: {built.stderr[-500:]}")
-
-
-def miss(what: str) -> NoReturn:
-    """Skip the test; continuous integration has everything, and fails instead."""
-    if os.environ.get("CI"):
-        pytest.fail(what)
-    pytest.skip(what)
+    with alone("page", tmp_path_factory, testrun_uid):
+        build_page()
 
 
 @pytest.fixture(scope="module")
