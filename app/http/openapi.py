@@ -131,8 +131,8 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
             if method not in ("get", "head"):
                 added.append("origin_not_allowed")
             operation["responses"] = dict(_responses(operation, added))
-            if not is_open(template):
-                operation["security"] = [{"apiKey": []}, {}]
+            if is_open(template):
+                operation["security"] = []
             for parameter in operation.get("parameters", []):
                 _leave_out_null(parameter["schema"])
             _put_json_first(operation["responses"].values())
@@ -141,6 +141,7 @@ def complete(document: dict[str, Any]) -> dict[str, Any]:
                     operation.setdefault("parameters", []).append(dict(parameter))
             for name, example in _examples(operation["operationId"]).items():
                 _add_example(operation, name, example)
+    document["security"] = [{"apiKey": []}, {}]  # a key, or none where the service has none
     components = document["components"]
     for name in ("HTTPValidationError", "ValidationError", "BareVertex", "BareVertexSource"):
         components["schemas"].pop(name, None)

@@ -11,11 +11,11 @@ import geodesic_core as gc
 from app.errors import Fault
 from app.queries.validation import FAULTS_SHOWN, WrittenPoints, invalid_points
 from app.schemas.points import (
+    Curve,
     EdgePoint,
     FacePoint,
     Point,
     PointOrCurve,
-    Polyline,
     PositionPoint,
     Source,
     VertexPoint,
@@ -38,7 +38,7 @@ def numbered(pointer: str, points: Sequence[Point]) -> WrittenPoints:
 
 def points_in(pointer: str, written: PointOrCurve | Source) -> WrittenPoints:
     """Yield a point, or those of a curve, each with its pointer."""
-    if isinstance(written, Polyline):
+    if isinstance(written, Curve):
         return numbered(f"{pointer}/polyline", written.polyline)
     return iter([(pointer, written)])
 
@@ -52,7 +52,7 @@ def points_in_sources(sources: Sequence[Source]) -> WrittenPoints:
 
 def point_count(*written: PointOrCurve | Source) -> int:
     """Return the number of points, those of curves counted one by one."""
-    return sum(len(each.polyline) if isinstance(each, Polyline) else 1 for each in written)
+    return sum(len(each.polyline) if isinstance(each, Curve) else 1 for each in written)
 
 
 # Points of the mesh
@@ -101,7 +101,7 @@ def to_point_or_curve(
     ProblemError
         A piece of the curve lies in no face.
     """
-    if not isinstance(written, Polyline):
+    if not isinstance(written, Curve):
         return points[0]
     faults = (
         Fault(f"{pointer}/polyline/{i}", _GAP)

@@ -160,7 +160,7 @@ Point = Annotated[
 """A point of the surface, in one of five spellings."""
 
 
-class Polyline(StrictModel):
+class Curve(StrictModel):
     """A curve on the surface: straight from each point to the next, in a face of both."""
 
     polyline: FailFastList[Point] = Field(
@@ -170,7 +170,7 @@ class Polyline(StrictModel):
     )
 
 
-class CurveSource(Polyline, Start):
+class CurveSource(Curve, Start):
     """A source that is a curve: distances start at all of its points."""
 
 
@@ -180,7 +180,7 @@ PointOrCurve = Annotated[
     | Annotated[EdgePoint, Tag(POINT_TAGS["edge"])]
     | Annotated[FacePoint, Tag(POINT_TAGS["face"])]
     | Annotated[PositionPoint, Tag(POINT_TAGS["position"])]
-    | Annotated[Polyline, Tag(POINT_TAGS["polyline"])],
+    | Annotated[Curve, Tag(POINT_TAGS["polyline"])],
     _BY_FIELD_OR_CURVE,
 ]
 """A point or a curve where paths start."""

@@ -466,6 +466,25 @@ export interface components {
             };
         };
         /**
+         * Curve
+         * @description A curve on the surface: straight from each point to the next, in a face of both.
+         */
+        Curve: {
+            /**
+             * Polyline
+             * @description The `locations` of a path are such points
+             * @example [
+             *       {
+             *         "vertex": 0
+             *       },
+             *       {
+             *         "vertex": 1
+             *       }
+             *     ]
+             */
+            polyline: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+        };
+        /**
          * CurveSource
          * @description A source that is a curve: distances start at all of its points.
          */
@@ -1723,7 +1742,7 @@ export interface components {
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Source */
-            source: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"] | components["schemas"]["Polyline"];
+            source: number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"] | components["schemas"]["Curve"];
             /** Targets */
             targets: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
             /**
@@ -1731,25 +1750,6 @@ export interface components {
              * @description Targets farther than this, in mesh units, have no path
              */
             max_distance?: number | null;
-        };
-        /**
-         * Polyline
-         * @description A curve on the surface: straight from each point to the next, in a face of both.
-         */
-        Polyline: {
-            /**
-             * Polyline
-             * @description The `locations` of a path are such points
-             * @example [
-             *       {
-             *         "vertex": 0
-             *       },
-             *       {
-             *         "vertex": 1
-             *       }
-             *     ]
-             */
-            polyline: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
         };
         /**
          * PositionPoint

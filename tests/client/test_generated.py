@@ -23,6 +23,7 @@ ENVIRONMENT = ROOT / ".cache" / "generator"
 CONFIGURATION = """
 content_type_overrides:
   application/x-npy: application/octet-stream
+post_hooks: []
 """
 MYPY = """
 [mypy]

@@ -15,13 +15,13 @@ from app.errors import ProblemError
 from app.http.routes import query_request
 from app.http.routes.query_route import read
 from app.queries import KINDS
-from app.schemas.points import CurveSource, Polyline
+from app.schemas.points import Curve, CurveSource
 from app.settings import Settings
 
 MODELS = [query.model for query in KINDS.values()]
 LISTS = [
     (model, name)
-    for model in [*MODELS, CurveSource, Polyline]
+    for model in [*MODELS, CurveSource, Curve]
     for name, schema in model.model_json_schema()["properties"].items()
     if any(each.get("type") == "array" for each in [schema, *schema.get("anyOf", ())])
 ]
