@@ -1,5 +1,6 @@
 """The distributions of this repository: one version, and each its own folder."""
 
+import json
 import re
 import subprocess
 import tomllib
@@ -36,6 +37,8 @@ def requirements(folder: Path) -> dict[str, str]:
 def test_all_have_one_version_and_the_service_requires_that_of_the_library() -> None:
     assert project(LIBRARY)["version"] == project(SERVICE)["version"] == __version__
     assert project(CLIENT)["version"] == __version__
+    types = json.loads((CLIENT / "typescript" / "package.json").read_text())
+    assert types["version"] == __version__
     assert requirements(SERVICE)["geodesic-core[all]"] == f"=={__version__}"
 
 

@@ -109,8 +109,7 @@ def test_the_types_for_typescript_are_those_of_the_document(tmp_path: Path) -> N
     script = PACKAGES / "openapi-typescript" / "bin" / "cli.js"
     node_runner(tmp_path)(script, str(DOCUMENT), "--output", "index.d.ts")
     assert (tmp_path / "index.d.ts").read_text() == (TYPES / "index.d.ts").read_text(), (
-        "run: app/web/node_modules/.bin/openapi-typescript openapi/openapi.json "
-        "--output client/typescript/index.d.ts"
+        "run: scripts/page types"
     )
 
 
