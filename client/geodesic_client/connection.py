@@ -1,4 +1,4 @@
-"""What both clients tell httpx2 and stamina."""
+"""Settings of connections, and attempts of requests, the same for both clients."""
 
 from typing import Any
 

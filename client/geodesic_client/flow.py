@@ -76,10 +76,13 @@ def answer(query: Query[T], progress: Progress) -> Flow[T]:
     """Return the answer to a query: at once, or as a job where it takes long."""
     if (yield from estimate(query.request)) < JOB_FROM_S:
         try:
-            return query.decode((yield from send(query.request)))
+            response = yield from send(query.request)
         except ProblemError as error:
             if error.code != "deadline_exceeded":  # it took longer than expected
                 raise
+        else:
+            progress(1.0)
+            return query.decode(response)
     return query.decode((yield from as_job(query.request, progress)))
 
 

@@ -22,6 +22,7 @@ from geodesic_client import (
 from starlette.testclient import TestClient
 
 import geodesic_core as gc
+from tests.support.processes import Server
 from tests.support.service import TWO_TRIANGLES, stored_mesh
 
 SOURCES = [0, edge(1, 2, 0.3), starting_at(face(5, (0.2, 0.3, 0.5)), 0.5), curve([0, 1])]
@@ -219,3 +220,22 @@ def test_a_bar_moves(capsys: pytest.CaptureFixture[str]) -> None:
         show(0.5)
         show(1.0)
     assert "upload 100%" in capsys.readouterr().err
+
+
+def test_both_clients_by_the_address_and_the_key_of_a_service(tmp_path: Path) -> None:
+    key = "0123456789abcdef0123456789abcdef"
+    server = Server(tmp_path, GEODESIC_API_KEYS=f"ann:{key}")
+    try:
+        with Client(server.url, api_key=key) as client:
+            mesh = client.sample("plane", 200)
+            assert client.path(mesh, 0, 120).length == pytest.approx(2**0.5)
+
+        async def ask() -> float:
+            async with AsyncClient(server.url, api_key=key) as client:
+                return (await client.path(mesh, 0, 120)).length
+
+        assert anyio.run(ask) == pytest.approx(2**0.5)
+        with Client(server.url) as client, pytest.raises(ProblemError, match="no API key"):
+            client.about()
+    finally:
+        server.close()

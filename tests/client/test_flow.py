@@ -76,7 +76,9 @@ def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 
 def test_what_takes_little_is_one_request_after_its_estimate() -> None:
     service = Service(estimated(JOB_FROM_S / 2), httpx2.Response(200, json=ANSWER))
-    (found,) = service.client().nearest("m", 0, [1, 2])
+    shares: list[float] = []
+    (found,) = service.client().nearest("m", 0, [1, 2], progress=shares.append)
+    assert shares == [1.0]
     assert (found.candidate, found.distance) == (1, 2.5)
     assert [dict(each.url.params) for each in service.requests] == [{"estimate": "true"}, {}]
     assert json.loads(service.requests[1].content)["candidates"] == [1, 2]

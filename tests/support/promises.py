@@ -1,4 +1,4 @@
-"""What the interface document promises: ``python -m tests.support.promises`` prints it.
+"""Promises of the interface document: ``python -m tests.support.promises`` prints them.
 
 The promises of the last release are in ``openapi/promises.json``. A change that keeps them breaks
 no client. They are renewed with each release, and where a promise is broken on purpose.
