@@ -17,7 +17,7 @@ from geodesic_client.errors import GeodesicClientError, ProblemError
 
 T = TypeVar("T")
 
-JOB_FROM_S = 1.0
+JOB_FROM_S = 0.5
 """Seconds of expected work from which a query runs as a job"""
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.05, 2.0
 """Seconds between two looks at a job, which grow from the first to the longest"""
