@@ -115,6 +115,12 @@ CODES: Mapping[str, Code] = {
         "The database of jobs and quotas does not answer; see `Retry-After`. Whether a change was "
         "made is not known: repeat it with the same `Idempotency-Key`.",
     ),
+    "store_unavailable": Code(
+        503,
+        "Store unavailable",
+        "The object store of meshes and answers does not answer; see `Retry-After`. An upload that "
+        "is repeated stores its mesh once.",
+    ),
     "draining": Code(503, "Draining", "The service is shutting down."),
     "deadline_exceeded": Code(
         504, "Deadline exceeded", "The answer was not ready in the time granted."
@@ -182,6 +188,10 @@ class ProblemError(Exception):
 
 class StateUnavailableError(OSError):
     """The database that replicas share does not answer at the moment."""
+
+
+class StoreUnavailableError(OSError):
+    """The object store of the service does not answer at the moment."""
 
 
 def draining() -> ProblemError:
@@ -275,6 +285,13 @@ _NO_STATE = Problem(
 )
 
 
+_NO_STORE = Problem(
+    "store_unavailable",
+    "the object store of the service does not answer",
+    headers={"Retry-After": "1"},
+)
+
+
 def _internal_error(_error: BaseException) -> Problem:
     return Problem("internal_error", "the service failed at this request; its log says why")
 
@@ -291,6 +308,7 @@ EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (core.InternalError, lambda error: Problem("internal_error", str(error))),
     (MemoryError, lambda _: Problem("memory_limit", "the worker ran out of memory")),
     (StateUnavailableError, lambda _: _NO_STATE),
+    (StoreUnavailableError, lambda _: _NO_STORE),
     (OSError, _system_error),
     (BaseException, _internal_error),
 )

@@ -71,6 +71,10 @@ def _listed(value: object) -> object:
     return [item.strip() for item in value.split(",")] if value.strip() else []
 
 
+OBJECT_STORES = ("s3", "gs", "az")
+"""Schemes of the URLs of object stores"""
+
+
 def folder_of(store: str) -> Path:
     """Return the folder of a store, from its path or a URL of the scheme ``file``.
 
@@ -90,7 +94,9 @@ def folder_of(store: str) -> Path:
 
 
 def _store(value: object) -> object:
-    return folder_of(value) if isinstance(value, str) else value
+    if not isinstance(value, str) or urlsplit(value).scheme in OBJECT_STORES:
+        return value
+    return folder_of(value)
 
 
 def _keys(value: object) -> object:
@@ -118,8 +124,12 @@ class Settings(BaseSettings):
         hide_input_in_errors=True,  # the input may be an API key
     )
 
-    store: Annotated[Path, BeforeValidator(_store)] = Path("geodesic-store")
-    """Folder of meshes, results and fields, or its `file://` URL; created if missing."""
+    store: Annotated[Path | str, BeforeValidator(_store)] = Path("geodesic-store")
+    """Folder of meshes, results and fields, created if missing; or URL such as `s3://bucket/x`."""
+    copies: Path = Path("geodesic-copies")
+    """Folder of this machine, for copies of meshes, where the store is at a URL."""
+    copies_bytes: PositiveInt = 16 * GIB
+    """Size of these copies, which are pulled again where they are needed again."""
     engine: Literal["local", "ray"] = "local"
     """`local` computes on this machine, `ray` on the hosts of a cluster."""
     address: str | None = None
@@ -204,6 +214,11 @@ class Settings(BaseSettings):
     """`json` or `text`; text on a terminal and JSON elsewhere, unless set."""
     log_probes: Literal["on", "off"] = "off"
     """`on` logs requests for `/livez` and `/readyz` too."""
+
+    @property
+    def folder(self) -> Path:
+        """The folder that workers see: the store itself, or copies of what is in it."""
+        return self.store if isinstance(self.store, Path) else self.copies
 
     @field_validator("state")
     @classmethod

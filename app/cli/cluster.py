@@ -24,7 +24,7 @@ Address = Annotated[
 ]
 Store = Annotated[
     str | None,
-    typer.Option(help="Folder of the store, shared by all machines; GEODESIC_STORE unless given."),
+    typer.Option(help="Shared folder, or URL such as s3://bucket/x; GEODESIC_STORE unless given."),
 ]
 
 if TYPE_CHECKING:
@@ -54,15 +54,19 @@ def head(
 def node(folder: Folder, address: Address = None, store: Store = None) -> None:
     """Make this machine a host of a cluster until interrupted; then it ends what it has begun."""
     settings = read_settings(address=address, store=store)
-    settings = settings.model_copy(update={"store": settings.store.resolve()})
+    if isinstance(settings.store, Path):
+        settings = settings.model_copy(update={"store": settings.store.resolve()})
+    else:
+        settings = settings.model_copy(update={"copies": (folder / "copies").resolve()})
     from app.engine.ray_cluster import start_host
     from app.engine.ray_node import joined
+    from app.store.layout import StoreError
+    from app.store.opening import store_of
 
-    if not settings.store.is_dir():
-        raise Failure(
-            f"there is no store at {settings.store}: start geodesic serve on it first, and give "
-            "the same shared folder on all machines as --store"
-        )
+    try:
+        store_of(settings).require_claimed()
+    except StoreError as error:
+        raise Failure(str(error)) from error
     with _failing_clearly(), joined(folder, settings) as ray:
         import ray as client
 

@@ -17,10 +17,11 @@ from app.engine.cluster import BEAT_S, LEASE_S, SILENCE_S, Cluster, HostLostErro
 from app.engine.interface import Load, ProgressCallback
 from app.engine.placement import Occupancy, choose
 from app.engine.wire import Message, Wire, WireError, decode
-from app.engine.work import Outcome, StoreMesh, Task, TaskResult
+from app.engine.work import MeshFromFile, Outcome, StoreMesh, Task, TaskResult
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.queries import code_version
 from app.settings import Settings
+from app.store.interface import Store
 from app.tracing import Period, record_span
 
 logger = structlog.get_logger(module=__name__)
@@ -71,9 +72,10 @@ class DistributedEngine:
     whose worker died is not, since it may be its fault.
     """
 
-    def __init__(self, cluster: Cluster, settings: Settings) -> None:
+    def __init__(self, cluster: Cluster, settings: Settings, store: Store) -> None:
         self._cluster = cluster
-        self._wire = Wire(settings.store)
+        self._store = store
+        self._wire = Wire(settings.folder)
         self._hosts: dict[str, _Host] = {}
         self._refused: set[str] = set()
         """Hosts of another release, which the log has named"""
@@ -143,6 +145,13 @@ class DistributedEngine:
         """Have a host do the work of a task, see ``Engine``."""
         if self.is_draining:
             raise draining()
+        work = task.work
+        if isinstance(work, StoreMesh) and isinstance(work.mesh_input, MeshFromFile):
+            async with self._store.lent(work.mesh_input.path):
+                return await self._run(task, on_progress)
+        return await self._run(task, on_progress)
+
+    async def _run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
         note = _rising(on_progress)
         refusal: Problem | None = None
         without: set[str] = set()

@@ -32,7 +32,7 @@ class Host:
     def __init__(self, engine: Engine, settings: Settings) -> None:
         self._engine = engine
         self._settings = settings
-        self._wire = Wire(settings.store)
+        self._wire = Wire(settings.folder)
         self._leases: dict[str, _Lease] = {}
         self._shares: dict[str, float] = {}
         self._stopped: dict[str, float] = {}

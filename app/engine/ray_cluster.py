@@ -3,6 +3,7 @@
 import asyncio
 import sys
 from collections.abc import Collection, Sequence
+from contextlib import ExitStack
 from typing import Any, TypeVar
 
 import structlog
@@ -11,9 +12,12 @@ from app import logs
 from app.engine import fork_server
 from app.engine.cluster import HostLostError
 from app.engine.host import Host
+from app.engine.interface import Engine
 from app.engine.local import LocalEngine
+from app.engine.supplied import SuppliedEngine
 from app.settings import Settings
 from app.store import layout
+from app.store.opening import store_of
 
 logger = structlog.get_logger(module=__name__)
 
@@ -36,7 +40,13 @@ class HostActor:
         vars(sys.modules["__main__"]).pop("__file__", None)
         logs.install(settings.log_format)
         fork_server.start()
-        self._host = Host(LocalEngine(settings, settings.store / layout.RESULTS), settings)
+        engine: Engine = LocalEngine(settings, settings.folder / layout.RESULTS)
+        supply = store_of(settings).supply
+        if supply is not None:
+            self._folder = ExitStack()
+            self._folder.enter_context(supply.owned())  # as long as this process lives
+            engine = SuppliedEngine(engine, supply)
+        self._host = Host(engine, settings)
         self._is_started = False
 
     async def run(self, ticket: str, task: bytes) -> bytes:

@@ -100,11 +100,11 @@ class Worker:
 
     def __post_init__(self) -> None:
         self.settings = self.config.settings
-        self.store = MeshStore(self.settings.store)
+        self.store = MeshStore(self.settings.folder)
         self.meshes: LRUCache[tuple[str, bytes], OpenMesh]
         """Open meshes by id and barriers"""
         self.meshes = LRUCache(self.settings.worker_mesh_bytes, lambda opened: opened.nbytes)
-        self._stored = FieldStore(self.settings.store, self.settings.fields_bytes)
+        self._stored = FieldStore(self.settings.folder, self.settings.fields_bytes)
         self.fields = FieldCache(self.settings.worker_field_bytes, self._stored, code_version())
         self._writer = _low_priority_thread()
         self._before = Signals.from_buffer_copy(self.signals)  # what former workers have counted

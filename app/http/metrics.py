@@ -94,7 +94,7 @@ class Metrics(Collector):
         """Return all metrics in the text format that ``accept`` asks for, and its media type."""
         service = self._service
         self._jobs = await service.jobs.count()
-        pids, store = service.engine.load.pids, service.settings.store
+        pids, store = service.engine.load.pids, service.settings.folder
         self._resources = await to_thread.run_sync(measure, pids, store)
         write, media_type = choose_encoder(accept)
         return write(self._registry), media_type

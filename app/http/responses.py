@@ -1,9 +1,13 @@
 """Responses: problems, results, estimates and jobs as HTTP has them."""
 
+import os
 import re
-from collections.abc import Mapping
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
 from datetime import datetime
 from functools import partial
+from pathlib import Path
+from stat import S_IFREG
 from typing import Any
 
 import orjson
@@ -19,7 +23,7 @@ from app.queries import Estimate
 from app.schemas.service import ProblemDocument
 from app.service.service import Manifest, PhaseSeconds
 from app.store.meshes import PUBLIC_ARRAYS
-from app.store.results import Result, ResultStore
+from app.store.results import RemoteBody, RemoteFile, Result, ResultStore
 
 NEGOTIATED = {"Vary": "Accept, Accept-Encoding, Prefer"}
 CACHED = {"Cache-Control": "private, max-age=3600"}
@@ -39,6 +43,7 @@ WORK_PROBLEMS = (
     "engine_unavailable",
     "draining",
     "state_unavailable",
+    "store_unavailable",
     "deadline_exceeded",
     "storage_full",
 )
@@ -212,20 +217,44 @@ def result_response(
 
 
 class _ResultFileResponse(StoredFileResponse):
-    """The file of a result, which the store protects until it has been sent."""
+    """The body of a result, which the store protects until it has been sent."""
+
+    _remote: RemoteFile | None = None
 
     def __init__(
         self, result: Result, media_type: str, store: ResultStore, headers: Mapping[str, str]
     ) -> None:
-        super().__init__(store.body_path(result), headers=headers, media_type=media_type)
+        body = store.body(result)
+        self._body = None if isinstance(body, Path) else body
+        path = body if isinstance(body, Path) else result.key
+        status = None if self._body is None else _status_of(self._body)
+        super().__init__(path, headers=headers, media_type=media_type, stat_result=status)
         self._release = partial(store.release, result)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the result, and release it."""
         try:
+            if self._body is not None:
+                self._remote = await self._body.open()  # now a failure can still be answered
             await super().__call__(scope, receive, send)
         finally:
+            if self._remote is not None:
+                await self._remote.aclose()
             self._release()
+
+    @asynccontextmanager
+    async def _open_file(self) -> AsyncIterator[Any]:
+        # Starlette opens the file by this method; all else of ranges is the same for both.
+        if self._remote is not None:
+            yield self._remote
+        else:
+            async with super()._open_file() as file:
+                yield file
+
+
+def _status_of(body: RemoteBody) -> os.stat_result:
+    """Return the status that a file of this size would have."""
+    return os.stat_result((S_IFREG, 0, 0, 1, 0, 0, body.size, 0, 0, 0))
 
 
 def _is_valid(ranges: str) -> bool:

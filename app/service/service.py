@@ -31,6 +31,7 @@ from anyio import CapacityLimiter, to_thread
 from app.access import Caller
 from app.encoding import Representation
 from app.engine.interface import Engine, ProgressCallback
+from app.engine.supplied import SuppliedEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, StateUnavailableError, problem
 from app.jobs import Job, JobManager, JobRepository, JobSpec
@@ -44,9 +45,10 @@ from app.settings import Settings, variable_of
 from app.state import Allowances, Database, MeshRecords, Replicas, SqliteDatabase, StateError
 from app.store import layout
 from app.store.fields import FieldStore
+from app.store.interface import Store
 from app.store.mesh_catalog import MeshCatalog
-from app.store.meshes import MeshStore
-from app.store.ownership import Share, owned, shared
+from app.store.opening import store_of
+from app.store.ownership import Share
 from app.store.results import Result, ResultStore, result_name
 
 _CATALOG_PERIOD_S = 2.0
@@ -81,19 +83,20 @@ class Service:
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.database = _database_of(settings)
-        results = settings.store / layout.RESULTS
-        self.meshes = MeshStore(settings.store)
+        self.store = store_of(settings)
         self.mesh_catalog = MeshCatalog(
-            settings.store,
-            self.meshes,
+            settings.folder,
+            self.store.meshes,
             settings.store_bytes,
             evicts=settings.store_evict == "lru",
             quota=settings.quota_bytes,
             shared=MeshRecords(self.database) if self.database.is_shared else None,
         )
-        self.results = ResultStore(results, settings.results_bytes, settings.results_memory_bytes)
-        self.fields = FieldStore(settings.store, settings.fields_bytes)
-        self.engine = _engine(settings, results)
+        self.results = ResultStore(
+            self.store.results, settings.results_bytes, settings.results_memory_bytes
+        )
+        self.fields = FieldStore(settings.folder, settings.fields_bytes)
+        self.engine = _engine(settings, self.store)
         replicas = Replicas(self.database) if self.database.is_shared else None
         self.allowances = Allowances(self.database, replicas.id) if replicas else None
         """What callers have taken, where several services count together"""
@@ -136,7 +139,7 @@ class Service:
                 try:
                     async with (
                         self.jobs.running(self._solve_again),
-                        scrubbing(self.settings.store, self._repair),
+                        scrubbing(self.settings.folder, self._repair),
                     ):
                         self.results.make_room()  # now it is known which are those of jobs
                         yield
@@ -150,14 +153,10 @@ class Service:
         Raises ``StoreError`` where the store is not usable, and ``StateError`` where the database
         is not.
         """
-        if self.database.is_shared:
-            with shared(self.settings.store) as share:
-                self.database.prepare()
-                yield share
-        else:
-            with owned(self.settings.store):
-                self.database.prepare()
-                yield None
+        with self.store.owned(is_shared=self.database.is_shared) as share:
+            self.database.prepare()
+            self.store.claim(self.database.service)
+            yield share
 
     @asynccontextmanager
     async def _open_database(self, share: Share | None) -> AsyncIterator[None]:
@@ -165,9 +164,10 @@ class Service:
         await self.database.open()
         following = None
         try:
-            if share is not None:
-                if share.is_first:
+            if self.database.is_shared:
+                if share is None or share.is_first:
                     await self.mesh_catalog.reconcile()
+                if share is not None:
                     share.let_others_in()
                 following = asyncio.create_task(self._follow_catalog())
             yield
@@ -224,40 +224,49 @@ class Service:
             await self._forget(written.mesh_id)
         return StoredMesh(written.manifest, change.is_new, done.seconds)
 
-    def manifest(self, mesh_id: str) -> Manifest:
+    async def manifest(self, mesh_id: str) -> Manifest:
         """Return the manifest of a mesh, and mark the mesh as used."""
         self.mesh_catalog.use(mesh_id)
-        return self.meshes.manifest(mesh_id)
+        return await self.store.meshes.manifest(mesh_id)
 
     async def array_file(self, mesh_id: str, name: str) -> Path:
         """Return the file of an array that clients may read, and mark the mesh as used."""
         self.mesh_catalog.use(mesh_id)
-        return await to_thread.run_sync(self.meshes.array_file, mesh_id, name)
+        return await self.store.meshes.array_file(mesh_id, name)
 
-    def size(self, mesh_id: str) -> MeshSize:
+    async def size(self, mesh_id: str) -> MeshSize:
         """Return the counts of a mesh that checks and estimates need."""
-        report = self.meshes.manifest(mesh_id)["report"]
+        report = (await self.store.meshes.manifest(mesh_id))["report"]
         return MeshSize(report["vertices"], report["faces"], report["mean_edge_length"])
 
     async def list_meshes(self, limit: int, after: str) -> tuple[list[Manifest], str | None]:
         """Return the manifests of ``limit`` meshes after an id, and the id to go on after."""
-        return await to_thread.run_sync(self._list_meshes, limit, after)
+        ids, more = await self.store.meshes.page(after, limit)
+        found = await asyncio.gather(*map(self._manifest_if_any, ids))
+        return [each for each in found if each is not None], ids[-1] if more else None
 
-    def _list_meshes(self, limit: int, after: str) -> tuple[list[Manifest], str | None]:
-        ids, more = self.meshes.page(after, limit)
-        manifests = []
-        for mesh_id in ids:
-            # Left out: meshes deleted meanwhile, and damaged ones. Reading those alone says why.
-            with suppress(ProblemError):
-                manifests.append(self.meshes.manifest(mesh_id))
-        return manifests, ids[-1] if more else None
+    async def _manifest_if_any(self, mesh_id: str) -> Manifest | None:
+        # Left out: meshes deleted meanwhile, and damaged ones. Reading those alone says why.
+        with suppress(ProblemError):
+            return await self.store.meshes.manifest(mesh_id)
+        return None
 
     async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
         """Remove a mesh and its results."""
-        if not caller.may_delete(self.meshes.owner(mesh_id)):
+        if not caller.may_delete(await self._owner(mesh_id)):
             raise problem("forbidden", f"mesh {mesh_id} was stored with another API key")
         await self.mesh_catalog.delete(mesh_id)
         await self._forget(mesh_id)
+
+    async def _owner(self, mesh_id: str) -> str | None:
+        """Return the owner of a mesh; None where it has none, or its manifest is damaged."""
+        try:
+            owner: str | None = (await self.store.meshes.manifest(mesh_id))["owner"]
+        except ProblemError as error:
+            if error.problem.code != "mesh_damaged":
+                raise
+            return None
+        return owner
 
     async def _forget(self, mesh_id: str) -> None:
         """Remove results and fields of a mesh that is gone, or that was damaged.
@@ -272,7 +281,7 @@ class Service:
         """Make sure that nothing damaged is used, though its file's status looks as before."""
         match damage.folder:
             case layout.MESHES:
-                await to_thread.run_sync(self.meshes.distrust, damage.name)
+                await self.store.meshes.distrust(damage.name)
                 await self._forget(damage.name)
             case layout.RESULTS:
                 self.results.discard(damage.name)
@@ -363,7 +372,7 @@ class Service:
         representation = Representation(spec.media_type, spec.dtype, spec.coding)
         async with self.time_limit(self.settings.job_deadline_s, "job_deadline_s"):
             with self.mesh_catalog.pinned(spec.mesh_id):
-                size = self.size(spec.mesh_id)
+                size = await self.size(spec.mesh_id)
                 # One at a time: each may take a tenth of a second, and others want to be served.
                 query = await to_thread.run_sync(
                     self._stored_query, spec, size, written, limiter=self._reading
@@ -432,15 +441,16 @@ class Service:
             ) from None
 
 
-def _engine(settings: Settings, results: Path) -> Engine:
+def _engine(settings: Settings, store: Store) -> Engine:
     if settings.engine == "ray":  # nothing else imports what several machines need
         from app.engine.distributed import DistributedEngine
         from app.engine.ray_cluster import RayCluster
 
-        return DistributedEngine(RayCluster(), settings)
+        return DistributedEngine(RayCluster(), settings, store)
     from app.engine.local import LocalEngine
 
-    return LocalEngine(settings, results)
+    engine = LocalEngine(settings, settings.folder / layout.RESULTS)
+    return engine if store.supply is None else SuppliedEngine(engine, store.supply)
 
 
 def ignore_progress(_share: float) -> None:
@@ -449,7 +459,7 @@ def ignore_progress(_share: float) -> None:
 
 def _database_of(settings: Settings) -> Database:
     if settings.state is None:
-        return SqliteDatabase(settings.store / layout.JOB_DATABASE)
+        return SqliteDatabase(settings.folder / layout.JOB_DATABASE)
     try:
         from app.state.postgres import PostgresDatabase  # an extra, and half a second
     except ImportError as error:

@@ -32,6 +32,8 @@ class Database(Statements, Protocol):
 
     is_shared: bool
     """Whether several services may use it at the same time"""
+    service: str | None
+    """What names the services that share it; None where it is a file of one"""
     clock: str
     """The seconds since 1970 by the clock of the database, as an expression of its SQL"""
 

@@ -4,7 +4,8 @@ from collections.abc import AsyncIterator, Collection, Iterable
 from contextlib import asynccontextmanager
 
 from app.state.database import Database, Statements
-from app.store.mesh_catalog import MeshRecord, MeshTable
+from app.store.mesh_catalog import MeshTable
+from app.store.mesh_home import MeshRecord
 
 PINNED_S = 10.0
 """Seconds for which a mesh stays pinned, unless it is pinned again"""

@@ -20,6 +20,11 @@ _STATEMENT_S = 5
 """Seconds that a statement may take, waiting for others included"""
 _CONNECTIONS = 8
 """Most connections of a service"""
+_NAME = """
+    SELECT system_identifier || '/' || oid FROM pg_control_system(), pg_database
+    WHERE datname = current_database()
+"""
+"""Names the database, by whatever address it is reached"""
 _OPTIONS: dict[str, Any] = {
     "autocommit": True,
     "connect_timeout": 3,
@@ -38,6 +43,7 @@ class PostgresDatabase:
 
     def __init__(self, url: str) -> None:
         self._url = url
+        self.service: str | None = None
         self._pool: AsyncConnectionPool[AsyncConnection[Any]] | None = None
 
     def prepare(self) -> None:
@@ -46,6 +52,7 @@ class PostgresDatabase:
         try:
             with psycopg.connect(self._url, **_OPTIONS) as connection:
                 upgrade(connection)
+                (self.service,) = connection.execute(_NAME).fetchone() or (None,)
         except psycopg.ProgrammingError as error:
             if error.sqlstate is None:  # the message could show a part of the secret
                 example = "postgresql://user:secret@host:5432/database"

@@ -31,6 +31,7 @@ class SqliteDatabase:
     """The database in the file ``path``; see ``Database``."""
 
     is_shared = False
+    service: str | None = None
     clock = "((JULIANDAY('now') - 2440587.5) * 86400.0)"
 
     def __init__(self, path: Path) -> None:

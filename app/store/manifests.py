@@ -38,7 +38,12 @@ def manifest_of(path: str) -> Mapping[str, Any]:
 
 def read_manifest(path: str) -> Mapping[str, Any]:
     """Return the manifest in a file as it is now; raises as `manifest_of` does."""
-    manifest = orjson.loads(Path(path).read_bytes())
+    return decode_manifest(Path(path).read_bytes())
+
+
+def decode_manifest(content: bytes) -> Mapping[str, Any]:
+    """Return the manifest that `encode_manifest` wrote; raises ``ValueError`` for anything else."""
+    manifest = orjson.loads(content)
     if not isinstance(manifest, dict) or manifest.pop(_CHECKSUM, None) != _checksum(manifest):
         raise ValueError("its checksum is not that of its content")
     return manifest

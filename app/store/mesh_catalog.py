@@ -1,10 +1,10 @@
 """The catalog of stored meshes: sizes, owners and order of use.
 
-One process knows it, or the catalogs of several services share a table. The directory is the source
-of truth. Each change is one rename, made together with its entry here: a crash leaves a mesh either
-there or not, and the next start counts anew. Workers write new meshes into a scratch folder, which
-is removed with everything left in it. The files of a damaged mesh are replaced one by one: until
-the last one is there, it is still damaged.
+One process knows it, or the catalogs of several services share a table. Their home is the source of
+truth: a folder, or an object store. Each change there is made together with its entry here: a crash
+leaves a mesh either there or not, and the next start counts anew. Workers write new meshes into a
+scratch folder, which is removed with everything left in it. The files of a damaged mesh are
+replaced: until the last one is there, it is still damaged.
 """
 
 import asyncio
@@ -12,17 +12,16 @@ import shutil
 import tempfile
 from collections import Counter, OrderedDict
 from collections.abc import AsyncIterator, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager, suppress
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Protocol
 from uuid import uuid4
 
-from app.errors import ProblemError, over_limit
-from app.store.atomic import sync, sync_all
+from app.errors import over_limit
 from app.store.layout import TEMPORARY
-from app.store.manifests import MANIFEST
-from app.store.meshes import MeshStore, WrittenMesh, mesh_not_found
+from app.store.mesh_home import MeshHome, MeshRecord
+from app.store.meshes import WrittenMesh, mesh_not_found
 
 
 @dataclass(frozen=True)
@@ -34,16 +33,6 @@ class CatalogChange:
     """Whether the mesh was there, but damaged"""
     evicted: Sequence[str] = ()
     """Ids of the meshes that were removed to make room"""
-
-
-class MeshRecord(NamedTuple):
-    """A mesh in the catalog."""
-
-    size: int
-    """Bytes on disk"""
-    owner: str | None
-    is_pinned: bool = False
-    """Whether a service that shares the table needs it at the moment"""
 
 
 class MeshTable(Protocol):
@@ -82,14 +71,15 @@ class MeshCatalog:
     def __init__(
         self,
         root: Path,
-        store: MeshStore,
+        home: MeshHome,
         capacity: int,
         *,
         evicts: bool,
         quota: int | None = None,
         shared: MeshTables | None = None,
     ) -> None:
-        self._store = store
+        self._home = home
+        self._lock = asyncio.Lock()
         self._shared = shared
         self._used: dict[str, None] = {}
         """Meshes used since the shared table was told, the last one last"""
@@ -107,21 +97,16 @@ class MeshCatalog:
 
         Another service may be writing it, where this one is not alone.
         """
-        self._store.folder.mkdir(exist_ok=True)
         self._temporary.mkdir(exist_ok=True)
         if is_alone:
             _remove(*self._temporary.iterdir())
-        sizes = self._store.sizes().items()
-        self._entries = OrderedDict(
-            (mesh_id, MeshRecord(size, self._owner(mesh_id))) for mesh_id, size in sizes
-        )
+        self._entries = OrderedDict(self._home.found())
 
     async def reconcile(self) -> None:
-        """Bring the shared table up to date with the directory, before other services come."""
+        """Bring the shared table up to date with what is there."""
         if self._shared is not None:
-            found = self._entries.copy()
             async with self._table():
-                self._entries = found
+                self._entries = OrderedDict(await asyncio.to_thread(self._home.found))
 
     async def keep_up(self) -> None:
         """Tell the shared table of uses, and take over what other services changed."""
@@ -134,7 +119,8 @@ class MeshCatalog:
     async def _table(self) -> AsyncIterator[None]:
         """Be alone in changing meshes inside the block; the shared table follows."""
         if self._shared is None:
-            yield
+            async with self._lock:
+                yield
             return
         failure: BaseException | None = None
         async with self._shared.alone() as table:
@@ -163,18 +149,12 @@ class MeshCatalog:
             self._used = {**used, **self._used}
             raise
 
-    def _find(self, mesh_id: str) -> None:
-        """Note a mesh that is in the directory, though the shared table was not told."""
+    async def _find(self, mesh_id: str) -> None:
+        """Note a mesh that is there, though the shared table was not told."""
         if self._shared is not None and mesh_id not in self._entries:
-            size = self._store.size(mesh_id)
-            if size is not None:
-                self._entries[mesh_id] = MeshRecord(size, self._owner(mesh_id))
-
-    def _owner(self, mesh_id: str) -> str | None:
-        try:
-            return self._store.owner(mesh_id)
-        except ProblemError:  # a folder that is no mesh
-            return None
+            record = await self._home.record(mesh_id)
+            if record is not None:
+                self._entries[mesh_id] = record
 
     @property
     def ids(self) -> Collection[str]:
@@ -216,40 +196,40 @@ class MeshCatalog:
         if written.folder is None:
             if self._shared is not None:
                 async with self._table():
-                    self._find(mesh_id)
+                    await self._find(mesh_id)
             return self._use_again(mesh_id)
-        await asyncio.to_thread(sync_all, written.folder)
-        async with self._table():
-            return await self._add(written, written.folder)
+        change = None
+        try:
+            await self._home.settle(written)
+            async with self._table():
+                change = await self._add(written)
+        finally:
+            if change is None or not (change.is_new or change.is_healed):
+                await self._home.discard(written)
+        return change
 
-    async def _add(self, written: WrittenMesh, folder: Path) -> CatalogChange:
+    async def _add(self, written: WrittenMesh) -> CatalogChange:
         mesh_id = written.mesh_id
-        self._find(mesh_id)
-        if await asyncio.to_thread(self._store.is_intact, mesh_id):  # another upload was faster
+        await self._find(mesh_id)
+        if await self._home.is_intact(mesh_id):  # another upload was faster
             change = self._use_again(mesh_id)
             if change is not None:
                 return change
-        is_new, place = mesh_id not in self._entries, self._store.folder / mesh_id
+        is_new = mesh_id not in self._entries
         entry = MeshRecord(written.size, written.manifest["owner"])
         if is_new:  # one that is healed has its room already
             self._refuse_over_quota(entry)
         evicted = self._choose_evicted(mesh_id, entry.size)
-        gone: list[Path] = []
+        for old in evicted:
+            await self._remove(old)
         try:
-            gone.extend(self._move_out(old) for old in evicted)
+            await self._home.put(written, is_new=is_new)
+        except BaseException:
             if is_new:
-                folder.rename(place)
-            else:
-                _replace_files(place, folder)
-            self._entries[mesh_id] = entry
-            self.use(mesh_id)
-            await asyncio.to_thread(sync, self._store.folder if is_new else place)
-        except OSError:
-            if is_new and mesh_id in self._entries:
-                gone.append(self._move_out(mesh_id))  # a power cut might lose it: fail now
+                await self._home.remove(mesh_id)  # a power cut might lose it: fail now
             raise
-        finally:
-            await asyncio.to_thread(_remove, *gone)
+        self._entries[mesh_id] = entry
+        self.use(mesh_id)
         self.evictions += len(evicted)
         return CatalogChange(is_new, is_healed=not is_new, evicted=evicted)
 
@@ -261,17 +241,16 @@ class MeshCatalog:
     async def delete(self, mesh_id: str) -> None:
         """Remove a mesh at once; processes that have it open can go on reading it."""
         async with self._table():
-            self._find(mesh_id)
+            await self._find(mesh_id)
             if mesh_id not in self._entries:
                 raise mesh_not_found(mesh_id)
-            gone = self._move_out(mesh_id)
-        await asyncio.to_thread(_remove, gone)
+            await self._remove(mesh_id)
 
     def use(self, mesh_id: str) -> None:
         """Mark a mesh as the most recently used, if it is there."""
         if mesh_id in self._entries:
             self._entries.move_to_end(mesh_id)
-            self._store.note_use(mesh_id)
+            self._home.note_use(mesh_id)
             if self._shared is not None:
                 self._used.pop(mesh_id, None)
                 self._used[mesh_id] = None
@@ -327,21 +306,12 @@ class MeshCatalog:
             )
         return evicted
 
-    def _move_out(self, mesh_id: str) -> Path:
-        gone = self._new_name()
-        with suppress(FileNotFoundError):  # a crash came before the shared table was told
-            (self._store.folder / mesh_id).rename(gone)
+    async def _remove(self, mesh_id: str) -> None:
+        await self._home.remove(mesh_id)
         del self._entries[mesh_id]
-        return gone
 
     def _new_name(self) -> Path:
         return self._temporary / f"{uuid4().hex}.gone"
-
-
-def _replace_files(folder: Path, new: Path) -> None:
-    """Move the files of a mesh over those in ``folder``, the manifest last."""
-    for path in sorted(new.iterdir(), key=lambda path: path.name == MANIFEST):
-        path.replace(folder / path.name)
 
 
 def _remove(*entries: Path) -> None:

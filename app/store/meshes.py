@@ -144,9 +144,9 @@ class MeshStore:
             manifest = read(f"{self._path(mesh_id)}/{MANIFEST}")
         except (OSError, ValueError) as error:
             self._folder(mesh_id)  # raises where there is no such mesh
-            raise _damaged(mesh_id, "its manifest is not what was written") from error
+            raise mesh_damaged(mesh_id, "its manifest is not what was written") from error
         if manifest["id"] != mesh_id:
-            raise _damaged(mesh_id, "its manifest is that of another mesh")
+            raise mesh_damaged(mesh_id, "its manifest is that of another mesh")
         return manifest
 
     def owner(self, mesh_id: str) -> str | None:
@@ -209,16 +209,16 @@ class MeshStore:
                 yield None
             else:
                 is_intact = False
-                yield _damaged(mesh_id, f"its array {name} is not what was written")
+                yield mesh_damaged(mesh_id, f"its array {name} is not what was written")
         if not is_intact:
             return
         try:
             arrays = {name: _open_array(Path(folder) / f"{name}.npy") for name in checksums}
         except FileNotFoundError:
-            yield _damaged(mesh_id, "an array is missing")
+            yield mesh_damaged(mesh_id, "an array is missing")
             return
         is_named = content_hash(arrays) == mesh_id
-        yield None if is_named else _damaged(mesh_id, "its name is not that of its content")
+        yield None if is_named else mesh_damaged(mesh_id, "its name is not that of its content")
 
     def is_intact(self, mesh_id: str) -> bool:
         """Read the files of a mesh; tell whether it is in the store and all are as written."""
@@ -240,7 +240,7 @@ class MeshStore:
         """Return the file of an array; raise where it is not what was written."""
         path = self._folder(mesh_id) / f"{name}.npy"
         if checksum_of(str(path)) != self.manifest(mesh_id)["crc32"][name]:
-            raise _damaged(mesh_id, f"its array {name} is not what was written")
+            raise mesh_damaged(mesh_id, f"its array {name} is not what was written")
         return path
 
     def array_file(self, mesh_id: str, name: str) -> Path:
@@ -295,9 +295,14 @@ class MeshStore:
 
     def _path(self, mesh_id: str) -> str:
         """Return the path of a mesh, as text: each request needs it, and a `Path` is slow."""
-        if not _ID.fullmatch(mesh_id):
-            raise mesh_not_found(mesh_id)
+        require_id(mesh_id)
         return f"{self.folder}/{mesh_id}"
+
+
+def require_id(mesh_id: str) -> None:
+    """Raise where no mesh can have this id."""
+    if not _ID.fullmatch(mesh_id):
+        raise mesh_not_found(mesh_id)
 
 
 def content_hash(arrays: Mapping[str, NDArray[Any]]) -> str:
@@ -361,6 +366,7 @@ def mesh_not_found(mesh_id: str) -> ProblemError:
     return problem("mesh_not_found", f"there is no mesh {mesh_id!r}")
 
 
-def _damaged(mesh_id: str, reason: str) -> ProblemError:
+def mesh_damaged(mesh_id: str, reason: str) -> ProblemError:
+    """Return the error for a mesh whose files are not what was written."""
     hint = "upload it again: that replaces the damaged files"
     return problem("mesh_damaged", f"mesh {mesh_id} is damaged: {reason}", hint=hint)

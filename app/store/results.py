@@ -9,10 +9,11 @@ on it.
 import errno
 import zlib
 from collections import Counter, OrderedDict
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
+from typing import Protocol
 
 from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
@@ -24,7 +25,7 @@ from app.store.log import warn
 Buffer = bytes | memoryview
 
 
-_SMALL = 2**16
+SMALL = 2**16
 """Bytes of a body that is also held in memory: most of them, but for fields and long lines"""
 
 
@@ -96,7 +97,7 @@ def write_result(
     first: list[Buffer] = []
     for part in rest:
         first.append(part)
-        if sum(map(len, first)) > _SMALL:
+        if sum(map(len, first)) > SMALL:
             return _write(root, name, chain(first, rest), headers, code)
     body = b"".join(first)
     manifest = ResultManifest(
@@ -129,16 +130,111 @@ def _write(
     return Result(name, manifest, None, has_files=True)
 
 
+class ResultFiles(Protocol):
+    """The files of results: a folder, or objects that several machines reach."""
+
+    def found(self, *, is_alone: bool) -> Iterable[tuple[str, int]]:
+        """Yield names and sizes of the results of a former service, the oldest first.
+
+        What is incomplete is removed, where no other service may be writing it.
+        """
+
+    async def read(self, name: str) -> Result | None:
+        """Return a result; None where it is missing or damaged."""
+
+    async def size(self, name: str) -> int | None:
+        """Return the size of the body of a result; None where it is missing."""
+
+    async def write(self, name: str, body: bytes, manifest: ResultManifest) -> None:
+        """Write the files of a result in memory."""
+
+    def note_use(self, name: str) -> None:
+        """Mark a result as the most recently used."""
+
+    def remove(self, name: str) -> None:
+        """Remove a result, if it is there."""
+
+    def body(self, result: Result) -> "Path | RemoteBody":
+        """Return the body of a result that has files."""
+
+
+class RemoteFile(Protocol):
+    """A file that is elsewhere."""
+
+    async def seek(self, offset: int) -> object:
+        """Go on at an offset."""
+
+    async def read(self, size: int) -> bytes:
+        """Return the next bytes: as many, or fewer at the end."""
+
+    async def aclose(self) -> None:
+        """End the use of the file."""
+
+
+class RemoteBody(Protocol):
+    """A body that is elsewhere, and read while it is sent."""
+
+    size: int
+
+    async def open(self) -> RemoteFile:
+        """Open the body for reading."""
+
+
+class FolderResults:
+    """The results in the folder ``root``."""
+
+    def __init__(self, root: Path) -> None:
+        self._root = root
+
+    def found(self, *, is_alone: bool) -> Iterator[tuple[str, int]]:
+        """Yield what is there, see ``ResultFiles``."""
+        self._root.mkdir(parents=True, exist_ok=True)
+        bodies = sorted(self._root.glob("*/*.body"), key=lambda path: order_of_use(path.stat()))
+        for path in bodies:
+            name = path.relative_to(self._root).with_suffix("").as_posix()
+            if _manifest_path(self._root, name).exists():
+                yield name, path.stat().st_size
+            elif is_alone:
+                path.unlink()
+        if is_alone:
+            remove_partial(self._root)
+
+    async def read(self, name: str) -> Result | None:
+        """Return a result; None where it is missing or damaged."""
+        return await to_thread.run_sync(_read, self._root, name)
+
+    async def size(self, name: str) -> int | None:
+        """Return the size of a body; None where it is missing."""
+        return await to_thread.run_sync(_size, self._root, name)
+
+    async def write(self, name: str, body: bytes, manifest: ResultManifest) -> None:
+        """Write a result."""
+        await to_thread.run_sync(_write, self._root, name, [body], manifest.headers, manifest.code)
+
+    def note_use(self, name: str) -> None:
+        """Note a use as the time of the file."""
+        note_use(_body_path(self._root, name))
+
+    def remove(self, name: str) -> None:
+        """Remove the files of a result."""
+        _manifest_path(self._root, name).unlink(missing_ok=True)
+        _body_path(self._root, name).unlink(missing_ok=True)
+
+    def body(self, result: Result) -> Path:
+        """Return the file of a body."""
+        return _body_path(self._root, result.name)
+
+
 class ResultStore:
-    """The results under ``root``, at most ``capacity`` bytes; the least recently used go first.
+    """Results in ``files``, at most ``capacity`` bytes; the least recently used go first.
 
     Small results of up to ``memory`` bytes are held in memory: all those without files, and some
     of the others. One process owns the store and its index. `find` and `add` acquire a result,
     which protects its files until `release`; a pinned one stays until `unpin`.
     """
 
-    def __init__(self, root: Path, capacity: int, memory: int) -> None:
-        self._root = root
+    def __init__(self, files: ResultFiles, capacity: int, memory: int) -> None:
+        self._files = files
         self._capacity = capacity
         self._memory = memory
         self._small: OrderedDict[str, Result] = OrderedDict()
@@ -158,25 +254,17 @@ class ResultStore:
         Where this service is not alone, another one may be writing those. `make_room` is to follow
         once those that must stay are pinned.
         """
-        self._root.mkdir(parents=True, exist_ok=True)
-        bodies = sorted(self._root.glob("*/*.body"), key=lambda path: order_of_use(path.stat()))
-        for path in bodies:
-            name = path.relative_to(self._root).with_suffix("").as_posix()
-            if _manifest_path(self._root, name).exists():
-                self._count(name, path.stat().st_size)
-            elif is_alone:
-                path.unlink()
-        if is_alone:
-            remove_partial(self._root)
+        for name, size in self._files.found(is_alone=is_alone):
+            self._count(name, size)
 
     @property
     def nbytes(self) -> int:
         """Bytes of all bodies that are files."""
         return self._total
 
-    def body_path(self, result: Result) -> Path:
-        """Return the file of a body, for a result that has files."""
-        return _body_path(self._root, result.name)
+    def body(self, result: Result) -> Path | RemoteBody:
+        """Return the body of a result that has files."""
+        return self._files.body(result)
 
     async def find(self, name: str) -> Result | None:
         """Acquire a result; None where it is missing or damaged."""
@@ -187,9 +275,9 @@ class ResultStore:
             return None
         self._in_use[name] += 1  # protects the files while a thread reads them
         try:
-            result = await to_thread.run_sync(_read, self._root, name)
+            result = await self._files.read(name)
             if result is not None:
-                note_use(_body_path(self._root, name))
+                self._files.note_use(name)
                 self._cache_small(result)
                 return self._acquire(result)
         finally:
@@ -200,7 +288,7 @@ class ResultStore:
     async def index(self, name: str) -> None:
         """Index a result that another service may have written."""
         if name not in self._sizes:
-            size = await to_thread.run_sync(_size, self._root, name)
+            size = await self._files.size(name)
             if size is not None:
                 self._count(name, size)
 
@@ -226,11 +314,9 @@ class ResultStore:
         if result.has_files:
             return result
         assert result.body is not None, "a result without files is in memory"  # noqa: S101
-        name, manifest, body = result.name, result.manifest, [result.body]
+        name, manifest = result.name, result.manifest
         try:
-            await to_thread.run_sync(
-                _write, self._root, name, body, manifest.headers, manifest.code
-            )
+            await self._files.write(name, result.body, manifest)
         except BaseException:
             self.release(result)
             raise
@@ -308,8 +394,7 @@ class ResultStore:
 
     def _remove(self, name: str) -> None:
         self._drop_small(name)
-        _manifest_path(self._root, name).unlink(missing_ok=True)
-        _body_path(self._root, name).unlink(missing_ok=True)
+        self._files.remove(name)
         self._total -= self._sizes.pop(name, 0)
 
 
@@ -363,10 +448,10 @@ def _read(root: Path, name: str) -> Result | None:
             while chunk := file.read(2**20):
                 checksum = zlib.crc32(chunk, checksum)
                 size += len(chunk)
-                if size <= _SMALL:
+                if size <= SMALL:
                     small.append(chunk)
     except (FileNotFoundError, ValidationError):
         return None
     if (size, checksum) != (manifest.size, manifest.crc32):
         return None
-    return Result(name, manifest, b"".join(small) if size <= _SMALL else None, has_files=True)
+    return Result(name, manifest, b"".join(small) if size <= SMALL else None, has_files=True)

@@ -13,6 +13,7 @@ from structlog.testing import capture_logs
 import geodesic_core as gc
 from app.service import scrub
 from app.store import verified
+from app.store.meshes import MeshStore
 from tests.support.faults import FAULTS, MANIFEST_FAULTS, Fault, flip_bytes
 from tests.support.service import check_problem, distances, serving, upload_sample
 from tests.support.waiting import wait_until
@@ -80,7 +81,7 @@ def test_a_damaged_array_is_not_served_and_an_upload_heals_it(client: Any, fault
         np.load(BytesIO(distances(client, mesh_id, NPY, **other).content)),
         gc.exact_distance(gc.TriangleMesh(vertices, faces), 8).distances,
     )
-    assert not any(client.app.state.service.meshes.inspect(mesh_id))
+    assert not any(MeshStore(client.app.state.service.settings.folder).inspect(mesh_id))
 
 
 @pytest.mark.parametrize("fault", MANIFEST_FAULTS.values(), ids=MANIFEST_FAULTS.keys())

@@ -171,7 +171,7 @@ def check_told(told: str, job: Job | None) -> None:
 async def check_answer(service: Service, job: Job) -> None:
     """Check an answer to the bit."""
     _, result = await service.jobs.result(None, job.id)
-    body = service.results.body_path(result).read_bytes()
+    body = service.results.body(result).read_bytes()
     service.results.release(result)
     match job.spec.media_type:
         case "application/json":

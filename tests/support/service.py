@@ -18,6 +18,7 @@ from app.main import create_app
 from app.queries import ExecutionContext, FieldCache
 from app.settings import Settings
 from app.store.fields import FieldStore
+from app.store.folder_meshes import FolderMeshes
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
 from app.store.ownership import owned
@@ -95,7 +96,7 @@ def apart(client: TestClient) -> str:
 def store_mesh(root: Path, mesh: gc.TriangleMesh, owner: str | None = None) -> str:
     """Put a mesh into a store on which no service runs."""
     store = MeshStore(root)
-    catalog = MeshCatalog(root, store, 2**60, evicts=False)
+    catalog = MeshCatalog(root, FolderMeshes(root), 2**60, evicts=False)
 
     async def add() -> str:
         async with catalog.scratch_folder() as folder:

@@ -160,7 +160,7 @@ async def get_mesh(
     mesh_id: str, request: Request, response: Response, service: ServiceDep
 ) -> Response | dict[str, object]:
     """Return the report of a mesh, the same as after its upload."""
-    manifest = service.manifest(mesh_id)
+    manifest = await service.manifest(mesh_id)
     headers = {**REVALIDATED, "ETag": etag_of(mesh_id)}
     response.headers.update(headers)
     return not_modified(request, etag_of(mesh_id), headers) or mesh_document(manifest)

@@ -103,7 +103,7 @@ class QueryRequest:
         """Validate the query in ``body``, and respond with its answer, an estimate or a job."""
         request, context = self.request, self.context
         service = service_of(request)
-        size = service.size(self.mesh_id)
+        size = await service.size(self.mesh_id)
 
         def make_query() -> Query[Any]:
             query = kind.ask(self.mesh_id, size, body, service.settings)

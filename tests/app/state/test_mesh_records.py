@@ -9,6 +9,7 @@ import pytest
 import geodesic_core as gc
 from app.errors import ProblemError
 from app.state import Database, MeshRecords
+from app.store.folder_meshes import FolderMeshes
 from app.store.mesh_catalog import CatalogChange, MeshCatalog
 from app.store.meshes import MeshStore
 from tests.support.databases import opened
@@ -23,7 +24,7 @@ class Replica:
         self.store = MeshStore(root)
         self.catalog = MeshCatalog(
             root,
-            self.store,
+            FolderMeshes(root),
             capacity,
             evicts=True,
             quota=quota,

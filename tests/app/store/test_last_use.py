@@ -10,7 +10,7 @@ import pytest
 from app.store.fields import FieldStore, field_files
 from app.store.last_use import note_use, order_of_use
 from app.store.meshes import MeshStore
-from app.store.results import ResultStore, write_result
+from app.store.results import FolderResults, ResultStore, write_result
 
 YEARS_S = 10 * 365.25 * 86_400
 
@@ -86,7 +86,7 @@ def test_the_next_start_finds_meshes_and_results_in_the_same_order(tmp_path: Pat
     set_ahead(tmp_path / "results" / "m" / "b.body")
     assert list(MeshStore(tmp_path).sizes()) == ["b", "a"]
 
-    results = ResultStore(tmp_path / "results", 50, memory=0)
+    results = ResultStore(FolderResults(tmp_path / "results"), 50, memory=0)
     results.prepare()
     results.make_room()
     assert [path.name for path in tmp_path.glob("results/m/*.body")] == ["a.body"]

@@ -26,7 +26,8 @@ from app.engine.interface import ProgressCallback
 from app.engine.work import RunQuery, Task, TaskResult
 from app.errors import ProblemError
 from app.state import require_intact
-from app.store import mesh_catalog, ownership
+from app.store import folder_meshes, ownership
+from app.store.folder_meshes import FolderMeshes
 from app.store.layout import LAYOUT, StoreError, require_layout
 from app.store.mesh_catalog import CatalogChange, MeshCatalog
 from app.store.meshes import MeshStore, WrittenMesh
@@ -233,7 +234,7 @@ def opened(
     root: Path, capacity: int = 2**60, *, evicts: bool = False, quota: int | None = None
 ) -> Iterator[Store]:
     store = MeshStore(root)
-    catalog = MeshCatalog(root, store, capacity, evicts=evicts, quota=quota)
+    catalog = MeshCatalog(root, FolderMeshes(root), capacity, evicts=evicts, quota=quota)
     with owned(root):
         catalog.prepare()
         yield store, catalog
@@ -573,8 +574,8 @@ class Crash(BaseException):
 
 STEPS = [
     (Path, "open"),
-    (mesh_catalog, "sync_all"),
-    (mesh_catalog, "sync"),
+    (folder_meshes, "sync_all"),
+    (folder_meshes, "sync"),
     (Path, "write_bytes"),
     (Path, "rename"),
     (Path, "replace"),

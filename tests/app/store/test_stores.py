@@ -11,7 +11,7 @@ import geodesic_core as gc
 from app.errors import ProblemError
 from app.store.manifests import encode_manifest, read_manifest
 from app.store.meshes import MeshStore
-from app.store.results import Result, ResultStore, write_result
+from app.store.results import FolderResults, Result, ResultStore, write_result
 from tests.support.service import store_mesh
 
 SQUARE = (
@@ -137,7 +137,7 @@ def test_unknown_ids(meshes: MeshStore, mesh_id: str) -> None:
 
 @pytest.fixture
 def results(tmp_path: Path) -> ResultStore:
-    store = ResultStore(tmp_path / "results", 100, memory=0)
+    store = ResultStore(FolderResults(tmp_path / "results"), 100, memory=0)
     store.prepare()
     return store
 
@@ -164,7 +164,7 @@ def test_a_result_comes_back(results: ResultStore, tmp_path: Path) -> None:
     found = find(results, "m/a")
 
     assert found is not None
-    assert results.body_path(found).read_bytes() == b"x" * 40
+    assert results.body(found).read_bytes() == b"x" * 40
     assert found.manifest.headers == {"A": "b"}
     assert found.key == "a"
 
@@ -183,10 +183,10 @@ def test_what_is_being_sent_stays(results: ResultStore, tmp_path: Path) -> None:
     sent = results.add(write(tmp_path, "m/a", 90))
     put(results, tmp_path, "m/b")
 
-    assert results.body_path(sent).exists()
+    assert results.body(sent).exists()
     results.release(sent)
     put(results, tmp_path, "m/c")
-    assert not results.body_path(sent).exists()
+    assert not results.body(sent).exists()
 
 
 def test_a_changed_result_is_not_served(results: ResultStore, tmp_path: Path) -> None:
@@ -211,7 +211,7 @@ def test_the_answer_of_a_job_stays_where_a_start_has_to_make_room(
         put(results, tmp_path, f"m/{key}")
         os.utime(tmp_path / "results" / "m" / f"{key}.body", (second, second))
 
-    restarted = ResultStore(tmp_path / "results", 50, memory=0)
+    restarted = ResultStore(FolderResults(tmp_path / "results"), 50, memory=0)
     restarted.prepare()
     restarted.pin("m/job")
     restarted.make_room()
@@ -227,7 +227,7 @@ def test_results_survive_a_restart(results: ResultStore, tmp_path: Path) -> None
     (tmp_path / "results" / "m" / "incomplete.body").write_bytes(b"x")
     (tmp_path / "results" / "m" / "tmpabc").write_bytes(b"x")
 
-    restarted = ResultStore(tmp_path / "results", 50, memory=0)
+    restarted = ResultStore(FolderResults(tmp_path / "results"), 50, memory=0)
     restarted.prepare()
     restarted.make_room()
 
@@ -248,7 +248,7 @@ def test_results_of_a_mesh_are_forgotten(results: ResultStore, tmp_path: Path) -
 
 
 def test_small_results_are_in_memory_as_far_as_they_fit(tmp_path: Path) -> None:
-    results = ResultStore(tmp_path / "results", 10**6, memory=2 * 4096 + 100)
+    results = ResultStore(FolderResults(tmp_path / "results"), 10**6, memory=2 * 4096 + 100)
     results.prepare()
     for key in "abc":
         put(results, tmp_path, f"m/{key}")
@@ -264,7 +264,7 @@ def test_small_results_are_in_memory_as_far_as_they_fit(tmp_path: Path) -> None:
 
 def test_the_memory_of_small_results_is_counted_whole(tmp_path: Path) -> None:
     memory = 2**22
-    results = ResultStore(tmp_path / "results", 10**6, memory=memory)
+    results = ResultStore(FolderResults(tmp_path / "results"), 10**6, memory=memory)
     headers = {"Geodesic-Method": "exact", "Geodesic-Error": "0.0", "Geodesic-Vertices": "12"}
 
     def answer(number: int) -> Result:
@@ -308,7 +308,7 @@ def test_a_failed_result_leaves_nothing(tmp_path: Path) -> None:
 
 @pytest.fixture
 def roomy(tmp_path: Path) -> ResultStore:
-    store = ResultStore(tmp_path / "results", 10**6, memory=2 * 4096 + 100)
+    store = ResultStore(FolderResults(tmp_path / "results"), 10**6, memory=2 * 4096 + 100)
     store.prepare()
     return store
 
@@ -339,10 +339,10 @@ def test_files_come_when_they_are_needed(
     roomy.pin("m/a")
     roomy.release(filed)
 
-    assert roomy.body_path(filed).read_bytes() == b"x" * 40
+    assert roomy.body(filed).read_bytes() == b"x" * 40
     assert filed.manifest == taken.manifest
     assert anyio.run(roomy.with_files, filed) is filed
-    restarted = ResultStore(tmp_path / "results", 10**6, memory=0)
+    restarted = ResultStore(FolderResults(tmp_path / "results"), 10**6, memory=0)
     restarted.prepare()
     assert find(restarted, "m/a").body == b"x" * 40
 

@@ -1,0 +1,136 @@
+"""The store at a URL: objects that all machines reach, and a folder of this one for copies.
+
+The folder has the layout of a store in a folder. Distance fields stay there, and so do jobs, where
+no database is shared.
+"""
+
+import shutil
+from collections.abc import AsyncIterator, Iterator
+from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
+from pathlib import Path
+from uuid import uuid4
+
+import orjson
+from anyio import to_thread
+
+from app.errors import StoreUnavailableError
+from app.settings import variable_of
+from app.store.layout import RESULTS, StoreError
+from app.store.meshes import WrittenMesh
+from app.store.object_meshes import ObjectMeshes
+from app.store.object_results import ObjectResults
+from app.store.objects import Objects
+from app.store.ownership import owned
+from app.store.results import FolderResults, Result
+
+_OWNER = "owner.json"
+_UPLOADS = "uploads"
+_IDENTITY = "identity"
+"""File of the folder that names a service whose state is there as well"""
+
+
+class ObjectStore:
+    """The store in ``objects``, see ``Store`` and ``Supply``, with copies of meshes in ``folder``.
+
+    The copies take ``capacity`` bytes.
+    """
+
+    def __init__(self, objects: Objects, folder: Path, capacity: int, name: str) -> None:
+        self.folder = folder
+        self.meshes = ObjectMeshes(objects, folder, capacity)
+        self.results = ObjectResults(objects)
+        self.supply = self
+        self._local_results = FolderResults(folder / RESULTS)
+        self._objects = objects
+        self._name = name
+
+    @contextmanager
+    def owned(self, *, is_shared: bool = False) -> Iterator[None]:  # noqa: ARG002 - the folder is not
+        """Lock the folder, which is this process's alone."""
+        with owned(self.folder):
+            self.meshes.prepare()
+            yield
+
+    def claim(self, service: str | None) -> None:
+        """Mark the store by an object that is written once."""
+        content = orjson.dumps({"service": service or self._identity()})
+        try:
+            is_ours = self._objects.create(_OWNER, content)
+        except FileNotFoundError as error:
+            raise StoreError(f"the store {self._name} does not exist: {error}") from None
+        except StoreUnavailableError as error:
+            raise StoreError(
+                f"the store {self._name} cannot be used: {error}; endpoint and credentials are "
+                "those of the environment, such as AWS_ENDPOINT_URL and AWS_ACCESS_KEY_ID"
+            ) from None
+        if not is_ours:
+            raise StoreError(
+                f"the store {self._name} belongs to another service: give this one a prefix of "
+                f"its own, see {variable_of('store')}, or the same {variable_of('state')}; where "
+                f"the other one is gone for ever, remove the object {_OWNER}"
+            )
+
+    def require_claimed(self) -> None:
+        """Raise ``StoreError`` where no service has the store."""
+        try:
+            if self._objects.read(_OWNER) is not None:
+                return
+        except StoreUnavailableError as error:
+            raise StoreError(f"the store {self._name} cannot be used: {error}") from None
+        raise StoreError(
+            f"there is no store at {self._name}: start geodesic serve on it first, and give all "
+            f"machines the same {variable_of('store')}"
+        )
+
+    @asynccontextmanager
+    async def lent(self, file: Path) -> AsyncIterator[None]:
+        """Send a file for the block."""
+        name = self._upload_name(file)
+        await to_thread.run_sync(self._objects.write, name, file)
+        try:
+            yield
+        finally:
+            await to_thread.run_sync(self._objects.remove, name)
+
+    def holding(self, mesh_id: str) -> AbstractAsyncContextManager[None]:
+        """Hold a copy of a mesh."""
+        return self.meshes.holding(mesh_id)
+
+    @asynccontextmanager
+    async def bringing(self, file: Path | None, folder: Path) -> AsyncIterator[None]:
+        """Fetch a file that is not here."""
+        is_guest = not folder.parent.is_dir()
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            if is_guest and file is not None:
+                await to_thread.run_sync(self._objects.fetch, self._upload_name(file), file)
+            yield
+        finally:
+            if is_guest:
+                await to_thread.run_sync(_remove, folder.parent)
+
+    async def send_mesh(self, written: WrittenMesh) -> bool:
+        """Send a mesh."""
+        return await self.meshes.send(written)
+
+    async def send_result(self, result: Result) -> None:
+        """Send a result."""
+        await self.results.send(result, self._local_results.body(result))
+        self._local_results.remove(result.name)
+
+    async def distrust(self, mesh_id: str) -> None:
+        """Drop the copy of a mesh."""
+        await self.meshes.distrust(mesh_id)
+
+    def _upload_name(self, file: Path) -> str:
+        return f"{_UPLOADS}/{file.relative_to(self.folder).as_posix()}"
+
+    def _identity(self) -> str:
+        path = self.folder / _IDENTITY
+        if not path.exists():
+            path.write_text(uuid4().hex)
+        return path.read_text()
+
+
+def _remove(folder: Path) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
