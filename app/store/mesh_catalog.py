@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Protocol
 from uuid import uuid4
 
-from app.errors import over_limit
+from app.errors import ProblemError, over_limit
 from app.store.layout import TEMPORARY
 from app.store.mesh_home import MeshHome, MeshRecord
 from app.store.meshes import WrittenMesh, mesh_not_found
@@ -198,14 +198,15 @@ class MeshCatalog:
                 async with self._table():
                     await self._find(mesh_id)
             return self._use_again(mesh_id)
-        change = None
         try:
             await self._home.settle(written)
             async with self._table():
                 change = await self._add(written)
-        finally:
-            if change is None or not (change.is_new or change.is_healed):
-                await self._home.discard(written)
+        except ProblemError:  # after any other error, the mesh may be there
+            await self._home.discard(written)
+            raise
+        if not (change.is_new or change.is_healed):
+            await self._home.discard(written)
         return change
 
     async def _add(self, written: WrittenMesh) -> CatalogChange:
@@ -222,13 +223,13 @@ class MeshCatalog:
         evicted = self._choose_evicted(mesh_id, entry.size)
         for old in evicted:
             await self._remove(old)
+        self._entries[mesh_id] = entry
         try:
             await self._home.put(written, is_new=is_new)
-        except BaseException:
+        except OSError:
             if is_new:
-                await self._home.remove(mesh_id)  # a power cut might lose it: fail now
+                await self._remove(mesh_id)  # a power cut might lose it: fail now
             raise
-        self._entries[mesh_id] = entry
         self.use(mesh_id)
         self.evictions += len(evicted)
         return CatalogChange(is_new, is_healed=not is_new, evicted=evicted)

@@ -14,6 +14,7 @@ LIBRARY = TESTS.parent / "geodesic_core"
 
 TEXTS = {
     "store": ("/somewhere", Path("/somewhere")),
+    "copies": ("/elsewhere", Path("/elsewhere")),
     "state": ("postgresql://a:b@c/d", SecretStr("postgresql://a:b@c/d")),
     "worker_memory_bytes": ("3000000000", 3_000_000_000),
     "deadline_s": ("0.5", 0.5),
@@ -69,8 +70,16 @@ def test_the_store_is_a_folder_or_its_url(
     assert Settings().store == Path(folder)
 
 
+def test_a_store_at_a_url_has_a_folder_here_besides(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GEODESIC_STORE", "s3://bucket/meshes")
+    monkeypatch.setenv("GEODESIC_COPIES", "/srv/copies")
+
+    assert Settings().store == "s3://bucket/meshes"
+    assert Settings().folder == Path("/srv/copies")
+
+
 @pytest.mark.parametrize(
-    "url", ["", "s3://bucket/meshes", "file://elsewhere/srv", "https://x.org/"]
+    "url", ["", "ftp://x.org/meshes", "file://elsewhere/srv", "https://x.org/"]
 )
 def test_a_store_that_is_no_folder_here_stops_the_start(
     monkeypatch: pytest.MonkeyPatch, url: str

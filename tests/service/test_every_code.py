@@ -16,10 +16,11 @@ from starlette.routing import compile_path
 from starlette.testclient import TestClient
 
 from app.engine.slot import Slot
-from app.errors import CODES, StateUnavailableError
+from app.errors import CODES, StateUnavailableError, StoreUnavailableError
 from app.jobs import JobRepository
 from app.main import create_app
 from app.settings import Settings
+from app.store.folder_meshes import FolderMeshes
 from tests.support.disks import fill_disk
 from tests.support.listening import listening, read_answer
 from tests.support.processes import stopped
@@ -176,6 +177,14 @@ def no_state(site: Site) -> Any:
     return site.client.get("/v1/jobs")
 
 
+def no_store(site: Site) -> Any:
+    async def away(_meshes: FolderMeshes, _mesh_id: str) -> Any:
+        raise StoreUnavailableError
+
+    site.patch.setattr(FolderMeshes, "manifest", away)
+    return site.client.get(f"/v1/meshes/{site.small}")
+
+
 def no_disk(site: Site) -> Any:
     fill_disk(site.patch, "upload")
     return site.client.post("/v1/meshes", json=TWO_TRIANGLES)
@@ -258,6 +267,7 @@ PROVOKED: dict[str, Callable[[Site], Any]] = {
     ),
     "engine_unavailable": not_started,
     "state_unavailable": no_state,
+    "store_unavailable": no_store,
     "draining": draining,
     "deadline_exceeded": late,
     "storage_full": no_disk,

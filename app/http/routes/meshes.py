@@ -135,7 +135,7 @@ async def create_mesh(
     operation_id="listMeshes",
     summary="List the meshes in the store",
     response_model=MeshList,
-    responses=problems("invalid_request"),
+    responses=problems("invalid_request", "store_unavailable"),
 )
 async def list_meshes(
     parameters: Annotated[ListParameters, Query()], service: ServiceDep
@@ -153,7 +153,7 @@ async def list_meshes(
     responses={
         200: {"description": "The report", "headers": documented("ETag", "Cache-Control")},
         304: {"description": "The report has not changed", "headers": documented("ETag")},
-        **problems("mesh_not_found", "mesh_damaged"),
+        **problems("mesh_not_found", "mesh_damaged", "store_unavailable"),
     },
 )
 async def get_mesh(
@@ -171,7 +171,7 @@ async def get_mesh(
     operation_id="deleteMesh",
     summary="Remove a mesh and its results",
     status_code=204,
-    responses=problems("forbidden", "mesh_not_found"),
+    responses=problems("forbidden", "mesh_not_found", "store_unavailable"),
 )
 async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> None:
     """Remove a mesh; queries that run on it are still answered.
@@ -198,7 +198,13 @@ async def delete_mesh(mesh_id: str, service: ServiceDep, caller: CallerDep) -> N
             "headers": documented("Content-Range", *FILE_HEADERS),
         },
         304: {"description": "The array has not changed", "headers": documented("ETag")},
-        **problems("mesh_not_found", "not_found", "range_not_satisfiable", "mesh_damaged"),
+        **problems(
+            "mesh_not_found",
+            "not_found",
+            "range_not_satisfiable",
+            "mesh_damaged",
+            "store_unavailable",
+        ),
     },
 )
 async def get_mesh_array(

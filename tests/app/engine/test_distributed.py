@@ -15,6 +15,7 @@ from app.engine.cluster import BEAT_S, LEASE_S, SILENCE_S
 from app.engine.distributed import DistributedEngine
 from app.engine.work import MeshFromSample, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, problem
+from app.store.folder_store import FolderStore
 from tests.support import virtual_time
 from tests.support.fake_cluster import SETTINGS, FakeCluster
 from tests.support.virtual_time import now
@@ -53,7 +54,7 @@ class Replica:
 @asynccontextmanager
 async def replica_of(cluster: FakeCluster) -> AsyncIterator[Replica]:
     await cluster.start()
-    engine = DistributedEngine(cluster, SETTINGS)
+    engine = DistributedEngine(cluster, SETTINGS, FolderStore(SETTINGS.folder))
     await engine.start()
     await asyncio.sleep(2 * BEAT_S)
     yield Replica(cluster, engine)

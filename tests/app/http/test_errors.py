@@ -4,7 +4,15 @@ import pickle
 import pytest
 from starlette.testclient import TestClient
 
-from app.errors import CODES, Problem, ProblemError, StateUnavailableError, pointer, problem_of
+from app.errors import (
+    CODES,
+    Problem,
+    ProblemError,
+    StateUnavailableError,
+    StoreUnavailableError,
+    pointer,
+    problem_of,
+)
 from geodesic_core import errors as core
 from tests.support.service import check_problem
 
@@ -31,6 +39,7 @@ CONTRACT = {
         "draining",
         "too_many_connections",
         "state_unavailable",
+        "store_unavailable",
     },
     504: {"deadline_exceeded"},
     507: {"storage_full", "quota_exceeded"},
@@ -74,6 +83,7 @@ def test_unknown_code(client: TestClient) -> None:
         (core.MemoryLimitExceeded(9, 7), "memory_limit"),
         (MemoryError(), "memory_limit"),
         (StateUnavailableError("no server"), "state_unavailable"),
+        (StoreUnavailableError("no server"), "store_unavailable"),
         (OSError(errno.ENOSPC, "full"), "storage_full"),
         (OSError(errno.EDQUOT, "no more for you"), "storage_full"),
         (OSError(errno.EIO, "broken"), "internal_error"),

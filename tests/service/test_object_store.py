@@ -1,0 +1,276 @@
+"""A service whose meshes and answers are in an object store."""
+
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import Any
+
+import anyio
+import numpy as np
+import pytest
+
+from tests.service.test_replicas import refused_start
+from tests.support.postgres import Server as Postgres
+from tests.support.processes import Server
+from tests.support.s3 import S3
+from tests.support.service import (
+    NPY,
+    ServiceClient,
+    check_problem,
+    distances,
+    serving,
+    upload_sample,
+)
+from tests.support.waiting import LONG_S, wait_until
+
+IDENTITY = {"Accept-Encoding": "identity"}
+LONG = {**NPY, **IDENTITY}
+
+
+@pytest.fixture
+def url(s3: S3) -> str:
+    return s3.new_url()
+
+
+@pytest.fixture
+def service(url: str, tmp_path: Path) -> Iterator[ServiceClient]:
+    with serving(url, copies=tmp_path / "copies") as client:  # type: ignore[arg-type]
+        yield client
+
+
+def copies_of(service: ServiceClient) -> set[str]:
+    folder = service.app.state.service.settings.folder / "meshes"  # type: ignore[attr-defined]
+    return {path.name for path in folder.iterdir()}
+
+
+def drop_copies(service: ServiceClient) -> None:
+    """Have the service pull each mesh again, as another machine would."""
+    meshes = service.app.state.service.store.meshes  # type: ignore[attr-defined]
+    for mesh_id in copies_of(service):
+        anyio.run(meshes.distrust, mesh_id)
+
+
+def test_a_mesh_and_its_answers_are_objects_and_all_goes(
+    service: ServiceClient, s3: S3, url: str, tmp_path: Path
+) -> None:
+    mesh_id = upload_sample(service, "plane", 30_000)
+    answer = distances(service, mesh_id, LONG)
+    assert answer.status_code == 200
+    kept = s3.names(url)
+    assert f"meshes/{mesh_id}/manifest.json" in kept
+    assert sum(name.startswith(f"results/{mesh_id}/") for name in kept) == 2
+    assert not list((tmp_path / "copies" / "results").glob("*/*"))
+    assert not any(name.startswith("uploads/") for name in kept)
+
+    again = distances(service, mesh_id, LONG)
+    assert (again.content, again.headers["server-timing"]) == (answer.content, "kept")
+    assert service.delete(f"/v1/meshes/{mesh_id}").status_code == 204
+    wait_until(lambda: s3.names(url) == {"owner.json"})
+    assert copies_of(service) == set()
+    check_problem(service.get(f"/v1/meshes/{mesh_id}"), 404, "mesh_not_found")
+
+
+def test_ranges_of_an_answer_are_streamed(service: ServiceClient) -> None:
+    mesh_id = upload_sample(service, "plane", 30_000)
+    job = distances(service, mesh_id, {**LONG, "Prefer": "respond-async"})
+    link = job.headers["location"]
+    wait_until(lambda: service.get(link).json()["status"] == "successful")
+    whole = service.get(f"{link}/results").content
+    assert whole == distances(service, mesh_id, LONG).content
+    for text, expected in {
+        "bytes=0-99": whole[:100],
+        "bytes=100000-100099": whole[100_000:100_100],
+        "bytes=-50": whole[-50:],
+    }.items():
+        part = service.get(f"{link}/results", headers={"Range": text})
+        assert (part.status_code, part.content) == (206, expected)
+    several = service.get(f"{link}/results", headers={"Range": "bytes=0-9,50-59"})
+    assert several.status_code == 206
+    assert whole[50:60] in several.content
+
+
+def test_a_restart_has_meshes_answers_and_jobs(url: str, tmp_path: Path) -> None:
+    with serving(url, copies=tmp_path) as client:  # type: ignore[arg-type]
+        mesh_id = upload_sample(client, "plane", 30_000)
+        first = distances(client, mesh_id, LONG)
+    with serving(url, copies=tmp_path) as client:  # type: ignore[arg-type]
+        again = distances(client, mesh_id, LONG)
+        assert (again.content, again.headers["server-timing"]) == (first.content, "kept")
+        assert [each["id"] for each in client.get("/v1/meshes").json()["meshes"]] == [mesh_id]
+
+
+def test_a_mesh_is_pulled_once_however_many_ask(service: ServiceClient) -> None:
+    mesh_id = upload_sample(service, "sphere", 2000)
+    drop_copies(service)
+    pulls = []
+    objects = service.app.state.service.store.meshes._objects  # type: ignore[attr-defined]
+    fetch = objects.fetch
+    objects.fetch = lambda name, path: pulls.append(name) or fetch(name, path)
+
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda n: service.get(_path(mesh_id, n)).status_code, range(16)))
+
+    assert set(answers) == {200}
+    assert len(pulls) == len(set(pulls)) > 0
+
+
+def _path(mesh_id: str, number: int) -> str:
+    return f"/v1/meshes/{mesh_id}/path?from=v0&to=v{number + 1}"
+
+
+def test_copies_are_bounded_and_pulled_again(url: str, tmp_path: Path) -> None:
+    with serving(url, copies=tmp_path, copies_bytes=1_500_000) as client:  # type: ignore[arg-type]
+        meshes = [upload_sample(client, "plane", 5000 + n) for n in range(4)]
+        assert 0 < len(copies_of(client)) < 4
+        for mesh_id in meshes:
+            assert client.get(_path(mesh_id, 1)).status_code == 200
+        assert 0 < len(copies_of(client)) < 4
+
+
+def test_damage_of_a_mesh_is_noticed_and_an_upload_heals_it(
+    service: ServiceClient, s3: S3, url: str
+) -> None:
+    mesh_id = upload_sample(service, "plane", 500)
+    expected = service.get(_path(mesh_id, 5)).json()
+    array = next(name for name in s3.names(url) if name.endswith("/faces.npy"))
+    s3.damage(url, array)
+    drop_copies(service)
+    check_problem(service.get(_path(mesh_id, 6)), 500, "mesh_damaged")
+
+    assert upload_sample(service, "plane", 500) == mesh_id
+    drop_copies(service)
+    assert service.get(_path(mesh_id, 5)).json()["length"] == expected["length"]
+    assert array not in s3.names(url)
+
+
+def test_a_damaged_answer_is_cut_off_and_computed_again(
+    service: ServiceClient, s3: S3, url: str
+) -> None:
+    mesh_id = upload_sample(service, "plane", 30_000)
+    expected = distances(service, mesh_id, LONG).content
+    body = next(name for name in s3.names(url) if name.endswith(".body"))
+    s3.damage(url, body)
+    broken = distances(service, mesh_id, LONG)
+    assert broken.status_code != 200 or len(broken.content) < len(expected)
+    wait_until(lambda: body not in s3.names(url))
+    assert distances(service, mesh_id, LONG).content == expected
+
+
+def test_two_uploads_of_one_mesh_at_once_store_it_once(
+    service: ServiceClient, s3: S3, url: str
+) -> None:
+    def upload(_number: int) -> Any:
+        return service.post("/v1/meshes", params={"sample": "sphere", "faces": 3000})
+
+    with ThreadPoolExecutor(4) as pool:
+        answers = list(pool.map(upload, range(4)))
+
+    assert sorted(answer.status_code for answer in answers) == [200, 200, 200, 201]
+    (mesh_id,) = {answer.json()["id"] for answer in answers}
+    wait_until(lambda: len({name.split("/")[2] for name in s3.names(url) if "npy" in name}) == 1)
+    drop_copies(service)
+    assert service.get(_path(mesh_id, 1)).status_code == 200
+
+
+def test_half_an_upload_is_no_mesh(s3: S3, url: str, tmp_path: Path) -> None:
+    mesh_id = "0123456789abcdef0123456789abcdef"
+    key = f"{url.removeprefix('s3://bucket/')}/meshes/{mesh_id}/some-upload/faces.npy"
+    s3.client.put_object(Bucket="bucket", Key=key, Body=b"half")
+    with serving(url, copies=tmp_path) as client:  # type: ignore[arg-type]
+        check_problem(client.get(f"/v1/meshes/{mesh_id}"), 404, "mesh_not_found")
+        assert client.get("/v1/meshes").json()["meshes"] == []
+
+
+def test_a_store_that_is_away_is_a_clear_error_and_comes_back(
+    service: ServiceClient, s3: S3
+) -> None:
+    mesh_id = upload_sample(service, "plane", 500)
+    with s3.away():
+        wait_until(lambda: service.get(f"/v1/meshes/{mesh_id}").status_code == 503)
+        answer = service.get(_path(mesh_id, 3))
+        problem = check_problem(answer, 503, "store_unavailable")
+        assert answer.headers["retry-after"] == "1", problem
+        upload = service.post("/v1/meshes", params={"sample": "plane", "faces": 800})
+        check_problem(upload, 503, "store_unavailable")
+    assert service.get(_path(mesh_id, 3)).status_code == 200
+    assert upload_sample(service, "plane", 800)
+
+
+def test_a_mesh_that_is_deleted_while_it_is_pulled_is_gone(service: ServiceClient) -> None:
+    mesh_id = upload_sample(service, "sphere", 3000)
+    drop_copies(service)
+    objects = service.app.state.service.store.meshes._objects  # type: ignore[attr-defined]
+    fetch, is_deleted = objects.fetch, threading.Event()
+
+    def slow(name: str, path: Path) -> int:
+        is_deleted.wait(LONG_S)
+        return fetch(name, path)
+
+    objects.fetch = slow
+    with ThreadPoolExecutor(1) as pool:
+        asked = pool.submit(service.get, _path(mesh_id, 1))
+        wait_until(lambda: bool(service.app.state.service.store.meshes._pulls))  # type: ignore[attr-defined]
+        assert service.delete(f"/v1/meshes/{mesh_id}").status_code == 204
+        is_deleted.set()
+        check_problem(asked.result(), 404, "mesh_not_found")
+    assert copies_of(service) == set()
+
+
+@pytest.mark.parametrize(
+    ("store", "environment", "said"),
+    [
+        ("s3://no-such-bucket/x", {}, "does not exist"),
+        ("s3://", {}, "is no URL of a store"),
+        ("s3://bucket/x", {"AWS_ENDPOINT_URL": "http://127.0.0.1:9"}, "cannot be used"),
+    ],
+)
+@pytest.mark.usefixtures("s3")
+def test_starts_that_are_refused(
+    tmp_path: Path, store: str, environment: dict[str, str], said: str
+) -> None:
+    settings = {"GEODESIC_COPIES": str(tmp_path), **environment}
+    assert said in refused_start(store, **settings)  # type: ignore[arg-type]
+
+
+def test_a_store_of_another_service_is_refused(url: str, tmp_path: Path) -> None:
+    with serving(url, copies=tmp_path / "one"):  # type: ignore[arg-type]
+        pass
+    said = refused_start(url, GEODESIC_COPIES=str(tmp_path / "two"))  # type: ignore[arg-type]
+    assert "belongs to another service" in said
+    with serving(url, copies=tmp_path / "one"):  # type: ignore[arg-type]
+        pass
+
+
+def test_two_replicas_share_meshes_answers_and_jobs(
+    postgres: Postgres, url: str, tmp_path: Path
+) -> None:
+    state = {"GEODESIC_STATE": postgres.new_database()}
+    with ExitStack() as stack:
+        first, second = (
+            stack.enter_context(
+                closing(Server(url, **state, GEODESIC_COPIES=str(tmp_path / name)))  # type: ignore[arg-type]
+            )
+            for name in ("one", "two")
+        )
+        mesh_id = upload_sample(first.client, "plane", 30_000)  # type: ignore[arg-type]
+        assert upload_sample(second.client, "plane", 30_000) == mesh_id  # type: ignore[arg-type]
+        answers = [
+            distances(server.client, mesh_id, LONG).content  # type: ignore[arg-type]
+            for server in (first, second)
+        ]
+        assert answers[0] == answers[1]
+        assert np.isfinite(np.frombuffer(answers[0][128:])).all()
+        job = distances(first.client, mesh_id, {**LONG, "Prefer": "respond-async"})  # type: ignore[arg-type]
+        link = job.headers["location"]
+        wait_until(lambda: second.client.get(link).json()["status"] == "successful")
+        assert second.client.get(f"{link}/results").content == answers[0]
+        assert second.client.delete(f"/v1/meshes/{mesh_id}").status_code == 204
+        wait_until(lambda: first.client.get(f"/v1/meshes/{mesh_id}").status_code == 404)
+        assert upload_sample(first.client, "plane", 30_000) == mesh_id  # type: ignore[arg-type]
+    assert "belongs to another" in refused_start(
+        url,  # type: ignore[arg-type]
+        GEODESIC_COPIES=str(tmp_path / "one"),
+        GEODESIC_STATE=postgres.new_database(),
+    )
