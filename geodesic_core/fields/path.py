@@ -30,7 +30,8 @@ class ErrorBound:
     """Bound of the difference between an answer and the exact one.
 
     ``value`` is a share of the exact answer where ``type`` is ``"relative"``, else mesh units.
-    ``kind`` tells whether the bound is proved or estimated.
+    ``kind`` tells whether the bound is proved or estimated. What is proved of approximate distances
+    is that they are too short by no more; that they are never too long is argued and measured.
 
     Examples
     --------

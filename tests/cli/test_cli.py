@@ -167,7 +167,7 @@ def knot(run: Run) -> Path:
     ("options", "errors", "bound"),
     [
         ("", {}, "0.001 (relative, guaranteed)"),
-        ("--relative-error 0.05", {"relative_error": 0.05}, "0.05 (relative, guaranteed)"),
+        ("--relative-error 0.05", {"relative_error": 0.05}, "0.002 (relative, guaranteed)"),
         (
             "--absolute-error 0.02",
             {"relative_error": None, "absolute_error": 0.02},
@@ -176,7 +176,7 @@ def knot(run: Run) -> Path:
         (
             "--relative-error 0.05 --absolute-error 0.02",
             {"relative_error": 0.05, "absolute_error": 0.02},
-            "0.05 (relative, guaranteed)",
+            "0.002 (relative, guaranteed)",
         ),
     ],
 )
