@@ -160,8 +160,7 @@ def test_field_has_the_documented_arrays(error):
     assert field.mesh is mesh
     assert field.max_distance == np.inf
     assert [source.start_distance for source in field.sources] == [0.0]
-    assert (field.error_bound.type, field.error_bound.value) == ("relative", min(error, WIDEST_ERROR))
-    assert field.error_bound.kind == "guaranteed"
+    assert field.error_bound == gc.ErrorBound("relative", min(error, WIDEST_ERROR), "guaranteed")
 
 
 @each_error
