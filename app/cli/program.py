@@ -7,7 +7,7 @@ import typer
 from typer.exceptions import TyperException
 
 from app import __version__
-from app.cli import batch, cluster, compilation, meshes, queries, serve, tables
+from app.cli import batch, cluster, cluster_status, compilation, meshes, queries, serve, tables
 from app.cli.steps import Failure, show_help_without_command
 from app.cli.store import store
 from app.cli.words import with_options
@@ -82,3 +82,4 @@ for command in (
 
 cli.command("compile")(compilation.compile_kernels)
 cli.add_typer(store, name="store")
+cli.add_typer(cluster_status.cluster, name="cluster")

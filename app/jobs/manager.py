@@ -179,7 +179,8 @@ class JobManager:
                 await self._refuse_over_quota(records, spec.owner)
                 await records.add(job, query)
         except (StateUnavailableError, asyncio.CancelledError):
-            self._doubtful.add(job.id)
+            if self._replicas is not None:
+                self._doubtful.add(job.id)
             raise
         self._begin(job, solve)
         return job
@@ -313,7 +314,7 @@ class JobManager:
         """Record progress, stop what others dismissed or took over, and take over what is left."""
         living = await replicas.beat()
         await self._record_ends()
-        live_jobs = list(self._live.values())
+        live_jobs, doubtful = list(self._live.values()), frozenset(self._doubtful)
         records = {job.id: job for job in await self._repository.unfinished()}
         for live in live_jobs:
             record = records.get(live.job.id)
@@ -327,9 +328,9 @@ class JobManager:
                         await self._repository.update(live.job, replicas.id)
         for job in records.values():
             is_left = job.replica not in living
-            if is_left or (job.id in self._doubtful and job.id not in self._live):
-                self._doubtful.discard(job.id)
+            if is_left or (job.id in doubtful and job.id not in self._live):
                 await self._resume(job, solve_again)
+        self._doubtful -= doubtful  # the others were not added
 
     async def _let_go(self, live: _LiveJob) -> None:
         """Stop a job that another replica has dismissed, removed, or taken over."""

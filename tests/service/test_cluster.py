@@ -297,6 +297,27 @@ def test_a_node_says_why_it_cannot_join(
     assert node.said.count("\n") == 1
 
 
+def test_the_status_tells_each_host_and_its_load(spread: Place, cluster: ProcessCluster) -> None:
+    spread.wait_until_idle()
+    asked = cluster.run("cluster", "status", "--json")
+    assert asked.process.wait() == 0, asked.said
+    told = json.loads(asked.said)
+    assert told["address"] == cluster.settings["GEODESIC_ADDRESS"]
+    assert len(told["hosts"]) == len(cluster.living())
+    for host in told["hosts"].values():
+        assert (host["workers"], host["is_ready"], host["is_draining"]) == (1, True, False)
+
+    asked = cluster.run("cluster", "status")
+    assert asked.process.wait() == 0
+    assert asked.said.count("ready, 0 of 1 workers busy, 0 tasks waiting") == len(told["hosts"])
+
+
+def test_the_status_says_why_it_has_none(cluster: ProcessCluster) -> None:
+    asked = cluster.run("cluster", "status", GEODESIC_ADDRESS=f"{HOST}:1")
+    assert asked.process.wait() == 1
+    assert f"no head answers at {HOST}:1" in asked.said
+
+
 def test_a_second_head_at_the_same_address_is_refused(cluster: ProcessCluster) -> None:
     port = str(cluster.port)
     head = cluster.run("head", "--host", HOST, "--port", port, "--dir", str(cluster.folder / "y"))
