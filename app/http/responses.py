@@ -5,10 +5,10 @@ import re
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from datetime import datetime
-from functools import partial
 from pathlib import Path
 from stat import S_IFREG
 from typing import Any
+from weakref import finalize
 
 import orjson
 from starlette.datastructures import Headers
@@ -229,7 +229,8 @@ class _ResultFileResponse(StoredFileResponse):
         path = body if isinstance(body, Path) else result.key
         status = None if self._body is None else _status_of(self._body)
         super().__init__(path, headers=headers, media_type=media_type, stat_result=status)
-        self._release = partial(store.release, result)
+        # Once: when it has been sent, or when a cancelled request drops it unsent.
+        self._release = finalize(self, store.release, result)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Send the result, and release it."""
