@@ -13,6 +13,7 @@ import pytest
 from PIL import Image
 from playwright.sync_api import Route, expect
 
+from tests.page.conftest import sample
 from tests.support.paths import ROOT
 from tests.support.viewing import PLAIN, View, angle_at, length_of, query_of
 
@@ -42,6 +43,40 @@ def seen(view: View, colour: np.ndarray, within: int = 12) -> np.ndarray:
 
 
 # Load
+
+
+def test_the_page_opens_on_a_coloured_sample_whose_path_follows_the_pointer(view: View) -> None:
+    view.open()
+    assert not view.page.is_visible("#welcome")
+    assert view.page.is_visible("#legend")
+    lengths = {view.text("#length")}
+    x, y = view.centre
+    strand = seen(view, PATH)[0]
+    for aside in (0, 30):
+        view.page.mouse.move(x + strand[0], y + strand[1] + aside)
+        view.wait()
+        lengths.add(view.text("#length"))
+    assert len(lengths) > 1, "without a press"
+
+    view.page.click("#samples [data-sample=sphere]")
+    view.wait()
+    view.page.mouse.move(x, y)
+    view.wait()
+    assert "target" not in query_of(view)
+
+
+def test_the_axis_upwards_is_guessed_and_can_be_chosen(view: View, service: str) -> None:
+    terrain = sample(service, "terrain", 2000)
+    view.open(f"/?mesh={terrain}")
+    assert view.page.is_checked("#ups [value=z]")
+    lying = view.pixels()
+
+    view.page.check("#ups [value=y]", force=True)
+    view.wait()
+
+    assert query_of(view)["up"] == ["y"]
+    changed = np.abs(view.pixels() - lying).max(axis=2) > 30
+    assert changed.mean() > 0.03
 
 
 def test_a_sample_is_loaded_and_a_click_colours_it(view: View) -> None:

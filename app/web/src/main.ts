@@ -1,5 +1,5 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
-import { getMesh } from "./api/meshes";
+import { getMesh, makeSample } from "./api/meshes";
 import { getAbout } from "./api/queries";
 import { Fields } from "./ask/fields";
 import { Routes } from "./ask/routes";
@@ -35,7 +35,7 @@ drawRamp();
 exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
 exportPanel.nearest = () => routes.source;
 controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
-stage.onMove = (view) => store.update({ view });
+stage.onMove = (view) => store.update({ view, up: sceneView.mesh?.frame.up ?? null });
 setUpAppearance(() => void showWires(store.state));
 
 controls.show(store.state);
@@ -43,18 +43,25 @@ controls.show(store.state);
 let opening = new AbortController();
 
 store.listen((state, before) => {
-  if (state.mesh !== null && state.mesh !== before.mesh) open(state.mesh);
+  if (state.mesh !== null && (state.mesh !== before.mesh || isTurned(state))) open(state.mesh);
+  if (before.mesh !== null && state.mesh !== before.mesh) pointer.follows = false;
   controls.show(state);
   exportPanel.show(state);
   fields.follow(state);
   routes.follow(state);
   if (state.lines !== before.lines) fields.setIsolines(state);
   if (state.wireframe !== before.wireframe) void showWires(state);
-  if (state.sources.length > 0) dismissHint();
+  if (state.sources.length > 0 && !pointer.follows) dismissHint();
   if (sceneView.mesh) sceneView.showPoints(state);
   if (state.barriers !== before.barriers) sceneView.barriers.show(sceneView.mesh, state.barriers);
   writeAddress();
 });
+
+/** Whether another axis is to point upwards than is drawn. */
+function isTurned({ up }: State): boolean {
+  const drawn = sceneView.mesh?.frame.up;
+  return drawn !== undefined && up !== null && up !== drawn;
+}
 
 /** Load a mesh, and draw on it the answers that have arrived by then. */
 function open(mesh: string): void {
@@ -67,12 +74,13 @@ function open(mesh: string): void {
   opening = stop;
   status.run("loading", "Loading the mesh…", stop, async () => {
     const document = await getMesh(mesh);
-    await sceneView.open(document, stop.signal);
+    await sceneView.open(document, store.state.up, stop.signal);
     stop.signal.throwIfAborted();
+    controls.showUp(sceneView.mesh?.frame.up ?? "y");
     const now = store.state;
     stage.look(now.view ?? sceneView.viewOf(now));
     showReport(document, sceneView);
-    if (now.sources.length === 0) showHint();
+    if (now.sources.length === 0 || pointer.follows) showHint();
     sceneView.showPoints(now);
     sceneView.barriers.show(sceneView.mesh, now.barriers);
     fields.paint(now);
@@ -108,7 +116,9 @@ function begin(): void {
     void meshes.list().catch((error: unknown) => status.fail(error));
     const written = readState(location.search);
     const { mesh } = written;
-    byId("welcome").hidden = mesh !== null;
+    const isEmpty = mesh === null && store.state.mesh === null;
+    byId("welcome").hidden = !isEmpty;
+    if (isEmpty && about.samples.includes("knot")) await showExample();
     if (mesh === null) return;
     const [sources, target, waypoints] = await Promise.all([
       resolved(mesh, written.sources),
@@ -119,6 +129,14 @@ function begin(): void {
     store.update({ ...written, sources, target: target[0] ?? null, waypoints });
     if (isOpen) open(mesh); // without a valid key it was not loaded the first time
   });
+}
+
+/** Show a sample that is coloured already; until the first click its path follows the pointer. */
+async function showExample(): Promise<void> {
+  const { id } = await makeSample("knot", 30_000);
+  if (store.state.mesh !== null) return; // another was chosen meanwhile
+  pointer.follows = true;
+  store.update({ mesh: id, sources: [{ vertex: 0 }], target: { vertex: 9000 } });
 }
 
 status.onKey = () => {

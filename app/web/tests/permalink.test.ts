@@ -9,8 +9,9 @@ function searchOf(state: State): string {
 }
 
 function randomState(random: Random): State {
-  const point = () => randomPoint(random);
   const round = (x: number) => Number(x.toFixed(4));
+  const view = random.pick([null, Array.from({ length: 6 }, () => round(6 * random.next() - 3))]);
+  const point = () => randomPoint(random);
   const barriers = new Set(random.list(40, () => random.below(60)));
   return {
     mesh: random.pick([null, "0123456789abcdef", "f46a3f2a"]),
@@ -25,7 +26,8 @@ function randomState(random: Random): State {
     shade: random.pick(["distance", "territories", "difference"] as const),
     lines: random.pick([null, { count: 1 + random.below(99) }, { spacing: random.size() }]),
     wireframe: random.pick([true, false]),
-    view: random.pick([null, Array.from({ length: 6 }, () => round(6 * random.next() - 3))]),
+    up: random.pick(view ? (["y", "z"] as const) : ([null, "y", "z"] as const)),
+    view,
   };
 }
 
@@ -122,7 +124,7 @@ describe("reading", () => {
     ["view=1,2,3,4,5,x", {}],
     ["view=1,2,3,4,5,Infinity", {}],
     ["view=1,2,3,4,5,6,7", {}],
-    ["view=1,2,3,4,5,6", { view: [1, 2, 3, 4, 5, 6] }],
+    ["view=1,2,3,4,5,6", { view: [1, 2, 3, 4, 5, 6], up: "y" as const }],
     ["barriers=", {}],
     ["barriers=x,3,-4,5-,7-6,1.5", { barriers: [3] }],
     ["barriers=8-10,2", { barriers: [8, 9, 10, 2] }],

@@ -4,17 +4,18 @@ import { MeshBVH } from "three-mesh-bvh";
 import { authorization } from "../api/http";
 import { ProblemError } from "../api/problemError";
 import type { MeshDocument } from "../api/types";
+import { drawnIn, type Frame, type Up } from "./frame";
 
 type Triple = [number, number, number];
 
-/** The transform of drawn positions: moved to the origin and scaled into the unit ball. */
-export interface Frame {
-  centre: Triple;
-  radius: number;
-}
-
 export type LoaderRequest =
-  | { kind: "mesh"; vertices: string; faces: string; headers: Record<string, string> }
+  | {
+      kind: "mesh";
+      vertices: string;
+      faces: string;
+      headers: Record<string, string>;
+      up: Up | null;
+    }
   | { kind: "edges" };
 
 export type LoaderResponse =
@@ -76,8 +77,7 @@ export class LoadedMesh {
 
   /** Return the drawn position of one in mesh units. */
   drawn(position: readonly number[]): Triple {
-    const { centre, radius } = this.frame;
-    return position.map((x, i) => (x - centre[i]!) / radius) as Triple;
+    return drawnIn(this.frame, position);
   }
 
   /** Return the vertices of all edges, in pairs. */
@@ -92,7 +92,11 @@ export class LoadedMesh {
   }
 }
 
-export async function loadMesh(document: MeshDocument, signal: AbortSignal): Promise<LoadedMesh> {
+export async function loadMesh(
+  document: MeshDocument,
+  up: Up | null,
+  signal: AbortSignal,
+): Promise<LoadedMesh> {
   const worker = new LoaderWorker();
   signal.addEventListener("abort", () => worker.end());
   const { vertices, faces } = document.arrays as Record<string, string>;
@@ -101,6 +105,7 @@ export async function loadMesh(document: MeshDocument, signal: AbortSignal): Pro
     vertices: vertices!,
     faces: faces!,
     headers: authorization(),
+    up,
   };
   const shape = await worker.ask(question, "shape");
   signal.throwIfAborted();

@@ -3,6 +3,7 @@ import { BufferAttribute, BufferGeometry } from "three";
 import { MeshBVH } from "three-mesh-bvh";
 import { parseNpy, toIndices } from "../api/npy";
 import { ProblemError, problemOfResponse } from "../api/problemError";
+import { drawnIn, frameOf } from "./frame";
 import type { LoaderRequest, LoaderResponse } from "./loader";
 
 let faces = new Uint32Array(0);
@@ -21,14 +22,15 @@ async function load({
   vertices,
   faces: facesUrl,
   headers,
+  up,
 }: LoaderRequest & { kind: "mesh" }): Promise<void> {
   const [points, corners] = await Promise.all([array(vertices, headers), array(facesUrl, headers)]);
   const doubles = Float64Array.from(points.data as Float64Array);
   faces = toIndices(corners);
-  const frame = frameOf(doubles);
+  const frame = frameOf(doubles, up);
   const positions = new Float32Array(doubles.length);
-  for (let i = 0; i < doubles.length; i++) {
-    positions[i] = (doubles[i]! - frame.centre[i % 3]!) / frame.radius;
+  for (let i = 0; i < doubles.length; i += 3) {
+    positions.set(drawnIn(frame, [doubles[i]!, doubles[i + 1]!, doubles[i + 2]!]), i);
   }
   const normals = normalsOf(positions, faces);
   send({ kind: "shape", frame, vertices: doubles, positions, normals, faces }, []);
@@ -53,18 +55,6 @@ async function array(
   const response = await fetch(url, { headers });
   if (!response.ok) throw await problemOfResponse(response);
   return parseNpy(await response.arrayBuffer());
-}
-
-function frameOf(points: Float64Array): { centre: [number, number, number]; radius: number } {
-  const low = [Infinity, Infinity, Infinity];
-  const high = [-Infinity, -Infinity, -Infinity];
-  for (let i = 0; i < points.length; i++) {
-    low[i % 3] = Math.min(low[i % 3]!, points[i]!);
-    high[i % 3] = Math.max(high[i % 3]!, points[i]!);
-  }
-  const centre = low.map((x, i) => (x + high[i]!) / 2) as [number, number, number];
-  const radius = Math.hypot(...low.map((x, i) => (high[i]! - x) / 2)) || 1;
-  return { centre, radius };
 }
 
 /** Return area-weighted normals at vertices, pointing outwards on the whole whatever the winding. */

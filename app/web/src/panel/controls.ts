@@ -2,6 +2,7 @@
 import { locate } from "../api/queries";
 import type { Effort, Method, Point } from "../api/types";
 import { byId, query } from "../dom";
+import type { Up } from "../mesh/frame";
 import { readState, writeRanges } from "../state/permalink";
 import { parsePoints, type WrittenPoint, writePoint } from "../state/point";
 import { INITIAL, type Lines, type Shade, type State, type Store } from "../state/state";
@@ -24,6 +25,7 @@ export class Controls {
       store.update({ sources: [], target: null, waypoints: [], barriers: [], maxDistance: null });
     });
     onChoice("methods", (method) => store.update({ method: method as Method }));
+    onChoice("ups", (up) => store.update({ up: up as Up, view: null }));
     onChoice("shades", (shade) => store.update({ shade: shade as Shade }));
     const slider = byId("error-slider", HTMLInputElement);
     slider.addEventListener("input", () => showError(errorOf(slider)));
@@ -47,6 +49,11 @@ export class Controls {
 
   get tool(): Tool {
     return query("#tools input:checked", HTMLInputElement).value as Tool;
+  }
+
+  /** Show which axis points upwards as drawn. */
+  showUp(up: Up): void {
+    choose("ups", up);
   }
 
   /** Show ``state`` in all fields. */

@@ -27,6 +27,8 @@ export class Pointer {
   private drag: ((event: Place) => void) | null = null;
   private painted: Set<number> | null = null;
   private fingers = 0;
+  /** Whether the target follows the pointer, until the first press. */
+  follows = false;
   /** The last place of the brush. */
   private last: Place | null = null;
 
@@ -46,6 +48,7 @@ export class Pointer {
 
   private down(event: PointerEvent): void {
     this.fingers += 1;
+    this.follows = false;
     if (event.button !== 0 || this.fingers > 1) {
       this.abandon(); // two fingers move the mesh, even after one has begun a drag
       return;
@@ -94,6 +97,10 @@ export class Pointer {
   private move(event: PointerEvent): void {
     // Browsers report moves once a frame.
     if (this.start && this.drag && this.hasMoved(event)) this.drag(event);
+    else if (this.follows && event.pointerType === "mouse" && this.store.state.sources.length > 0) {
+      const point = this.at(event);
+      if (point) this.store.update({ target: point });
+    }
   }
 
   private up(event: PointerEvent): void {

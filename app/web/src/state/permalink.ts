@@ -1,5 +1,6 @@
 // The state as the page's address, and back: /?mesh=ID&source=v0&target=v99
 import type { Effort, Method } from "../api/types";
+import type { Up } from "../mesh/frame";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
 import { INITIAL, type Lines, type Shade, type State } from "./state";
 
@@ -27,16 +28,20 @@ export function writeState(state: State): string {
   if (writeLines(state.lines) !== writeLines(INITIAL.lines))
     query.set("lines", writeLines(state.lines));
   if (state.wireframe) query.set("wireframe", "1");
+  if (state.up) query.set("up", state.up);
   if (state.view) query.set("view", state.view.map((x) => Number(x.toFixed(4))).join(","));
   // Points are easier to read without escapes, which none of these needs in a query.
   const text = query.toString().replaceAll("%2C", ",").replaceAll("%3A", ":");
   return text ? `/?${text}` : "/";
 }
 
+const UPS: readonly Up[] = ["y", "z"];
+
 export function readState(search: string): WrittenState {
   const query = new URLSearchParams(search);
   const target = query.get("target");
-  const view = query.get("view")?.split(",").map(Number);
+  const numbers = query.get("view")?.split(",").map(Number);
+  const view = numbers?.length === 6 && numbers.every(Number.isFinite) ? numbers : null;
   return {
     mesh: query.get("mesh"),
     sources: query.getAll("source").map(parsePoint),
@@ -50,7 +55,9 @@ export function readState(search: string): WrittenState {
     shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference"]),
     lines: readLines(query.get("lines")),
     wireframe: query.get("wireframe") === "1",
-    view: view?.length === 6 && view.every(Number.isFinite) ? view : null,
+    // A view without an axis was written when y was always up.
+    up: UPS.find((up) => up === query.get("up")) ?? (view && "y"),
+    view,
   };
 }
 

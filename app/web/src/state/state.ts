@@ -1,5 +1,6 @@
 // The state of the page: all that the user has chosen. Everything that is drawn follows from it.
 import type { Effort, Method, Point } from "../api/types";
+import type { Up } from "../mesh/frame";
 
 export type Shade = "distance" | "territories" | "difference";
 export type Lines = { count: number } | { spacing: number } | null;
@@ -17,6 +18,8 @@ export interface State {
   shade: Shade;
   lines: Lines;
   wireframe: boolean;
+  /** The axis that points upwards; null: as guessed. */
+  up: Up | null;
   /** Azimuth, polar angle, distance and target of the camera, as drawn; null: the whole mesh. */
   view: number[] | null;
 }
@@ -34,6 +37,7 @@ export const INITIAL: State = {
   shade: "distance",
   lines: { count: 20 },
   wireframe: false,
+  up: null,
   view: null,
 };
 
@@ -65,5 +69,6 @@ export const WITHOUT_POINTS = {
   waypoints: [],
   barriers: [],
   maxDistance: null,
+  up: null,
   view: null,
 } satisfies Partial<State>;

@@ -16,7 +16,13 @@ import { Backdrop } from "./backdrop";
 
 ColorManagement.enabled = false; // colours are given in sRGB, as displayed
 
-const CAMERA_DISTANCE = 2.9; // in radii of the unit ball
+/** How far the camera stays away beyond what the mesh needs. */
+const MARGIN = 1.12;
+/** Directions to look from; what is flat is seen from higher up. */
+const ASIDE = new Vector3(0.5, 0.35, 0.8);
+const ABOVE = new Vector3(0.4, 0.9, 0.8);
+/** Below this half height, in radii of the unit ball, a mesh is flat. */
+const FLAT = 0.3;
 
 export class Stage {
   private readonly scene = new Scene();
@@ -26,6 +32,8 @@ export class Stage {
   readonly camera = new PerspectiveCamera(38, 1, 0.01, 50);
   private readonly controls: OrbitControls;
   readonly renderer: WebGLRenderer;
+  /** Drawn positions of the mesh, three numbers each, which a view of the whole mesh shows. */
+  shape: ArrayLike<number> = [];
   onMove: (view: number[]) => void = () => undefined;
   onFrame: () => void = () => undefined;
   private isDue = false;
@@ -119,7 +127,7 @@ export class Stage {
 
   /** Move the camera to a view; null shows the whole mesh. */
   look(view: number[] | null): void {
-    const [theta, phi, radius, x, y, z] = view ?? this.viewFrom(new Vector3(0.5, 0.35, 0.8));
+    const [theta, phi, radius, x, y, z] = view ?? this.viewFrom(this.isFlat() ? ABOVE : ASIDE);
     this.controls.target.set(x!, y!, z!);
     this.camera.position
       .setFromSpherical(new Spherical(radius, phi, theta))
@@ -132,8 +140,32 @@ export class Stage {
   /** Return the view of the whole mesh from a direction, kept off the poles, where up is undefined. */
   viewFrom(direction: Vector3): number[] {
     const { theta, phi } = new Spherical().setFromVector3(direction);
-    const away = CAMERA_DISTANCE / Math.min(1, this.canvas.clientWidth / this.canvas.clientHeight);
-    return [theta, Math.min(Math.max(phi, 0.4), Math.PI - 0.4), away, 0, 0, 0];
+    const tilt = Math.min(Math.max(phi, 0.4), Math.PI - 0.4);
+    return [theta, tilt, MARGIN * this.distanceFrom(theta, tilt), 0, 0, 0];
+  }
+
+  /** Return how far the camera must be away for the mesh to fit into the canvas. */
+  private distanceFrom(theta: number, phi: number): number {
+    const towards = new Vector3().setFromSphericalCoords(1, phi, theta);
+    const right = new Vector3(0, 1, 0).cross(towards).normalize();
+    const up = towards.clone().cross(right);
+    const slope = Math.tan((this.camera.fov * Math.PI) / 360);
+    const aspect = this.canvas.clientWidth / this.canvas.clientHeight || 1;
+    const point = new Vector3();
+    let away = 0;
+    for (let i = 0; i < this.shape.length; i += 3) {
+      point.set(this.shape[i]!, this.shape[i + 1]!, this.shape[i + 2]!);
+      const aside = Math.max(Math.abs(point.dot(right)) / aspect, Math.abs(point.dot(up)));
+      away = Math.max(away, point.dot(towards) + aside / slope);
+    }
+    return away || 1;
+  }
+
+  private isFlat(): boolean {
+    for (let i = 1; i < this.shape.length; i += 3) {
+      if (Math.abs(this.shape[i]!) > FLAT) return false;
+    }
+    return true;
   }
 
   /** Turn by angles, and move nearer by a factor. */

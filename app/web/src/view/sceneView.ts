@@ -2,6 +2,7 @@
 import { Mesh, PlaneGeometry, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
 import type { MeshDocument, Outline, Point } from "../api/types";
+import type { Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
 import { type FacePoint, pick, positionOf } from "../mesh/picking";
 import type { State } from "../state/state";
@@ -41,11 +42,12 @@ export class SceneView {
     stage.onFrame = () => showScaleBar(stage, this.mesh?.frame.radius ?? null);
   }
 
-  async open(document: MeshDocument, signal: AbortSignal): Promise<void> {
-    const mesh = await loadMesh(document, signal);
+  async open(document: MeshDocument, up: Up | null, signal: AbortSignal): Promise<void> {
+    const mesh = await loadMesh(document, up, signal);
     this.close();
     this.mesh = mesh;
     this.surface = new Surface(mesh, this.paint);
+    this.stage.shape = mesh.geometry.getAttribute("position").array;
     this.stage.add(this.surface.object);
     await this.stage.drawn();
     this.tree = await mesh.tree;
