@@ -12,6 +12,8 @@ export interface Frame {
 
 /** The share of the height that counts as the foot of a mesh. */
 const FOOT = 0.03;
+/** Below this share of its width and depth, a mesh is flat. */
+const FLAT = 0.4;
 
 /** Return the frame of a mesh; which way is up is guessed where it is not given. */
 export function frameOf(points: ArrayLike<number>, up: Up | null): Frame {
@@ -27,8 +29,11 @@ export function drawnIn({ centre, radius, up }: Frame, position: readonly number
   return up === "y" ? [x, y, z] : [x, z, -y];
 }
 
-/** Return the axis along which the mesh stands better: on a wide foot. Where both do, y is up. */
+/** Return the axis along which a mesh lies if it is flat, or else stands on the wider foot; or y. */
 function guessUp(points: ArrayLike<number>, low: Triple, high: Triple): Up {
+  const [x, y, z] = low.map((least, axis) => high[axis]! - least) as Triple;
+  if (z < FLAT * Math.min(x, y)) return "z";
+  if (y < FLAT * Math.min(x, z)) return "y";
   const widths = [0, 2].map((axis) => footOf(points, low, high, 1, axis));
   const depths = [0, 1].map((axis) => footOf(points, low, high, 2, axis));
   return depths[0]! * depths[1]! > 1.1 * widths[0]! * widths[1]! ? "z" : "y";
