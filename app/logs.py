@@ -23,7 +23,7 @@ LogFormat = Literal["json", "text"]
 _LEVEL = logging.INFO
 
 
-def install(log_format: LogFormat | None, stream: TextIO = sys.stderr) -> None:
+def install(log_format: LogFormat | None, stream: TextIO | None = None) -> None:
     """Write all log lines of this process to ``stream``.
 
     Those of the standard library's loggers and warnings are among them.
@@ -34,8 +34,9 @@ def install(log_format: LogFormat | None, stream: TextIO = sys.stderr) -> None:
         ``"json"`` for one object a line, ``"text"`` for people; None for text where the stream is a
         terminal, and JSON elsewhere.
     stream
-        The stream to write to.
+        The stream to write to; standard error where None is named.
     """
+    stream = stream or sys.stderr
     is_terminal = stream.isatty()
     is_text = log_format == "text" or (log_format is None and is_terminal)
     structlog.configure(

@@ -1,4 +1,4 @@
-"""Where answers and their summaries go."""
+"""Places of answers and of their summaries: files, and standard output."""
 
 import sys
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""Which of the stores it is."""
+"""Choice of the store: a folder, or an object store by its URL."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Where commands print: answers on standard output, and then their summaries on standard error."""
+"""Output of commands: answers on standard output, and then their summaries on standard error."""
 
 import csv
 import json

@@ -1,4 +1,4 @@
-"""What results say of themselves: the facts in a line, and a table in notebooks."""
+"""Representations of results: the facts in a line, and a table in notebooks."""
 
 from typing import Any
 from xml.etree import ElementTree as ET
