@@ -2353,7 +2353,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description queue_full, engine_unavailable, draining, state_unavailable, too_many_connections */
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -2616,7 +2616,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description queue_full, engine_unavailable, draining, state_unavailable, too_many_connections */
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -2874,7 +2874,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description queue_full, engine_unavailable, draining, state_unavailable, too_many_connections */
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -3124,7 +3124,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description queue_full, engine_unavailable, draining, state_unavailable, too_many_connections */
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -3374,7 +3374,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description queue_full, engine_unavailable, draining, state_unavailable, too_many_connections */
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -3626,7 +3626,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description queue_full, engine_unavailable, draining, state_unavailable, too_many_connections */
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -3872,7 +3872,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description queue_full, engine_unavailable, draining, state_unavailable, too_many_connections */
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -4118,7 +4118,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description queue_full, engine_unavailable, draining, state_unavailable, too_many_connections */
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -4246,7 +4246,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description too_many_connections */
+            /** @description store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -4428,7 +4428,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description queue_full, engine_unavailable, draining, state_unavailable, too_many_connections */
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -4568,7 +4568,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description too_many_connections */
+            /** @description store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -4692,7 +4692,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description too_many_connections */
+            /** @description store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -4852,7 +4852,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description too_many_connections */
+            /** @description store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -5414,7 +5414,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["ProblemDocument"];
                 };
             };
-            /** @description queue_full, engine_unavailable, draining, state_unavailable, too_many_connections */
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
             503: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];

@@ -100,8 +100,9 @@ def load_mesh(
             kind = _known_kind(file_type or path.suffix)  # before a large file is read
             data = _bytes_of(path)
         else:
+            begins = _bytes_of(path, len(FREESURFER_MAGIC))
+            kind = "freesurfer" if begins == FREESURFER_MAGIC else _known_kind(path.suffix)
             data = _bytes_of(path)
-            kind = "freesurfer" if data.startswith(FREESURFER_MAGIC) else _known_kind(path.suffix)
     else:
         kind = _known_kind(file_type or "")
         data = bytes(source)
@@ -133,9 +134,10 @@ def _known_kind(file_type: str) -> str:
     return kind
 
 
-def _bytes_of(path: Path) -> bytes:
+def _bytes_of(path: Path, most: int = -1) -> bytes:
     try:
-        return path.read_bytes()
+        with path.open("rb") as file:
+            return file.read(most)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InvalidMesh(f"cannot read {path}: {reason}") from error

@@ -582,7 +582,7 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
     ("arguments", "message"),
     [
         ("info nowhere.ply", "cannot read nowhere.ply"),
-        ("info plane.xyz", "unknown mesh file type 'xyz'"),
+        ("info plane.xyz", "cannot read plane.xyz"),
         ("info plane.stl", "STL"),
         ("distance plane.ply --source -1 --out d.npy", "-1"),
         ("distance plane.ply --source 121 --out d.npy", "121"),

@@ -1,4 +1,4 @@
-"""Representations of results: the facts in a line, and a table in notebooks."""
+"""Reprs of results: the facts in a line, and a table in notebooks."""
 
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -23,8 +23,8 @@ SHOWN: list[tuple[Any, str]] = [
         "DistanceField(8 vertices, 2 sources, 4 unreached, 1 farthest, exact)",
     ),
     (
-        gc.approximate_distance(SQUARE, 0, 0.01),
-        "DistanceField(4 vertices, 1 source, 1.41421 farthest, guaranteed relative error 0.01)",
+        gc.approximate_distance(SQUARE, 0, 0.001),
+        "DistanceField(4 vertices, 1 source, 1.41421 farthest, guaranteed relative error 0.001)",
     ),
     (gc.shortest_path(SQUARE, 1, 2), "GeodesicPath(3 points, length 1.41421, exact)"),
     (gc.shortest_path(SQUARE, 1, 1), "GeodesicPath(1 point, length 0, exact)"),

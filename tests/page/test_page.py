@@ -355,7 +355,7 @@ def test_exact_and_approximate_side_by_side(view: View, knot: str) -> None:
     view.page.click("#methods >> text=Approximate")
     view.wait()
 
-    assert view.text("#bound-approximate") == "10 %"
+    assert view.text("#bound-approximate") == "0.2 %"
     assert query_of(view)["method"] == ["approximate"]
     assert 0 < float(view.text("#measured-approximate").split()[0]) < 10
     assert view.text("#bound-exact") == "0"

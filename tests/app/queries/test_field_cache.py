@@ -91,7 +91,7 @@ def test_what_is_asked_otherwise_is_another_field(opened: OpenMesh, sweeps: list
         {"sources": [{"vertex": 4}, {"vertex": 3}]},
         {"sources": [{"vertex": 3}], "max_distance": 1.0},
         {"sources": [{"vertex": 3}], **APPROXIMATE},
-        {"sources": [{"vertex": 3}], **APPROXIMATE, "relative_error": 0.02},
+        {"sources": [{"vertex": 3}], **APPROXIMATE, "relative_error": 0.0015},
         {"sources": [{"vertex": 3}], **APPROXIMATE, "absolute_error": 0.02},
         *({"sources": [{"vertex": 3}], **FAST, "effort": effort} for effort in (1, 2, 4, 8)),
         {"sources": [{"polyline": [{"vertex": 3}]}]},

@@ -201,7 +201,7 @@ BAD = [
     ({"sources": []}, "InvalidArgument", "no sources"),
     ({"targets": ()}, "InvalidArgument", "no targets"),
     ({"sources": np.empty(0, int)}, "InvalidArgument", "no sources"),
-    ({"sources": 3}, "InvalidArgument", "sources is 3"),
+    ({"sources": 3.5}, "InvalidArgument", "sources is 3.5"),
     ({"targets": "12"}, "InvalidArgument", "targets is '12'"),
     ({"targets": None}, "InvalidArgument", "targets is None"),
     ({"sources": [0, -1]}, "InvalidPoint", "source 1 is vertex -1"),

@@ -120,7 +120,7 @@ def test_the_sweep_ends_at_the_last_of_the_nearest(monkeypatch):
 
 BAD = [
     ({"candidates": []}, "InvalidArgument", "no candidates"),
-    ({"candidates": 3}, "InvalidArgument", "candidates is 3"),
+    ({"candidates": 3.5}, "InvalidArgument", "candidates is 3.5"),
     ({"candidates": [1, -1]}, "InvalidPoint", "candidate 1 is vertex -1"),
     ({"candidates": [6]}, "InvalidPoint", "candidate 0 is vertex 6"),
     ({"source": 6}, "InvalidPoint", "source is vertex 6"),
