@@ -54,7 +54,7 @@ class Supply(Protocol):
         """Have a mesh in the folder inside the block."""
 
     def bringing(self, file: Path | None, folder: Path) -> AbstractAsyncContextManager[None]:
-        """Have a file that was lent, if any, and the parent of a new folder, inside the block."""
+        """Have a lent file, if any, and the parent of a folder to come, inside the block."""
 
     async def send_mesh(self, written: WrittenMesh) -> bool:
         """Send the files of a mesh; False where it is to be written again."""

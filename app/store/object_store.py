@@ -99,15 +99,17 @@ class ObjectStore:
     @asynccontextmanager
     async def bringing(self, file: Path | None, folder: Path) -> AsyncIterator[None]:
         """Fetch a file that is not here."""
-        is_guest = not folder.parent.is_dir()
-        folder.parent.mkdir(parents=True, exist_ok=True)
+        parents = {folder.parent} if file is None else {folder.parent, file.parent}
+        new = [each for each in parents if not each.is_dir()]
+        for each in new:
+            each.mkdir(parents=True)
         try:
-            if is_guest and file is not None:
+            if file is not None and file.parent in new:
                 await to_thread.run_sync(self._objects.fetch, self._upload_name(file), file)
             yield
         finally:
-            if is_guest:
-                await to_thread.run_sync(_remove, folder.parent)
+            for each in new:
+                await to_thread.run_sync(_remove, each)
 
     async def send_mesh(self, written: WrittenMesh) -> bool:
         """Send a mesh."""
