@@ -58,8 +58,8 @@ class _Lines(structlog.BytesLogger):
     """A writer of lines; those that cannot be written are lost, and the service goes on."""
 
     def msg(self, message: bytes) -> None:
-        """Write a line, unless the disk is full or the reader is gone."""
-        with suppress(OSError):
+        """Write a line, unless the disk is full, the reader is gone, or the stream is closed."""
+        with suppress(OSError, ValueError):
             super().msg(message)
 
     info = warning = error = critical = msg
