@@ -1,11 +1,13 @@
 """The ``geodesic`` command, run in this process."""
 
+import logging
 import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import structlog
 
 from app.cli import main
 from tests.support.commands import Ran, Run
@@ -17,6 +19,17 @@ def sigint_as_in_a_terminal() -> Iterator[None]:
     inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, inherited)
+
+
+@pytest.fixture(autouse=True)
+def logging_as_before() -> Iterator[None]:
+    """``geodesic serve`` has all loggers of its process write to a stream that ends with a test."""
+    root = logging.getLogger()
+    handlers, level, configuration = root.handlers[:], root.level, structlog.get_config()
+    yield
+    root.handlers[:] = handlers
+    root.setLevel(level)
+    structlog.configure(**configuration)
 
 
 @pytest.fixture
