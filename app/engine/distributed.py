@@ -17,7 +17,7 @@ from app.engine.cluster import BEAT_S, LEASE_S, SILENCE_S, Cluster, HostLostErro
 from app.engine.interface import Load, ProgressCallback
 from app.engine.placement import Occupancy, choose
 from app.engine.wire import Message, Wire, WireError, decode
-from app.engine.work import MeshFromFile, Outcome, StoreMesh, Task, TaskResult
+from app.engine.work import MeshFromFile, Outcome, RunQuery, StoreMesh, Task, TaskResult
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.queries import code_version
 from app.settings import Settings
@@ -198,6 +198,10 @@ class DistributedEngine:
             )
             for name, report in (ready or usable).items()
         }
+        if isinstance(task.work, RunQuery):
+            for name in hosts:
+                if task.work.result_name in usable[name].computing:
+                    return name  # where it joins that computation, however full the host is
         # The last key is the mesh. What has none, such as an upload, may go anywhere.
         key = task.affinity_keys[-1] if task.affinity_keys else uuid4().hex
         return choose(key, hosts, is_small=task.is_small)

@@ -9,9 +9,10 @@ import structlog
 from structlog.contextvars import bound_contextvars
 
 from app.engine.cluster import BEAT_S, LEASE_S, HostReport
-from app.engine.interface import Engine
+from app.engine.interface import Engine, ProgressCallback
+from app.engine.single_flight import SingleFlight
 from app.engine.wire import Wire, WireError, encode
-from app.engine.work import Outcome
+from app.engine.work import Outcome, RunQuery, Task, TaskResult
 from app.errors import Problem, ProblemError, problem_of
 from app.queries import code_version
 from app.settings import Settings
@@ -35,6 +36,7 @@ class Host:
         self._wire = Wire(settings.folder)
         self._leases: dict[str, _Lease] = {}
         self._shares: dict[str, float] = {}
+        self._flights: SingleFlight[TaskResult] = SingleFlight()
         self._stopped: dict[str, float] = {}
         """Tickets that were stopped before their tasks came, and until when that counts"""
         self._expiring: asyncio.Task[None] | None = None
@@ -92,6 +94,7 @@ class Host:
             is_ready=self._engine.is_ready,
             is_draining=self._engine.is_draining,
             code=code_version(),
+            computing=tuple(self._flights),
             shares={ticket: self._shares[ticket] for ticket in tickets if ticket in self._shares},
         )
         return encode(report)
@@ -101,7 +104,7 @@ class Host:
         try:
             message = self._wire.decode_task(data)
             with bound_contextvars(**message.log_fields):
-                return await self._engine.run(message.task, partial(self._note, ticket))
+                return await self._run(message.task, partial(self._note, ticket))
         except ProblemError as error:
             return error.problem
         except WireError as error:
@@ -109,6 +112,13 @@ class Host:
         except Exception as error:
             logger.exception("task of a replica failed")
             return problem_of(error)
+
+    async def _run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
+        """Do a task; replicas that ask for one result at the same time share its computation."""
+        run = partial(self._engine.run, task)
+        if not isinstance(task.work, RunQuery):
+            return await run(on_progress)
+        return await self._flights.join(task.work.result_name, run, on_progress)
 
     def _note(self, ticket: str, share: float) -> None:
         self._shares[ticket] = share

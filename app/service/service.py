@@ -31,6 +31,7 @@ from anyio import CapacityLimiter, to_thread
 from app.access import Caller
 from app.encoding import Representation
 from app.engine.interface import Engine, ProgressCallback
+from app.engine.single_flight import SingleFlight
 from app.engine.supplied import SuppliedEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, StateUnavailableError, problem
@@ -40,7 +41,6 @@ from app.service.concurrency import ConcurrencyLimit
 from app.service.maintenance import Damage
 from app.service.resources import share_arenas
 from app.service.scrub import scrubbing
-from app.service.single_flight import SingleFlight
 from app.settings import Settings, variable_of
 from app.state import Allowances, Database, MeshRecords, Replicas, SqliteDatabase, StateError
 from app.store import layout

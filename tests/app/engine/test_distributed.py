@@ -26,6 +26,12 @@ WORK = Task(run_query(distances_query(MESH)), "alice", (MESH,))
 PROMISED = replace(WORK, is_promised=True)
 
 
+def different(count: int) -> list[Task]:
+    """Return tasks of one mesh that no result has in common."""
+    work = [replace(WORK.work, result_name=f"{MESH}/{i}") for i in range(count)]
+    return [replace(WORK, work=each) for each in work]
+
+
 @dataclass
 class Replica:
     """An engine of a service, over a cluster that it may share with others."""
@@ -108,10 +114,47 @@ def test_work_of_other_replicas_counts() -> None:
     async def main() -> None:
         cluster = FakeCluster("a", "b")
         async with replica_of(cluster) as one, replica_of(cluster) as other:
-            first = one.ask()
+            task, another = different(2)
+            first = one.ask(task)
             await asyncio.sleep(2 * BEAT_S)
-            await asyncio.gather(first, other.ask())
+            await asyncio.gather(first, other.ask(another))
             assert one.begun == {"a": 1, "b": 1}
+
+    virtual_time.run(main())
+
+
+@pytest.mark.parametrize("later_s", [0.0, 0.1, 2 * BEAT_S, 7.0])
+def test_one_result_is_computed_once_for_all_replicas(later_s: float) -> None:
+    """The host is full from the first on, and another one has room."""
+
+    async def main() -> None:
+        cluster = FakeCluster("a", "b")
+        async with replica_of(cluster) as one, replica_of(cluster) as other:
+            first = one.ask()
+            await asyncio.sleep(later_s)
+            await asyncio.gather(first, other.ask())
+            assert sum(one.begun.values()) == 1
+            assert now() <= 8.0 + later_s + 6 * BEAT_S  # of which the replicas wait four
+
+    virtual_time.run(main())
+
+
+def test_a_replica_that_stops_leaves_the_computation_to_the_others() -> None:
+    async def main() -> None:
+        cluster = FakeCluster("a")
+        async with replica_of(cluster) as one, replica_of(cluster) as other:
+            first, second = one.ask(), other.ask()
+            await asyncio.sleep(1)
+            first.cancel()
+            await second
+            assert cluster.engines["a"].ended == ["done"]
+            assert max(other.shares) == 0.75
+            third, fourth = one.ask(), other.ask()
+            await asyncio.sleep(1)
+            third.cancel()
+            fourth.cancel()
+            await asyncio.sleep(1)
+            assert cluster.engines["a"].ended == ["done", "stopped"]
 
     virtual_time.run(main())
 
@@ -336,7 +379,7 @@ def test_a_host_of_another_release_is_not_used_and_named_once() -> None:
 def test_a_full_cluster_refuses_jobs() -> None:
     async def scene(replica: Replica) -> None:
         replica.engine.refuse_when_full("alice")
-        asking = [replica.ask() for _ in range(2 * (1 + SETTINGS.queue_size))]
+        asking = [replica.ask(task) for task in different(2 * (1 + SETTINGS.queue_size))]
         await asyncio.sleep(1)
         with pytest.raises(ProblemError) as caught:
             replica.engine.refuse_when_full("alice")
@@ -352,7 +395,7 @@ def test_a_full_cluster_refuses_jobs() -> None:
 
 def test_the_load_is_that_of_all_hosts() -> None:
     async def scene(replica: Replica) -> None:
-        asking = [replica.ask() for _ in range(3)]
+        asking = [replica.ask(task) for task in different(3)]
         await asyncio.sleep(1)
         load = replica.engine.load
         assert (load.busy, load.waiting, load.idle) == (2, 1, 0)

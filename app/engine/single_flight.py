@@ -1,7 +1,7 @@
 """Single-flight: concurrent requests for one result share one computation."""
 
 import asyncio
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Iterator
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -27,6 +27,9 @@ class SingleFlight(Generic[T]):
 
     def __contains__(self, name: str) -> bool:
         return name in self._flights
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._flights)
 
     async def join(
         self,

@@ -6,8 +6,8 @@ from collections.abc import Callable
 import pytest
 
 from app.engine.interface import ProgressCallback
+from app.engine.single_flight import SingleFlight
 from app.service.service import ignore_progress
-from app.service.single_flight import SingleFlight
 
 
 class Work:
