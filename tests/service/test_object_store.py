@@ -92,6 +92,7 @@ def test_ranges_of_an_answer_are_streamed(service: ServiceClient) -> None:
     assert whole[50:60] in several.content
 
 
+@pytest.mark.full
 def test_a_restart_has_meshes_answers_and_jobs(url: str, tmp_path: Path) -> None:
     with serving(url, copies=tmp_path) as client:  # type: ignore[arg-type]
         mesh_id = upload_sample(client, "plane", 30_000)
@@ -121,6 +122,7 @@ def _path(mesh_id: str, number: int) -> str:
     return f"/v1/meshes/{mesh_id}/path?from=v0&to=v{number + 1}"
 
 
+@pytest.mark.full
 def test_copies_are_bounded_and_pulled_again(url: str, tmp_path: Path) -> None:
     with serving(url, copies=tmp_path, copies_bytes=1_500_000) as client:  # type: ignore[arg-type]
         meshes = [upload_sample(client, "plane", 5000 + n) for n in range(4)]
@@ -146,6 +148,7 @@ def test_damage_of_a_mesh_is_noticed_and_an_upload_heals_it(
     assert array not in s3.names(url)
 
 
+@pytest.mark.full
 def test_a_damaged_answer_is_cut_off_and_computed_again(
     service: ServiceClient, s3: S3, url: str
 ) -> None:
@@ -175,6 +178,7 @@ def test_two_uploads_of_one_mesh_at_once_store_it_once(
     assert service.get(_path(mesh_id, 1)).status_code == 200
 
 
+@pytest.mark.full
 def test_half_an_upload_is_no_mesh(s3: S3, url: str, tmp_path: Path) -> None:
     mesh_id = "0123456789abcdef0123456789abcdef"
     key = f"{url.removeprefix('s3://bucket/')}/meshes/{mesh_id}/some-upload/faces.npy"
@@ -199,6 +203,7 @@ def test_a_store_that_is_away_is_a_clear_error_and_comes_back(
     assert upload_sample(service, "plane", 800)
 
 
+@pytest.mark.full
 def test_a_mesh_that_is_deleted_while_it_is_pulled_is_gone(service: ServiceClient) -> None:
     mesh_id = upload_sample(service, "sphere", 3000)
     drop_copies(service)
@@ -235,6 +240,7 @@ def test_starts_that_are_refused(
     assert said in refused_start(store, **settings)  # type: ignore[arg-type]
 
 
+@pytest.mark.full
 def test_a_store_of_another_service_is_refused(url: str, tmp_path: Path) -> None:
     with serving(url, copies=tmp_path / "one"):  # type: ignore[arg-type]
         pass
@@ -244,6 +250,7 @@ def test_a_store_of_another_service_is_refused(url: str, tmp_path: Path) -> None
         pass
 
 
+@pytest.mark.full
 def test_two_replicas_share_meshes_answers_and_jobs(
     postgres: Postgres, url: str, tmp_path: Path
 ) -> None:

@@ -30,6 +30,8 @@ def upgrade(connection: Connection[Any]) -> None:
     )
     config = Config()
     config.set_main_option("script_location", str(Path(__file__).parent))
+    # With autocommit there would be no transaction, and each statement would release the lock.
+    connection.autocommit = False
     try:
         with engine.begin() as transaction:
             transaction.execute(text("SELECT pg_advisory_xact_lock(hashtextextended('schema', 0))"))
@@ -40,3 +42,6 @@ def upgrade(connection: Connection[Any]) -> None:
         raise StateError(f"{detail} of {variable_of('state')}: use that release") from error
     except DBAPIError as error:
         raise error.orig or error from None
+    finally:
+        if not connection.closed:
+            connection.autocommit = True

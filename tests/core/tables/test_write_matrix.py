@@ -151,7 +151,7 @@ def run_killed(out: Path, blocks: int) -> int:
 
 
 @pytest.mark.jit
-@pytest.mark.parametrize("suffix", [".npy", ".npz"])
+@pytest.mark.parametrize("suffix", [".npy", pytest.param(".npz", marks=pytest.mark.full)])
 def test_a_process_that_is_killed_goes_on_where_it_was(suffix, tmp_path):
     whole, out = tmp_path / f"whole{suffix}", tmp_path / f"killed{suffix}"
     command = [sys.executable, "-c", KILLED]
