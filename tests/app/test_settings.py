@@ -8,6 +8,7 @@ from pydantic import SecretStr, ValidationError
 
 from app.settings import GIB, LIBRARY_VARIABLES, MIB, Settings, available_memory, variable_of
 from tests.support.service import distances, serving, upload_sample
+from tests.support.syntax import syntax_tree
 
 TESTS = Path(__file__).parents[1]
 LIBRARY = TESTS.parent / "geodesic_core"
@@ -95,7 +96,7 @@ def test_every_setting_is_put_to_use_in_a_test() -> None:
     for path in TESTS.rglob("*.py"):
         text = path.read_text()
         if path != Path(__file__) and any(name in text.lower() for name in unused):
-            named = names_in(ast.parse(text))
+            named = names_in(syntax_tree(path))
             unused -= {name for name in unused if {name, variable_of(name)} & named}
 
     assert not unused

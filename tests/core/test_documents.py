@@ -10,6 +10,7 @@ import pytest
 
 from geodesic_core import kernels, tolerances
 from tests.support.paths import ROOT
+from tests.support.syntax import syntax_tree
 
 DOCUMENTS = sorted(
     [
@@ -108,7 +109,7 @@ def test_tolerances_that_documents_name_are_there(name: str) -> None:
 @pytest.mark.parametrize("folder", ["geodesic_core", "app", "tests", "benchmarks"])
 def test_docstrings_of_modules_begin_with_a_noun_or_a_verb(folder: str) -> None:
     sources = [path for path in (ROOT / folder).rglob("*.py") if "node_modules" not in path.parts]
-    docstrings = [ast.get_docstring(ast.parse(path.read_text())) or "" for path in sources]
+    docstrings = [ast.get_docstring(syntax_tree(path)) or "" for path in sources]
     assert len(docstrings) > 10
     openings = {text.split()[0].strip(",:") for text in docstrings if text}
     assert not openings & {"What", "Who", "Which", "Where", "How"}

@@ -125,7 +125,7 @@ def test_headers_of_binary_distances(client: TestClient, knot: str, name: str) -
 
 
 def test_each_method_and_error_has_a_result_of_its_own(client: TestClient, knot: str) -> None:
-    exact = {"sources": [{"vertex": 42}]}
+    exact = {"sources": [{"vertex": 42, "start_distance": 0.625}]}
     bodies = [
         exact,
         exact | {"method": "approximate"},

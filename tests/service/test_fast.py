@@ -74,7 +74,7 @@ def test_the_usual_effort_is_2(client: TestClient, knot: str) -> None:
 
 
 def test_each_effort_has_a_result_of_its_own(client: TestClient, knot: str) -> None:
-    one = {"sources": [{"vertex": 42}]}
+    one = {"sources": [{"vertex": 42, "start_distance": 0.375}]}
     rough = one | {"method": "approximate"}
     bodies = [one, rough, *(one | {"method": "fast", "effort": effort} for effort in EFFORTS)]
     first = [distances(client, knot, **body) for body in bodies]

@@ -10,6 +10,7 @@ from app.engine.fork_server import PRELOADED
 from app.engine.worker import FIRST_KERNELS
 from tests.support.fresh import told_by
 from tests.support.paths import ROOT
+from tests.support.syntax import syntax_tree
 
 WORK = [ROOT / "geodesic_core", ROOT / "app/encoding", ROOT / "app/queries"]
 NOT_FOR_WORKERS = {"nibabel", "meshio", "zarr", "pyarrow", "pyvista", "PIL", "trimesh"}
@@ -18,9 +19,7 @@ NOT_FOR_WORKERS = {"nibabel", "meshio", "zarr", "pyarrow", "pyvista", "PIL", "tr
 
 def late_imports(path: Path) -> set[str]:
     """Return the modules that the functions of a source import."""
-    functions = [
-        node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.FunctionDef)
-    ]
+    functions = [node for node in ast.walk(syntax_tree(path)) if isinstance(node, ast.FunctionDef)]
     inner = [node for function in functions for node in ast.walk(function)]
     plain = {name.name for node in inner if isinstance(node, ast.Import) for name in node.names}
     return plain | {node.module or "" for node in inner if isinstance(node, ast.ImportFrom)}
