@@ -53,6 +53,7 @@ def colours(file: Path) -> int:
 
 
 @pytest.mark.parametrize("thing", [FIELD, PATH], ids=["field", "path"])
+@pytest.mark.jit
 def test_pictures_are_drawn_without_a_window(thing: Any, tmp_path: Path) -> None:
     file = tmp_path / "picture.png"
     assert thing.plot(screenshot=file) is None

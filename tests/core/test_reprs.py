@@ -40,6 +40,7 @@ def test_the_facts_are_in_one_line(thing: Any, line: str) -> None:
     assert len(repr(thing)) < 100
 
 
+@pytest.mark.jit
 def test_the_repr_of_a_large_field_is_as_short() -> None:
     assert len(repr(gc.exact_distance(gc.samples.sphere(2000), 0))) < 100
 

@@ -38,6 +38,7 @@ def _volume(vertices: np.ndarray, faces: np.ndarray) -> float:
     return float(np.linalg.det(vertices[faces]).sum() / 6.0)
 
 
+@pytest.mark.jit
 def test_the_sphere_is_the_unit_sphere_seen_from_outside() -> None:
     sample = samples.sphere(20_000)
     vertices, faces = sample.vertices, sample.faces
@@ -54,6 +55,7 @@ def test_the_smallest_sphere_is_an_icosahedron() -> None:
     assert (np.linalg.det(vertices[faces]) > 0).all()
 
 
+@pytest.mark.jit
 def test_the_knot_is_a_tube_seen_from_outside() -> None:
     sample = samples.knot(20_000)
     vertices, faces = sample.vertices, sample.faces
@@ -63,6 +65,7 @@ def test_the_knot_is_a_tube_seen_from_outside() -> None:
     assert edges.max() < 4.0 * edges.min()
 
 
+@pytest.mark.jit
 def test_the_plane_is_the_unit_square_seen_from_above() -> None:
     sample = samples.plane(2_000)
     vertices, faces = sample.vertices, sample.faces
@@ -132,6 +135,7 @@ def test_the_terrain_is_a_height_field_with_hills_and_valleys(faces: int) -> Non
     assert 0.2 < heights.std() < 1.0
 
 
+@pytest.mark.jit
 def test_the_terrain_s_faces_have_the_shorter_diagonals_of_their_cells() -> None:
     sample = samples.terrain(3_000)
     vertices, faces = sample.vertices, sample.faces

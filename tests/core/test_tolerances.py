@@ -513,6 +513,7 @@ def test_grazing_is_the_least_angle_of_a_merged_pseudosource(reach):
 @given(
     st.floats(-2, 3), st.floats(-3, -0.01), st.floats(-2, 3), st.floats(-3, -0.01), st.floats(0, 1)
 )
+@pytest.mark.jit
 def test_lower_bound_is_all_that_a_merged_window_rises_by(s0x, s0y, s1x, s1y, joint):
     b = 0.2 + 0.6 * joint
     # Both windows give the same distance where they meet
@@ -749,6 +750,7 @@ def test_flat_faces_send_light_from_their_middle(scale):
 
 @SCALES
 @pytest.mark.parametrize("name", ["book_of_5", "complex_1", "complex_4", "moebius"])
+@pytest.mark.jit
 def test_same_place_tells_the_face_that_a_path_came_from(name, scale):
     """Rounding stays below it, and what lies elsewhere above: every path has its distance."""
     case = zoo.IRREGULAR[name].moved(scale * zoo.rotation(5), scale * np.array((1.0, -2.0, 3.0)))
@@ -807,6 +809,7 @@ def strip_with_fins(count) -> gc.TriangleMesh:
     return gc.TriangleMesh(np.vstack([points, tips]), [*np.asarray(faces).tolist(), *fins])
 
 
+@pytest.mark.jit
 def test_forks_are_enough_for_a_line_over_that_many_seams():
     mesh = strip_with_fins(FORKS)
     for source in (0, FORKS + 1):

@@ -19,6 +19,7 @@ from tests.support.meshes import mesh_of
 @pytest.mark.slow
 @pytest.mark.slice(2)
 @zoo.each(MERGING)
+@pytest.mark.jit
 def test_paths_where_much_is_merged(case):
     mesh = mesh_of(case)
     for source in some_sources(case, 1 if WITHOUT_JIT else 5):
@@ -31,6 +32,7 @@ def test_paths_where_much_is_merged(case):
 
 
 @pytest.mark.parametrize("name", ["dented_ball", "islands", "dented_ring"])
+@pytest.mark.jit
 def test_kept_or_found_again_the_path_is_the_same(name):
     mesh = mesh_of(MERGING[name])
     kept, found = (
@@ -54,6 +56,7 @@ def test_some_paths_are_longer_than_the_field_says(name):
     assert 1e-5 < max(bounds) < 1e-2
 
 
+@pytest.mark.jit
 def test_paths_under_an_absolute_error():
     mesh = mesh_of(MERGING["dented_ring"])
     exact = gc.exact_distance(mesh, 3).distances

@@ -59,6 +59,7 @@ def test_stadiums_around_a_segment(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
+@pytest.mark.jit
 def test_around_a_polyline_is_the_edge_of_its_stadiums(seed):
     """All points at the level; within, as much area as a fine raster says."""
     rng = np.random.default_rng(seed)
@@ -104,6 +105,7 @@ def test_open_lines_where_the_domain_ends(jitter):
 @pytest.mark.parametrize("seed", range(6))
 @pytest.mark.parametrize("scale", [1.0, 1.37])
 @pytest.mark.parametrize("limited", [False, True])
+@pytest.mark.jit
 def test_lines_along_edges_do_not_depend_on_rounding(seed, scale, limited):
     """Around a square along edges, at the levels of other edges, however turned."""
     points, faces = zoo.grid(8, 8)
@@ -143,6 +145,7 @@ def test_fronts_that_meet_leave_no_line():
         np.testing.assert_allclose([line.length for line in before], 6.0, rtol=1e-12)
 
 
+@pytest.mark.jit
 def test_bands_around_a_box():
     """A curve once around a box: straight lines beside it, then down over the edges."""
     size = 3, 2, 2

@@ -213,6 +213,7 @@ def test_distances_on_a_box_are_least_over_the_curve(seed):
 @pytest.mark.slice(4)
 @pytest.mark.parametrize("error", [None, 1e-3])
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
+@pytest.mark.jit
 def test_distances_are_least_over_the_points_of_the_curve(case, error):
     """On every kind of mesh, non-manifold ones too, at vertices and at points anywhere."""
     mesh, rng = mesh_of(case), np.random.default_rng(7)

@@ -31,6 +31,7 @@ def answer(mesh, source, error, *, retain="paths"):
     "name",
     ["crags", "torus", "double_frame", "pinched_holes", "dented_ball", "islands", "furrows"],
 )
+@pytest.mark.jit
 def test_two_runs_agree(name, error):
     meshes = [mesh_of(CASES[name]) for _ in range(2)]
     first = answer(meshes[0], 7, error)

@@ -58,6 +58,7 @@ def reached_by(field: gc.DistanceField, count: int) -> list[int]:
 
 @pytest.mark.slice(12)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
+@pytest.mark.jit
 def test_never_below_the_oracle_and_paths_are_as_short(case):
     matrix, mesh = expected.matrix(case), mesh_of(case)
     for source in some_sources(case, 6):
@@ -219,6 +220,7 @@ def test_the_gradient_is_the_direction_of_the_last_piece_of_the_path(source):
         assert math.acos(min(cosine, 1.0)) < 1e-4
 
 
+@pytest.mark.jit
 def test_progress_and_stopping():
     mesh, seen = gc.TriangleMesh(*zoo.icosphere(3)), []
     exact = gc.exact_distance(mesh, 0).distances

@@ -95,6 +95,7 @@ def test_it_needs_no_sweep_for_what_the_first_one_knew(monkeypatch: pytest.Monke
         field.isolines([0.1])
 
 
+@pytest.mark.jit
 def test_sources_are_spelled_canonically() -> None:
     field = gc.exact_distance(MESH, [3, gc.Source(LINE, 0.5)])
 
@@ -106,6 +107,7 @@ def test_sources_are_spelled_canonically() -> None:
     )
 
 
+@pytest.mark.jit
 def test_the_mesh_keeps_its_barriers() -> None:
     among = MESH.with_barriers(range(200, 260))
     field = gc.exact_distance(among, 3)

@@ -42,6 +42,7 @@ def test_a_field_comes_back_as_it_was(kind: str, tmp_path: Path) -> None:
     assert again.nbytes == field.nbytes
 
 
+@pytest.mark.jit
 def test_any_reader_of_numpy_gets_the_distances(tmp_path: Path) -> None:
     field = FIELDS["barriers"]()
     field.save(tmp_path / "field.NPZ")
@@ -143,6 +144,7 @@ def test_what_is_no_field_is_refused(file: Path, tmp_path: Path) -> None:
         (3, "path is 3; it must be a text or a Path"),
     ],
 )
+@pytest.mark.jit
 def test_a_place_where_no_field_can_be_written_is_refused(path: Any, message: str) -> None:
     with pytest.raises(InvalidArgument, match=message):
         gc.exact_distance(MESH, 3).save(path)

@@ -37,6 +37,7 @@ def test_distance_falls_by_as_much_as_one_walks_against_it(case):
 
 @pytest.mark.parametrize("approximate", [False, True])
 @zoo.each({name: zoo.SMALL[name] for name in GENERIC})
+@pytest.mark.jit
 def test_it_is_the_direction_of_the_last_piece_of_the_path(case, approximate):
     """On meshes on which no two ways are as long."""
     mesh = mesh_of(case)

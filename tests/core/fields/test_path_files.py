@@ -82,6 +82,7 @@ def test_a_folder_in_the_way_is_named(tmp_path: Path) -> None:
     assert [each.name for each in tmp_path.iterdir()] == ["path.obj"]
 
 
+@pytest.mark.jit
 def test_a_path_knows_its_surface_and_leaves_it_behind_when_it_is_copied() -> None:
     assert PATH.mesh is MESH
     assert gc.exact_distance(MESH, 3).path_to(120).mesh is MESH

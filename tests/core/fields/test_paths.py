@@ -30,6 +30,7 @@ def check_paths(mesh, source, exact, error, at_most=10**9):
 
 @pytest.mark.slice(8)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
+@pytest.mark.jit
 def test_paths_on_small_meshes(case):
     mesh = mesh_of(case)
     for source in some_sources(case, 1 if WITHOUT_JIT else 4):
@@ -82,6 +83,7 @@ def test_a_path_through_saddles_has_its_vertices_as_points():
         pytest.param(MERGING["islands"], (0, 70, 120), id="islands"),
     ],
 )
+@pytest.mark.jit
 def test_a_path_ends_at_the_nearest_of_several_sources(case, roots, error):
     mesh = mesh_of(case)
     first, second, third = roots

@@ -297,6 +297,7 @@ def test_edges_and_shares_that_there_are_not(ends, t, message):
 @pytest.mark.slice(15)
 @zoo.each(zoo.SMALL)
 @pytest.mark.parametrize("approximate", [False, True])
+@pytest.mark.jit
 def test_the_nearest_source_of_points(case, approximate):
     """By a sweep from each source alone; where two are as near, either will do."""
     mesh = mesh_of(case)
@@ -345,6 +346,7 @@ def test_points_hard_by_an_irregular_edge_are_found_again(weight):
     "seed", [*range(3), *(pytest.param(i, marks=pytest.mark.full) for i in range(3, 20))]
 )
 @zoo.each({name: case for name, case in zoo.IRREGULAR.items() if name.startswith("complex")})
+@pytest.mark.jit
 def test_approximate_paths_take_the_right_face_beyond_an_irregular_edge(case, seed):
     """Where windows were merged, a face that the path did not come from leads nowhere."""
     mesh, rng = mesh_of(case), np.random.default_rng(seed)

@@ -29,6 +29,7 @@ def test_each_word_holds_more_and_answers_the_same(solve):
 @pytest.mark.parametrize(
     ("solve", "default"), [(gc.exact_distance, "paths"), (gc.approximate_distance, "distances")]
 )
+@pytest.mark.jit
 def test_the_default_is_as_documented(solve, default):
     assert solve(MESH, 0).nbytes == solve(MESH, 0, retain=default).nbytes
     assert getattr(gc.Solver(MESH), solve.__name__)(0).nbytes == solve(MESH, 0).nbytes

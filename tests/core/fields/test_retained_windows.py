@@ -85,6 +85,7 @@ def test_windows_keep_to_max_distance(case):
             assert near.distance_at(target) == pytest.approx(distance, rel=SAME, abs=1e-14)
 
 
+@pytest.mark.jit
 def test_what_is_kept_changes_nothing_else():
     mesh = gc.samples.knot(500)
     kept, plain = kept_field(mesh, [3, 50]), gc.exact_distance(mesh, [3, 50])

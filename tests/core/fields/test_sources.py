@@ -23,6 +23,7 @@ SMALL_AND_MERGING = zoo.SMALL | MERGING
 
 @pytest.mark.slice(len(zoo.SMALL))
 @zoo.each(zoo.SMALL)
+@pytest.mark.jit
 def test_several_sources_are_the_least_of_each(case):
     mesh, matrix = mesh_of(case), expected.matrix(case)
     rng = np.random.default_rng(len(case.faces))
@@ -47,6 +48,7 @@ def test_several_sources_are_the_least_of_each(case):
 
 
 @each_error
+@pytest.mark.jit
 def test_sources_in_every_spelling(error):
     mesh = mesh_of(zoo.SMALL["torus"])
     plain = solve(mesh, 5, error)
@@ -70,6 +72,7 @@ def test_ties_go_to_the_lowest_source(error):
 
 
 @each_error
+@pytest.mark.jit
 def test_a_source_behind_another_is_not_nearest_even_to_itself(error):
     case = zoo.SMALL["hills"]
     row = expected.matrix(case)[3]
@@ -79,6 +82,7 @@ def test_a_source_behind_another_is_not_nearest_even_to_itself(error):
 
 
 @each_error
+@pytest.mark.jit
 def test_start_distances_shift_the_field(error):
     """A share of a late start may be more than the whole mesh, and nothing gets worse."""
     small, land = zoo.SMALL["crags"], MERGING["land"]
@@ -126,6 +130,7 @@ def test_within_max_distance_exact_distances_stay_as_they_are(case):
 
 
 @each_error
+@pytest.mark.jit
 def test_max_distance_with_several_sources(error):
     case = zoo.SMALL["torus"]
     points, starts = [0, 20, 40], [0.0, 0.25, 0.5]

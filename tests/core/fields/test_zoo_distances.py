@@ -105,6 +105,7 @@ def test_distances_scale_with_the_mesh_and_stay_after_rigid_motion(case):
 
 
 @zoo.each(MERGING)
+@pytest.mark.jit
 def test_meshes_on_which_much_is_merged(case):
     mesh = mesh_of(case)
     for source in some_sources(case, 1 if WITHOUT_JIT else 20):
@@ -125,6 +126,7 @@ def test_merging_saves_windows_and_uses_what_it_is_granted(case):
 
 
 @zoo.each(MERGING)
+@pytest.mark.jit
 def test_an_absolute_error_holds_with_and_without_a_relative_one(case):
     mesh = mesh_of(case)
     for source in some_sources(case, 1 if WITHOUT_JIT else 4):

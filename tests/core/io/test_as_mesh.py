@@ -65,6 +65,7 @@ def test_each_kind_is_the_same_mesh(kind: str, tmp_path: Path) -> None:
 
 
 @given
+@pytest.mark.jit
 def test_all_functions_take_each_kind(kind: str, tmp_path: Path) -> None:
     ball = GIVEN[kind](tmp_path)
     expected = gc.exact_distance(BALL, 0).distances
@@ -157,6 +158,7 @@ def test_no_library_is_imported_to_know_its_meshes() -> None:
     assert told_by(work) == "\n"
 
 
+@pytest.mark.jit
 def test_one_point_needs_no_list() -> None:
     middle = gc.SurfacePoint.face(12, (0.2, 0.3, 0.5))
     solver = gc.Solver(BALL)

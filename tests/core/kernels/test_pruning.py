@@ -62,6 +62,7 @@ def view_toward(mesh, landmarks, start, **goal):
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # inf - inf, in plain Python
 @zoo.each(CASES)
 @pytest.mark.parametrize("count", [0, 1, 4])
+@pytest.mark.jit
 def test_the_rest_is_never_bounded_above_the_distance(case, count):
     mesh, landmarks = with_landmarks(case, count)
     matrix = distances_of(case)
@@ -80,6 +81,7 @@ def test_the_rest_is_never_bounded_above_the_distance(case, count):
 
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # inf - inf, in plain Python
 @zoo.each(CASES)
+@pytest.mark.jit
 def test_landmarks_alone_are_bounds_and_tight_behind_the_start(case):
     """Seen from a landmark, what lies straight behind the start is bounded almost exactly."""
     mesh, landmarks = with_landmarks(case, 4)
@@ -96,6 +98,7 @@ def test_landmarks_alone_are_bounds_and_tight_behind_the_start(case):
 
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # inf - inf, in plain Python
 @zoo.each(CASES)
+@pytest.mark.jit
 def test_the_steepest_bound_exceeds_any_other_by_the_way_between(case):
     mesh, landmarks = with_landmarks(case, 4)
     matrix = distances_of(case)

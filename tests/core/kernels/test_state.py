@@ -66,6 +66,7 @@ def test_every_step_on_curved_meshes(name):
 
 
 @pytest.mark.parametrize("name", PLANAR)
+@pytest.mark.jit
 def test_every_step_on_the_plane(name):
     case = CASES[name]
     last = len(case.vertices) - 1
@@ -92,6 +93,7 @@ def test_every_step_from_several_sources(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("limit", [0.0, 0.7, 1.5])
+@pytest.mark.jit
 def test_every_step_within_a_limit(limit):
     watch(CASES["icosahedron"], exact_by_unfolding, [0], [0.0], limit)
     watch(CASES["jittered_grid"], exact_by_euclid, [20], [0.0], 2 * limit)

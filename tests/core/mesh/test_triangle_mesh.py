@@ -84,6 +84,7 @@ def test_warns_of_fans_that_meet():
     assert "first is vertex 0" in mesh.warnings[0]
 
 
+@pytest.mark.jit
 def test_what_a_store_keeps_makes_the_same_mesh():
     ball = gc.samples.sphere(320)
     mesh = gc.TriangleMesh(ball.vertices, ball.faces, merge="exact")

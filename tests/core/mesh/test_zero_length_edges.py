@@ -172,6 +172,7 @@ def test_points_in_needles_are_those_of_the_edge_that_is_left(case):
             )
 
 
+@pytest.mark.jit
 def test_landmarks_lie_at_places_that_can_be_reached():
     both = Needled(zoo.SMALL["crumpled_sphere"], seed=7)
     solver = gc.Solver(both.mesh)
@@ -184,6 +185,7 @@ def test_landmarks_lie_at_places_that_can_be_reached():
 
 @pytest.mark.slice(12)
 @zoo.each(zoo.SMALL)
+@pytest.mark.jit
 def test_tables_and_candidates_by_any_copy(case):
     both = Needled(case, seed=8)
     points = places(both.clean, 7)

@@ -40,6 +40,7 @@ def columns(mesh, landmarks) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["sphere", "crags_with_holes", "two_components", "bow_tie"])
+@pytest.mark.jit
 def test_distances_are_those_of_one_vertex_each(name):
     """Short by the error at most, and never too long but for rounding; infinite elsewhere."""
     mesh, landmarks = landmarks_of(zoo.SMALL[name], 3)
@@ -57,6 +58,7 @@ def test_distances_are_those_of_one_vertex_each(name):
         assert (distances[reached] >= least).all()
 
 
+@pytest.mark.jit
 def test_landmarks_lie_far_apart():
     """The first far from where the search began, each further one far from those before."""
     mesh, landmarks = landmarks_of(zoo.SMALL["hills"], 5, beside=20)
@@ -70,6 +72,7 @@ def test_landmarks_lie_far_apart():
 
 
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # inf - inf, in plain Python
+@pytest.mark.jit
 def test_landmarks_of_several_components():
     """Each lies where it was asked for, and the searches of both components stay right."""
     solver = solver_of(zoo.SMALL["two_components"])
@@ -92,6 +95,7 @@ def test_an_isolated_vertex_may_be_a_landmark():
 
 
 @pytest.mark.parametrize("name", ["square", "crags", "crumpled_torus"])
+@pytest.mark.jit
 def test_neither_landmarks_nor_memory_grow_without_end(name):
     solver = solver_of(zoo.SMALL[name])
     pairs = random_pairs(solver.mesh, 3 if WITHOUT_JIT else 40)
@@ -201,6 +205,7 @@ def test_what_stops_a_landmark_does_not_lose_the_path(stop, monkeypatch):
 
 
 @pytest.mark.parametrize("scale", [1e-49, 1e49])
+@pytest.mark.jit
 def test_paths_where_single_precision_ends(scale):
     vertices, faces = zoo.torus(8, 6)
     small = gc.Solver(gc.TriangleMesh(vertices, faces))

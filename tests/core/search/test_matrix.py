@@ -61,6 +61,7 @@ def test_distances_are_those_of_the_oracle(case):
 
 
 @zoo.each({name: zoo.SMALL[name] for name in ("saddle", "bow_tie", "bow_tie_of_fans", "crags")})
+@pytest.mark.jit
 def test_distances_are_those_of_fields(case):
     mesh = mesh_of(case)
     points = [*random_points(mesh, 5, seed=22), 0, len(mesh.vertices) - 1]
@@ -127,6 +128,7 @@ def check_same(table, other):
         np.testing.assert_array_equal(table, other)
 
 
+@pytest.mark.jit
 def test_a_matrix_of_one_set_of_points_is_symmetric():
     mesh = mesh_of(zoo.SMALL["crags"])
     points = random_points(mesh, 8, seed=25)
@@ -138,6 +140,7 @@ def test_a_matrix_of_one_set_of_points_is_symmetric():
     np.testing.assert_allclose(table, gc.distance_matrix(mesh, points, points[::-1])[:, ::-1], SAME)
 
 
+@pytest.mark.jit
 def test_transposing_permuting_and_leaving_out_commute_with_the_matrix():
     mesh = mesh_of(zoo.SMALL["crumpled_torus"])
     rng = np.random.default_rng(26)

@@ -45,6 +45,7 @@ def test_the_nearest_are_those_of_the_oracle(case):
 
 
 @zoo.each({name: zoo.SMALL[name] for name in ("crags", "crumpled_torus", "two_components")})
+@pytest.mark.jit
 def test_the_nearest_are_those_of_a_field(case):
     mesh = mesh_of(case)
     points = random_points(mesh, 8, seed=32)

@@ -131,6 +131,7 @@ def test_the_limit_is_that_of_the_whole_path():
         assert caught.value.reason == "beyond_max_distance"
 
 
+@pytest.mark.jit
 def test_straight_legs_at_the_very_limit():
     """The rest is bounded by what is as long as the path: rounding must not refuse it."""
     points, faces = zoo.grid(9, 9)

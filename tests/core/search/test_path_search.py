@@ -25,6 +25,7 @@ EXACT = 1e-9
 
 @pytest.mark.slice(5)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
+@pytest.mark.jit
 def test_small_meshes_between_vertices_everywhere(case):
     solver = solver_of(case)
     for source in spread(case, 2 if WITHOUT_JIT else 8):
@@ -252,6 +253,7 @@ def test_ends_that_are_no_vertices(bad):
         solver.shortest_path(0, bad)
 
 
+@pytest.mark.jit
 def test_ends_may_be_surface_points():
     solver = solver_of(zoo.SMALL["crags"])
     point = gc.SurfacePoint.vertex
@@ -274,6 +276,7 @@ def test_a_solver_answers_as_a_new_one_does():
     assert landmark_count(solver) > 2
 
 
+@pytest.mark.jit
 def test_a_solver_has_the_solvers_of_its_mesh():
     solver = solver_of(zoo.SMALL["crags"])
     exact = solver.exact_distance([3, 5], max_distance=2.0)

@@ -72,6 +72,7 @@ def test_without_explain_there_are_no_steps_and_the_same_path():
         assert answer(path)[:-1] == answer(explained)[:-1]
 
 
+@pytest.mark.jit
 def test_steps_come_leg_by_leg():
     solver = solver_of(zoo.SMALL["crags"])
     path = solver.shortest_path(3, 50, [30, 30, 8], explain=True)

@@ -27,6 +27,7 @@ def test_the_length_is_the_sum_of_the_legs(name, waypoints):
         check_search(solver.mesh, find(1, 10, waypoints), 1, 10, total)
 
 
+@pytest.mark.jit
 def test_the_path_is_that_of_its_legs():
     solver = solver_of(zoo.SMALL["crags"])
     stops = [3, 30, 30, 8, 50]
@@ -43,6 +44,7 @@ def test_the_path_is_that_of_its_legs():
     )
 
 
+@pytest.mark.jit
 def test_a_closed_tour():
     solver = solver_of(zoo.SMALL["sphere"])
     path = solver.shortest_path(0, 0, [20, 31])
@@ -56,6 +58,7 @@ def test_standing_still():
     check_search(solver.mesh, solver.shortest_path(7, 7, [7, 7]), 7, 7, 0.0)
 
 
+@pytest.mark.jit
 def test_repeated_stops_add_nothing():
     solver = solver_of(zoo.SMALL["crags"])
     direct = answer(solver.shortest_path(3, 50))
@@ -84,6 +87,7 @@ def test_a_bad_waypoint_is_named(bad):
         solver.shortest_path(0, 1, [3, 4, bad, 5])
 
 
+@pytest.mark.jit
 def test_progress_goes_on_from_leg_to_leg():
     solver = solver_of(zoo.SMALL["crags"])
     seen = []
@@ -95,6 +99,7 @@ def test_progress_goes_on_from_leg_to_leg():
         assert len(inside) >= 2, "each leg tells of its start and of more"
 
 
+@pytest.mark.jit
 def test_legs_share_what_a_solver_keeps():
     """A tour gives its later legs landmarks."""
     solver = solver_of(zoo.SMALL["crags"])

@@ -92,6 +92,7 @@ def test_distances_are_those_of_the_oracle(case, suffix, tmp_path):
     ],
     ids=str,
 )
+@pytest.mark.jit
 def test_each_row_is_that_of_a_field(mesh, suffix, options, tmp_path):
     points = [*range(0, 160, 12), gc.SurfacePoint.face(200, (0.2, 0.3, 0.5))]
     out = tmp_path / f"table{suffix}"
@@ -166,6 +167,7 @@ def test_a_process_that_is_killed_goes_on_where_it_was(suffix, tmp_path):
 
 @pytest.mark.usefixtures("small_blocks")
 @pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.jit
 def test_a_stop_loses_no_block_and_a_damaged_block_is_made_again(
     mesh, suffix, tmp_path, monkeypatch
 ):
@@ -221,6 +223,7 @@ def hold(mesh: gc.TriangleMesh, out: Path, has_begun, may_end) -> None:
     gc.write_matrix(mesh, out, range(9), cancel=cancel)
 
 
+@pytest.mark.jit
 def test_two_processes_do_not_write_one_table(mesh, tmp_path):
     out, context = tmp_path / "table.npy", multiprocessing.get_context("spawn")
     has_begun, may_end = context.Event(), context.Event()
