@@ -85,10 +85,16 @@ async def get_context(
 ContextDep = Annotated[RequestContext, Depends(get_context)]
 
 
-def prefers_async(prefer: str | None) -> bool:
-    """Tell whether the header ``Prefer`` asks for a job instead of an answer."""
+def job_after(prefer: str | None) -> int | None:
+    """Return the seconds after which the header ``Prefer`` asks for a job (RFC 7240).
+
+    None: for an answer, however long it takes.
+    """
     preferences = [part.partition(";")[0].strip().lower() for part in (prefer or "").split(",")]
-    return "respond-async" in preferences
+    if "respond-async" not in preferences:
+        return None
+    waits = (re.fullmatch(r'wait\s*=\s*"?([0-9]{1,9})"?', each) for each in preferences)
+    return next((int(wait[1]) for wait in waits if wait), 0)
 
 
 def require_json(request: Request) -> None:

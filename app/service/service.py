@@ -39,6 +39,7 @@ from app.jobs import Job, JobManager, JobRepository, JobSpec
 from app.queries import KINDS, Estimate, MeshSize, Query, fingerprint, result_key
 from app.service.concurrency import ConcurrencyLimit
 from app.service.maintenance import Damage
+from app.service.progress import LatestProgress, ignore_progress
 from app.service.resources import share_arenas
 from app.service.scrub import scrubbing
 from app.settings import Settings, variable_of
@@ -351,19 +352,80 @@ class Service:
                 )
                 return result
 
-        spec = JobSpec(
+        spec = self._job_spec(query, representation, context, idempotency_key)
+        return await self.jobs.submit(spec, query.written, solve)
+
+    async def answer_or_submit(
+        self,
+        query: Query[Any],
+        size: MeshSize,
+        representation: Representation,
+        context: RequestContext,
+        wait_s: float,
+        idempotency_key: str | None,
+        *,
+        as_file: bool,
+    ) -> tuple[Result, PhaseSeconds] | Job:
+        """Answer a query, by a job if that takes longer than the wait.
+
+        The job goes on with the work that was begun. The caller releases a result to
+        ``results`` once it has been sent.
+        """
+        client = context.caller.name
+        self.engine.refuse_when_full(client)
+        progress = LatestProgress()
+        answering = asyncio.create_task(
+            self._answer(query, size, representation, client, progress, is_promised=True)
+        )
+
+        async def solve(on_progress: ProgressCallback) -> Result:
+            async with self.time_limit(self.settings.job_deadline_s, "job_deadline_s"):
+                progress.follow(on_progress)
+                result, _ = await answering
+                return result
+
+        try:
+            await asyncio.wait({answering}, timeout=min(wait_s, context.deadline_s))
+            if not answering.done():
+                spec = self._job_spec(query, representation, context, idempotency_key)
+                job = await self.jobs.submit(spec, query.written, solve)
+                if job.spec is not spec:  # an earlier one with the same idempotency key
+                    self._abandon(answering)
+                return job
+        except BaseException:
+            self._abandon(answering)
+            raise
+        result, seconds = answering.result()
+        return await self.results.with_files(result) if as_file else result, seconds
+
+    def _abandon(self, answering: "asyncio.Task[tuple[Result, PhaseSeconds]]") -> None:
+        """Stop an answer that nobody will send."""
+        answering.cancel()
+        answering.add_done_callback(self._release)
+
+    def _release(self, answered: "asyncio.Task[tuple[Result, PhaseSeconds]]") -> None:
+        if not answered.cancelled() and answered.exception() is None:
+            self.results.release(answered.result()[0])
+
+    def _job_spec(
+        self,
+        query: Query[Any],
+        representation: Representation,
+        context: RequestContext,
+        idempotency_key: str | None,
+    ) -> JobSpec:
+        return JobSpec(
             owner=context.caller.owner,
             kind=query.kind,
             mesh_id=query.mesh_id,
             media_type=representation.media_type,
             dtype=representation.dtype,
             coding=representation.coding,
-            client=client,
+            client=context.caller.name,
             fingerprint=fingerprint(query, representation),
             idempotency_key=idempotency_key,
             request_id=context.request_id,
         )
-        return await self.jobs.submit(spec, query.written, solve)
 
     async def _solve_again(
         self, spec: JobSpec, written: bytes, on_progress: ProgressCallback
@@ -451,10 +513,6 @@ def _engine(settings: Settings, store: Store) -> Engine:
 
     engine = LocalEngine(settings, settings.folder / layout.RESULTS)
     return engine if store.supply is None else SuppliedEngine(engine, store.supply)
-
-
-def ignore_progress(_share: float) -> None:
-    """Do nothing: the progress callback of calls that nobody watches."""
 
 
 def _database_of(settings: Settings) -> Database:

@@ -12,13 +12,13 @@ from uuid import uuid4
 
 import httpx2
 
-from geodesic_client.answers import to_estimate, to_job
-from geodesic_client.errors import GeodesicClientError, ProblemError
+from geodesic_client.answers import Job, to_job
+from geodesic_client.errors import GeodesicClientError
 
 T = TypeVar("T")
 
-JOB_FROM_S = 0.5
-"""Seconds of expected work from which a query runs as a job"""
+JOB_AFTER_S = 1
+"""Seconds of work after which a query goes on as a job"""
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.05, 2.0
 """Seconds between two looks at a job, which grow from the first to the longest"""
 
@@ -66,31 +66,19 @@ def send(request: Request) -> Flow[httpx2.Response]:
     return response
 
 
-def estimate(request: Request) -> Flow[float]:
-    """Return the seconds that the answer to a query will take."""
-    response = yield from send(replace(request, params={**request.params, "estimate": "true"}))
-    return to_estimate(response).seconds
-
-
 def answer(query: Query[T], progress: Progress) -> Flow[T]:
-    """Return the answer to a query: at once, or as a job where it takes long."""
-    if (yield from estimate(query.request)) < JOB_FROM_S:
-        try:
-            response = yield from send(query.request)
-        except ProblemError as error:
-            if error.code != "deadline_exceeded":  # it took longer than expected
-                raise
-        else:
-            progress(1.0)
-            return query.decode(response)
-    return query.decode((yield from as_job(query.request, progress)))
+    """Return the answer to a query, which becomes a job of the service if it takes long."""
+    prefer = f"respond-async, wait={JOB_AFTER_S}"
+    headers = {**query.request.headers, "Prefer": prefer, "Idempotency-Key": uuid4().hex}
+    response = yield from send(replace(query.request, headers=headers))
+    if response.status_code == httpx2.codes.ACCEPTED:
+        response = yield from result_of(to_job(response.json()), progress)
+    progress(1.0)
+    return query.decode(response)
 
 
-def as_job(request: Request, progress: Progress) -> Flow[httpx2.Response]:
-    """Run a query as a job, and return its response. Whatever ends the wait early, ends the job."""
-    headers = {"Prefer": "respond-async", "Idempotency-Key": uuid4().hex}
-    submitted = yield from send(replace(request, headers={**request.headers, **headers}))
-    job = to_job(submitted.json())
+def result_of(job: Job, progress: Progress) -> Flow[httpx2.Response]:
+    """Wait for a job, and return its result. Whatever ends the wait early, ends the job."""
     link = f"/v1/jobs/{job.id}"
     pause = FIRST_PAUSE_S
     try:
@@ -105,6 +93,4 @@ def as_job(request: Request, progress: Progress) -> Flow[httpx2.Response]:
         with suppress(GeodesicClientError):
             yield from send(Request("DELETE", link))
         raise
-    response = yield from send(Request("GET", f"{link}/results"))
-    progress(1.0)
-    return response
+    return (yield from send(Request("GET", f"{link}/results")))

@@ -2147,7 +2147,7 @@ export interface operations {
             header?: {
                 /** @description Milliseconds that the client waits at most */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer at once with a job, RFC 7240 */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
                 prefer?: string;
                 /** @description Freely chosen name of a job: a request sent again with it gets the same job */
                 "idempotency-key"?: string;
@@ -2417,7 +2417,7 @@ export interface operations {
             header?: {
                 /** @description Milliseconds that the client waits at most */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer at once with a job, RFC 7240 */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
                 prefer?: string;
                 /** @description Freely chosen name of a job: a request sent again with it gets the same job */
                 "idempotency-key"?: string;
@@ -2664,7 +2664,7 @@ export interface operations {
             header?: {
                 /** @description Milliseconds that the client waits at most */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer at once with a job, RFC 7240 */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
                 prefer?: string;
                 /** @description Freely chosen name of a job: a request sent again with it gets the same job */
                 "idempotency-key"?: string;
@@ -2920,7 +2920,7 @@ export interface operations {
             header?: {
                 /** @description Milliseconds that the client waits at most */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer at once with a job, RFC 7240 */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
                 prefer?: string;
                 /** @description Freely chosen name of a job: a request sent again with it gets the same job */
                 "idempotency-key"?: string;
@@ -3170,7 +3170,7 @@ export interface operations {
             header?: {
                 /** @description Milliseconds that the client waits at most */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer at once with a job, RFC 7240 */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
                 prefer?: string;
                 /** @description Freely chosen name of a job: a request sent again with it gets the same job */
                 "idempotency-key"?: string;
@@ -3420,7 +3420,7 @@ export interface operations {
             header?: {
                 /** @description Milliseconds that the client waits at most */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer at once with a job, RFC 7240 */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
                 prefer?: string;
                 /** @description Freely chosen name of a job: a request sent again with it gets the same job */
                 "idempotency-key"?: string;
@@ -3672,7 +3672,7 @@ export interface operations {
             header?: {
                 /** @description Milliseconds that the client waits at most */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer at once with a job, RFC 7240 */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
                 prefer?: string;
                 /** @description Freely chosen name of a job: a request sent again with it gets the same job */
                 "idempotency-key"?: string;
@@ -3918,7 +3918,7 @@ export interface operations {
             header?: {
                 /** @description Milliseconds that the client waits at most */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer at once with a job, RFC 7240 */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
                 prefer?: string;
                 /** @description Freely chosen name of a job: a request sent again with it gets the same job */
                 "idempotency-key"?: string;

@@ -173,7 +173,7 @@ def test_a_refusal_names_the_element(service: Client, apart: Mesh) -> None:
 def test_jobs(
     service: Client, mesh: Mesh, same: gc.TriangleMesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(flow, "JOB_FROM_S", 0.0)
+    monkeypatch.setattr(flow, "JOB_AFTER_S", 0)
     shares: list[float] = []
     found = service.distances(mesh, [11], progress=shares.append)
     np.testing.assert_array_equal(found.distances, gc.exact_distance(same, 11).distances)

@@ -7,16 +7,11 @@ from collections.abc import Callable
 import httpx2
 import pytest
 from geodesic_client import AsyncClient, Client, ProblemError, UnreachableError
-from geodesic_client.flow import JOB_FROM_S
+from geodesic_client.flow import JOB_AFTER_S
 
 JOB = {"id": "7", "kind": "nearest", "mesh_id": "m", "status": "running", "progress": 0.5}
 ANSWER = {"nearest": [{"candidate": 1, "distance": 2.5}]}
 Reply = Callable[[httpx2.Request], httpx2.Response]
-
-
-def estimated(seconds: float) -> httpx2.Response:
-    document = {"seconds": seconds, "memory_bytes": 1, "response_bytes": 1}
-    return httpx2.Response(200, json=document)
 
 
 def problem(status: int, code: str, **headers: str) -> httpx2.Response:
@@ -74,30 +69,30 @@ def pauses(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return made
 
 
-def test_what_takes_little_is_one_request_after_its_estimate() -> None:
-    service = Service(estimated(JOB_FROM_S / 2), httpx2.Response(200, json=ANSWER))
+def test_what_takes_little_is_one_request() -> None:
+    service = Service(httpx2.Response(200, json=ANSWER))
     shares: list[float] = []
     (found,) = service.client().nearest("m", 0, [1, 2], progress=shares.append)
     assert shares == [1.0]
     assert (found.candidate, found.distance) == (1, 2.5)
-    assert [dict(each.url.params) for each in service.requests] == [{"estimate": "true"}, {}]
-    assert json.loads(service.requests[1].content)["candidates"] == [1, 2]
+    (request,) = service.requests
+    assert request.headers["prefer"] == f"respond-async, wait={JOB_AFTER_S}"
+    assert json.loads(request.content)["candidates"] == [1, 2]
 
 
 def long_replies() -> list[httpx2.Response | Exception]:
     half = httpx2.Response(202, json=JOB)
     done = httpx2.Response(200, json=JOB | {"status": "successful", "progress": 1.0})
-    return [estimated(JOB_FROM_S), half, done, httpx2.Response(200, json=ANSWER)]
+    return [half, done, httpx2.Response(200, json=ANSWER)]
 
 
 def check_long(service: Service, progress: list[float], pauses: list[float]) -> None:
-    assert service.sent[1:] == [
+    assert service.sent == [
         "POST /v1/meshes/m/nearest",
         "GET /v1/jobs/7",
         "GET /v1/jobs/7/results",
     ]
-    assert service.requests[1].headers["prefer"] == "respond-async"
-    assert service.requests[1].headers["idempotency-key"]
+    assert service.requests[0].headers["idempotency-key"]
     assert progress == [0.5, 1.0]
     assert len(pauses) == 1
 
@@ -115,24 +110,18 @@ def test_coroutines_have_the_same_conversation(pauses: list[float]) -> None:
     check_long(service, progress, pauses)
 
 
-def test_what_takes_longer_than_expected_runs_as_a_job_after_all() -> None:
-    late = problem(504, "deadline_exceeded")
-    service = Service(estimated(0.1), late, *long_replies()[1:])
-    assert service.client().nearest("m", 0, [1])[0].candidate == 1
-
-
 def test_a_callback_that_raises_stops_the_job() -> None:
     def stop(_share: float) -> None:
         raise KeyboardInterrupt
 
-    service = Service(*long_replies()[:2], httpx2.Response(200, json=JOB))
+    service = Service(*long_replies()[:1], httpx2.Response(200, json=JOB))
     with pytest.raises(KeyboardInterrupt):
         service.client().nearest("m", 0, [1], progress=stop)
     assert service.sent[-1] == "DELETE /v1/jobs/7"
 
 
 def test_a_cancelled_task_stops_its_job(monkeypatch: pytest.MonkeyPatch) -> None:
-    service = Service(*long_replies()[:2], httpx2.Response(200, json=JOB))
+    service = Service(*long_replies()[:1], httpx2.Response(200, json=JOB))
 
     async def cancel_while_it_waits() -> None:
         waiting = asyncio.Event()

@@ -236,6 +236,68 @@ def test_one_key_is_one_job(one: ServiceClient, small: str) -> None:
 
 
 @pytest.mark.usefixtures("held_workers")
+def waiting(seconds: Any) -> dict[str, str]:
+    """Return the header of a client that prefers a job to a longer wait."""
+    return {"Prefer": f"respond-async, wait={seconds}"}
+
+
+def test_an_answer_that_is_there_within_the_wait_is_no_job(one: ServiceClient, small: str) -> None:
+    link = f"/v1/meshes/{small}/path?from=v17&to=v40"
+    before = one.get("/v1/jobs").json()
+    answer = one.get(link, headers=waiting(600))
+    part = one.get(link, headers=waiting(600) | {"Range": "bytes=0-99"})
+    known = one.get(link, headers=waiting(600) | {"If-None-Match": answer.headers["etag"]})
+    wrong = one.get(f"{link}00000", headers=waiting(600))
+
+    assert answer.status_code == 200
+    assert answer.content == one.get(link).content
+    assert (part.status_code, part.content) == (206, answer.content[:100])
+    assert known.status_code == 304
+    check_problem(wrong, 422, "invalid_point")
+    assert one.get("/v1/jobs").json() == before
+
+
+def test_what_takes_longer_than_the_wait_goes_on_as_a_job(one: ServiceClient, small: str) -> None:
+    solves = one.app.state.service.solves
+    before = solves["distances"]
+    with stopped(one.workers()):
+        response = submit(one, small, waiting(1))
+        assert response.headers["preference-applied"] == "respond-async"
+
+    job = wait_for(one, job_of(response), "successful")
+
+    assert one.get(job["links"]["results"]).status_code == 200
+    assert solves["distances"] == before + 1
+
+
+def test_a_job_that_began_as_a_wait_is_stopped_like_any_other(
+    one: ServiceClient, small: str
+) -> None:
+    engine = one.app.state.service.engine
+    before = engine.load.cancelled
+    with stopped(one.workers()):
+        job = job_of(submit(one, small, waiting(1)))
+        assert one.delete(job).json()["status"] == "dismissed"
+    wait_until(lambda: engine.load.cancelled == before + 1)
+
+
+@pytest.mark.usefixtures("held_workers")
+def test_a_key_stands_for_the_job_that_has_it_after_a_wait_too(
+    one: ServiceClient, small: str
+) -> None:
+    key, body = {"Idempotency-Key": "waits"}, {"sources": [{"vertex": 1, "start_distance": 0.3}]}
+    first, again = (submit(one, small, waiting(wait) | key, **body) for wait in (0, 1))
+    assert job_of(first) == job_of(again)
+
+
+@pytest.mark.usefixtures("held_workers")
+@pytest.mark.parametrize("seconds", ["", "x", "-1", "1.5", "9" * 30])
+def test_a_wait_that_is_no_number_of_seconds_is_ignored(
+    one: ServiceClient, small: str, seconds: str
+) -> None:
+    assert submit(one, small, waiting(seconds)).status_code == 202
+
+
 def test_the_key_of_a_dismissed_job_can_be_sent_again(one: ServiceClient, small: str) -> None:
     body = {"sources": [{"vertex": 3}]}
     job = job_of(submit(one, small, {"Idempotency-Key": "k3"}, **body))

@@ -4,7 +4,7 @@ Large bodies are read and checked in a thread, so that the event loop goes on. O
 40 000 points would take a tenth of a second.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from functools import partial
 from time import sleep, thread_time
@@ -19,9 +19,9 @@ from app.errors import over_limit, problem
 from app.http.dependencies import (
     TimeoutHeader,
     context_of,
+    job_after,
     negotiated,
     note_work,
-    prefers_async,
     service_of,
     while_connected,
 )
@@ -35,10 +35,12 @@ from app.http.responses import (
     not_modified,
     result_response,
 )
+from app.jobs import Job
 from app.queries import Query, result_key
 from app.schemas.requests import AnswerParameters
-from app.service.service import RequestContext
+from app.service.service import PhaseSeconds, RequestContext
 from app.settings import Settings
+from app.store.results import Result
 
 LARGE = 2**16
 """Bytes of a body that is worth a thread: it takes some milliseconds."""
@@ -94,7 +96,8 @@ class QueryRequest:
     mesh_id: str
     request: Request
     context: RequestContext
-    is_async: bool
+    job_after_s: int | None
+    """Seconds of waiting from which the client prefers a job; None: never"""
     idempotency_key: str | None
 
     async def answer(
@@ -118,8 +121,8 @@ class QueryRequest:
             estimate, seconds = await while_connected(request, estimating)
             note_work(request, self.mesh_id, seconds)
             return estimate_response(self.mesh_id, estimate, media_type, seconds)
-        if self.is_async:
-            key = self.idempotency_key
+        wait_s, key = self.job_after_s, self.idempotency_key
+        if wait_s == 0:
             return accepted_response(
                 await service.submit(query, size, representation, context, key)
             )
@@ -131,8 +134,17 @@ class QueryRequest:
             if unchanged is not None:
                 return unchanged
         as_file = "range" in request.headers
-        answering = service.answer(query, size, representation, context, as_file=as_file)
-        result, seconds = await while_connected(request, answering)
+        answering: Coroutine[Any, Any, tuple[Result, PhaseSeconds] | Job]
+        if wait_s is None:
+            answering = service.answer(query, size, representation, context, as_file=as_file)
+        else:
+            answering = service.answer_or_submit(
+                query, size, representation, context, wait_s, key, as_file=as_file
+            )
+        answer = await while_connected(request, answering)
+        if isinstance(answer, Job):
+            return accepted_response(answer)
+        result, seconds = answer
         note_work(request, self.mesh_id, seconds)
         return result_response(request, result, seconds, media_type, service.results, headers)
 
@@ -141,7 +153,11 @@ class QueryHeaders(TimeoutHeader):
     """The headers of a request for a query."""
 
     prefer: str | None = Field(
-        default=None, description="`respond-async`: answer at once with a job, RFC 7240"
+        default=None,
+        description=(
+            "`respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only "
+            "if the answer is not there after two seconds"
+        ),
     )
     idempotency_key: str | None = Field(
         default=None,
@@ -156,8 +172,8 @@ async def get_query_request(
     mesh_id: str, request: Request, headers: Annotated[QueryHeaders, Header()]
 ) -> QueryRequest:
     """Return the request for a query, as a dependency."""
-    context, is_async = context_of(request, headers), prefers_async(headers.prefer)
-    return QueryRequest(mesh_id, request, context, is_async, headers.idempotency_key)
+    context, job_after_s = context_of(request, headers), job_after(headers.prefer)
+    return QueryRequest(mesh_id, request, context, job_after_s, headers.idempotency_key)
 
 
 QueryRequestDep = Annotated[QueryRequest, Depends(get_query_request)]

@@ -7,7 +7,7 @@ import pytest
 
 from app.engine.interface import ProgressCallback
 from app.engine.single_flight import SingleFlight
-from app.service.service import ignore_progress
+from app.service.progress import ignore_progress
 
 
 class Work:
