@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import geodesic_core as gc
 from geodesic_core import kernels, tolerances
 from tests.support.paths import ROOT
 from tests.support.syntax import syntax_tree
@@ -124,3 +125,18 @@ def test_the_examples_of_documents_run(name: str) -> None:
     )
     assert results.attempted >= 4
     assert results.failed == 0
+
+
+@pytest.mark.jit
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["README.md", "docs/library.md"])
+def test_python_in_documents_runs(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / name).read_text(), re.DOTALL)
+    monkeypatch.chdir(tmp_path)
+    gc.samples.knot(100_000).to_trimesh().export(tmp_path / "knot.ply")
+    for block in blocks:
+        exec(block, {})  # noqa: S102 - our own documents
+
+    assert len(capsys.readouterr().out.splitlines()) >= len(blocks) > 0
