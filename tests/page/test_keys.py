@@ -106,14 +106,14 @@ def test_progress_is_read_with_the_key(view: View, knot: str) -> None:
     streams: list[Request] = []
     answers: list[Route] = []
 
-    def expect_a_minute(estimate: Route) -> None:
-        estimate.fulfill(json=estimate.fetch().json() | {"seconds": 60})
+    def ask_for_a_job(query: Route) -> None:
+        query.continue_(headers=query.request.headers | {"prefer": "respond-async"})
 
     def hold(answer: Route) -> None:
         answers.append(answer)
 
     view.page.on("request", lambda each: streams.append(each) if "/events" in each.url else None)
-    view.page.route("**/distances?estimate=true", expect_a_minute)  # so that it runs as a job
+    view.page.route("**/distances", ask_for_a_job)
     view.page.route("**/results", hold)  # so that progress stays to be seen
     view.page.goto(f"/?mesh={knot}&source=v0&{PLAIN}")
     view.wait("error")

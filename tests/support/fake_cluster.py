@@ -71,7 +71,7 @@ class SleepingEngine:
 
 
 class FakeCluster:
-    """See ``Cluster``. A dead host fails each call; one that is cut off never answers."""
+    """See ``Cluster``. A dead host fails each call; messages to one that is cut off wait."""
 
     def __init__(self, *names: str) -> None:
         self.engines = {name: SleepingEngine() for name in names}
@@ -115,7 +115,7 @@ class FakeCluster:
             await asyncio.sleep(self.slow_tasks)
             return await self.machines[host].run(ticket, task)
 
-        return await self._reach(host, run())
+        return await self._reach(host, run)
 
     async def stop(self, host: str, ticket: str) -> None:
         self.stops.append(ticket)
@@ -126,7 +126,7 @@ class FakeCluster:
         async def stop() -> None:
             self.machines[host].stop(ticket)
 
-        await self._reach(host, stop())
+        await self._reach(host, stop)
 
     async def beat(self, host: str, tickets: Sequence[str]) -> bytes:
         async def beat() -> bytes:
@@ -135,23 +135,26 @@ class FakeCluster:
                 return data
             return encode(replace(decode(data, HostReport), code=self.code))
 
-        return await self._reach(host, beat())
+        return await self._reach(host, beat)
 
-    async def _reach(self, host: str, call: Awaitable[T]) -> T:
-        """Do a call in a task of its own, which goes on at the host if the caller is cancelled."""
-        calling = asyncio.ensure_future(call)
-        if host not in self.cut_off | self.dead:
-            dying = asyncio.ensure_future(self._until_dead(host))
-            await asyncio.wait({calling, dying}, return_when=asyncio.FIRST_COMPLETED)
-            dying.cancel()
-        else:
-            calling.cancel()
+    async def _reach(self, host: str, call: Callable[[], Awaitable[T]]) -> T:
+        """Have a host do a call, which goes on there if the caller is cancelled."""
+        await self._until_connected(host)
+        calling = asyncio.ensure_future(call())
+        dying = asyncio.ensure_future(self._until_dead(host))
+        await asyncio.wait({calling, dying}, return_when=asyncio.FIRST_COMPLETED)
+        dying.cancel()
         if host in self.dead:
             calling.cancel()
-            raise HostLostError
-        if host in self.cut_off:
-            await asyncio.sleep(3600)
+        await self._until_connected(host)
         return await asyncio.shield(calling)
+
+    async def _until_connected(self, host: str) -> None:
+        """Wait while a host is cut off: messages are late then, as in TCP, not lost."""
+        while host in self.cut_off and host not in self.dead:
+            await asyncio.sleep(0.1)
+        if host in self.dead:
+            raise HostLostError
 
     async def _until_dead(self, host: str) -> None:
         while host not in self.dead:

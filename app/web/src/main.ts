@@ -2,6 +2,7 @@
 import { getMesh, makeSample } from "./api/meshes";
 import { getAbout } from "./api/queries";
 import { Fields } from "./ask/fields";
+import { Isolines } from "./ask/isolines";
 import { Routes } from "./ask/routes";
 import { byId } from "./dom";
 import { dismissHint, isDark, setUpAppearance, showHint } from "./panel/appearance";
@@ -25,6 +26,7 @@ const sceneView = new SceneView(stage);
 const status = new Status(() => stage.drawn());
 const store = new Store();
 const fields = new Fields(status, sceneView);
+const isolines = new Isolines(status, sceneView, fields);
 const routes = new Routes(status, sceneView);
 const meshes = new Meshes(store, status);
 const controls = new Controls(store, status, sceneView);
@@ -36,6 +38,7 @@ exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
 exportPanel.nearest = () => routes.source;
 controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
 stage.onMove = (view) => store.update({ view, up: sceneView.mesh?.frame.up ?? null });
+fields.onPaint = (state) => isolines.follow(state);
 setUpAppearance(() => void showWires(store.state));
 
 controls.show(store.state);
@@ -49,7 +52,7 @@ store.listen((state, before) => {
   exportPanel.show(state);
   fields.follow(state);
   routes.follow(state);
-  if (state.lines !== before.lines) fields.setIsolines(state);
+  if (state.lines !== before.lines) isolines.follow(state);
   if (state.wireframe !== before.wireframe) void showWires(state);
   if (state.sources.length > 0 && !pointer.follows) dismissHint();
   if (sceneView.mesh) sceneView.showPoints(state);
@@ -69,6 +72,7 @@ function open(mesh: string): void {
   meshes.showChosen();
   byId("welcome").hidden = true;
   sceneView.close();
+  isolines.forget();
   showReport(null, sceneView);
   const stop = new AbortController();
   opening = stop;
@@ -134,6 +138,7 @@ function begin(): void {
 /** Show a sample that is coloured already; until the first click its path follows the pointer. */
 async function showExample(): Promise<void> {
   const { id } = await makeSample("knot", 30_000);
+  await meshes.list();
   if (store.state.mesh !== null) return; // another was chosen meanwhile
   pointer.follows = true;
   store.update({ mesh: id, sources: [{ vertex: 0 }], target: { vertex: 9000 } });

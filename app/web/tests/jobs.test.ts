@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
 import { events } from "../src/api/events";
-import { answerOfJob } from "../src/api/jobs";
+import { answerOf } from "../src/api/jobs";
 import { ProblemError } from "../src/api/problemError";
 import { Random } from "./support/random";
 import { fakeService, inParts, json, type Sent } from "./support/service";
@@ -68,7 +68,7 @@ describe("a job", () => {
 
   function ask(stop = new AbortController()) {
     const onProgress = vi.fn();
-    const answer = answerOfJob("/v1/x", { a: 1 }, "text/csv", onProgress, stop.signal);
+    const answer = answerOf("/v1/x", { a: 1 }, "text/csv", onProgress, stop.signal);
     answer.catch(() => undefined); // looked at later
     return { answer, onProgress };
   }
@@ -89,7 +89,7 @@ describe("a job", () => {
     ]);
     const [start, watch] = requests;
     expect(start?.body).toEqual({ a: 1 });
-    expect(start?.headers.get("Prefer")).toBe("respond-async");
+    expect(start?.headers.get("Prefer")).toBe("respond-async, wait=1");
     expect(start?.headers.get("Accept")).toBe("text/csv");
     expect(watch?.headers.get("Accept")).toBe("text/event-stream");
     expect(watch?.headers.has("Last-Event-ID")).toBe(false);

@@ -1,7 +1,15 @@
 import { describe, expect, test, vi } from "vitest";
 import type { Question, RouteQuestion } from "../src/api/queries";
-import { askDistances, askRoute, askTerritories, locate, pointOf } from "../src/api/queries";
+import {
+  askDistances,
+  askIsolines,
+  askRoute,
+  askTerritories,
+  locate,
+  pointOf,
+} from "../src/api/queries";
 import { questionOf } from "../src/ask/fields";
+import { isolinesOf } from "../src/ask/isolines";
 import { INITIAL, type State } from "../src/state/state";
 import { npyOf } from "./support/npy";
 import { fakeService, inParts, json } from "./support/service";
@@ -21,10 +29,43 @@ function distances(values: number[], timing = "queue;dur=0.1, compute;dur=12.5")
   return new Response(body, { headers });
 }
 
+describe("isolines", () => {
+  const state: State = { ...INITIAL, mesh: "m", sources: [{ vertex: 0 }] };
+
+  test("are asked for by number or by distance, up to the largest one", () => {
+    expect(isolinesOf(state, { count: 7 }, 3)).toMatchObject({ count: 7, method: "exact" });
+    expect(isolinesOf(state, { spacing: 0.5 }, 1.75)).toMatchObject({ levels: [0.5, 1, 1.5] });
+    expect(isolinesOf(state, { spacing: 2 }, 1.75)).toMatchObject({ levels: [] });
+  });
+
+  test("of a fast field are approximate", () => {
+    const question = isolinesOf({ ...state, method: "fast" }, { count: 7 }, 3);
+    expect(question).toMatchObject({ method: "approximate", relative_error: state.error });
+    expect(question).not.toHaveProperty("effort");
+  });
+
+  test("are all lines of all levels", async () => {
+    const [first, second, third] = [[[0, 0, 0]], [[1, 1, 1]], [[2, 2, 2]]];
+    const requests = fakeService({
+      "POST /v1/meshes/m/isolines": () =>
+        json({
+          isolines: [
+            { level: 1, lines: [{ points: first }, { points: second }] },
+            { level: 2, lines: [] },
+            { level: 3, lines: [{ points: third }] },
+          ],
+        }),
+    });
+    const question = { ...QUESTION, count: 3 };
+    const lines = await askIsolines("m", question, () => undefined, signal);
+    expect(lines).toEqual([first, second, third]);
+    expect(requests[0]?.body).toEqual(question);
+  });
+});
+
 describe("distances", () => {
   test("of a short query are asked for at once", async () => {
     const requests = fakeService({
-      "POST /v1/meshes/m/distances?estimate=true": () => json({ seconds: 0.5 }),
       "POST /v1/meshes/m/distances": () => distances([0, 2, Infinity, 1]),
     });
     const onProgress = vi.fn();
@@ -37,12 +78,9 @@ describe("distances", () => {
       unreachable: UNREACHABLE,
       seconds: 0.0125,
     });
-    expect(requests).toHaveLength(2);
-    for (const { body, headers } of requests) {
-      expect(body).toEqual(QUESTION);
-      expect(headers.get("Accept")).toBe("application/x-npy");
-      expect(headers.has("Prefer")).toBe(false);
-    }
+    expect(requests).toHaveLength(1);
+    expect(requests[0]?.body).toEqual(QUESTION);
+    expect(requests[0]?.headers.get("Accept")).toBe("application/x-npy");
     expect(onProgress).not.toHaveBeenCalled();
   });
 
@@ -55,7 +93,6 @@ describe("distances", () => {
     const event = (id: number, status: string, progress: number) =>
       `id: ${id}\ndata: ${JSON.stringify({ status, progress, links })}\n\n`;
     const requests = fakeService({
-      "POST /v1/meshes/m/distances?estimate=true": () => json({ seconds: 0.51 }),
       "POST /v1/meshes/m/distances": () => json({ status: "accepted", links }, 202),
       "GET /v1/jobs/j/events": () =>
         inParts([event(1, "running", 0.25) + event(2, "running", 0.5), event(3, "successful", 1)]),
@@ -66,27 +103,17 @@ describe("distances", () => {
 
     expect(field.largest).toBe(3);
     expect(onProgress.mock.calls).toEqual([[0.25], [0.5], [1]]);
-    expect(requests[1]?.headers.get("Prefer")).toBe("respond-async");
-    expect(requests.map(({ method }) => method)).toEqual(["POST", "POST", "GET", "GET"]);
+    expect(requests.map(({ method }) => method)).toEqual(["POST", "GET", "GET"]);
   });
 
   test("from the cache took no time of computing", async () => {
     fakeService({
-      "POST /v1/meshes/m/distances?estimate=true": () => json({ seconds: 0 }),
       "POST /v1/meshes/m/distances": () => distances([0, Infinity], "kept"),
     });
     const field = await askDistances("m", QUESTION, () => undefined, signal);
 
     expect(field.seconds).toBeNull();
     expect(field.largest).toBe(0);
-  });
-
-  test("an estimate that is refused is not followed by the query", async () => {
-    const problem = { detail: "No mesh.", code: "mesh_not_found", status: 404, request_id: "r" };
-    const requests = fakeService({ "POST /v1": () => json(problem, 404) });
-
-    await expect(askDistances("m", QUESTION, () => undefined, signal)).rejects.toThrow("No mesh.");
-    expect(requests).toHaveLength(1);
   });
 
   test("territories have -1 where no source is near", async () => {

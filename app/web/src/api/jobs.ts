@@ -1,20 +1,24 @@
-// Long queries run as jobs: started, watched to their end, and dismissed when the caller aborts.
+// Queries whose answer takes long: they become jobs, which are watched to their end.
 import { events } from "./events";
 import { call, isAbort, post } from "./http";
 import type { Job } from "./types";
 
+const ACCEPTED = 202;
+const JOB_AFTER_S = 1;
 const RETRY_MS = 1000;
 
-/** Run a query as a job, and return its answer. */
-export async function answerOfJob(
+/** Return the answer to a query; where it takes long, report progress. An abort stops the work. */
+export async function answerOf(
   path: string,
   body: unknown,
   accept: string,
   onProgress: (share: number) => void,
   signal: AbortSignal,
 ): Promise<Response> {
-  const headers = { Accept: accept, Prefer: "respond-async" };
-  const job = (await (await post(path, body, headers)).json()) as Job;
+  const headers = { Accept: accept, Prefer: `respond-async, wait=${JOB_AFTER_S}` };
+  const response = await post(path, body, headers, signal);
+  if (response.status !== ACCEPTED) return response;
+  const job = (await response.json()) as Job;
   const links = job.links as { self: string; results: string; events: string };
   const dismiss = (): void => void call(links.self, { method: "DELETE" }).catch(() => undefined);
   if (signal.aborted) dismiss();

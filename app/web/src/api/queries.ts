@@ -1,13 +1,13 @@
 // Queries of the page: distances, territories, paths, points.
 import { getJson, post } from "./http";
-import { answerOfJob } from "./jobs";
+import { answerOf } from "./jobs";
 import { parseNpy } from "./npy";
 import type {
   About,
   DistancesAnswer,
   DistancesRequest,
   ErrorBound,
-  Estimate,
+  IsolinesAnswer,
   LocateAnswer,
   Outline,
   Point,
@@ -15,9 +15,8 @@ import type {
   Unreachable,
 } from "./types";
 
+const JSON_TYPE = "application/json";
 const NPY = "application/x-npy";
-/** Queries expected to take longer run as jobs, which report progress. */
-const JOB_FROM_S = 0.5;
 
 export type Question = Partial<DistancesRequest> & Pick<DistancesRequest, "sources">;
 
@@ -38,12 +37,7 @@ export async function askDistances(
   signal: AbortSignal,
 ): Promise<Field> {
   const path = `/v1/meshes/${mesh}/distances`;
-  const estimated = await post(`${path}?estimate=true`, question, { Accept: NPY }, signal);
-  const { seconds } = (await estimated.json()) as Estimate;
-  const response =
-    seconds > JOB_FROM_S
-      ? await answerOfJob(path, question, NPY, onProgress, signal)
-      : await post(path, question, { Accept: NPY }, signal);
+  const response = await answerOf(path, question, NPY, onProgress, signal);
   const distances = parseNpy(await response.arrayBuffer()).data as Float64Array;
   return {
     distances,
@@ -64,6 +58,21 @@ export async function askTerritories(
   const response = await post(`/v1/meshes/${mesh}/distances`, body, {}, signal);
   const { nearest_source } = (await response.json()) as DistancesAnswer;
   return Int32Array.from(nearest_source ?? [], (source) => source ?? -1);
+}
+
+export type IsolinesQuestion = Question & ({ levels: number[] } | { count: number });
+
+/** Return the polylines of the isolines at some levels. */
+export async function askIsolines(
+  mesh: string,
+  question: IsolinesQuestion,
+  onProgress: (share: number) => void,
+  signal: AbortSignal,
+): Promise<[number, number, number][][]> {
+  const path = `/v1/meshes/${mesh}/isolines`;
+  const response = await answerOf(path, question, JSON_TYPE, onProgress, signal);
+  const { isolines } = (await response.json()) as IsolinesAnswer;
+  return isolines.flatMap(({ lines }) => lines.map(({ points }) => points));
 }
 
 export interface RouteQuestion {

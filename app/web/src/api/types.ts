@@ -5,7 +5,7 @@ type Schemas = components["schemas"];
 
 export type About = Schemas["About"];
 export type ErrorBound = Schemas["ErrorBound"];
-export type Estimate = Schemas["Estimate"];
+export type IsolinesAnswer = Schemas["IsolinesAnswer"];
 export type Job = Schemas["JobDocument"];
 export type LocateAnswer = Schemas["LocateAnswer"];
 export type MeshDocument = Schemas["MeshDocument"];

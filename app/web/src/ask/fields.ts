@@ -23,6 +23,8 @@ interface Answers {
 }
 
 export class Fields {
+  /** Called when the colours have changed. */
+  onPaint: (state: State) => void = () => undefined;
   private answers: Answers = { key: "" };
   private requested = "";
   private stop = new AbortController();
@@ -100,7 +102,8 @@ export class Fields {
       surface.setValues(null, 1);
       hideLegend();
     }
-    this.setIsolines(state);
+    this.onPaint(state);
+    this.sceneView.stage.invalidate();
   }
 
   private paintField(surface: Surface, field: Field, state: State): void {
@@ -120,15 +123,6 @@ export class Fields {
       surface.setTerritories(nearest);
       showTerritories(sources.map(writePoint));
     } else showScale("Distance in mesh units", field.largest);
-  }
-
-  /** Draw the isolines that ``state`` asks for. */
-  setIsolines(state: State): void {
-    const field = this.of(state);
-    const { surface, stage } = this.sceneView;
-    const isDrawn = field !== null && state.shade !== "difference";
-    surface?.setIsolines(isDrawn ? spacingOf(state, field.largest) : 0);
-    stage.invalidate();
   }
 
   /** Show time and error of all methods side by side. */
@@ -156,12 +150,6 @@ export function questionOf(state: State, method: Method): Question {
     ...(state.maxDistance === null ? {} : { max_distance: state.maxDistance }),
     ...(state.barriers.length > 0 ? { barriers: state.barriers } : {}),
   };
-}
-
-/** Return the distance between isolines, by the rule that the service has for its levels. */
-function spacingOf({ lines }: State, largest: number): number {
-  if (lines === null) return 0;
-  return "count" in lines ? largest / (lines.count + 1) : lines.spacing;
 }
 
 /** Return the method that is compared with the exact one. */

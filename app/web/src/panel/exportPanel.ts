@@ -2,6 +2,7 @@
 import { authorization, post } from "../api/http";
 import type { About, Point } from "../api/types";
 import { questionOf } from "../ask/fields";
+import { isolinesOf } from "../ask/isolines";
 import { button, byId } from "../dom";
 import { writeState } from "../state/permalink";
 import type { State, Store } from "../state/state";
@@ -94,10 +95,7 @@ export class ExportPanel {
     const { target, waypoints, barriers, lines } = state;
     if (what === "path") return { source: this.source(), target, waypoints, barriers };
     if (what === "distances" || lines === null) return questionOf(state, state.method);
-    return {
-      ...questionOf(state, state.method === "fast" ? "exact" : state.method), // it draws no lines
-      ...("count" in lines ? { count: lines.count } : { levels: this.levels(lines.spacing) }),
-    };
+    return isolinesOf(state, lines, this.largest());
   }
 
   /** Return the largest distance that is drawn. */
@@ -110,13 +108,6 @@ export class ExportPanel {
     const source = this.nearest() ?? this.store.state.sources[0];
     if (!source) throw new Error("There is no source yet.");
     return source;
-  }
-
-  private levels(spacing: number): number[] {
-    return Array.from(
-      { length: Math.floor(this.largest() / spacing) },
-      (_, i) => (i + 1) * spacing,
-    );
   }
 
   private savePicture(): void {

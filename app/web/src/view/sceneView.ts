@@ -7,8 +7,10 @@ import { type LoadedMesh, loadMesh } from "../mesh/loader";
 import { type FacePoint, pick, positionOf } from "../mesh/picking";
 import type { State } from "../state/state";
 import { type Rgb, territory } from "./colours";
+import { IsolineLayer } from "./isolines";
 import { type Mark, Markers } from "./markers";
 import { Patch } from "./patch";
+import type { Triple } from "./ribbon";
 import { RouteLine } from "./route";
 import { showScaleBar } from "./scalebar";
 import type { Stage } from "./scene";
@@ -29,12 +31,14 @@ export class SceneView {
   private tree: MeshBVH | null = null;
   private readonly points: Markers;
   private readonly faultPoints: Markers;
+  private readonly isolines: IsolineLayer;
   private readonly route: RouteLine;
 
   constructor(readonly stage: Stage) {
     this.barriers = new Patch(stage, 0x15181f, 0.82);
     this.region = new Patch(stage, 0xff8a1f, 0.6);
     this.faults = new Patch(stage, 0xd9121f, 0.9);
+    this.isolines = new IsolineLayer(stage);
     this.route = new RouteLine(stage);
     this.points = new Markers(stage);
     this.faultPoints = new Markers(stage);
@@ -55,13 +59,16 @@ export class SceneView {
 
   /** Draw everything once without extent, so that later nothing waits for its shader. */
   private warmUp(): void {
+    const nowhere: Triple[] = [
+      [0, 0, 0],
+      [0, 0, 0],
+    ];
     this.points.show([{ position: [0, 0, 0], fill: SOURCE, size: 0 }]);
-    this.route.show([
-      [0, 0, 0],
-      [0, 0, 0],
-    ]);
+    this.isolines.show([nowhere]);
+    this.route.show(nowhere);
     this.stage.warmUp(new Mesh(new PlaneGeometry(0, 0), this.paint));
     this.points.show([]);
+    this.isolines.show([]);
     this.route.show([]);
   }
 
@@ -74,6 +81,7 @@ export class SceneView {
     for (const patch of [this.barriers, this.region, this.faults]) patch.show(null, []);
     this.points.show([]);
     this.faultPoints.show([]);
+    this.isolines.show([]);
     this.route.show([]);
   }
 
@@ -113,6 +121,11 @@ export class SceneView {
   showRoute(outline: Outline | null): void {
     const points = this.mesh ? (outline?.points ?? []) : [];
     this.route.show(points.map((point) => this.mesh!.drawn(point)));
+  }
+
+  showIsolines(lines: Triple[][]): void {
+    const { mesh } = this;
+    this.isolines.show(mesh ? lines.map((line) => line.map((point) => mesh.drawn(point))) : []);
   }
 
   showFaults(faces: number[], points: [number, number, number][]): void {

@@ -1,4 +1,4 @@
-// The surface as it is drawn: distances as colours, isolines as stripes.
+// The surface as it is drawn, with distances as colours.
 import {
   BufferAttribute,
   BufferGeometry,
@@ -35,7 +35,6 @@ const VERTEX = /* glsl */ `
 const FRAGMENT = /* glsl */ `
   uniform sampler2D ramp;
   uniform float largest;
-  uniform float spacing;
   uniform float tinted;
   uniform vec3 clay;
   varying float v_value;
@@ -48,14 +47,6 @@ const FRAGMENT = /* glsl */ `
       float share = clamp(v_value / largest, 0.0, 1.0);
       colour = texture2D(ramp, vec2(share * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
       colour = mix(colour, v_tint * (1.06 - 0.36 * share), tinted);
-      if (spacing > 0.0) {
-        float level = v_value / spacing;
-        float width = fwidth(level);
-        float away = abs(fract(level - 0.5) - 0.5) / max(width, 1e-6);
-        float line = (1.0 - smoothstep(0.4, 1.4, away)) * (1.0 - smoothstep(0.25, 0.7, width));
-        line *= step(0.5, level);
-        colour = mix(colour, share > 0.45 ? colour * 0.35 : colour + vec3(0.42), line * 0.85);
-      }
     }
     vec3 normal = normalize(v_normal);
     vec3 eye = normalize(-v_eye);
@@ -75,7 +66,6 @@ export function surfacePaint(): ShaderMaterial {
     uniforms: {
       ramp: { value: rampTexture() },
       largest: { value: 1 },
-      spacing: { value: 0 },
       tinted: { value: 0 },
       clay: { value: new Color().setRGB(0.72, 0.74, 0.78) },
     },
@@ -108,7 +98,6 @@ export class Surface {
     this.object = new Mesh(mesh.geometry, paint);
     this.setValues(null, 1);
     this.setTerritories(null);
-    this.setIsolines(0);
   }
 
   /** Colour by values at vertices; vertices without a finite value are grey, with null all are. */
@@ -131,11 +120,6 @@ export class Surface {
       if (nearest[i]! >= 0) array.set(territory(nearest[i]!), 3 * i);
     }
     this.tints.needsUpdate = true;
-  }
-
-  /** Draw isolines ``spacing`` apart; 0 draws none. */
-  setIsolines(spacing: number): void {
-    this.uniform("spacing").value = spacing;
   }
 
   async setWireframe(isVisible: boolean, colour: Rgb): Promise<void> {
