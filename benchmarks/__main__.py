@@ -16,6 +16,7 @@ from benchmarks import (
     page,
     path,
     service,
+    sharing,
     topology,
 )
 from benchmarks.inputs import Inputs
@@ -36,6 +37,7 @@ BENCHMARKS = {
     "landmarks": path.run_landmarks,
     "matrix": matrix.run,
     "large-matrix": large_matrix.run,
+    "sharing": sharing.run,
     "service": service.run,
     "load": load.run,
     "attacks": attacks.run,

@@ -1,5 +1,6 @@
 """Labels of brain surfaces: the faces in them, and files that are no labels of the surface."""
 
+import sys
 from pathlib import Path
 
 import nibabel
@@ -101,3 +102,10 @@ def test_what_is_no_label_of_the_surface_is_refused(tmp_path: Path) -> None:
     path = gifti(tmp_path, parcels(), "NIFTI_INTENT_LABEL", {7: "wall"})
     with pytest.raises(gc.errors.InvalidArgument, match="no label 'Wall'; it has 'wall'"):
         gc.load_label(path, BALL, "Wall")
+
+
+def test_gifti_needs_an_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = gifti(tmp_path, parcels(), "NIFTI_INTENT_LABEL")
+    monkeypatch.setitem(sys.modules, "nibabel.gifti.gifti", None)
+    with pytest.raises(gc.errors.MissingExtra, match="brain"):
+        gc.load_label(path, BALL)
