@@ -16,11 +16,13 @@ from benchmarks import (
     page,
     path,
     service,
+    sharing,
     topology,
 )
 from benchmarks.inputs import Inputs
 from benchmarks.paper import experiments as paper
 from benchmarks.peers import report as peers
+from benchmarks.scaling import measurement as scaling
 from benchmarks.soak import measurement as soak
 from benchmarks.tables import write
 
@@ -36,15 +38,16 @@ BENCHMARKS = {
     "landmarks": path.run_landmarks,
     "matrix": matrix.run,
     "large-matrix": large_matrix.run,
+    "sharing": sharing.run,
     "service": service.run,
     "load": load.run,
     "attacks": attacks.run,
     "large-answers": service.run_large,
     "page": page.run,
 }
-SOAK, PAPER, PEERS, GATE = "soak", "paper", "peers", "gate"
+SOAK, SCALING, PAPER, PEERS, GATE = "soak", "scaling", "paper", "peers", "gate"
 """Run only where they are named, and write reports of their own"""
-NAMES = (*BENCHMARKS, SOAK, PAPER, PEERS, GATE)
+NAMES = (*BENCHMARKS, SOAK, SCALING, PAPER, PEERS, GATE)
 ROOT = Path(__file__).parents[1]
 
 
@@ -76,6 +79,9 @@ def main() -> None:
     for name in arguments.names or BENCHMARKS:
         if name == SOAK:
             print(soak.run(arguments.minutes, Path(__file__).with_name("results") / "soak.md"))
+            continue
+        if name == SCALING:
+            print(scaling.run(Path(__file__).with_name("results") / "scaling.md"))
             continue
         if name == GATE:
             text, is_good = gate.run(is_new=arguments.new)

@@ -24,6 +24,7 @@ from geodesic_core.fields.repeatable_sweep import SweepStats
 from geodesic_core.fields.sources import Source
 from geodesic_core.fields.stored_field import load_field
 from geodesic_core.io.as_mesh import as_mesh
+from geodesic_core.io.label import load_label
 from geodesic_core.io.load import load_mesh
 from geodesic_core.mesh.curve import Curve, share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
@@ -72,6 +73,7 @@ __all__ = [
     "fast_distance",
     "kernel_digest",
     "load_field",
+    "load_label",
     "load_mesh",
     "nearest",
     "resolve_chord_error",

@@ -117,6 +117,35 @@ class Position:
         return self.coordinates
 
 
+@dataclass(frozen=True)
+class BlockedFaces:
+    """The faces that an option lists, or those in a label of the surface."""
+
+    listed: Sequence[int] = ()
+    file: Path | None = None
+    """Of the label"""
+    label: str | None = None
+    """The one of several in a file"""
+
+    @classmethod
+    def parse(cls, text: str) -> "BlockedFaces":
+        """Return the faces that an option lists, those of ``@FILE``, or those in a label there."""
+        label = _LABEL.fullmatch(text)
+        return cls(faces(text)) if label is None else cls((), Path(label[1]), label[2])
+
+    def of(self, mesh: Any) -> Sequence[int]:
+        """Return the faces, of a mesh."""
+        if self.file is None:
+            return self.listed
+        from geodesic_core import load_label
+
+        found: Sequence[int] = load_label(self.file, mesh, self.label).tolist()
+        return found
+
+
+_LABEL = re.compile(r"@(.+(?:\.label|\.gii))(?:=(.+))?")
+
+
 def faces(text: str) -> Sequence[int]:
     """Return the faces that an option lists, or those of ``@FILE``, one or more a line."""
     if text.startswith("@"):
@@ -225,9 +254,12 @@ Targets = Annotated[
 ]
 SomeTargets = Annotated[list[Point] | None, *get_args(Targets)[1:]]
 Barriers = Annotated[
-    Sequence[int] | None,
+    BlockedFaces | None,
     typer.Option(
-        parser=faces, metavar="FACES", help="Faces that are blocked, as 3,7,40-59 or @FILE: holes."
+        parser=BlockedFaces.parse,
+        metavar="FACES",
+        help="Faces that are blocked, as 3,7,40-59 or @FILE: holes. Of a brain, @FILE.label or "
+        "@FILE.gii blocks a label; @FILE.gii=NAME one of several.",
     ),
 ]
 MethodOption = Annotated[

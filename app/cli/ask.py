@@ -5,7 +5,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from app.cli.arguments import Merge, Point, PointOrCurve, Position
+from app.cli.arguments import BlockedFaces, Merge, Point, PointOrCurve, Position
 from app.cli.steps import Failure, read, showing
 from app.cli.words import words_of
 
@@ -62,7 +62,9 @@ def ask(
     report = opened.mesh.report
     size = MeshSize(report.vertices, report.faces, report.mean_edge_length)
     query_class = KINDS[kind]
-    body = {**{name: _as_json(value) for name, value in points.items()}, **members}
+    body = {name: _as_json(value) for name, value in points.items()} | dict(members)
+    if isinstance(blocked := body.get("barriers"), BlockedFaces):
+        body["barriers"] = blocked.of(opened.mesh)
     try:
         with showing(label) as step:
             start = perf_counter()

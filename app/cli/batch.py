@@ -2,14 +2,15 @@
 
 import csv
 import json
-import multiprocessing
 import signal
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from io import StringIO
+from itertools import chain
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, Literal, get_args, get_type_hints
@@ -37,6 +38,11 @@ from app.cli.steps import showing
 from app.cli.words import with_options
 
 _FAILED = 1
+_PARCEL_BYTES, _PARCELS = 1 << 22, 8
+"""Bytes of the files that a process is handed together, at most, but for a larger one; and parcels
+for each process, at least. Handed meshes of 2 ms one by one, processes wait for half of the time"""
+_AHEAD = 3
+"""Parcels for each process that it is at, or gets next"""
 
 
 @dataclass(frozen=True)
@@ -110,13 +116,18 @@ def batch(
         raise typer.BadParameter("give --out with a file, or --json")
     options = accuracy(method, relative_error, None, effort) | {"max_distance": max_distance}
     questions = Questions(source, target or [], options, merge.value)
+    from app.engine import fork_server
     from app.settings import available_cores
-    from geodesic_core import warm_up
 
     count = min(processes or available_cores(), len(meshes))
     rows: dict[Path, list[Row]] = {}
     with showing("Loading kernels (compiled on the first run)"):
-        warm_up(["exact", "paths"])
+        fork_server.start()  # which loads them, if they are compiled
+        from geodesic_core import compile_kernels
+
+        compile_kernels(["exact", "paths"])
+        with _pool(1) as pool:
+            pool.submit(_load).result()
     start = perf_counter()
     with showing(f"Solving {len(meshes)} meshes") as step:
         for mesh, answers in _answers(meshes, questions, count):
@@ -151,36 +162,86 @@ def _answers(
 
     A process that dies takes all that run with it: those are asked again, each by itself.
     """
-    ask = partial(_QUESTION, questions)
-    alone: list[Path] = []
+    ask = partial(_ask_each, _QUESTION, questions)
+    left, lost = deque(_parcels(meshes, processes)), list[Path]()
+    while left:
+        yield from _answers_of_pool(ask, left, lost, processes)
+    for mesh in lost:
+        died: list[Path] = []
+        yield from _answers_of_pool(ask, deque([[mesh]]), died, 1)
+        if died:
+            yield mesh, [Row(str(mesh), error="the process died: memory may be short")]
+
+
+def _parcels(meshes: Sequence[Path], processes: int) -> Iterator[list[Path]]:
+    """Yield meshes that are handed over together."""
+    sizes = [_size(mesh) for mesh in meshes]
+    most = min(_PARCEL_BYTES, sum(sizes) // (_PARCELS * processes))
+    parcel, total = list[Path](), 0
+    for mesh, size in zip(meshes, sizes, strict=True):
+        if parcel and total + size > most:
+            yield parcel
+            parcel, total = [], 0
+        parcel.append(mesh)
+        total += size
+    yield parcel
+
+
+def _size(mesh: Path) -> int:
+    """Return the bytes of a file, 0 where there is none; who reads it says why."""
+    try:
+        return mesh.stat().st_size
+    except OSError:
+        return 0
+
+
+def _answers_of_pool(
+    ask: Callable[[Sequence[Path]], list[list[Row]]],
+    left: deque[list[Path]],
+    lost: list[Path],
+    processes: int,
+) -> Iterator[tuple[Path, list[Row]]]:
+    """Take parcels that are left, and yield the rows of their meshes; stop where a process dies.
+
+    The meshes that were under way then are lost.
+    """
+    waiting: dict[Future[list[list[Row]]], list[Path]] = {}
     with _pool(processes) as pool:
-        waiting: dict[Future[list[Row]], Path] = {pool.submit(ask, mesh): mesh for mesh in meshes}
         try:
-            while waiting:
+            while left or waiting:
+                while left and len(waiting) < _AHEAD * processes:
+                    future = pool.submit(ask, left[0])
+                    waiting[future] = left.popleft()
                 for future in wait(waiting, return_when=FIRST_COMPLETED).done:
-                    mesh = waiting.pop(future)
-                    try:
-                        yield mesh, future.result()
-                    except BrokenProcessPool:
-                        alone.append(mesh)
+                    rows = future.result()
+                    yield from zip(waiting.pop(future), rows, strict=True)
+        except BrokenProcessPool:
+            lost += chain.from_iterable(waiting.values())
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
-    for mesh in alone:
-        with _pool(1) as pool:
-            try:
-                yield mesh, pool.submit(ask, mesh).result()
-            except BrokenProcessPool:
-                yield mesh, [Row(str(mesh), error="the process died: memory may be short")]
 
 
 def _pool(processes: int) -> ProcessPoolExecutor:
+    from app.engine import fork_server
+
     # Ctrl-C is for the command: processes end with the question that they are at.
     return ProcessPoolExecutor(
-        processes,
-        multiprocessing.get_context("spawn"),
-        signal.signal,
-        (signal.SIGINT, signal.SIG_IGN),
+        processes, fork_server.CONTEXT, signal.signal, (signal.SIGINT, signal.SIG_IGN)
     )
+
+
+def _load() -> None:
+    """Load the kernels, unless the fork server has."""
+    from geodesic_core import warm_up
+
+    warm_up(["exact", "paths"])
+
+
+def _ask_each(
+    ask: Callable[[Questions, Path], list[Row]], questions: Questions, meshes: Sequence[Path]
+) -> list[list[Row]]:
+    """Return the rows of each mesh of a parcel."""
+    return [ask(questions, mesh) for mesh in meshes]
 
 
 def _ask(questions: Questions, file: Path) -> list[Row]:

@@ -11,6 +11,7 @@ import typer
 from app.cli.arguments import (
     AbsoluteError,
     Barriers,
+    BlockedFaces,
     BoundedMethod,
     BoundedMethodOption,
     EffortOption,
@@ -84,7 +85,7 @@ def distance(
     output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error, effort)
     members["include"] = ["nearest_source", *(["gradient"] if gradient else [])]
-    members |= {"max_distance": max_distance, "barriers": barriers or []}
+    members |= {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}
     points: WrittenMembers = {"sources": source}
     answered = ask("distances", mesh_file, merge, "Computing distances", points, members)
     import numpy as np
@@ -146,7 +147,11 @@ def path(
     if method is not Method.EXACT and (via or explain):
         name = "--via" if via else "--explain"
         raise typer.BadParameter(f"{name} goes with --method exact only")
-    members |= {"max_distance": max_distance, "explain": explain, "barriers": barriers or []}
+    members |= {
+        "max_distance": max_distance,
+        "explain": explain,
+        "barriers": barriers or BlockedFaces(),
+    }
     points: WrittenMembers = {"source": source, "target": target, "waypoints": via or []}
     answered = ask("path", mesh_file, merge, "Computing the path", points, members)
     found = answered.answer.members
@@ -190,7 +195,7 @@ def paths(
     """Compute shortest paths from one point to several others, in one sweep."""
     output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error, effort)
-    members |= {"max_distance": max_distance, "barriers": barriers or []}
+    members |= {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}
     points: WrittenMembers = {"source": source, "targets": target}
     answered = ask("paths", mesh_file, merge, "Computing the paths", points, members)
     output.write(answered.answer)
@@ -241,7 +246,7 @@ def isolines(
     if (count is None) == (level is None):
         raise typer.BadParameter("give --count, or --level at least once, and not both")
     members |= {"levels": level, "count": count, "chord_error": chord_error}
-    members |= {"max_distance": max_distance, "barriers": barriers or []}
+    members |= {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}
     points: WrittenMembers = {"sources": source}
     answered = ask("isolines", mesh_file, merge, "Drawing isolines", points, members)
     output.write(answered.answer)
@@ -278,7 +283,7 @@ def nearest(
     output = Output(out, as_json)
     if k > len(candidate):
         raise typer.BadParameter(f"-k is {k}, but there are only {len(candidate)} candidates")
-    members = {"k": k, "max_distance": max_distance, "barriers": barriers or []}
+    members = {"k": k, "max_distance": max_distance, "barriers": barriers or BlockedFaces()}
     points: WrittenMembers = {"source": source, "candidates": candidate}
     answered = ask("nearest", mesh_file, merge, "Looking for the nearest", points, members)
     found = answered.answer.members["nearest"]

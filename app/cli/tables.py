@@ -9,6 +9,7 @@ import typer
 
 from app.cli.arguments import (
     Barriers,
+    BlockedFaces,
     EffortOption,
     Layout,
     MaxDistance,
@@ -123,7 +124,7 @@ def matrix(
             stops,
             **options,
             max_distance=max_distance,
-            barriers=barriers or (),
+            barriers=() if barriers is None else barriers.of(mesh),
             threads=threads,
             progress=step.progress,
             cancel=step.cancel,
@@ -175,7 +176,7 @@ def _ask_matrix(
     target: list[Point],
     layout: Layout,
     max_distance: float | None,
-    barriers: Any,
+    barriers: BlockedFaces | None,
     merge: Merge,
 ) -> None:
     """Ask for a matrix as the service would be asked."""
@@ -190,7 +191,7 @@ def _ask_matrix(
     members: Mapping[str, Any] = {
         "layout": layout.value,
         "max_distance": max_distance,
-        "barriers": barriers or [],
+        "barriers": barriers or BlockedFaces(),
     }
     points: WrittenMembers = {"sources": source, "targets": target}
     answered = ask("matrix", mesh_file, merge, "Computing the matrix", points, members)

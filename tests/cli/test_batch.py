@@ -89,6 +89,20 @@ def test_a_process_that_dies_costs_its_own_mesh_alone(
         assert rows[path][0].farthest == gc.exact_distance(gc.load_mesh(path), 0).distances.max()
 
 
+def test_small_meshes_are_handed_over_together_and_large_ones_alone(tmp_path: Path) -> None:
+    sizes = [1000, 1000, 9 << 20, 0, 500, 1000]
+    meshes = [tmp_path / f"{number}.ply" for number in range(len(sizes))]
+    for mesh, size in zip(meshes, sizes, strict=True):
+        mesh.touch()
+        os.truncate(mesh, size)
+    missing = tmp_path / "missing.ply"
+    parcels = list(batch._parcels([*meshes, missing], 1))
+    assert parcels == [meshes[:2], [meshes[2]], [*meshes[3:], missing]]
+    # Of a few meshes each process gets some.
+    some = [meshes[0], meshes[1], meshes[5]]
+    assert list(batch._parcels(some, 2)) == [[mesh] for mesh in some]
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

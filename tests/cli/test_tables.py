@@ -1,5 +1,6 @@
 """The command that writes matrices of any size."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -44,6 +45,33 @@ def test_points_of_files_are_those_of_the_library(run: Run, sphere: Path) -> Non
     assert table.nnz == np.isfinite(expected).sum()
     cells = table.toarray()
     np.testing.assert_allclose(cells, np.where(np.isfinite(expected), expected, 0.0), rtol=1e-6)
+
+
+def test_a_label_of_a_brain_is_a_barrier(run: Run, sphere: Path) -> None:
+    mesh = gc.load_mesh(sphere)
+    vertices = np.flatnonzero(mesh.vertices[:, 0] > 0.5)
+    rows = [f"{vertex} 0 0 0 0" for vertex in vertices]
+    label = written("lh.wall.label", "#!ascii label", str(len(rows)), *rows)
+    walled = mesh.with_barriers(gc.load_label(label, mesh))
+    assert len(walled.barriers) > 10
+    start, end = np.flatnonzero(mesh.vertices[:, 0] < 0.3)[[0, -1]].tolist()
+    some = written("some.txt", str(start), str(end))
+    barriers = ("--barriers", f"@{label}")
+    assert run("matrix", sphere, "--points", some, *barriers, "--out", "m.npy").code == 0
+    expected = gc.distance_matrix(walled, [start, end], [start, end])
+    assert np.isfinite(expected).all()
+    np.testing.assert_allclose(np.load("m.npy"), expected, rtol=1e-13)
+    path = ("path", sphere, "--source", start, "--target", end, *barriers)
+    assert run(*path, "--out", "p.json").code == 0
+    length = json.loads(Path("p.json").read_text())["length"]
+    assert length == pytest.approx(expected[0, 1], rel=1e-13)
+
+    written(label, "#!ascii label", "1", f"{len(mesh.vertices)} 0 0 0 0")
+    ran = run(*path, "--out", "q.json")
+    assert ran.code == 1
+    assert f"{label} is no label of this surface" in error_line(ran)
+    ran = run("matrix", sphere, "--points", some, "--barriers", "@a.gii=wall", "--out", "n.npy")
+    assert "cannot read a.gii" in error_line(ran)
 
 
 def test_all_vertices_by_each_method(run: Run, sphere: Path) -> None:
