@@ -23,7 +23,13 @@ pytest_plugins = [
 WITHOUT_JIT = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 
 MARKER_OF_FOLDER = {"service": "service", "page": "page"}
-LONGEST = ("test_cluster.py", "test_page.py", "test_process.py", "test_replicas.py")
+LONGEST = (
+    "test_cluster.py",
+    "test_page.py",
+    "test_process.py",
+    "test_replicas.py",
+    "test_object_store.py",
+)
 NOT_QUICK = ("service", "page", "slow")
 FULL_ONLY = ("full",)
 EXAMPLES = {"quick": 4, "slice": 15, "full": 2000, "interpreted": 4}

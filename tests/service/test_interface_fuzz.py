@@ -32,6 +32,7 @@ def make_up_requests(names: dict[str, str], url: str, folder: Path, *options: st
         [
             *(sys.executable, "-m", "schemathesis.cli", "--config-file", str(CONFIGURATION)),
             *("run", f"{url}/openapi.json", "--seed", str(SEED), *options),
+            *("--request-timeout", str(LONG_S)),  # ten seconds would ask for a pace
             *("--report", "ndjson", "--report-ndjson-path", str(report)),
         ],
         env=os.environ | names,
