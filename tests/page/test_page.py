@@ -11,7 +11,7 @@ import httpx2
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import Route, expect
+from playwright.sync_api import FilePayload, Route, expect
 
 from tests.page.conftest import sample
 from tests.support.paths import ROOT
@@ -442,6 +442,38 @@ def test_isolines_are_where_they_should_be(view: View, sphere: str) -> None:
     assert len(crossings) > 0
     assert all(np.abs(crossings - away).min() <= 2 for away in expected)
     assert all(np.abs(np.array(expected) - crossing).min() <= 4 for crossing in crossings)
+
+
+def test_the_distance_under_the_pointer_is_told_in_the_unit_of_the_mesh(
+    view: View, sphere: str
+) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(0, 0)
+    x, y = view.centre
+    view.page.mouse.move(x + 120, y)
+    words = view.text("#here")
+    expected = angle_at(view, 120)
+
+    value = float(words.removeprefix("≈ ").removesuffix(" mesh units here"))
+    assert value == pytest.approx(expected, rel=0.02)
+    view.page.fill("#unit", "mm")
+    view.page.press("#unit", "Enter")
+    view.wait()
+    assert view.text("#legend-title") == "Distance in mm"
+    assert "2 × 2 × 2 mm" in view.text("#report")
+    view.page.mouse.move(x + 120, y)
+    assert view.text("#here").endswith(" mm here")
+    view.page.mouse.move(x + 120, y - 300)
+    assert view.page.is_hidden("#here")
+
+
+def test_a_picture_is_refused_in_a_sentence(view: View) -> None:
+    view.open()
+    picture = FilePayload(name="cat.png", mimeType="image/png", buffer=b"\x89PNG")
+    view.page.set_input_files("#file", picture)
+    view.wait("error")
+    assert view.text("#error-title") == "Not a mesh"
+    assert view.text("#error-detail") == "cat.png is a picture."
 
 
 def test_the_search_step_by_step(view: View, knot: str) -> None:

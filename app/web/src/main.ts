@@ -1,6 +1,7 @@
 // The page's parts and their wiring: users change the state, and every part follows it.
 import { getMesh, makeSample } from "./api/meshes";
 import { getAbout } from "./api/queries";
+import type { MeshDocument } from "./api/types";
 import { Fields } from "./ask/fields";
 import { Isolines } from "./ask/isolines";
 import { Routes } from "./ask/routes";
@@ -13,7 +14,7 @@ import { Meshes } from "./panel/meshes";
 import { Pointer } from "./panel/pointer";
 import { showReport } from "./panel/report";
 import { readState, writeState } from "./state/permalink";
-import { type State, Store } from "./state/state";
+import { type State, Store, unitOf } from "./state/state";
 import { Status } from "./status";
 import { drawRamp } from "./view/legend";
 import { Stage } from "./view/scene";
@@ -32,6 +33,7 @@ const meshes = new Meshes(store, status);
 const controls = new Controls(store, status, sceneView);
 const exportPanel = new ExportPanel(store, status, stage);
 const pointer = new Pointer(sceneView, store, () => controls.tool);
+pointer.onHover = (point) => fields.tell(point, store.state);
 listenToKeys(store, status, sceneView, pointer);
 drawRamp();
 exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
@@ -44,6 +46,8 @@ setUpAppearance(() => void showWires(store.state));
 controls.show(store.state);
 
 let opening = new AbortController();
+/** The mesh that is shown. */
+let report: MeshDocument | null = null;
 
 store.listen((state, before) => {
   if (state.mesh !== null && (state.mesh !== before.mesh || isTurned(state))) open(state.mesh);
@@ -52,6 +56,7 @@ store.listen((state, before) => {
   exportPanel.show(state);
   fields.follow(state);
   routes.follow(state);
+  if (state.unit !== before.unit) nameUnit(state);
   if (state.lines !== before.lines) isolines.follow(state);
   if (state.wireframe !== before.wireframe) void showWires(state);
   if (state.sources.length > 0 && !pointer.follows) dismissHint();
@@ -59,6 +64,11 @@ store.listen((state, before) => {
   if (state.barriers !== before.barriers) sceneView.barriers.show(sceneView.mesh, state.barriers);
   writeAddress();
 });
+
+function nameUnit(state: State): void {
+  fields.paint(state);
+  if (report) showReport(report, sceneView, unitOf(state));
+}
 
 /** Whether another axis is to point upwards than is drawn. */
 function isTurned({ up }: State): boolean {
@@ -73,7 +83,8 @@ function open(mesh: string): void {
   byId("welcome").hidden = true;
   sceneView.close();
   isolines.forget();
-  showReport(null, sceneView);
+  report = null;
+  showReport(report, sceneView, "");
   const stop = new AbortController();
   opening = stop;
   status.run("loading", "Loading the mesh…", stop, async () => {
@@ -83,7 +94,8 @@ function open(mesh: string): void {
     controls.showUp(sceneView.mesh?.frame.up ?? "y");
     const now = store.state;
     stage.look(now.view ?? sceneView.viewOf(now));
-    showReport(document, sceneView);
+    report = document;
+    showReport(report, sceneView, unitOf(now));
     if (now.sources.length === 0 || pointer.follows) showHint();
     sceneView.showPoints(now);
     sceneView.barriers.show(sceneView.mesh, now.barriers);

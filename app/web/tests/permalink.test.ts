@@ -23,6 +23,7 @@ function randomState(random: Random): State {
     error: random.pick([INITIAL.error, random.size()]),
     effort: random.pick([1, 2, 4, 8] as const),
     maxDistance: random.pick([null, random.size()]),
+    unit: random.pick(["", "mm", "µm & more"]),
     shade: random.pick(["distance", "territories", "difference"] as const),
     lines: random.pick([null, { count: 1 + random.below(99) }, { spacing: random.size() }]),
     wireframe: random.pick([true, false]),

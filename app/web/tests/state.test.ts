@@ -1,5 +1,5 @@
 import { expect, test, vi } from "vitest";
-import { INITIAL, type State, Store, WITHOUT_POINTS } from "../src/state/state";
+import { INITIAL, type State, Store, unitOf, withMesh } from "../src/state/state";
 
 test("a store begins with the initial state", () => {
   expect(new Store().state).toEqual(INITIAL);
@@ -68,7 +68,7 @@ test("a new mesh takes along the settings and none of the points", () => {
     lines: null,
     wireframe: true,
   });
-  store.update({ ...WITHOUT_POINTS, mesh: "new" });
+  store.update(withMesh("new", store.state));
 
   expect(store.state).toEqual({
     ...INITIAL,
@@ -79,4 +79,16 @@ test("a new mesh takes along the settings and none of the points", () => {
     lines: null,
     wireframe: true,
   });
+});
+
+test("a distance between isolines belongs to a mesh, their number does not", () => {
+  const spaced = withMesh("new", { ...INITIAL, lines: { spacing: 0.5 }, unit: "mm" });
+  expect(spaced).toMatchObject({ lines: INITIAL.lines, unit: "" });
+  expect(withMesh("new", { ...INITIAL, lines: { count: 7 } }).lines).toEqual({ count: 7 });
+  expect(withMesh("new", { ...INITIAL, lines: null }).lines).toBeNull();
+});
+
+test("a unit without a name is that of the mesh", () => {
+  expect(unitOf({ ...INITIAL, unit: "mm" })).toBe("mm");
+  expect(unitOf(INITIAL)).toBe("mesh units");
 });

@@ -3,10 +3,11 @@ import type { Field, Question } from "../api/queries";
 import { askDistances, askTerritories } from "../api/queries";
 import type { Effort, Method } from "../api/types";
 import { byId, duration, written } from "../dom";
+import type { FacePoint } from "../mesh/picking";
 import { writePoint } from "../state/point";
-import type { State } from "../state/state";
+import { type State, unitOf } from "../state/state";
 import type { Status } from "../status";
-import { hideLegend, showScale, showTerritories } from "../view/legend";
+import { hideLegend, showHere, showScale, showTerritories } from "../view/legend";
 import type { SceneView } from "../view/sceneView";
 import type { Surface } from "../view/surface";
 
@@ -122,7 +123,20 @@ export class Fields {
     if (shade === "territories" && nearest) {
       surface.setTerritories(nearest);
       showTerritories(sources.map(writePoint));
-    } else showScale("Distance in mesh units", field.largest);
+    } else showScale(`Distance in ${unitOf(state)}`, field.largest);
+  }
+
+  /** Tell the distance at a point, interpolated within its face; null: nowhere. */
+  tell(point: FacePoint | null, state: State): void {
+    const field = this.of(state);
+    const mesh = this.sceneView.mesh;
+    const isTold = point && field && mesh && state.shade !== "difference";
+    const value = isTold
+      ? mesh
+          .corners(point.face)
+          .reduce((sum, v, i) => sum + (point.barycentric[i] ?? 0) * (field.distances[v] ?? NaN), 0)
+      : Number.NaN;
+    showHere(Number.isFinite(value) ? `≈ ${written(value, 4)} ${unitOf(state)} here` : null);
   }
 
   /** Show time and error of all methods side by side. */

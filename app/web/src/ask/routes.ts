@@ -4,7 +4,7 @@ import { askRoute, pointOf, type RouteQuestion } from "../api/queries";
 import type { Outline, Point, Step } from "../api/types";
 import { byId, count, duration, written } from "../dom";
 import { writePoint } from "../state/point";
-import type { State } from "../state/state";
+import { type State, unitOf } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
 
@@ -22,6 +22,7 @@ const WORDS: Record<Step["name"], string> = {
 export class Routes {
   outline: Outline | null = null;
   private requested = "";
+  private unit = "";
   private steps: Step[] = [];
   private request: RouteRequest | null = null;
   private readonly latestOnly: LatestOnly<RouteRequest>;
@@ -46,7 +47,10 @@ export class Routes {
   }
 
   /** Request the path that ``state`` asks for. */
-  follow({ mesh, sources, target, waypoints, barriers }: State): void {
+  follow(state: State): void {
+    const { mesh, sources, target, waypoints, barriers } = state;
+    this.unit = unitOf(state);
+    this.note();
     const requested = JSON.stringify([mesh, sources, target, waypoints, barriers]);
     if (requested === this.requested) return;
     this.requested = requested;
@@ -82,10 +86,17 @@ export class Routes {
     readout.dataset.target = writePoint(question.target);
     const { length } = outline;
     byId("length").textContent = length == null ? "No path" : written(length, 6);
+    this.note();
+  }
+
+  private note(): void {
+    const { outline, unit } = this;
+    if (!outline) return;
+    const { length } = outline.waypoints;
     byId("length-note").textContent =
-      length == null
+      outline.length == null
         ? reason(outline)
-        : `mesh units, exact${question.waypoints.length > 0 ? `, via ${question.waypoints.length}` : ""}`;
+        : `${unit}, exact${length > 0 ? `, via ${length}` : ""}`;
   }
 
   private explain(): void {

@@ -3,7 +3,7 @@ import { locate } from "../api/queries";
 import type { Effort, Method, Point } from "../api/types";
 import { byId, query } from "../dom";
 import type { Up } from "../mesh/frame";
-import { readState, writeRanges } from "../state/permalink";
+import { LONGEST_UNIT, readState, writeRanges } from "../state/permalink";
 import { parsePoints, type WrittenPoint, writePoint } from "../state/point";
 import { INITIAL, type Lines, type Shade, type State, type Store } from "../state/state";
 import type { Status } from "../status";
@@ -38,6 +38,9 @@ export class Controls {
     });
     byId("lines").addEventListener("change", () => this.readLines(true));
     byId("lines-value").addEventListener("change", () => this.readLines(false));
+    const unit = byId("unit", HTMLInputElement);
+    unit.maxLength = LONGEST_UNIT;
+    unit.addEventListener("change", () => store.update({ unit: unit.value.trim() }));
     byId("wireframe").addEventListener("change", () =>
       store.update({ wireframe: byId("wireframe", HTMLInputElement).checked }),
     );
@@ -76,6 +79,7 @@ export class Controls {
       "lines-value",
       lines === null ? "" : String("count" in lines ? lines.count : lines.spacing),
     );
+    setValue("unit", state.unit);
     byId("wireframe", HTMLInputElement).checked = state.wireframe;
   }
 

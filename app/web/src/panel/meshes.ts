@@ -1,8 +1,9 @@
 // Choosing a mesh: from a file, from a sample or from the store.
 import { listMeshes, makeSample, uploadMesh } from "../api/meshes";
+import { ProblemError } from "../api/problemError";
 import type { MeshDocument } from "../api/types";
 import { button, byId, count } from "../dom";
-import { type Store, WITHOUT_POINTS } from "../state/state";
+import { type Store, withMesh } from "../state/state";
 import type { OnProgress, Status } from "../status";
 
 const SAMPLES = [
@@ -11,6 +12,8 @@ const SAMPLES = [
   ["terrain", "Terrain", 40_000],
   ["obstacles", "Obstacles", 20_000],
 ] as const;
+
+const SUFFIXES = ["obj", "off", "ply", "stl", "glb", "json"];
 
 /** The value of the option that lists more of the store; no mesh has this id. */
 const MORE = "more";
@@ -43,7 +46,7 @@ export class Meshes {
     this.select.addEventListener("change", () => {
       const id = this.select.value;
       if (id === MORE) this.listMore();
-      else if (id) store.update({ ...WITHOUT_POINTS, mesh: id });
+      else if (id) store.update(withMesh(id, store.state));
     });
     this.acceptDrops();
   }
@@ -94,6 +97,11 @@ export class Meshes {
   }
 
   private upload(file: File): void {
+    const refusal = refusalOf(file);
+    if (refusal) {
+      this.status.fail(refusal);
+      return;
+    }
     this.create(`Uploading ${file.name}…`, file.name, (onProgress, signal) =>
       uploadMesh(file, onProgress, signal),
     );
@@ -108,7 +116,7 @@ export class Meshes {
     this.status.run("loading", words, stop, async (onProgress) => {
       const mesh = await make(onProgress, stop.signal);
       this.names.set(mesh.id, name);
-      this.store.update({ ...WITHOUT_POINTS, mesh: mesh.id });
+      this.store.update(withMesh(mesh.id, this.store.state));
       await this.list();
     });
   }
@@ -129,4 +137,25 @@ export class Meshes {
       if (file) this.upload(file);
     });
   }
+}
+
+/** Return why a file cannot be a mesh, judged by its name; null if it may be one. */
+export function refusalOf({ name, type }: Pick<File, "name" | "type">): ProblemError | null {
+  const suffix = name.split(".").pop()?.toLowerCase() ?? "";
+  if (SUFFIXES.includes(suffix)) return null;
+  const [kind] = type.split("/");
+  const what =
+    kind === "image"
+      ? "a picture"
+      : kind === "text"
+        ? "a text"
+        : "not a mesh that can be read here";
+  return new ProblemError({
+    title: "Not a mesh",
+    detail: `${name} is ${what}.`,
+    hint: `Choose a file that ends in ${SUFFIXES.slice(0, -1).join(", ")} or ${SUFFIXES.at(-1)}.`,
+    code: "unsupported_media_type",
+    status: 415,
+    request_id: "",
+  });
 }

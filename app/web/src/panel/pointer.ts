@@ -29,6 +29,8 @@ export class Pointer {
   private fingers = 0;
   /** Whether the target follows the pointer, until the first press. */
   follows = false;
+  /** Called with the point under the mouse; null where there is none. */
+  onHover: (point: FacePoint | null) => void = () => undefined;
   /** The last place of the brush. */
   private last: Place | null = null;
 
@@ -42,6 +44,7 @@ export class Pointer {
     canvas.addEventListener("pointerdown", (event) => this.down(event), { capture: true });
     canvas.addEventListener("pointermove", (event) => this.move(event), { capture: true });
     canvas.addEventListener("pointerup", (event) => this.up(event), { capture: true });
+    canvas.addEventListener("pointerleave", () => this.onHover(null));
     canvas.addEventListener("pointercancel", () => this.cancel(), { capture: true });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
   }
@@ -97,10 +100,13 @@ export class Pointer {
   private move(event: PointerEvent): void {
     // Browsers report moves once a frame.
     if (this.start && this.drag && this.hasMoved(event)) this.drag(event);
-    else if (this.follows && event.pointerType === "mouse" && this.store.state.sources.length > 0) {
-      const point = this.at(event);
-      if (point) this.store.update({ target: point });
-    }
+    else if (event.pointerType === "mouse" && event.buttons === 0) this.hover(this.at(event));
+  }
+
+  private hover(point: FacePoint | null): void {
+    this.onHover(point);
+    if (point && this.follows && this.store.state.sources.length > 0)
+      this.store.update({ target: point });
   }
 
   private up(event: PointerEvent): void {

@@ -7,12 +7,16 @@ import type { SceneView } from "../view/sceneView";
 type Faults = MeshDocument["degenerate_faces"];
 type Kind = "face" | "vertex" | "edge";
 
-export function showReport(document_: MeshDocument | null, sceneView: SceneView): void {
+export function showReport(
+  document_: MeshDocument | null,
+  sceneView: SceneView,
+  unit: string,
+): void {
   const report = byId("report");
   report.replaceChildren();
   if (!document_) return;
   const words = document.createElement("p");
-  words.textContent = describe(document_);
+  words.textContent = describe(document_, unit);
   const list = document.createElement("ul");
   for (const [faults, noun, plural, kind] of faultsOf(document_)) {
     if (faults.count > 0)
@@ -27,7 +31,7 @@ export function showReport(document_: MeshDocument | null, sceneView: SceneView)
   report.append(words, list);
 }
 
-function describe(mesh: MeshDocument): string {
+function describe(mesh: MeshDocument, unit: string): string {
   const [low, high] = mesh.bounds;
   const size = high.map((x, i) => written(x - (low[i] ?? 0), 3)).join(" × ");
   const parts = mesh.components === 1 ? "one piece" : count(mesh.components, "piece");
@@ -37,7 +41,7 @@ function describe(mesh: MeshDocument): string {
       : `with ${count(mesh.boundary_loops, "boundary", "boundaries")}`;
   return (
     `${count(mesh.vertices, "vertex", "vertices")}, ${count(mesh.faces, "face")}; ${parts}, ${rim}. ` +
-    `${size} mesh units, edges of ${written(mesh.mean_edge_length, 3)} on average.`
+    `${size} ${unit}, edges of ${written(mesh.mean_edge_length, 3)} on average.`
   );
 }
 

@@ -4,6 +4,8 @@ import type { Up } from "../mesh/frame";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
 import { INITIAL, type Lines, type Shade, type State } from "./state";
 
+/** Characters of the name of a unit. */
+export const LONGEST_UNIT = 12;
 const EFFORTS: Effort[] = [1, 2, 4, 8];
 
 /** A state whose points may still be positions, which the service has to locate. */
@@ -24,6 +26,7 @@ export function writeState(state: State): string {
   if (state.error !== INITIAL.error) query.set("error", String(state.error));
   if (state.effort !== INITIAL.effort) query.set("effort", String(state.effort));
   if (state.maxDistance !== null) query.set("max_distance", String(state.maxDistance));
+  if (state.unit) query.set("unit", state.unit);
   if (state.shade !== INITIAL.shade) query.set("shade", state.shade);
   if (writeLines(state.lines) !== writeLines(INITIAL.lines))
     query.set("lines", writeLines(state.lines));
@@ -52,6 +55,7 @@ export function readState(search: string): WrittenState {
     error: positive(query.get("error")) ?? INITIAL.error,
     effort: EFFORTS.find((effort) => String(effort) === query.get("effort")) ?? INITIAL.effort,
     maxDistance: positive(query.get("max_distance")),
+    unit: query.get("unit")?.slice(0, LONGEST_UNIT) ?? "",
     shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference"]),
     lines: readLines(query.get("lines")),
     wireframe: query.get("wireframe") === "1",

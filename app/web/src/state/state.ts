@@ -15,6 +15,8 @@ export interface State {
   error: number;
   effort: Effort;
   maxDistance: number | null;
+  /** The name of the unit of the mesh; empty: unknown. */
+  unit: string;
   shade: Shade;
   lines: Lines;
   wireframe: boolean;
@@ -34,6 +36,7 @@ export const INITIAL: State = {
   error: 0.01,
   effort: 2,
   maxDistance: null,
+  unit: "",
   shade: "distance",
   lines: { count: 20 },
   wireframe: false,
@@ -62,13 +65,23 @@ export class Store {
   }
 }
 
-/** The part of the state that belongs to a mesh, empty for a new one. */
-export const WITHOUT_POINTS = {
-  sources: [],
-  target: null,
-  waypoints: [],
-  barriers: [],
-  maxDistance: null,
-  up: null,
-  view: null,
-} satisfies Partial<State>;
+/** Return the change to another mesh: what belongs to the one before is gone. */
+export function withMesh(mesh: string, { lines }: State): Partial<State> {
+  return {
+    mesh,
+    sources: [],
+    target: null,
+    waypoints: [],
+    barriers: [],
+    maxDistance: null,
+    unit: "",
+    lines: lines && "spacing" in lines ? INITIAL.lines : lines,
+    up: null,
+    view: null,
+  };
+}
+
+/** Return the unit in words. */
+export function unitOf({ unit }: State): string {
+  return unit || "mesh units";
+}

@@ -17,6 +17,13 @@ export function hideLegend(): void {
   byId("legend").hidden = true;
 }
 
+/** Show what the pointer is at; null: nothing. */
+export function showHere(words: string | null): void {
+  const here = byId("here");
+  here.hidden = words === null;
+  here.textContent = words ?? "";
+}
+
 /** Show the scale from 0 to ``largest``. */
 export function showScale(title: string, largest: number): void {
   byId("legend").hidden = false;
