@@ -1,6 +1,7 @@
 """Configuration of the documentation site, which `scripts/docs` builds."""
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -22,6 +23,7 @@ extensions = [
     "sphinxcontrib.mermaid",
 ]
 exclude_patterns = ["_build"]
+suppress_warnings = ["misc.highlighting_failure"]  # sessions show answers shortened by …
 myst_heading_anchors = 4
 myst_fence_as_directive = ["mermaid"]
 napoleon_google_docstring = False
@@ -32,7 +34,7 @@ autodoc_member_order = "bysource"
 
 def draw(_: Sphinx) -> None:
     """Draw the pictures that pages show, by running the examples of these pages."""
-    folder = DOCS / "pictures"
+    folder = DOCS / "drawn"
     folder.mkdir(exist_ok=True)
     before = Path.cwd()
     os.chdir(folder)
@@ -44,6 +46,18 @@ def draw(_: Sphinx) -> None:
         os.chdir(before)
 
 
+def leave_out_links_to_the_repository(app: Sphinx, page: str, text: list[str]) -> None:
+    """Leave the words of links to Markdown files that are no pages of the site."""
+    folder = Path(app.env.doc2path(page)).parent
+
+    def kept(link: re.Match[str]) -> str:
+        inside = (folder / link[2]).resolve().is_relative_to(DOCS)
+        return link[0] if inside else link[1]
+
+    text[0] = re.sub(r"\[([^]]+)\]\(([^)#:]+\.md)(?:#[^)]*)?\)", kept, text[0])
+
+
 def setup(app: Sphinx) -> None:
-    """Have the pictures drawn before the pages are read."""
+    """Have the pictures drawn before the pages are read, and links adapted."""
     app.connect("builder-inited", draw)
+    app.connect("source-read", leave_out_links_to_the_repository)

@@ -74,7 +74,7 @@ def test_tests_that_documents_name_are_there() -> None:
             (path, target)
             for path in DOCUMENTS
             for target in re.findall(r"\]\(([^)#:]+)(?:#[^)]*)?\)", path.read_text())
-            if "pictures/" not in target  # which examples draw
+            if "drawn/" not in target  # which examples draw
         }
     ),
     ids=str,
