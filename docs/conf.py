@@ -1,0 +1,63 @@
+"""Configuration of the documentation site, which `scripts/docs` builds."""
+
+import os
+import re
+import sys
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+DOCS = Path(__file__).parent
+sys.path.insert(0, str(DOCS.parent))
+
+from tests.support.documents import pictures_of, run_examples  # noqa: E402
+
+project = "Geodesic"
+default_role = "py:obj"  # names in backticks lead to what they name, where it is documented
+html_theme = "furo"
+html_title = "Geodesic"
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinxcontrib.mermaid",
+]
+exclude_patterns = ["_build"]
+suppress_warnings = ["misc.highlighting_failure"]  # sessions show answers shortened by …
+myst_heading_anchors = 4
+myst_fence_as_directive = ["mermaid"]
+napoleon_google_docstring = False
+napoleon_use_ivar = True
+autodoc_typehints = "none"  # the signature and the docstring have them
+autodoc_member_order = "bysource"
+
+
+def draw(_: Sphinx) -> None:
+    """Draw the pictures that pages show, by running the examples of these pages."""
+    folder = DOCS / "drawn"
+    folder.mkdir(exist_ok=True)
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        for page in sorted(DOCS.rglob("*.md")):
+            if pictures_of(page):
+                run_examples(page)
+    finally:
+        os.chdir(before)
+
+
+def leave_out_links_to_the_repository(app: Sphinx, page: str, text: list[str]) -> None:
+    """Leave the words of links to Markdown files that are no pages of the site."""
+    folder = Path(app.env.doc2path(page)).parent
+
+    def kept(link: re.Match[str]) -> str:
+        inside = (folder / link[2]).resolve().is_relative_to(DOCS)
+        return link[0] if inside else link[1]
+
+    text[0] = re.sub(r"\[([^]]+)\]\(([^)#:]+\.md)(?:#[^)]*)?\)", kept, text[0])
+
+
+def setup(app: Sphinx) -> None:
+    """Have the pictures drawn before the pages are read, and links adapted."""
+    app.connect("builder-inited", draw)
+    app.connect("source-read", leave_out_links_to_the_repository)
