@@ -222,6 +222,7 @@ def test_a_bar_moves(capsys: pytest.CaptureFixture[str]) -> None:
     assert "upload 100%" in capsys.readouterr().err
 
 
+@pytest.mark.service
 def test_both_clients_by_the_address_and_the_key_of_a_service(tmp_path: Path) -> None:
     key = "0123456789abcdef0123456789abcdef"
     server = Server(tmp_path, GEODESIC_API_KEYS=f"ann:{key}")

@@ -54,6 +54,7 @@ def colours(file: Path) -> int:
 
 @pytest.mark.parametrize("thing", [FIELD, PATH], ids=["field", "path"])
 @pytest.mark.jit
+@pytest.mark.slow
 def test_pictures_are_drawn_without_a_window(thing: Any, tmp_path: Path) -> None:
     file = tmp_path / "picture.png"
     assert thing.plot(screenshot=file) is None
@@ -62,6 +63,7 @@ def test_pictures_are_drawn_without_a_window(thing: Any, tmp_path: Path) -> None
     assert colours(tmp_path / "picture.JPG") > 100
 
 
+@pytest.mark.slow
 def test_a_path_that_lost_its_surface_is_drawn_alone(tmp_path: Path) -> None:
     copy.copy(PATH).plot(tmp_path / "path.png")
     assert colours(tmp_path / "path.png") > 1

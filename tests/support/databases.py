@@ -12,7 +12,7 @@ from app.state import Database, SqliteDatabase
 AnyDatabase = TypeVar("AnyDatabase", bound=Database)
 
 
-@pytest.fixture(params=["sqlite", "postgresql"])
+@pytest.fixture(params=["sqlite", pytest.param("postgresql", marks=pytest.mark.service)])
 def database(request: pytest.FixtureRequest, tmp_path: Path) -> Database:
     """A database that is prepared, and not open."""
     if request.param == "sqlite":

@@ -154,6 +154,7 @@ def test_bodies_in_large_chunks_are_read_in_large_pieces(listener: Listener) -> 
     assert max(listener.parsed_bytes) == LARGEST_READ
 
 
+@pytest.mark.slow
 def test_tiny_chunks_wait_for_an_application_that_does_not_read(listener: Listener) -> None:
     listener.held_bytes.clear()
     later = CHUNKED.replace(b"POST /", b"POST /later?late")

@@ -273,6 +273,7 @@ async def use(database: SqliteDatabase, folder: Path) -> None:
     assert (folder / "jobs.reserve").exists(), "there is room again"
 
 
+@pytest.mark.slow
 def test_on_a_full_disk_jobs_end_and_are_removed_but_none_is_accepted() -> None:
     ran = run_on_own_disk(f"{sys.executable} -m {__name__}")
     assert (ran.returncode, ran.stdout) == (0, "done\n"), ran.stderr

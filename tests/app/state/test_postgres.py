@@ -20,6 +20,8 @@ import psycopg
 
 from app.state.postgres import PostgresDatabase
 
+pytestmark = pytest.mark.service
+
 
 def refusal(url: str) -> str:
     with pytest.raises(StateError) as refused:

@@ -152,6 +152,7 @@ def run_killed(out: Path, blocks: int) -> int:
 
 
 @pytest.mark.jit
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".npy", pytest.param(".npz", marks=pytest.mark.full)])
 def test_a_process_that_is_killed_goes_on_where_it_was(suffix, tmp_path):
     whole, out = tmp_path / f"whole{suffix}", tmp_path / f"killed{suffix}"
@@ -224,6 +225,7 @@ def hold(mesh: gc.TriangleMesh, out: Path, has_begun, may_end) -> None:
 
 
 @pytest.mark.jit
+@pytest.mark.slow
 def test_two_processes_do_not_write_one_table(mesh, tmp_path):
     out, context = tmp_path / "table.npy", multiprocessing.get_context("spawn")
     has_begun, may_end = context.Event(), context.Event()
