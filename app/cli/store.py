@@ -42,17 +42,27 @@ Root = Annotated[
 
 _DEFAULT = Path("geodesic-store")
 
+State = Annotated[
+    str | None,
+    typer.Option(
+        metavar="URL",
+        envvar="GEODESIC_STATE",
+        show_envvar=True,
+        help="Database that the services of the store share, if they do: it has their jobs.",
+    ),
+]
+
 
 store.callback(invoke_without_command=True)(show_help_without_command)
 
 
 @store.command()
-def ls(root: Root = _DEFAULT, as_json: AsJson = False) -> None:
+def ls(root: Root = _DEFAULT, state: State = None, as_json: AsJson = False) -> None:
     """List the meshes, and the totals of results, distance fields and jobs."""
-    from app.service.maintenance import contents
+    from app.service.maintenance import contents, jobs_of
 
     with _store_at(root):
-        found = contents(root)
+        found = contents(root, jobs_of(root, state))
     if as_json:
         print_json(_document(found))
         return
@@ -95,6 +105,7 @@ def prune(
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Only list what would be removed.")
     ] = False,
+    state: State = None,
     as_json: AsJson = False,
 ) -> None:
     """Remove half-written files, and results and fields that are damaged, outdated or without mesh.
@@ -102,14 +113,17 @@ def prune(
     No service may run on the store. Meshes and the answers of jobs stay.
     """
     from app.queries import code_version
-    from app.service.maintenance import leftovers, remove
+    from app.service.maintenance import jobs_of, leftovers, remove
     from app.store.ownership import owned
 
-    with _store_at(root), owned(root), showing("Reading"):
-        going = [(leftover, leftover.bytes) for leftover in leftovers(root, code_version())]
-        for leftover, _ in going:
-            if not dry_run:
-                remove(leftover)
+    with _store_at(root), owned(root):
+        jobs = jobs_of(root, state)
+        with showing("Reading"):
+            found = leftovers(root, code_version(), jobs)
+            going = [(leftover, leftover.bytes) for leftover in found]
+            for leftover, _ in going:
+                if not dry_run:
+                    remove(leftover)
     if as_json:
         removed = [
             {"reason": leftover.reason, "paths": list(map(str, leftover.paths)), "bytes": size}
@@ -129,6 +143,7 @@ _ROW = "{:32}  {:>9}  {:>13}  {:25}  {:25}  {}"
 @contextmanager
 def _store_at(root: Path) -> Iterator[None]:
     """Fail in one line where there is no readable store."""
+    from app.state import StateError
     from app.store.layout import StoreError, is_store, require_layout
 
     if not is_store(root):
@@ -136,7 +151,7 @@ def _store_at(root: Path) -> Iterator[None]:
     try:
         require_layout(root)
         yield
-    except (StoreError, OSError) as error:
+    except (StateError, StoreError, OSError) as error:
         raise Failure(str(error)) from error
 
 

@@ -2,6 +2,6 @@
 
 from app.jobs.job import Job, JobSpec
 from app.jobs.manager import JobManager
-from app.jobs.repository import JobRepository, read_jobs
+from app.jobs.repository import JobRepository, read_jobs, read_shared_jobs
 
-__all__ = ["Job", "JobManager", "JobRepository", "JobSpec", "read_jobs"]
+__all__ = ["Job", "JobManager", "JobRepository", "JobSpec", "read_jobs", "read_shared_jobs"]

@@ -1,12 +1,12 @@
 """The records of jobs, in a database: they outlive the process that wrote them."""
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
 from app.jobs.job import Job
-from app.state import Database, Statements, read_database
+from app.state import Database, Statements, read_database, read_shared_database
 
 _RECORD = "CAST(record AS TEXT)"
 
@@ -112,7 +112,7 @@ class JobRecords:
 
     async def _jobs(self, condition: str, *values: Any) -> list[Job]:
         rows = await self._statements.rows(f"SELECT {_RECORD} FROM jobs {condition}", *values)  # noqa: S608 - no value
-        return [Job.model_validate_json(record) for (record,) in rows]
+        return _jobs_of(rows)
 
 
 class JobRepository(JobRecords):
@@ -135,7 +135,22 @@ class JobRepository(JobRecords):
             yield JobRecords(statements)
 
 
+_ALL = f"SELECT {_RECORD} FROM jobs ORDER BY number"  # noqa: S608 - no value
+
+
 def read_jobs(path: Path) -> list[Job]:
     """Return the jobs in SQLite's file ``path``, the oldest first; none where it is missing."""
-    rows = read_database(path, "SELECT record FROM jobs ORDER BY number")
+    return _jobs_of(read_database(path, _ALL))
+
+
+def read_shared_jobs(url: str) -> tuple[str, list[Job]]:
+    """Return what names the services of a shared database, and their jobs, the oldest first.
+
+    Raises ``StateError`` where the database cannot be used.
+    """
+    service, rows = read_shared_database(url, _ALL)
+    return service, _jobs_of(rows)
+
+
+def _jobs_of(rows: Iterable[tuple[str]]) -> list[Job]:
     return [Job.model_validate_json(record) for (record,) in rows]

@@ -1,17 +1,26 @@
 """Maintenance of a store: its contents, its damage, and what can be removed."""
 
 import shutil
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
 from app.errors import ProblemError
-from app.jobs import Job, read_jobs
-from app.state import require_intact
+from app.jobs import Job, read_jobs, read_shared_jobs
+from app.settings import variable_of
+from app.state import StateError, require_intact
 from app.store.fields import code_of_field, field_files, name_of_field
-from app.store.layout import FIELDS, JOB_DATABASE, MESHES, RESULTS, TEMPORARY, StoreError
+from app.store.layout import (
+    FIELDS,
+    JOB_DATABASE,
+    MESHES,
+    RESULTS,
+    TEMPORARY,
+    StoreError,
+    noted_state,
+)
 from app.store.meshes import MeshStore
 from app.store.results import complete_results, read_manifest
 
@@ -66,8 +75,39 @@ class Leftover:
         return sum(file.stat().st_size for file in files if file.is_file())
 
 
-def contents(root: Path) -> Contents:
-    """Return the contents of the store ``root``; a service may run on it."""
+def jobs_of(root: Path, state: str | None) -> list[Job]:
+    """Return the jobs of the store ``root``; a service may run on it.
+
+    Parameters
+    ----------
+    root
+        Folder of the store.
+    state
+        URL of the database that services share; None where their jobs are in the store.
+
+    Raises
+    ------
+    StateError
+        The jobs of the store are in another database, or this one cannot be used.
+    StoreError
+        The store's own database is damaged.
+    """
+    jobs, service = read_jobs(root / JOB_DATABASE), noted_state(root)
+    if state is None:
+        if service is not None:
+            raise StateError(
+                f"services with a database of PostgreSQL share the store {root}: give its URL as "
+                f"--state or {variable_of('state')}, since it has their jobs"
+            )
+        return jobs
+    name, shared_jobs = read_shared_jobs(state)
+    if service not in (None, name):
+        raise StateError(f"the services of the store {root} share another database than that one")
+    return jobs + shared_jobs
+
+
+def contents(root: Path, jobs: list[Job]) -> Contents:
+    """Return the contents of the store ``root`` with these jobs; a service may run on it."""
     store = MeshStore(root)
     entries = []
     for mesh_id, size in store.sizes().items():
@@ -87,7 +127,6 @@ def contents(root: Path) -> Contents:
     results = complete_results(root / RESULTS)
     result_bytes = sum(body.stat().st_size for _, body in results.values())
     fields = field_files(root).values()
-    jobs = read_jobs(root / JOB_DATABASE)
     return Contents(entries, len(results), result_bytes, len(fields), sum(fields), jobs)
 
 
@@ -119,7 +158,7 @@ def inspect(root: Path) -> Iterator[Damage | None]:
         yield Damage(JOB_DATABASE, JOB_DATABASE, str(error))
 
 
-def leftovers(root: Path, code: str) -> Iterator[Leftover]:
+def leftovers(root: Path, code: str, jobs: Iterable[Job]) -> Iterator[Leftover]:
     """Yield the files that can be removed from a store that no service runs on.
 
     Parameters
@@ -128,6 +167,8 @@ def leftovers(root: Path, code: str) -> Iterator[Leftover]:
         Folder of the store.
     code
         Current version of the code: what another version computed is outdated.
+    jobs
+        The jobs of the store, see `jobs_of`: their results stay.
 
     Yields
     ------
@@ -136,7 +177,7 @@ def leftovers(root: Path, code: str) -> Iterator[Leftover]:
     """
     meshes = MeshStore(root).sizes()
     results, fields = complete_results(root / RESULTS), field_files(root)
-    of_jobs = {job.result for job in read_jobs(root / JOB_DATABASE)}
+    of_jobs = {job.result for job in jobs}
     for name, files in results.items():
         manifest = read_manifest(root / RESULTS, name)
         if manifest is not None and name in of_jobs:

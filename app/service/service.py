@@ -43,7 +43,7 @@ from app.service.progress import LatestProgress, ignore_progress
 from app.service.resources import share_arenas
 from app.service.scrub import scrubbing
 from app.settings import Settings, variable_of
-from app.state import Allowances, Database, MeshRecords, Replicas, SqliteDatabase, StateError
+from app.state import Allowances, Database, MeshRecords, Replicas, database_of
 from app.store import layout
 from app.store.fields import FieldStore
 from app.store.interface import Store
@@ -516,11 +516,5 @@ def _engine(settings: Settings, store: Store) -> Engine:
 
 
 def _database_of(settings: Settings) -> Database:
-    if settings.state is None:
-        return SqliteDatabase(settings.folder / layout.JOB_DATABASE)
-    try:
-        from app.state.postgres import PostgresDatabase  # an extra, and half a second
-    except ImportError as error:
-        extra = "pip install geodesic[cluster]"
-        raise StateError(f"{variable_of('state')} needs {error.name}: {extra}") from error
-    return PostgresDatabase(settings.state.get_secret_value())
+    url = settings.state.get_secret_value() if settings.state else None
+    return database_of(settings.folder / layout.JOB_DATABASE, url)

@@ -3,6 +3,7 @@
 from app.state.allowances import Allowances
 from app.state.database import Database, StateError, Statements
 from app.state.mesh_records import MeshRecords
+from app.state.opening import database_of, read_shared_database
 from app.state.replicas import Replicas
 from app.state.sqlite import SqliteDatabase, read_database, require_intact
 
@@ -14,6 +15,8 @@ __all__ = [
     "SqliteDatabase",
     "StateError",
     "Statements",
+    "database_of",
     "read_database",
+    "read_shared_database",
     "require_intact",
 ]

@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import Any
 
 import psycopg
-from psycopg import AsyncConnection
+from psycopg import AsyncConnection, Connection
 from psycopg_pool import AsyncConnectionPool
 
 from app.errors import StateUnavailableError
@@ -48,18 +48,9 @@ class PostgresDatabase:
 
     def prepare(self) -> None:
         """Bring the tables up to date; raises ``StateError`` where the server cannot be used."""
-        setting = variable_of("state")
-        try:
-            with psycopg.connect(self._url, **_OPTIONS) as connection:
-                upgrade(connection)
-                (self.service,) = connection.execute(_NAME).fetchone() or (None,)
-        except psycopg.ProgrammingError as error:
-            if error.sqlstate is None:  # the message could show a part of the secret
-                example = "postgresql://user:secret@host:5432/database"
-                raise StateError(f"{setting} is no URL such as {example}") from None
-            raise StateError(f"the database of {setting} refuses: {_line(error)}") from error
-        except psycopg.Error as error:
-            raise StateError(f"the database of {setting} cannot be used: {_line(error)}") from error
+        with _connected(self._url) as connection:
+            upgrade(connection)
+            self.service = _name_of(connection)
 
     async def open(self) -> None:
         """Open a pool of connections."""
@@ -125,6 +116,36 @@ class _Session:
         return cursor.rowcount
 
     run_on_reserve = run
+
+
+def read(url: str, statement: str) -> tuple[str, list[Any]]:
+    """Return what names the services of a database, and the rows that a statement yields.
+
+    Raises ``StateError`` where the server cannot be used, or no service has prepared the database.
+    """
+    with _connected(url) as connection:
+        return _name_of(connection), connection.execute(statement.encode()).fetchall()
+
+
+@contextmanager
+def _connected(url: str) -> Iterator[Connection[Any]]:
+    """Connect for the block; raise ``StateError`` where the server cannot be used."""
+    setting = variable_of("state")
+    try:
+        with psycopg.connect(url, **_OPTIONS) as connection:
+            yield connection
+    except psycopg.ProgrammingError as error:
+        if error.sqlstate is None:  # the message could show a part of the secret
+            example = "postgresql://user:secret@host:5432/database"
+            raise StateError(f"{setting} is no URL such as {example}") from None
+        raise StateError(f"the database of {setting} refuses: {_line(error)}") from error
+    except psycopg.Error as error:
+        raise StateError(f"the database of {setting} cannot be used: {_line(error)}") from error
+
+
+def _name_of(connection: Connection[Any]) -> str:
+    ((name,),) = connection.execute(_NAME).fetchall()
+    return str(name)
 
 
 async def _configure(connection: AsyncConnection[Any]) -> None:

@@ -5,7 +5,7 @@ from contextlib import AbstractContextManager, asynccontextmanager
 from pathlib import Path
 
 from app.store.folder_meshes import FolderMeshes
-from app.store.layout import RESULTS, StoreError
+from app.store.layout import RESULTS, StoreError, note_state
 from app.store.ownership import Share, owned, shared
 from app.store.results import FolderResults
 
@@ -25,7 +25,8 @@ class FolderStore:
         return shared(self.folder) if is_shared else owned(self.folder)
 
     def claim(self, service: str | None) -> None:
-        """Do nothing: the lock tells."""
+        """Note for `app.service.maintenance` where the jobs are; the lock keeps others away."""
+        note_state(self.folder, service)
 
     def require_claimed(self) -> None:
         """Raise ``StoreError`` where the folder is missing: a service makes it."""

@@ -8,7 +8,8 @@
         meshes/         see ``app.store.meshes``
         results/        see ``app.store.results``
         fields/         see ``app.store.fields``
-        jobs.sqlite3    see ``app.jobs.sqlite_repository``
+        jobs.sqlite3    see ``app.state.sqlite``
+        state           names the shared database that has the jobs instead, if any
         jobs.reserve    see ``app.store.reserve``
         tmp/            meshes that are being written
 """
@@ -21,6 +22,7 @@ LAYOUT = 7
 """Number of the layout that this code reads and writes. Raise it with every change of any file,
 including the tables of jobs."""
 
+STATE = "state"
 JOB_DATABASE, JOB_RESERVE = "jobs.sqlite3", "jobs.reserve"
 MESHES, RESULTS, FIELDS = "meshes", "results", "fields"
 TEMPORARY = "tmp"
@@ -62,6 +64,32 @@ def require_layout(root: Path) -> None:
             f"the store {root} has layout {found}, and this release reads {LAYOUT}: "
             f"start the service on it once, which converts it"
         )
+
+
+def note_state(root: Path, service: str | None) -> None:
+    """Note what names the shared database with the jobs of a store; None where it has a file.
+
+    Raises ``StoreError`` where the store cannot be written.
+    """
+    if service == noted_state(root):
+        return
+    aside = root / f"{STATE}.new"
+    try:
+        if service is None:
+            (root / STATE).unlink()
+        else:
+            aside.write_text(service)
+            aside.replace(root / STATE)
+    except OSError as error:
+        raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
+
+
+def noted_state(root: Path) -> str | None:
+    """Return what `note_state` noted last."""
+    try:
+        return (root / STATE).read_text().strip()
+    except FileNotFoundError:
+        return None
 
 
 def is_store(root: Path) -> bool:

@@ -16,6 +16,8 @@ from app.store.ownership import owned
 from app.store.results import ResultManifest
 from tests.support.commands import Run, error_line
 from tests.support.faults import edit_counts
+from tests.support.postgres import SECRET
+from tests.support.postgres import Server as Postgres
 from tests.support.service import serving, upload_sample, wait_until
 
 pytestmark = pytest.mark.service  # a store is left by a service that has run
@@ -226,6 +228,39 @@ def test_answers_of_jobs_are_there_after_pruning(run: Run, left: Left) -> None:
     assert run("store", "prune", left.root).figure("removed") == "0, 0 bytes"
     with serving(left.root, api_keys=f"bob:{KEYS['bob']}") as client:
         assert client.get(f"/v1/jobs/{left.job}/results", headers=BOB).status_code == 200
+
+
+def test_the_jobs_of_services_that_share_a_database(
+    run: Run, postgres: Postgres, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Their answers stay; and without the URL of their database nothing is removed."""
+    root, url, other = tmp_path / "store", postgres.new_database(), postgres.new_database()
+    with serving(root, state=url) as client:
+        mesh_id = upload_sample(client, "plane", 200)
+        job = client.post(
+            f"/v1/meshes/{mesh_id}/distances",
+            json={"sources": [{"vertex": 0}]},
+            headers={"Prefer": "respond-async"},
+        ).headers["location"]
+        wait_until(lambda: client.get(job).json()["status"] == "successful")
+    (held,) = Left(root, [mesh_id], job).results(0)
+    manifest = ResultManifest.model_validate_json(held.with_suffix(".json").read_bytes())
+    written = manifest.model_copy(update={"code": "an older one"}).model_dump_json()
+    held.with_suffix(".json").write_text(written)
+    capsys.readouterr()  # the log of the service
+
+    for command in ("ls", "prune"):
+        ran = run("store", command, root)
+        assert ran.code == 1
+        assert "share the store" in error_line(ran)
+        assert "GEODESIC_STATE" in error_line(ran)
+    assert run("store", "ls", root, "--state", url).figure("jobs") == "1, 1 successful"
+    ran = run("store", "prune", root, "--state", other)
+    assert ran.code == 1
+    assert SECRET not in ran.err
+    assert run("store", "prune", root, "--state", url).figure("removed") == "0, 0 bytes"
+    with serving(root, state=url) as client:
+        assert client.get(f"{job}/results").status_code == 200
 
 
 def test_prune_needs_the_store_for_itself(run: Run, left: Left) -> None:
