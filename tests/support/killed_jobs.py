@@ -28,7 +28,7 @@ from app.engine import worker
 from app.jobs import Job, read_jobs
 from app.queries import DistancesQuery, MeshSize, code_version, field_cache
 from app.schemas.requests import DistancesRequest
-from app.service.maintenance import inspect, leftovers
+from app.service.maintenance import inspect, jobs_of, leftovers
 from app.service.service import RequestContext, Service
 from app.settings import Settings
 from tests.support.direct_engine import DirectEngine
@@ -149,7 +149,8 @@ async def verify(store: Store) -> None:
         bodies = sum(path.stat().st_size for path in store.root.glob("results/*/*.body"))
         assert service.results.nbytes == bodies, "each file is counted"
     assert [damage for damage in inspect(store.root) if damage is not None] == []
-    assert list(leftovers(store.root, code_version())) == []
+    jobs = jobs_of(store.root, None)
+    assert list(leftovers(store.root, code_version(), jobs)) == []
     with closing(sqlite3.connect(store.root / "jobs.sqlite3")) as database:
         assert database.execute("SELECT * FROM queries").fetchall() == []
 
