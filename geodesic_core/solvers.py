@@ -168,7 +168,7 @@ def approximate_distance(
     -------
     DistanceField
         Distances, (V,) float64 in mesh units, and the error that they keep to: less than was
-        allowed, where merging more would save nothing.
+        allowed, where merging more would save nothing, and none where merging at all would not.
 
     Raises
     ------
@@ -194,7 +194,9 @@ def approximate_distance(
     kept = min(relative, WIDEST_ERROR)
     bounds = merging_bounds(limit, kept, absolute)
     mesh, control = _with_barriers(as_mesh(mesh), barriers, control)
-    if math.isfinite(relative):
+    if mesh.is_rough:
+        bounds, promise = exact_bounds(limit), EXACT
+    elif math.isfinite(relative):
         promise = ErrorBound("relative", kept, "guaranteed")
     else:
         promise = ErrorBound("absolute", absolute, "guaranteed")

@@ -64,7 +64,8 @@ def noisy(surface: Surface, noise: float, seed: int) -> Surface:
 
 def knot(faces: int) -> Surface:
     """Return the smooth knot of the samples."""
-    return gc.samples.knot(faces)
+    mesh = gc.samples.knot(faces)
+    return mesh.vertices, mesh.faces
 
 
 def subdivided(surface: Surface, level: int) -> Surface:

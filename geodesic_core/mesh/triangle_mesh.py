@@ -1,5 +1,6 @@
 """Triangle meshes: validated, frozen, with their topology."""
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, Literal
@@ -34,7 +35,10 @@ from geodesic_core.mesh.validation import (
 )
 from geodesic_core.tolerances import (
     LARGEST_COORDINATE,
+    ROUGH,
+    ROUGH_VERTICES,
     ROUNDED_COORDINATE,
+    SHARP_SADDLE,
     SHORTEST_EDGE,
     SNAP,
     WEIGHT_ERROR,
@@ -308,6 +312,14 @@ class TriangleMesh:
         outer = self.topology.outer_face
         inner[outer] = np.arange(len(outer), dtype=np.int32)
         return inner
+
+    @cached_property
+    def is_rough(self) -> bool:
+        """Whether saddles are so many and so sharp that approximate distances take no less time."""
+        excess = self.topology.total_angle - 2.0 * math.pi
+        if len(excess) < ROUGH_VERTICES:
+            return False
+        return bool((excess > SHARP_SADDLE).mean() >= ROUGH)
 
     @cached_property
     def origin(self) -> Floats:

@@ -83,6 +83,8 @@ from geodesic_core.tolerances import (
     OVERLAP,
     PASSES,
     PATH_LENGTH,
+    ROUGH,
+    ROUGH_VERTICES,
     ROUNDED_COORDINATE,
     ROUNDED_POSITION,
     RUNS,
@@ -91,6 +93,7 @@ from geodesic_core.tolerances import (
     SEARCH_SLACK,
     SECTOR_MARGIN,
     SHARP,
+    SHARP_SADDLE,
     SHORTEST_EDGE,
     SINGLE_PRECISION,
     SLACK,
@@ -550,6 +553,31 @@ def test_runs_are_more_than_winding_about_a_tip_takes():
     topology = topology_of(zoo.Case("flat", *zoo.grid(2, 2)))
     counted = np.iinfo(new_wavefront(topology, merges=True).pool.runs.dtype).max
     assert 1.5 * 2 * math.pi / SHARP < RUNS < counted
+
+
+def is_rough(saddles: int, excess: float, vertices: int = 2 * ROUGH_VERTICES) -> bool:
+    """Whether a flat mesh counts as rough when some of its vertices have so much excess."""
+    mesh = gc.samples.plane(8)
+    angles = np.full(vertices, 2 * math.pi)
+    angles[:saddles] += excess
+    mesh.topology = mesh.topology._replace(total_angle=angles)
+    return mesh.is_rough
+
+
+@pytest.mark.parametrize(("excess", "expected"), [(0.99, False), (1.01, True)])
+def test_sharp_saddle_is_the_least_excess_that_makes_a_mesh_rough(excess, expected):
+    assert is_rough(2 * ROUGH_VERTICES, excess * SHARP_SADDLE) == expected
+
+
+@pytest.mark.parametrize(("share", "expected"), [(0.99, False), (1.01, True)])
+def test_rough_is_the_least_share_of_sharp_saddles(share, expected):
+    assert is_rough(round(share * ROUGH * 2 * ROUGH_VERTICES), 1.0) == expected
+
+
+@pytest.mark.parametrize(("vertices", "expected"), [(-1, False), (0, True)])
+def test_rough_vertices_are_the_fewest_of_a_rough_mesh(vertices, expected):
+    count = ROUGH_VERTICES + vertices
+    assert is_rough(count, 1.0, count) == expected
 
 
 @pytest.mark.usefixtures("worn_out")

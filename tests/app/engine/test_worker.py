@@ -1,5 +1,6 @@
 """A worker, in this process: what it keeps open, and work that fails or is stopped."""
 
+from functools import partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -228,14 +229,19 @@ def test_stored_fields_are_bounded(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("every_field_is_slow")
 def test_evictions_are_counted_by_all_workers_of_a_slot_together(tmp_path: Path) -> None:
     mesh_id = store_mesh(tmp_path, *planes(200))
-    signals = Signals()
-    stored_or_gone = lambda: signals.stored_field_evictions + len(field_files(tmp_path))  # noqa: E731
+    signals, bound = Signals(), 5000
+
+    def is_counted(number: int) -> bool:
+        """Whether each field so far is in the store, which is within its bound, or counted."""
+        sizes = field_files(tmp_path).values()
+        return sum(sizes) <= bound and signals.stored_field_evictions + len(sizes) == number
+
     for first in (1, 3):  # a worker, and the one that replaces it
-        config = worker_config(tmp_path, worker_field_bytes=1, fields_bytes=5000)
+        config = worker_config(tmp_path, worker_field_bytes=1, fields_bytes=bound)
         worker = Worker(config, signals)
         for number in (first, first + 1):
             assert code_of(worker, distances_query(mesh_id, vertex=number)) is None
-            wait_until(lambda: stored_or_gone() == number)  # noqa: B023
+            wait_until(partial(is_counted, number))
 
     assert signals.field_evictions == 4, "each goes as soon as it has been used"
     assert signals.stored_field_evictions > 0

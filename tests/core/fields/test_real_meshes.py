@@ -29,6 +29,12 @@ BY_PEER = [name for name in SLICE if name not in ("thin_cad", "cow.obj")]
 """Those without bow-ties, where pygeodesic fails, and without slivers, where it is no oracle."""
 
 
+@pytest.fixture(autouse=True)
+def merging_everywhere(monkeypatch):
+    """Merge windows on rough meshes as well: it has to be right there, though it is not faster."""
+    monkeypatch.setattr("geodesic_core.mesh.triangle_mesh.ROUGH", np.inf)
+
+
 def full(name, *arguments):
     return pytest.param(name, *arguments, marks=pytest.mark.full)
 
