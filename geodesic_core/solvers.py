@@ -168,7 +168,8 @@ def approximate_distance(
     -------
     DistanceField
         Distances, (V,) float64 in mesh units, and the error that they keep to: less than was
-        allowed, where merging more would save nothing, and none where merging at all would not.
+        allowed where merging more would save nothing. On a rough mesh (`TriangleMesh.is_rough`)
+        the distances are exact, because that takes less time.
 
     Raises
     ------

@@ -157,15 +157,15 @@ Its shadow is so wide that it cuts many of the windows that pass.
 """
 
 ROUGH = 0.14
-"""Share of sharp saddles among the vertices from which on a mesh counts as rough.
+"""Least share of sharp saddles among the vertices of a rough mesh.
 
-Saddles cut windows short, so that exact sweeps have few, of which merging saves less than it costs.
-Both kinds of sweep take the same time at a share of 0.12: merging takes 0.93 to 0.99 of the exact
-time where it is 0.10 to 0.12, and 1.02 to 1.25 of it where it is 0.23 to 0.32.
+Saddles cut windows short. Exact sweeps of a rough mesh have so few windows that merging costs more
+than it saves: a merging sweep takes 0.86 to 1.0 of the exact time where the share is 0.10 to 0.12,
+1.04 at 0.16, and 1.02 to 1.25 at 0.23 to 0.32.
 """
 
 ROUGH_VERTICES = 5000
-"""Number of vertices below which no mesh counts as rough: a sweep takes milliseconds either way."""
+"""Fewest vertices of a rough mesh: on a smaller one any sweep takes a few milliseconds."""
 
 STRAIGHT = 1e-5
 """Relative gain, or radians, below which a path along edges is not shortened any further.

@@ -41,6 +41,14 @@ def _options_of(request: Accuracy) -> dict[str, Any]:
     return request.model_dump(include=set().union(*_OPTIONS.values()), exclude_none=True)
 
 
+def as_swept(request: A, mesh: gc.TriangleMesh) -> A:
+    """Return the request by the sweep that answers it: an exact one on rough meshes."""
+    if request.method != "approximate" or not mesh.is_rough:
+        return request
+    exact = {"method": "exact", "relative_error": None, "absolute_error": None}
+    return request.model_copy(update=exact)
+
+
 def solve_field(
     opened: OpenMesh,
     request: Accuracy,
@@ -53,13 +61,12 @@ def solve_field(
 ) -> gc.DistanceField:
     """Return the field of distances from some sources, as exact as requested; maybe a cached one.
 
-    It retains what paths need. For ``isolines`` fields of merged windows retain all of them. Exact
-    fields sweep again: they have so many windows that it takes less time and memory to find only
-    those that the levels need.
+    It retains what paths need. For ``isolines`` approximate fields retain all windows. Exact fields
+    sweep again: they have so many windows that it takes less time and memory to find only those
+    that the levels need.
     """
+    request = as_swept(request, opened.mesh)
     solver, given = opened.solver, _options_of(request)
-    merges = request.method == "approximate" and not solver.mesh.is_rough
-    windows = isolines and merges
     # Vertices are reached in any case.
     off_vertices = tuple(target for target in targets if target.vertex_index is None)
     options = {"max_distance": max_distance, "targets": off_vertices, **context.options}
@@ -70,11 +77,12 @@ def solve_field(
         if request.method == "fast":
             return solver.fast_distance(sources, given["effort"], **options)
         errors = given.get("relative_error"), given.get("absolute_error")
-        retain: gc.Retain = "windows" if windows else "paths"
+        retain: gc.Retain = "windows" if isolines else "paths"
         return solver.approximate_distance(sources, *errors, retain=retain, **options)
 
     if context.fields is None:
         return solve()
+    windows = isolines and request.method != "exact"
     accuracy = request.method, *sorted(given.items())
     question = tuple(sources), max_distance, off_vertices, accuracy, windows
     return context.fields.find(opened, question, solve)

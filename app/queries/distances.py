@@ -12,6 +12,7 @@ from app.encoding import CSV, JSON, NPY, OCTETS, PLY, Answer, Indices
 from app.errors import Fault, problem
 from app.queries.accuracy import (
     affinity_keys_of,
+    as_swept,
     bound_of,
     expected_bound,
     expected_stats,
@@ -140,10 +141,11 @@ class DistancesQuery(Query[DistancesRequest]):
         share = 1.0
         if request.max_distance is not None:
             share = min(1.0, len(sources) * float(share_within(mesh, request.max_distance)))
-        sweep = sweep_cost(len(mesh.faces), request, share, paths="gradient" in self._included)
+        swept = as_swept(request, mesh)
+        sweep = sweep_cost(len(mesh.faces), swept, share, paths="gradient" in self._included)
         straight, nearest = straight_to_nearest(mesh, sources, targets, request.max_distance)
         cost = Cost(sweep.seconds + PER_POINT * len(points), sweep.memory_bytes)
-        bound = expected_bound(request)
+        bound = expected_bound(swept)
         included: dict[str, NDArray[Any]] = {}
         if "nearest_source" in self._included:
             included["nearest_source"] = nearest

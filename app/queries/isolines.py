@@ -11,6 +11,7 @@ import geodesic_core as gc
 from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
 from app.queries.accuracy import (
     affinity_keys_of,
+    as_swept,
     bound_of,
     expected_bound,
     expected_stats,
@@ -137,14 +138,15 @@ class IsolinesQuery(Query[IsolinesRequest]):
             for level, faces in zip(levels, crossed, strict=True)
         ]
         counts = np.array([len(faces) for faces in crossed])
-        sweep = sweep_cost(len(mesh.faces), request, share, crossed=counts.sum() / len(mesh.faces))
+        swept = as_swept(request, mesh)
+        sweep = sweep_cost(len(mesh.faces), swept, share, crossed=counts.sum() / len(mesh.faces))
         per_face = PER_FACE_CROSSED
-        if request.method == "exact":
+        if swept.method == "exact":
             per_face += PER_WINDOW_CROSSED * math.sqrt(share * len(mesh.faces))
         seconds = sweep.seconds + PER_POINT * len(points) + per_face * float(counts.sum())
-        segments = _segments_in_face(mesh, request, np.array(levels), chord_error)
+        segments = _segments_in_face(mesh, swept, np.array(levels), chord_error)
         times = float(counts @ segments) / counts.sum() if counts.any() else 1.0
-        bound, stats = expected_bound(request), expected_stats(mesh, share)
+        bound, stats = expected_bound(swept), expected_stats(mesh, share)
         answer = self._answer(opened, starts, chord_error, found, bound, stats)
         return Forecast(Cost(seconds, sweep.memory_bytes), answer, times)
 

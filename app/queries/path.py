@@ -13,7 +13,7 @@ import geodesic_core as gc
 from app.encoding import CSV, GEOJSON, JSON, NPY, OBJ, OCTETS, SVG, Answer
 from app.errors import Fault, ProblemError, pointer
 from app.queries import point_text
-from app.queries.accuracy import method_of, solve_field, with_default_accuracy
+from app.queries.accuracy import as_swept, method_of, solve_field, with_default_accuracy
 from app.queries.base import ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
     PER_PATH,
@@ -132,7 +132,7 @@ class PathQuery(Query[PathRequest]):
             cost = search_cost(len(mesh.faces), len(points) - 1)
         else:
             share = 1.0 if limit is None else float(share_within(mesh, limit))
-            cost = sweep_cost(len(mesh.faces), self.request, share, paths=True)
+            cost = sweep_cost(len(mesh.faces), as_swept(self.request, mesh), share, paths=True)
         stops = positions_of(mesh, [source, *waypoints, target])
         length = sum(float(np.linalg.norm(there - here)) for here, there in pairwise(stops))
         is_beyond = limit is not None and length > limit

@@ -8,6 +8,7 @@ import geodesic_core as gc
 from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
 from app.queries.accuracy import (
     affinity_keys_of,
+    as_swept,
     expected_stats,
     method_of,
     solve_field,
@@ -117,7 +118,7 @@ class PathsQuery(Query[PathsRequest]):
         starts, targets = self._parted(points)
         start = to_point_or_curve(mesh, "/source", self.request.source, starts)
         share = 1.0 if limit is None else float(share_within(mesh, limit))
-        sweep = sweep_cost(len(mesh.faces), self.request, share, paths=True)
+        sweep = sweep_cost(len(mesh.faces), as_swept(self.request, mesh), share, paths=True)
         seconds = sweep.seconds + (PER_PATH + PER_POINT) * len(targets)
         some = targets[:: 1 + len(targets) // _TRIED]
         edge = typical_edge(mesh)

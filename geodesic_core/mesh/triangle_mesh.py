@@ -315,7 +315,10 @@ class TriangleMesh:
 
     @cached_property
     def is_rough(self) -> bool:
-        """Whether saddles are so many and so sharp that approximate distances take no less time."""
+        """Whether its saddles are so many and so sharp that merging windows does not save time.
+
+        On such a mesh `approximate_distance` returns exact distances.
+        """
         excess = self.topology.total_angle - 2.0 * math.pi
         if len(excess) < ROUGH_VERTICES:
             return False

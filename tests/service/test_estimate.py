@@ -188,6 +188,25 @@ def test_memory_that_suffices(
     query.answer(opened, context(memory=3 * estimated.memory_bytes))
 
 
+@pytest.mark.parametrize("name", ["rough", "rough lines", "rough paths"])
+def test_on_rough_meshes_an_approximate_answer_costs_what_an_exact_one_does(
+    client: TestClient, ids: dict[str, str], name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened = OpenMesh(("", b""), gc.Solver(stored_mesh(client, ids["knot"])), [])
+    query = query_of(name)
+    exact = {"method": "exact", "relative_error": None}
+    as_exact = type(query)("m", query.request.model_copy(update=exact))
+    merged = estimate(query, Representation(JSON), opened, lambda: False)
+    monkeypatch.setitem(vars(opened.mesh), "is_rough", True)
+
+    found, expected = (
+        estimate(each, Representation(JSON), opened, lambda: False) for each in (query, as_exact)
+    )
+
+    assert (found.seconds, found.memory_bytes) == (expected.seconds, expected.memory_bytes)
+    assert found.memory_bytes != merged.memory_bytes
+
+
 def test_seconds_grow_with_the_work(client: TestClient, ids: dict[str, str]) -> None:
     def seconds(mesh: str, operation: str, **body: Any) -> float:
         link = f"/v1/meshes/{ids[mesh]}/{operation}?estimate=true"

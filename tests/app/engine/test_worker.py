@@ -232,7 +232,7 @@ def test_evictions_are_counted_by_all_workers_of_a_slot_together(tmp_path: Path)
     signals, bound = Signals(), 5000
 
     def is_counted(number: int) -> bool:
-        """Whether each field so far is in the store, which is within its bound, or counted."""
+        """Whether the store is within its bound, and each evicted field is counted."""
         sizes = field_files(tmp_path).values()
         return sum(sizes) <= bound and signals.stored_field_evictions + len(sizes) == number
 

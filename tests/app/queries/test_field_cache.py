@@ -81,6 +81,28 @@ def test_an_answer_is_the_same_of_a_field_that_was_kept(
     assert first == again == ask(opened, field_cache(1), kind, **body, **accuracy)
 
 
+@pytest.mark.parametrize(("kind", "body"), [*OF_FIELDS[:2], OF_FIELDS[3]])
+def test_on_rough_meshes_approximate_and_exact_questions_have_one_field(
+    opened: OpenMesh,
+    sweeps: list[int],
+    kind: Any,
+    body: dict[str, Any],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(vars(opened.mesh), "is_rough", True)
+    fields = field_cache()
+
+    answers = [
+        orjson.loads(ask(opened, fields, kind, **body, **accuracy))
+        for accuracy in ({}, APPROXIMATE)
+    ]
+
+    assert len(sweeps) == 1
+    assert [answer.pop("method") for answer in answers] == ["exact", "approximate"]
+    assert [answer.pop("exact") for answer in answers] == [True, False]
+    assert answers[0] == answers[1]
+
+
 def test_what_is_asked_otherwise_is_another_field(opened: OpenMesh, sweeps: list[int]) -> None:
     fields = field_cache()
     different: list[dict[str, Any]] = [

@@ -1,4 +1,4 @@
-"""Rough meshes: where merging would save nothing, approximate fields are exact ones."""
+"""Rough meshes, where merging would save no time: approximate fields are exact."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def rough() -> gc.TriangleMesh:
 
 @pytest.mark.parametrize("errors", [{}, {"relative_error": 0.05}, {"absolute_error": 0.1}])
 @pytest.mark.parametrize("retain", ["distances", "paths", "windows"])
-def test_approximate_is_exact_to_the_bit_and_says_so(rough, errors, retain):
+def test_approximate_fields_are_exact_to_the_bit_and_state_no_error(rough, errors, retain):
     options = {"targets": [TARGET], "max_distance": 2.5, "barriers": range(400, 440)}
     exact = gc.exact_distance(rough, SOURCES, **options, retain=retain)
     found = gc.approximate_distance(rough, SOURCES, **errors, **options, retain=retain)
@@ -39,7 +39,7 @@ def test_approximate_is_exact_to_the_bit_and_says_so(rough, errors, retain):
             np.testing.assert_array_equal(line.points, expected.points)
 
 
-def test_a_smoother_one_is_merged(rough):
+def test_windows_of_a_smoother_mesh_are_merged(rough):
     vertices, faces = zoo.icosphere(5)
     smoother = gc.TriangleMesh(zoo.crumpled(vertices, 0.001, seed=1), faces)
 
@@ -50,5 +50,5 @@ def test_a_smoother_one_is_merged(rough):
     assert found.error_bound.value == 1e-3
 
 
-def test_barriers_do_not_hide_the_saddles(rough):
+def test_with_barriers_it_is_rough_as_well(rough):
     assert rough.with_barriers(range(400)).is_rough
