@@ -2,9 +2,13 @@
 
 import ast
 import importlib
+import json
 import re
+import shutil
+import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import geodesic_core as gc
@@ -21,15 +25,22 @@ DOCUMENTS = sorted(
         ROOT / "geodesic_core" / "README.md",
     ]
 )
+BLENDER = shutil.which("blender")
+HOWTO_OF_BLENDER = ROOT / "docs" / "howto" / "blender.md"
 PAGES_OF_EXAMPLES = [
     "start.md",
-    *(f"howto/{path.name}" for path in sorted((ROOT / "docs" / "howto").glob("*.md"))),
+    "gallery.md",
+    *(
+        f"howto/{path.name}"
+        for path in sorted((ROOT / "docs" / "howto").glob("*.md"))
+        if path != HOWTO_OF_BLENDER
+    ),
 ]
 ROOMS = ["", "sweep.", "paths.", "isolines.", "mesh."]
 """Of the kernels, which documents name without their package."""
 OBJECTS = ("field", "path", "solver", "mesh")
 """Whose attributes are named like functions of a module."""
-BUILT = ("app/web/dist",)
+BUILT = ("app/web/dist", "docs/_build")
 """Folders that a build makes."""
 VARIABLES = ("NUMBA_", "GEODESIC_", "OTEL_", "FORWARDED_", "HATCH_", "XDG_")
 """Beginnings of environment variables."""
@@ -135,7 +146,7 @@ def test_the_examples_of_documents_run(
     monkeypatch.chdir(tmp_path)
     page = ROOT / "docs" / name
     assert run_examples(page) >= least
-    assert {path.name for path in tmp_path.iterdir()} == pictures_of(page)
+    assert {path.name for path in tmp_path.glob("*.png")} == pictures_of(page)
 
 
 @pytest.mark.jit
@@ -151,3 +162,25 @@ def test_python_in_documents_runs(
         exec(block, {})  # noqa: S102 - our own documents
 
     assert len(capsys.readouterr().out.splitlines()) >= len(blocks) > 0
+
+
+@pytest.mark.skipif(BLENDER is None, reason="to run it, install Blender (apt install blender)")
+def test_the_script_for_blender_runs_in_it(tmp_path: Path) -> None:
+    gc.samples.sphere(320).to_trimesh().export(tmp_path / "object.obj")
+    mesh = gc.load_mesh(tmp_path / "object.obj")
+    distances = gc.exact_distance(mesh, 0).distances
+    np.save(tmp_path / "distances.npy", distances)
+    (script,) = re.findall(r"```python\n(.*?)```", HOWTO_OF_BLENDER.read_text(), re.DOTALL)
+    before = "import bpy\nbpy.ops.import_scene.obj(filepath='object.obj')\n"
+    before += "bpy.context.view_layer.objects.active = bpy.context.selected_objects[0]\n"
+    after = "print('DISTANCES', [value.value for value in layer.data])\n"
+    (tmp_path / "script.py").write_text(before + script + after)
+    run = subprocess.run(  # noqa: S603 - our own document
+        [str(BLENDER), "--background", "--factory-startup", "--python", "script.py"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    (shown,) = re.findall(r"(?m)^DISTANCES (.*)$", run.stdout)
+    assert json.loads(shown) == pytest.approx(distances, rel=1e-6)
