@@ -67,12 +67,13 @@ def ls(root: Root = _DEFAULT, state: State = None, as_json: AsJson = False) -> N
         print_json(_document(found))
         return
     if found.meshes:
-        typer.echo(_ROW.format("id", "faces", "bytes", "created", "last used", "owner"))
+        typer.echo(_ROW.format("id", "faces", "bytes", "created", "last used", "owner", "name"))
     for mesh in found.meshes:
         faces = "damaged" if mesh.faces is None else mesh.faces
         used = mesh.last_used.isoformat(timespec="seconds")
-        row = mesh.id, faces, mesh.bytes, mesh.created or "", used, mesh.owner or ""
-        typer.echo(_ROW.format(*row).rstrip())
+        row = mesh.id, faces, mesh.bytes, mesh.created, used, mesh.owner, mesh.name
+        cells = ("" if cell is None else cell for cell in row)
+        typer.echo(_ROW.format(*cells).rstrip())
     total = sum(mesh.bytes for mesh in found.meshes)
     typer.echo(f"meshes      {len(found.meshes)}, {total} bytes")
     typer.echo(f"results     {found.results}, {found.result_bytes} bytes")
@@ -137,7 +138,7 @@ def prune(
     typer.echo(f"{verb:12}{len(going)}, {sum(size for _, size in going)} bytes")
 
 
-_ROW = "{:32}  {:>9}  {:>13}  {:25}  {:25}  {}"
+_ROW = "{:32}  {:>9}  {:>13}  {:25}  {:25}  {:8}  {}"
 
 
 @contextmanager

@@ -44,7 +44,7 @@ from app.store.meshes import WrittenMesh
 from app.store.results import Result, ResultManifest
 from app.tracing import Period
 
-VERSION = 1
+VERSION = 2
 """To be raised with every change of the types below, and of what they mean"""
 
 _MAGIC = b"GEOD"
@@ -73,22 +73,22 @@ class VersionError(WireError):
 
 
 class _Sample(msgspec.Struct, frozen=True, tag="sample"):
-    name: str
+    sample: str
     faces: int
     merge: Merge
-    owner: str | None
 
 
 class _File(msgspec.Struct, frozen=True, tag="file"):
     path: str
     file_type: str
     merge: Merge
-    owner: str | None
 
 
 class _Store(msgspec.Struct, frozen=True, tag="store"):
     mesh_input: _Sample | _File
     folder: str
+    owner: str | None
+    name: str | None
 
 
 class _Query(msgspec.Struct, frozen=True):
@@ -229,8 +229,8 @@ class Wire:
 
     def _work_out(self, work: Work) -> _Store | _Run | _Estimate:
         match work:
-            case StoreMesh(mesh_input, folder):
-                return _Store(self._input_out(mesh_input), self._path_out(folder))
+            case StoreMesh(mesh_input, folder, owner, name):
+                return _Store(self._input_out(mesh_input), self._path_out(folder), owner, name)
             case RunQuery(query, representation, name):
                 return _Run(_query_out(query), representation, name)
             case EstimateQuery(query, representation):
@@ -238,8 +238,8 @@ class Wire:
 
     def _work_in(self, work: _Store | _Run | _Estimate) -> Work:
         match work:
-            case _Store(mesh_input, folder):
-                return StoreMesh(self._input_in(mesh_input), self._path_in(folder))
+            case _Store(mesh_input, folder, owner, name):
+                return StoreMesh(self._input_in(mesh_input), self._path_in(folder), owner, name)
             case _Run(query, representation, name):
                 self._path_in(name)  # raises where it would lead out of the store
                 return RunQuery(_query_in(query), representation, name)
@@ -249,18 +249,16 @@ class Wire:
     def _input_out(self, given: MeshInput) -> _Sample | _File:
         match given:
             case MeshFromSample():
-                return _Sample(given.name, given.faces, given.merge, given.owner)
+                return _Sample(given.sample, given.faces, given.merge)
             case MeshFromFile():
-                path = self._path_out(given.path)
-                return _File(path, given.file_type, given.merge, given.owner)
+                return _File(self._path_out(given.path), given.file_type, given.merge)
 
     def _input_in(self, given: _Sample | _File) -> MeshInput:
         match given:
             case _Sample():
-                return MeshFromSample(given.name, given.faces, given.merge, given.owner)
+                return MeshFromSample(given.sample, given.faces, given.merge)
             case _File():
-                path = self._path_in(given.path)
-                return MeshFromFile(path, given.file_type, given.merge, given.owner)
+                return MeshFromFile(self._path_in(given.path), given.file_type, given.merge)
 
     def _mesh_out(self, mesh: WrittenMesh | None) -> _Mesh | None:
         if mesh is None:

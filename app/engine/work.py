@@ -21,18 +21,15 @@ class MeshFromFile:
     path: Path
     file_type: str
     merge: Merge
-    owner: str | None = None
-    """Name of the API key that may delete the mesh; None for everybody"""
 
 
 @dataclass(frozen=True)
 class MeshFromSample:
     """A sample mesh."""
 
-    name: str
+    sample: str
     faces: int
     merge: Merge
-    owner: str | None = None
 
 
 MeshInput = MeshFromFile | MeshFromSample
@@ -44,6 +41,10 @@ class StoreMesh:
 
     mesh_input: MeshInput
     folder: Path
+    owner: str | None = None
+    """Name of the API key that may delete the mesh; None for everybody"""
+    name: str | None = None
+    """What people call the mesh"""
 
 
 @dataclass(frozen=True)

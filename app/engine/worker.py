@@ -154,7 +154,7 @@ class Worker:
             with clock.phase("load"):
                 mesh = _make_mesh(work.mesh_input, self.settings.max_faces)
             with clock.phase("store"):
-                written = self.store.write_aside(mesh, work.folder, work.mesh_input.owner)
+                written = self.store.write_aside(mesh, work.folder, work.owner, work.name)
         except FileNotFoundError:
             if cancel():  # then the upload and the scratch folder are removed
                 raise gc.errors.Cancelled from None
@@ -278,7 +278,7 @@ def _make_mesh(mesh_input: MeshInput, max_faces: int) -> gc.TriangleMesh:
     faces: NDArray[np.int32] | NDArray[np.int64]
     match mesh_input:
         case MeshFromSample():
-            sample = gc.samples.SAMPLES[mesh_input.name](mesh_input.faces)
+            sample = gc.samples.SAMPLES[mesh_input.sample](mesh_input.faces)
             if len(sample.faces) <= max_faces and mesh_input.merge == "none":
                 return sample
             vertices, faces = sample.vertices, sample.faces

@@ -1,6 +1,7 @@
 """Uploads: the body goes to a file of the store, without being held in memory."""
 
 import gzip
+import re
 import shutil
 import zlib
 from collections.abc import AsyncIterator
@@ -12,7 +13,7 @@ from starlette.datastructures import UploadFile
 from starlette.requests import Request
 
 from app.errors import problem
-from app.schemas.meshes import MeshFormat
+from app.schemas.meshes import LONGEST_NAME, MeshFormat
 from app.settings import variable_of
 
 MESH_FORMATS = get_args(MeshFormat)
@@ -29,10 +30,13 @@ _FORMAT_OF_TYPE = {
     "model/gltf-binary": "glb",
 }
 _BLOCK = 2**20
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
 
-async def spool(request: Request, path: Path, file_format: str | None, max_bytes: int) -> str:
-    """Write the mesh file of a request to ``path``, and return its format.
+async def spool(
+    request: Request, path: Path, file_format: str | None, max_bytes: int
+) -> tuple[str, str | None]:
+    """Write the mesh file of a request to ``path``, and return its format and its name, if any.
 
     Parameters
     ----------
@@ -53,8 +57,9 @@ async def spool(request: Request, path: Path, file_format: str | None, max_bytes
         hint = "send the file itself, as it is or with gzip"
         headers = {"Accept-Encoding": "gzip, identity"}
         raise problem("unsupported_media_type", detail, hint=hint, headers=headers)
+    name = None
     if is_form:
-        guess = await _spool_form(request, path)
+        guess, name = await _spool_form(request, path)
     else:
         await _write(path, request.stream())
         guess = _FORMAT_OF_TYPE.get(media_type)
@@ -69,19 +74,21 @@ async def spool(request: Request, path: Path, file_format: str | None, max_bytes
         )
         detail = f"{media_type or 'no Content-Type'} does not tell the format of the mesh"
         raise problem("unsupported_media_type", detail, hint=hint)
-    return chosen
+    return chosen, name
 
 
-async def _spool_form(request: Request, path: Path) -> str | None:
+async def _spool_form(request: Request, path: Path) -> tuple[str | None, str | None]:
     async with request.form(max_files=1, max_fields=0) as form:
         file = next((part for part in form.values() if isinstance(part, UploadFile)), None)
         if file is None:
             raise problem("malformed_body", "the form has no file")
         with path.open("wb") as target:
             await to_thread.run_sync(shutil.copyfileobj, file.file, target, _BLOCK)
-        suffix = Path(file.filename or "").suffix.lower().removeprefix(".")
+        name = _CONTROL.sub("", Path(file.filename or "").name)
+        suffix = Path(name).suffix.lower().removeprefix(".")
         by_suffix = suffix if suffix in (*MESH_FORMATS, "json") else None
-        return by_suffix or _FORMAT_OF_TYPE.get(_media_type(file.content_type))
+        guess = by_suffix or _FORMAT_OF_TYPE.get(_media_type(file.content_type))
+        return guess, name[:LONGEST_NAME] or None
 
 
 async def _write(path: Path, chunks: AsyncIterator[bytes]) -> None:

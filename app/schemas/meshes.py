@@ -8,12 +8,20 @@ from app.schemas.points import LARGEST_COUNT, StrictModel
 
 Merge = Literal["none", "exact"]
 MeshFormat = Literal["obj", "off", "ply", "stl", "glb"]
+LONGEST_NAME = 200
+"""Characters of the name of a mesh"""
+MeshName = Annotated[str, Field(max_length=LONGEST_NAME, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
+"""Without control characters, which a terminal would obey"""
 SampleName = Literal["knot", "sphere", "terrain", "obstacles", "plane"]
 
 
 class UploadParameters(StrictModel):
     """Options for reading the mesh of an upload, or the sample to make."""
 
+    name: MeshName | None = Field(
+        default=None,
+        description="What people call it; if not given, the file's name in a form, or the sample's",
+    )
     format: MeshFormat | None = Field(default=None, description="Overrides `Content-Type`")
     merge: Merge = Field(default="none", description="`exact` joins vertices at the same position")
     sample: SampleName | None = Field(
@@ -42,6 +50,7 @@ class MeshDocument(BaseModel):
     """The report of a mesh in the store."""
 
     id: str
+    name: str | None = Field(description="The one that came with its first upload, if any")
     vertices: int
     faces: int = Field(description="All of them, those that repeat a vertex as well")
     warnings: list[str] = Field(description="A sentence or two each, with the remedy")

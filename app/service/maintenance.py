@@ -31,9 +31,10 @@ class MeshEntry:
 
     id: str
     faces: int | None
-    """None where its manifest is damaged, as for the next two"""
+    """None where its manifest is damaged, as for the next three"""
     created: str | None
     owner: str | None
+    name: str | None
     bytes: int
     last_used: datetime
 
@@ -120,6 +121,7 @@ def contents(root: Path, jobs: list[Job]) -> Contents:
                 manifest.get("report", {}).get("faces"),
                 manifest.get("created"),
                 manifest.get("owner"),
+                manifest.get("name"),
                 size,
                 store.last_used(mesh_id),
             )

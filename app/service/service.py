@@ -205,13 +205,16 @@ class Service:
             async with self._uploads.counting_for_all(caller, self.allowances):
                 yield
 
-    async def add_mesh(self, mesh_input: MeshInput, context: RequestContext) -> StoredMesh:
-        """Have a worker read or make a mesh, and store it."""
+    async def add_mesh(
+        self, mesh_input: MeshInput, name: str | None, context: RequestContext
+    ) -> StoredMesh:
+        """Have a worker read or make a mesh, and store it under a name, if it has one."""
         async with (
             self.mesh_catalog.scratch_folder() as scratch,
             self.time_limit(context.deadline_s),
         ):
-            task = Task(StoreMesh(mesh_input, scratch / "mesh"), context.caller.name)
+            work = StoreMesh(mesh_input, scratch / "mesh", context.caller.owner, name)
+            task = Task(work, context.caller.name)
             while True:
                 done = await self.engine.run(task, ignore_progress)
                 written = done.mesh

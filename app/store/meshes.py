@@ -2,7 +2,7 @@
 
 ::
 
-    meshes/{id}/manifest.json      report, warnings, owner, and the checksum of each array's file
+    meshes/{id}/manifest.json      report, warnings, owner, name, and the checksum of each array
     meshes/{id}/{array}.npy        one file for each array of ``TriangleMesh.arrays()``
 
 The id is a hash of the canonical arrays (vertices, faces, both maps), not of the uploaded bytes. So
@@ -105,11 +105,13 @@ class MeshStore:
     def __init__(self, root: Path) -> None:
         self.folder = root / MESHES
 
-    def write_aside(self, mesh: TriangleMesh, folder: Path, owner: str | None) -> WrittenMesh:
+    def write_aside(
+        self, mesh: TriangleMesh, folder: Path, owner: str | None, name: str | None = None
+    ) -> WrittenMesh:
         """Write ``mesh`` into a new scratch ``folder``, unless it is intact in the store.
 
-        A mesh in the store belongs to the ``owner`` that stored it first, as far as its manifest
-        still tells.
+        A mesh in the store belongs to the ``owner`` that stored it first, and keeps the ``name``
+        that it got then, as far as its manifest still tells.
         """
         arrays = mesh.arrays()
         mesh_id = content_hash(arrays)
@@ -120,6 +122,7 @@ class MeshStore:
         manifest = {
             "id": mesh_id,
             "owner": owner,
+            "name": name,
             "created": datetime.now(UTC).isoformat(timespec="seconds"),
             "report": mesh.report.as_dict(),
             "warnings": list(mesh.warnings),
@@ -129,7 +132,7 @@ class MeshStore:
         }
         with suppress(ProblemError):  # there is no such mesh, or its manifest is damaged
             stored = self.manifest(mesh_id)
-            manifest |= {name: stored[name] for name in ("owner", "created")}
+            manifest |= {key: stored.get(key) for key in ("owner", "name", "created")}
         (folder / MANIFEST).write_bytes(encode_manifest(manifest))
         return WrittenMesh(manifest, folder, _bytes_in(folder))
 

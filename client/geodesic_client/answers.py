@@ -34,6 +34,8 @@ class Mesh:
     """A mesh in the store of the service."""
 
     id: str
+    name: str | None
+    """The one that came with its first upload, if any"""
     vertices: int
     faces: int
     warnings: Sequence[str]
@@ -167,7 +169,7 @@ def to_array(response: httpx2.Response) -> NDArray[Any]:
 
 def to_mesh(document: Mapping[str, Any]) -> Mesh:
     """Return a mesh, from its report."""
-    members = {name: document[name] for name in ("id", "vertices", "faces", "warnings")}
+    members = {name: document[name] for name in ("id", "name", "vertices", "faces", "warnings")}
     return Mesh(**members, report=document)
 
 

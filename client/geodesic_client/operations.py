@@ -57,6 +57,7 @@ def upload(
     *,
     format: str | None = None,  # noqa: A002 - the service's name for it
     merge: Literal["none", "exact"] = "none",
+    name: str | None = None,
     progress: Progress = ignore_progress,
 ) -> Flow[Mesh]:
     """Store a mesh, and return it. The same mesh is never stored twice.
@@ -70,11 +71,17 @@ def upload(
         The format, where the end of the file's name does not tell it.
     merge
         ``exact`` joins vertices at the same position.
+    name
+        What people call the mesh; the name of the file, if not given. A mesh that is in the store
+        already keeps its name.
     progress
         Called with the share that is sent.
     """
     size, read = uploads.body_of(mesh, progress)
     parameters = {"format": uploads.format_of(mesh, format), "merge": merge}
+    called = uploads.name_of(mesh, name)
+    if called is not None:
+        parameters["name"] = called
     headers = {"Content-Type": "application/octet-stream", "Content-Length": str(size)}
     request = Request("POST", "/v1/meshes", parameters, headers, read)
     return to_mesh((yield from send(request)).json())

@@ -28,6 +28,13 @@ def format_of(mesh: Source, file_format: str | None) -> str:
     return Path(mesh).suffix.lower().removeprefix(".")
 
 
+def name_of(mesh: Source, name: str | None) -> str | None:
+    """Return what people call a mesh: as given, or the name of its file."""
+    if name is None and isinstance(mesh, str | PathLike):
+        return Path(mesh).name
+    return name
+
+
 def body_of(mesh: Source, progress: Progress) -> tuple[int, Callable[[], Iterator[bytes]]]:
     """Return the size of a mesh file in bytes, and what begins to read it."""
     data = ply_of(*mesh) if isinstance(mesh, tuple) else mesh

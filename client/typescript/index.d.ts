@@ -1302,6 +1302,11 @@ export interface components {
         MeshDocument: {
             /** Id */
             id: string;
+            /**
+             * Name
+             * @description The one that came with its first upload, if any
+             */
+            name: string | null;
             /** Vertices */
             vertices: number;
             /**
@@ -4272,6 +4277,8 @@ export interface operations {
     createMesh: {
         parameters: {
             query?: {
+                /** @description What people call it; if not given, the file's name in a form, or the sample's */
+                name?: string;
                 /** @description Overrides `Content-Type` */
                 format?: "obj" | "off" | "ply" | "stl" | "glb";
                 /** @description `exact` joins vertices at the same position */

@@ -103,9 +103,9 @@ def test_ls(run: Run, left: Left) -> None:
 
     assert (ran.code, ran.err) == (0, "")
     rows = [row.split() for row in ran.out.splitlines()]
-    assert rows[0] == ["id", "faces", "bytes", "created", "last", "used", "owner"]
+    assert rows[0] == ["id", "faces", "bytes", "created", "last", "used", "owner", "name"]
     assert [row[:2] for row in rows[1:3]] == [[left.ids[1], "200"], [left.ids[0], "45000"]]
-    assert [row[-2:] for row in rows[1:3]] == [
+    assert [row[-3:-1] for row in rows[1:3]] == [
         [f"1970-01-01T00:00:0{number}+00:00", "alice"] for number in range(2)
     ]
     on_disk = sum(path.stat().st_size for path in (left.root / "meshes").rglob("*.*"))

@@ -133,12 +133,14 @@ def test_a_mesh_is_stored_read_listed_and_removed(service: Client, tmp_path: Pat
     mesh = service.upload((vertices, [[0, 1, 2]]), progress=shares.append)
     assert shares == [1.0]
     assert (mesh.vertices, mesh.faces, mesh.report["boundary_loops"]) == (3, 1, 1)
+    assert mesh.name is None
     np.testing.assert_array_equal(service.array(mesh, "vertices"), vertices)
     assert service.mesh(mesh.id) == mesh
     assert mesh.id in [each.id for each in service.meshes()]
     file = tmp_path / "one.obj"
     file.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    assert service.upload(file).vertices == 3
+    stored = service.upload(file)
+    assert (stored.name, stored.vertices) == ("one.obj", 3)
     assert service.upload(file.read_bytes(), format="obj") == service.upload(str(file))
     service.delete_mesh(mesh)
     with pytest.raises(ProblemError) as caught:

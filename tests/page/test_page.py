@@ -71,6 +71,7 @@ def test_the_axis_upwards_is_guessed_and_can_be_chosen(view: View, service: str)
     assert view.page.is_checked("#ups [value=z]")
     lying = view.pixels()
 
+    open_display(view)
     view.page.check("#ups [value=y]", force=True)
     view.wait()
 
@@ -97,9 +98,14 @@ def test_a_sample_is_loaded_and_a_click_colours_it(view: View) -> None:
     assert not view.page.is_visible("#hint")
 
 
+def open_display(view: View) -> None:
+    """Unfold the rarer controls of the display."""
+    view.page.click("#more-display > summary")
+
+
 def test_a_file_is_dropped(view: View, wedge: str) -> None:
     view.open()
-    with view.page.expect_response("**/v1/meshes?format=obj"):
+    with view.page.expect_response("**/v1/meshes?name=wedge.obj*"):
         view.page.evaluate(
             """text => {
                 const files = new DataTransfer();
@@ -220,7 +226,7 @@ def test_a_refused_file_is_told_in_the_service_s_words(view: View) -> None:
     view.page.set_input_files("#file", nonsense)
     view.wait("error")
 
-    with view.page.expect_response("**/v1/meshes?format=ply") as answer:
+    with view.page.expect_response("**/v1/meshes?name=nonsense.ply*") as answer:
         view.page.set_input_files("#file", nonsense)
     view.wait("error")
 
@@ -233,6 +239,62 @@ def test_a_refused_file_is_told_in_the_service_s_words(view: View) -> None:
 
 
 # Ask
+
+
+def test_a_choice_of_colours_and_the_end_of_their_scale(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(0, 0)
+    teal = view.pixels()
+    open_display(view)
+    view.page.select_option("#palette", "magma")
+    view.page.wait_for_timeout(200)
+    magma = view.pixels()
+    assert (np.abs(magma - teal).max(axis=2) > 25).mean() > 0.05
+    assert query_of(view)["palette"] == ["magma"]
+
+    view.page.fill("#range", "1")
+    view.page.press("#range", "Enter")
+    view.wait()
+
+    assert view.text("#tick-2") == "1"
+    assert (np.abs(view.pixels() - magma).max(axis=2) > 25).mean() > 0.05
+    view.page.reload()
+    view.wait()
+    assert view.page.input_value("#palette") == "magma"
+    assert view.text("#tick-2") == "1"
+    view.page.click("#samples [data-sample=knot]")
+    view.wait()
+    assert "range" not in query_of(view), "it belongs to the mesh before"
+    assert query_of(view)["palette"] == ["magma"]
+
+
+def test_vertices_at_one_position_are_joined_by_a_button(view: View) -> None:
+    corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+    view.open()
+    view.upload("two.obj", corners + "v 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 4 6 5\n")
+    assert "6 vertices" in view.text("#report")
+    assert "two.obj" in view.text("#meshes option:checked")
+    view.page.click("#report >> text=Join them")
+    view.wait()
+    view.page.locator("#report", has_text="4 vertices").wait_for()
+    assert view.page.locator("#report >> text=Join them").count() == 0
+
+
+def test_points_are_told_in_words_and_edited_as_coordinates(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&source=v12&target=f7:0.2,0.3,0.5&{PLAIN}")
+    assert view.page.input_value("#sources") == "vertex 12"
+    assert view.page.input_value("#target") == "on face 7"
+    view.page.focus("#target")
+    assert view.page.input_value("#target") == "f7:0.2,0.3,0.5"
+    view.page.fill("#target", "no point")
+    view.page.focus("#sources")
+    assert view.page.input_value("#target") == "no point", "what was typed is not lost"
+    view.page.fill("#target", "v3")
+    view.page.press("#target", "Enter")
+    view.wait()
+    view.page.focus("#sources")
+    assert view.page.input_value("#target") == "vertex 3"
+    assert query_of(view)["target"] == ["v3"]
 
 
 def test_colours_are_those_of_the_distance(view: View, sphere: str) -> None:
@@ -351,6 +413,7 @@ def test_waypoints_and_barriers(view: View, sphere: str) -> None:
 
 def test_exact_and_approximate_side_by_side(view: View, knot: str) -> None:
     view.open(f"/?mesh={knot}&source=v0&error=0.1")
+    view.page.click("#more-method > summary")
     assert view.text("#bound-approximate") == "–"
 
     view.page.click("#methods >> text=Approximate")
@@ -370,6 +433,7 @@ def test_exact_and_approximate_side_by_side(view: View, knot: str) -> None:
 
 def test_fast_distances_beside_exact_ones(view: View, knot: str) -> None:
     view.open(f"/?mesh={knot}&source=v0&effort=1&shade=difference&lines=count:3")
+    view.page.click("#more-method > summary")
     assert view.text("#bound-fast") == "–"
 
     view.page.click("#methods >> text=Fast")
@@ -456,6 +520,7 @@ def test_the_distance_under_the_pointer_is_told_in_the_unit_of_the_mesh(
 
     value = float(words.removeprefix("≈ ").removesuffix(" mesh units here"))
     assert value == pytest.approx(expected, rel=0.02)
+    open_display(view)
     view.page.fill("#unit", "mm")
     view.page.press("#unit", "Enter")
     view.wait()
@@ -498,6 +563,7 @@ def test_the_search_step_by_step(view: View, knot: str) -> None:
 def test_wireframe_and_theme(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}")
     plain = view.pixels()
+    open_display(view)
     view.page.check("#wireframe")
     view.wait()
     view.page.wait_for_timeout(200)

@@ -106,6 +106,40 @@ def test_a_sample_of_too_few_faces_is_refused_with_the_fewest(
     assert f"{fewest} to" in check_problem(response, 422, "invalid_request")["detail"]
 
 
+@pytest.mark.parametrize(
+    ("upload", "name"),
+    [
+        ({"params": {"name": "tetra/4.obj", "format": "obj"}, "content": OBJ}, "tetra/4.obj"),
+        ({"params": {"name": "Δ" * 200}, "json": TETRAHEDRON}, "Δ" * 200),
+        ({"files": {"file": ("tetra.obj", OBJ)}}, "tetra.obj"),
+        ({"files": {"file": ("../far/away.obj", OBJ)}}, "away.obj"),
+        ({"files": {"file": ("x" * 300 + ".obj", OBJ)}}, "x" * 200),
+        ({"files": {"file": ("tetra.obj", OBJ)}, "params": {"name": "better"}}, "better"),
+        ({"json": TETRAHEDRON}, None),
+        ({"params": {"sample": "plane", "faces": 8}}, "plane"),
+        ({"params": {"sample": "plane", "faces": 8, "name": "a sheet"}}, "a sheet"),
+    ],
+    ids=str,
+)
+def test_the_name_of_a_mesh_comes_with_its_first_upload(
+    tmp_path: Path, upload: dict, name: str | None
+) -> None:
+    again = {**upload, "params": {**upload.get("params", {}), "name": "another"}}
+    with serving(tmp_path) as client:
+        document = client.post("/v1/meshes", **upload).json()
+        assert document["name"] == name
+        assert client.post("/v1/meshes", **again).json() == document
+    with serving(tmp_path) as client:
+        assert client.get("/v1/meshes").json()["meshes"] == [document]
+
+
+@pytest.mark.parametrize("name", ["", "x" * 201, "a\x1b[31mb", "a\x9bb", "a\n"])
+def test_names_that_are_refused(client: TestClient, name: str) -> None:
+    response = client.post("/v1/meshes", params={"name": name}, json=TETRAHEDRON)
+    problem = check_problem(response, 422, "invalid_request")
+    assert [error["pointer"] for error in problem["errors"]] == ["/query/name"]
+
+
 def test_merging_gives_a_vertex_map(client: TestClient) -> None:
     soup = {
         "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],

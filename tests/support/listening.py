@@ -59,6 +59,28 @@ class Listener:
         finally:
             over.set()
 
+    @contextmanager
+    def paused(self) -> Iterator[None]:
+        """Have the event loop stand still inside the block; it has answered a request before."""
+        assert self.loop is not None
+        stands, over = Event(), Event()
+
+        def stand() -> None:
+            stands.set()
+            over.wait(LONG_S)
+
+        self.loop.call_soon_threadsafe(stand)
+        stands.wait(LONG_S)
+        try:
+            yield
+        finally:
+            over.set()
+
+    def connect_at_once(self, sent: bytes) -> socket.socket:
+        """Connect, with what is sent there before the server knows of the connection."""
+        with self.paused():
+            return self.connect(sent)
+
     def connect(self, sent: bytes = b"") -> socket.socket:
         connection = socket.create_connection(("127.0.0.1", self.port), LONG_S)
         connection.sendall(sent)

@@ -40,7 +40,7 @@ class View:
     def upload(self, name: str, text: str) -> None:
         """Choose a file, and wait until its mesh is shown."""
         file = FilePayload(name=name, mimeType="", buffer=text.encode())
-        with self.page.expect_response("**/v1/meshes?format=*"):
+        with self.page.expect_response("**/v1/meshes?name=*"):
             self.page.set_input_files("#file", file)
         self.wait()
 

@@ -5,7 +5,6 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
-from app.access import Caller
 from app.encoding import NPY
 from app.engine.work import MeshFromFile, MeshFromSample
 from app.errors import Fault, over_limit, problem
@@ -121,7 +120,9 @@ async def create_mesh(
         if parameters.sample is None:
             stored = await _add_upload(service, parameters, request, context)
         else:
-            making = service.add_mesh(_sample(service, parameters, context.caller), context)
+            making = service.add_mesh(
+                _sample(service, parameters), parameters.name or parameters.sample, context
+            )
             stored = await while_connected(request, making)
     note_work(request, stored.manifest["id"], stored.seconds)
     response.status_code = 201 if stored.is_new else 200
@@ -230,14 +231,15 @@ async def _add_upload(
     ):
         path = folder / "upload"
         limit = service.settings.max_upload_bytes
-        file_format = await spool(request, path, parameters.format, limit)
-        mesh_input = MeshFromFile(path, file_format, parameters.merge, context.caller.owner)
-        return await while_connected(request, service.add_mesh(mesh_input, context))
+        file_format, file_name = await spool(request, path, parameters.format, limit)
+        mesh_input = MeshFromFile(path, file_format, parameters.merge)
+        name = parameters.name or file_name
+        return await while_connected(request, service.add_mesh(mesh_input, name, context))
 
 
-def _sample(service: Service, parameters: UploadParameters, caller: Caller) -> MeshFromSample:
+def _sample(service: Service, parameters: UploadParameters) -> MeshFromSample:
     faces = parameters.faces or _DEFAULT_SAMPLE_FACES
     if faces > service.settings.max_faces:
         limit = service.settings.max_faces
         raise over_limit("limit_exceeded", "faces", faces, limit, "max_faces")
-    return MeshFromSample(str(parameters.sample), faces, parameters.merge, caller.owner)
+    return MeshFromSample(str(parameters.sample), faces, parameters.merge)

@@ -35,7 +35,7 @@ const exportPanel = new ExportPanel(store, status, stage);
 const pointer = new Pointer(sceneView, store, () => controls.tool);
 pointer.onHover = (point) => fields.tell(point, store.state);
 listenToKeys(store, status, sceneView, pointer);
-drawRamp();
+drawRamp(store.state.palette);
 exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
 exportPanel.nearest = () => routes.source;
 controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
@@ -57,6 +57,8 @@ store.listen((state, before) => {
   fields.follow(state);
   routes.follow(state);
   if (state.unit !== before.unit) nameUnit(state);
+  if (state.range !== before.range) fields.paint(state);
+  if (state.palette !== before.palette) showPalette(state);
   if (state.lines !== before.lines) isolines.follow(state);
   if (state.wireframe !== before.wireframe) void showWires(state);
   if (state.sources.length > 0 && !pointer.follows) dismissHint();
@@ -67,7 +69,13 @@ store.listen((state, before) => {
 
 function nameUnit(state: State): void {
   fields.paint(state);
-  if (report) showReport(report, sceneView, unitOf(state));
+  if (report) showReport(report, sceneView, unitOf(state), meshes.joiningOf(report.id));
+}
+
+function showPalette({ palette }: State): void {
+  drawRamp(palette);
+  sceneView.surface?.setPalette(palette);
+  stage.invalidate();
 }
 
 /** Whether another axis is to point upwards than is drawn. */
@@ -84,7 +92,7 @@ function open(mesh: string): void {
   sceneView.close();
   isolines.forget();
   report = null;
-  showReport(report, sceneView, "");
+  showReport(report, sceneView, "", null);
   const stop = new AbortController();
   opening = stop;
   status.run("loading", "Loading the mesh…", stop, async () => {
@@ -95,12 +103,13 @@ function open(mesh: string): void {
     const now = store.state;
     stage.look(now.view ?? sceneView.viewOf(now));
     report = document;
-    showReport(report, sceneView, unitOf(now));
+    showReport(report, sceneView, unitOf(now), meshes.joiningOf(mesh));
     if (now.sources.length === 0 || pointer.follows) showHint();
     sceneView.showPoints(now);
     sceneView.barriers.show(sceneView.mesh, now.barriers);
     fields.paint(now);
     routes.draw();
+    showPalette(now);
     await showWires(now);
   });
 }

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import { readState, type WrittenState, writeRanges, writeState } from "../src/state/permalink";
-import { INITIAL, type State } from "../src/state/state";
+import { INITIAL, PALETTES, type State } from "../src/state/state";
 import { randomPoint } from "./support/points";
 import { Random } from "./support/random";
 
@@ -26,6 +26,8 @@ function randomState(random: Random): State {
     unit: random.pick(["", "mm", "µm & more"]),
     shade: random.pick(["distance", "territories", "difference"] as const),
     lines: random.pick([null, { count: 1 + random.below(99) }, { spacing: random.size() }]),
+    palette: random.pick(PALETTES),
+    range: random.pick([null, random.size()]),
     wireframe: random.pick([true, false]),
     up: random.pick(view ? (["y", "z"] as const) : ([null, "y", "z"] as const)),
     view,

@@ -1,6 +1,6 @@
 import { describe, expect, test } from "vitest";
 import type { Point } from "../src/api/types";
-import { parsePoint, parsePoints, rounded, writePoint } from "../src/state/point";
+import { parsePoint, parsePoints, rounded, sayPoint, writePoint } from "../src/state/point";
 import { randomPoint } from "./support/points";
 import { Random } from "./support/random";
 
@@ -97,4 +97,12 @@ describe("rounding", () => {
     const points: Point[] = [{ vertex: 5 }, { edge: [1, 2], t: 1 / 3 }];
     expect(points.map(rounded)).toEqual(points);
   });
+});
+
+test.each([
+  [{ vertex: 12 }, "vertex 12"],
+  [{ edge: [3, 4], t: 0.5 }, "on edge 3–4"],
+  [{ face: 7, barycentric: [0.2, 0.3, 0.5] }, "on face 7"],
+] as [Point, string][])("%j in words", (point, words) => {
+  expect(sayPoint(point)).toBe(words);
 });

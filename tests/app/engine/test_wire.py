@@ -69,8 +69,8 @@ def test_uploads_arrive_under_the_paths_of_the_other_machine(where: type) -> Non
     def task(store: Path) -> Task:
         work: Work
         if where is MeshFromFile:
-            given = MeshFromFile(store / "tmp/x/upload", "obj", "exact", "alice")
-            work = StoreMesh(given, store / "tmp/x/mesh")
+            given = MeshFromFile(store / "tmp/x/upload", "obj", "exact")
+            work = StoreMesh(given, store / "tmp/x/mesh", "alice", "a bunny")
         else:
             work = StoreMesh(MeshFromSample("knot", 100, "none"), store / "tmp/x/mesh")
         return Task(work, "alice")
@@ -181,7 +181,7 @@ def test_paths_stay_in_the_store(path: str) -> None:
     read = wire.decode(MESSAGE, wire._Task)
     stray = wire.encode(
         wire._Task(
-            wire._Store(wire._Sample("knot", 10, "none", None), path),
+            wire._Store(wire._Sample("knot", 10, "none"), path, None, None),
             read.client,
             read.affinity_keys,
             read.is_small,

@@ -34,6 +34,7 @@ CHUNKED = b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n
 @pytest.fixture(scope="module")
 def listener(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Listener]:
     with listening(Settings(store=tmp_path_factory.mktemp("store"))) as listener:
+        assert is_alive(listener)
         yield listener
 
 
@@ -236,7 +237,7 @@ def hasty(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("hasty")
 @pytest.mark.parametrize("begun", [START, b"G", WHOLE + START], ids=["head", "letter", "second"])
 def test_a_head_that_is_not_completed_is_refused(listener: Listener, begun: bytes) -> None:
-    with listener.connect(begun) as connection:
+    with listener.connect_at_once(begun) as connection:
         if begun.startswith(WHOLE):
             assert read_answer(connection).text == "answer"
         check_problem(read_answer(connection, listener.port), 504, "deadline_exceeded")
@@ -252,7 +253,7 @@ def test_a_connection_without_a_request_is_closed(listener: Listener, sent: byte
 
 @pytest.mark.usefixtures("hasty")
 def test_empty_lines_after_an_answer_do_not_hold_a_connection(listener: Listener) -> None:
-    with listener.connect(WHOLE) as connection:
+    with listener.connect_at_once(WHOLE) as connection:
         assert read_answer(connection).text == "answer"
         connection.sendall(b"\r\n")
         assert ends(connection)
@@ -261,8 +262,8 @@ def test_empty_lines_after_an_answer_do_not_hold_a_connection(listener: Listener
 @pytest.mark.usefixtures("hasty")
 def test_an_answer_under_way_is_not_cut_off(listener: Listener) -> None:
     gate = b"GET /gate?late HTTP/1.1\r\nHost: localhost\r\n\r\n"
-    with listener.connect(gate + START) as connection:
-        with listener.connect(START) as other:  # its time is over after that of the first
+    with listener.connect_at_once(gate + START) as connection:
+        with listener.connect_at_once(START) as other:  # its time is over after that of the first
             assert read_answer(other).status_code == 504
         listener.open_gate()
         assert read_answer(connection).text == "late"

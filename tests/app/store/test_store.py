@@ -247,7 +247,7 @@ def add(
 
     async def run() -> tuple[str, CatalogChange]:
         async with catalog.scratch_folder() as folder:
-            written = store.write_aside(mesh, folder / "mesh", owner)
+            written = store.write_aside(mesh, folder / "mesh", owner, "plane")
             change = await catalog.add(written)
             assert change is not None
             return written.mesh_id, change
@@ -281,7 +281,8 @@ def test_what_finds_no_room_is_refused_and_leaves_nothing(tmp_path: Path) -> Non
 
 def test_the_bound_holds_for_what_a_former_service_left(tmp_path: Path) -> None:
     (size,) = sizes(tmp_path, 50)
-    store_mesh(tmp_path / "store", plane(50))
+    with opened(tmp_path / "store") as store:
+        add(store, plane(50))
 
     with opened(tmp_path / "store", size) as store:
         assert store[1].total == size

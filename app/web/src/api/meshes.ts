@@ -3,6 +3,8 @@ import { authorization, call, getJson } from "./http";
 import { ProblemError, parseProblem } from "./problemError";
 import type { MeshDocument, MeshList } from "./types";
 
+const LONGEST_NAME = 200;
+
 /** List up to a hundred meshes, from the start or after a cursor. */
 export function listMeshes(cursor: string | null): Promise<MeshList> {
   const after = cursor === null ? {} : { cursor };
@@ -23,14 +25,16 @@ export async function makeSample(name: string, faces: number): Promise<MeshDocum
 /** Upload a file by XMLHttpRequest, because fetch does not report upload progress. */
 export function uploadMesh(
   file: File,
+  merge: "none" | "exact",
   onProgress: (share: number | null) => void,
   signal: AbortSignal,
 ): Promise<MeshDocument> {
   const extension = file.name.split(".").pop()?.toLowerCase() ?? "";
+  const parameters = new URLSearchParams({ name: file.name.slice(0, LONGEST_NAME), merge });
+  if (extension !== "json") parameters.set("format", extension);
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
-    const format = extension === "json" ? "" : `?${new URLSearchParams({ format: extension })}`;
-    request.open("POST", `/v1/meshes${format}`);
+    request.open("POST", `/v1/meshes?${parameters}`);
     if (extension === "json") request.setRequestHeader("Content-Type", "application/json");
     for (const [name, value] of Object.entries(authorization())) {
       request.setRequestHeader(name, value);

@@ -4,7 +4,7 @@ import { askDistances, askTerritories } from "../api/queries";
 import type { Effort, Method } from "../api/types";
 import { byId, duration, written } from "../dom";
 import type { FacePoint } from "../mesh/picking";
-import { writePoint } from "../state/point";
+import { sayPoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
 import type { Status } from "../status";
 import { hideLegend, showHere, showScale, showTerritories } from "../view/legend";
@@ -119,11 +119,12 @@ export class Fields {
       showScale(`Error, % (${kind}: ${written(100 * rough.bound.value, 3)})`, largest);
       return;
     }
-    surface.setValues(field.distances, field.largest);
+    const largest = state.range ?? field.largest;
+    surface.setValues(field.distances, largest);
     if (shade === "territories" && nearest) {
       surface.setTerritories(nearest);
-      showTerritories(sources.map(writePoint));
-    } else showScale(`Distance in ${unitOf(state)}`, field.largest);
+      showTerritories(sources.map(sayPoint));
+    } else showScale(`Distance in ${unitOf(state)}`, largest);
   }
 
   /** Tell the distance at a point, interpolated within its face; null: nowhere. */

@@ -4,13 +4,25 @@ import type { Effort, Method, Point } from "../api/types";
 import { byId, query } from "../dom";
 import type { Up } from "../mesh/frame";
 import { LONGEST_UNIT, readState, writeRanges } from "../state/permalink";
-import { parsePoints, type WrittenPoint, writePoint } from "../state/point";
-import { INITIAL, type Lines, type Shade, type State, type Store } from "../state/state";
+import { parsePoints, type WrittenPoint } from "../state/point";
+import {
+  INITIAL,
+  type Lines,
+  type Palette,
+  type Shade,
+  type State,
+  type Store,
+} from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
 import type { Tool } from "./pointer";
+import { PointField } from "./pointField";
 
 export class Controls {
+  private readonly sources = new PointField("sources");
+  private readonly target = new PointField("target");
+  private readonly waypoints = new PointField("waypoints");
+
   constructor(
     private readonly store: Store,
     private readonly status: Status,
@@ -38,6 +50,13 @@ export class Controls {
     });
     byId("lines").addEventListener("change", () => this.readLines(true));
     byId("lines-value").addEventListener("change", () => this.readLines(false));
+    byId("palette").addEventListener("change", () =>
+      store.update({ palette: byId("palette", HTMLSelectElement).value as Palette }),
+    );
+    byId("range").addEventListener("change", () => {
+      const range = byId("range", HTMLInputElement).valueAsNumber;
+      store.update({ range: range > 0 ? range : null });
+    });
     const unit = byId("unit", HTMLInputElement);
     unit.maxLength = LONGEST_UNIT;
     unit.addEventListener("change", () => store.update({ unit: unit.value.trim() }));
@@ -61,12 +80,16 @@ export class Controls {
 
   /** Show ``state`` in all fields. */
   show(state: State): void {
-    setValue("sources", state.sources.map(writePoint).join(" "));
-    setValue("target", state.target ? writePoint(state.target) : "");
-    setValue("waypoints", state.waypoints.map(writePoint).join(" "));
+    this.sources.show(state.sources);
+    this.target.show(state.target ? [state.target] : []);
+    this.waypoints.show(state.waypoints);
     setValue("barriers", writeRanges(state.barriers));
     setValue("max-distance", state.maxDistance === null ? "" : String(state.maxDistance));
+    if (state.waypoints.length > 0 || state.barriers.length > 0 || state.maxDistance !== null)
+      byId("more-points", HTMLDetailsElement).open = true;
     choose("methods", state.method);
+    byId("epsilon").hidden = state.method !== "approximate";
+    byId("efforts").hidden = state.method !== "fast";
     choose("shades", state.shade);
     setValue("error-slider", String(Math.log10(state.error)));
     showError(state.error);
@@ -80,6 +103,8 @@ export class Controls {
       lines === null ? "" : String("count" in lines ? lines.count : lines.spacing),
     );
     setValue("unit", state.unit);
+    byId("palette", HTMLSelectElement).value = state.palette;
+    setValue("range", state.range === null ? "" : String(state.range));
     byId("wireframe", HTMLInputElement).checked = state.wireframe;
   }
 
@@ -89,9 +114,9 @@ export class Controls {
     const text = (id: string): string => byId(id, HTMLInputElement).value.trim();
     this.status.run("busy", "Locating points…", new AbortController(), async () => {
       const [sources, targets, waypoints] = await Promise.all([
-        resolved(mesh, parsePoints(text("sources"))),
-        resolved(mesh, parsePoints(text("target"))),
-        resolved(mesh, parsePoints(text("waypoints"))),
+        resolved(mesh, parsePoints(this.sources.text)),
+        resolved(mesh, parsePoints(this.target.text)),
+        resolved(mesh, parsePoints(this.waypoints.text)),
       ]);
       const written = new URLSearchParams({
         barriers: text("barriers"),

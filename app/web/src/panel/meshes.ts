@@ -19,7 +19,8 @@ const SUFFIXES = ["obj", "off", "ply", "stl", "glb", "json"];
 const MORE = "more";
 
 export class Meshes {
-  private readonly names = new Map<string, string>();
+  /** Files of this visit by the id of their mesh, to send again with its vertices joined. */
+  private readonly files = new Map<string, File>();
   private readonly select = byId("meshes", HTMLSelectElement);
 
   constructor(
@@ -29,7 +30,7 @@ export class Meshes {
     for (const place of ["samples", "welcome-samples"]) {
       const buttons = SAMPLES.map(([name, title, faces]) => {
         const choice = button(title, () =>
-          this.create(`Making ${title}…`, title, () => makeSample(name, faces)),
+          this.create(`Making ${title}…`, () => makeSample(name, faces)),
         );
         choice.dataset.sample = name;
         return choice;
@@ -83,7 +84,7 @@ export class Meshes {
 
   private async listed(cursor: string | null): Promise<HTMLOptionElement[]> {
     const { meshes, next_cursor } = await listMeshes(cursor);
-    const options = meshes.map((mesh) => new Option(this.nameOf(mesh), mesh.id));
+    const options = meshes.map((mesh) => new Option(nameOf(mesh), mesh.id));
     if (next_cursor) {
       const more = new Option("More…", MORE);
       more.dataset.cursor = next_cursor;
@@ -92,30 +93,32 @@ export class Meshes {
     return options;
   }
 
-  private nameOf({ id, faces }: MeshDocument): string {
-    return `${this.names.get(id) ?? id.slice(0, 8)}, ${count(faces, "face")}`;
+  /** Return what uploads the file of a mesh again, with its vertices joined; null without a file. */
+  joiningOf(id: string): (() => void) | null {
+    const file = this.files.get(id);
+    return file ? () => this.upload(file, "exact") : null;
   }
 
-  private upload(file: File): void {
+  private upload(file: File, merge: "none" | "exact" = "none"): void {
     const refusal = refusalOf(file);
     if (refusal) {
       this.status.fail(refusal);
       return;
     }
-    this.create(`Uploading ${file.name}…`, file.name, (onProgress, signal) =>
-      uploadMesh(file, onProgress, signal),
-    );
+    this.create(`Uploading ${file.name}…`, async (onProgress, signal) => {
+      const mesh = await uploadMesh(file, merge, onProgress, signal);
+      this.files.set(mesh.id, file);
+      return mesh;
+    });
   }
 
   private create(
     words: string,
-    name: string,
     make: (onProgress: OnProgress, signal: AbortSignal) => Promise<MeshDocument>,
   ): void {
     const stop = new AbortController();
     this.status.run("loading", words, stop, async (onProgress) => {
       const mesh = await make(onProgress, stop.signal);
-      this.names.set(mesh.id, name);
       this.store.update(withMesh(mesh.id, this.store.state));
       await this.list();
     });
@@ -137,6 +140,10 @@ export class Meshes {
       if (file) this.upload(file);
     });
   }
+}
+
+function nameOf({ id, name, faces }: MeshDocument): string {
+  return `${name ?? id.slice(0, 8)}, ${count(faces, "face")}`;
 }
 
 /** Return why a file cannot be a mesh, judged by its name; null if it may be one. */

@@ -7,10 +7,12 @@ import type { SceneView } from "../view/sceneView";
 type Faults = MeshDocument["degenerate_faces"];
 type Kind = "face" | "vertex" | "edge";
 
+/** Show the report; `join` uploads the mesh again with vertices at one position joined. */
 export function showReport(
   document_: MeshDocument | null,
   sceneView: SceneView,
   unit: string,
+  join: (() => void) | null,
 ): void {
   const report = byId("report");
   report.replaceChildren();
@@ -19,8 +21,10 @@ export function showReport(
   words.textContent = describe(document_, unit);
   const list = document.createElement("ul");
   for (const [faults, noun, plural, kind] of faultsOf(document_)) {
-    if (faults.count > 0)
-      list.append(row(count(faults.count, noun, plural), faults, kind, sceneView));
+    if (faults.count === 0) continue;
+    const line = row(count(faults.count, noun, plural), faults, kind, sceneView);
+    if (join && faults === document_.duplicate_vertices) line.append(button("Join them", join));
+    list.append(line);
   }
   for (const warning of document_.warnings) {
     const line = document.createElement("li");

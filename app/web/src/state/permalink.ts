@@ -2,7 +2,7 @@
 import type { Effort, Method } from "../api/types";
 import type { Up } from "../mesh/frame";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
-import { INITIAL, type Lines, type Shade, type State } from "./state";
+import { INITIAL, type Lines, PALETTES, type Palette, type Shade, type State } from "./state";
 
 /** Characters of the name of a unit. */
 export const LONGEST_UNIT = 12;
@@ -30,6 +30,8 @@ export function writeState(state: State): string {
   if (state.shade !== INITIAL.shade) query.set("shade", state.shade);
   if (writeLines(state.lines) !== writeLines(INITIAL.lines))
     query.set("lines", writeLines(state.lines));
+  if (state.palette !== INITIAL.palette) query.set("palette", state.palette);
+  if (state.range !== null) query.set("range", String(state.range));
   if (state.wireframe) query.set("wireframe", "1");
   if (state.up) query.set("up", state.up);
   if (state.view) query.set("view", state.view.map((x) => Number(x.toFixed(4))).join(","));
@@ -58,6 +60,8 @@ export function readState(search: string): WrittenState {
     unit: query.get("unit")?.slice(0, LONGEST_UNIT) ?? "",
     shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference"]),
     lines: readLines(query.get("lines")),
+    palette: oneOf<Palette>(query.get("palette"), PALETTES),
+    range: positive(query.get("range")),
     wireframe: query.get("wireframe") === "1",
     // A view without an axis was written when y was always up.
     up: UPS.find((up) => up === query.get("up")) ?? (view && "y"),
@@ -101,7 +105,7 @@ function readRanges(text: string): number[] {
   });
 }
 
-function oneOf<T extends string>(text: string | null, choices: [T, ...T[]]): T {
+function oneOf<T extends string>(text: string | null, choices: readonly [T, ...T[]]): T {
   return choices.find((choice) => choice === text) ?? choices[0];
 }
 

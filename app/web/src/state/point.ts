@@ -34,6 +34,13 @@ export function writePoint(point: Point): string {
   return `f${point.face}:${point.barycentric.map((weight) => short(weight)).join(",")}`;
 }
 
+/** Return a point in words, without its coordinates. */
+export function sayPoint(point: Point): string {
+  if ("vertex" in point) return `vertex ${point.vertex}`;
+  if ("edge" in point) return `on edge ${point.edge.join("–")}`;
+  return `on face ${point.face}`;
+}
+
 /** Round the weights to six digits: less than a millionth of a face cannot be seen. */
 export function rounded(point: Point): Point {
   if (!("face" in point)) return point;

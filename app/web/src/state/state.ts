@@ -3,6 +3,8 @@ import type { Effort, Method, Point } from "../api/types";
 import type { Up } from "../mesh/frame";
 
 export type Shade = "distance" | "territories" | "difference";
+export const PALETTES = ["teal", "viridis", "magma", "cividis", "turbo"] as const;
+export type Palette = (typeof PALETTES)[number];
 export type Lines = { count: number } | { spacing: number } | null;
 
 export interface State {
@@ -19,6 +21,9 @@ export interface State {
   unit: string;
   shade: Shade;
   lines: Lines;
+  palette: Palette;
+  /** The distance of the last colour; null: the largest. */
+  range: number | null;
   wireframe: boolean;
   /** The axis that points upwards; null: as guessed. */
   up: Up | null;
@@ -39,6 +44,8 @@ export const INITIAL: State = {
   unit: "",
   shade: "distance",
   lines: { count: 20 },
+  palette: "teal",
+  range: null,
   wireframe: false,
   up: null,
   view: null,
@@ -75,6 +82,7 @@ export function withMesh(mesh: string, { lines }: State): Partial<State> {
     barriers: [],
     maxDistance: null,
     unit: "",
+    range: null,
     lines: lines && "spacing" in lines ? INITIAL.lines : lines,
     up: null,
     view: null,

@@ -1,15 +1,40 @@
 // Colours of distances and of territories.
+import { rgb } from "d3-color";
+import {
+  interpolateCividis,
+  interpolateMagma,
+  interpolateTurbo,
+  interpolateViridis,
+} from "d3-scale-chromatic";
+import type { Palette } from "../state/state";
+
 export type Rgb = [number, number, number];
 
 const SIZE = 256;
 
-/**
- * A ramp from dark indigo over teal to light yellow. Perceived lightness (OKLab) grows evenly: equal
- * steps of distance look equal, and every kind of colour vision sees their order.
- */
-export const RAMP: readonly Rgb[] = Array.from({ length: SIZE }, (_, i) => rampAt(i / (SIZE - 1)));
+const COLOURS: Record<Palette, (share: number) => Rgb> = {
+  teal: tealAt,
+  viridis: (t: number) => parsed(interpolateViridis(t)),
+  magma: (t: number) => parsed(interpolateMagma(t)),
+  cividis: (t: number) => parsed(interpolateCividis(t)),
+  turbo: (t: number) => parsed(interpolateTurbo(t)),
+};
 
-function rampAt(t: number): Rgb {
+/** Return the colours of a palette, from the nearest to the farthest. */
+export function ramp(palette: Palette): readonly Rgb[] {
+  return Array.from({ length: SIZE }, (_, i) => COLOURS[palette](i / (SIZE - 1)));
+}
+
+function parsed(text: string): Rgb {
+  const { r, g, b } = rgb(text);
+  return [r / 255, g / 255, b / 255];
+}
+
+/**
+ * Return a colour between dark indigo, teal and light yellow. Perceived lightness (OKLab) grows evenly:
+ * equal steps of distance look equal, and every kind of colour vision sees their order.
+ */
+function tealAt(t: number): Rgb {
   const chroma = 0.115 + 0.03 * Math.cos(2 * Math.PI * t); // as much as sRGB allows along the way
   return fromOklch(0.28 + 0.65 * t, chroma, ((300 - 200 * t) * Math.PI) / 180);
 }

@@ -1,13 +1,15 @@
 // The legend: the meaning of the colours.
 import { byId, written } from "../dom";
-import { css, RAMP, territory } from "./colours";
+import type { Palette } from "../state/state";
+import { css, ramp, territory } from "./colours";
 
-export function drawRamp(): void {
+export function drawRamp(palette: Palette): void {
   const strip = byId("ramp", HTMLCanvasElement);
-  strip.width = RAMP.length;
+  const colours = ramp(palette);
+  strip.width = colours.length;
   strip.height = 1;
   const context = strip.getContext("2d")!;
-  RAMP.forEach((colour, i) => {
+  colours.forEach((colour, i) => {
     context.fillStyle = css(colour);
     context.fillRect(i, 0, 1, 1);
   });

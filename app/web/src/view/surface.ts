@@ -13,7 +13,8 @@ import {
   ShaderMaterial,
 } from "three";
 import type { LoadedMesh } from "../mesh/loader";
-import { RAMP, type Rgb, territory } from "./colours";
+import type { Palette } from "../state/state";
+import { type Rgb, ramp, territory } from "./colours";
 
 const VERTEX = /* glsl */ `
   attribute float value;
@@ -64,7 +65,7 @@ const FRAGMENT = /* glsl */ `
 export function surfacePaint(): ShaderMaterial {
   return new ShaderMaterial({
     uniforms: {
-      ramp: { value: rampTexture() },
+      ramp: { value: rampTexture("teal") },
       largest: { value: 1 },
       tinted: { value: 0 },
       clay: { value: new Color().setRGB(0.72, 0.74, 0.78) },
@@ -122,6 +123,12 @@ export class Surface {
     this.tints.needsUpdate = true;
   }
 
+  setPalette(palette: Palette): void {
+    const uniform = this.uniform("ramp");
+    (uniform.value as DataTexture).dispose();
+    uniform.value = rampTexture(palette);
+  }
+
   async setWireframe(isVisible: boolean, colour: Rgb): Promise<void> {
     if (isVisible && !this.wires) {
       const edges = await this.mesh.allEdges();
@@ -149,11 +156,12 @@ export class Surface {
   }
 }
 
-function rampTexture(): DataTexture {
+function rampTexture(palette: Palette): DataTexture {
+  const colours = ramp(palette);
   const pixels = Uint8Array.from(
-    RAMP.flatMap((colour) => [...colour.map((x) => Math.round(255 * x)), 255]),
+    colours.flatMap((colour) => [...colour.map((x) => Math.round(255 * x)), 255]),
   );
-  const texture = new DataTexture(pixels, RAMP.length, 1, RGBAFormat);
+  const texture = new DataTexture(pixels, colours.length, 1, RGBAFormat);
   texture.minFilter = texture.magFilter = LinearFilter;
   texture.needsUpdate = true;
   return texture;
