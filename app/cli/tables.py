@@ -83,7 +83,7 @@ def matrix(
         Number, typer.Option(help="Of the distances, for points from files.")
     ] = Number.FLOAT64,
     threads: Annotated[
-        int | None, typer.Option(min=1, help="At most so many; one for each core if not named.")
+        int | None, typer.Option(min=1, help="Most threads; one for each core if not given.")
     ] = None,
     max_distance: MaxDistance = None,
     barriers: Barriers = None,

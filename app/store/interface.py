@@ -11,7 +11,7 @@ from app.store.results import Result, ResultFiles
 
 
 class Store(Protocol):
-    """What is kept of meshes and answers."""
+    """Where meshes and answers are stored."""
 
     @property
     def meshes(self) -> MeshHome:

@@ -22,7 +22,7 @@ anyway.
 
 
 class MinuteRate:
-    """Events of each caller, at most so many a minute; as many may come at once."""
+    """Events of each caller: a bound for a minute, which is also the most that may come at once."""
 
     def __init__(self, limit: int) -> None:
         self.limit = limit
