@@ -1,0 +1,91 @@
+"""The tour with curl and the command line, run as a reader would, against what they print there."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from tests.support.paths import ROOT
+from tests.support.processes import Server
+
+DOCUMENTS = ("tour.md", "command-line.md")
+"""In this order: the first makes the mesh file of the second."""
+ELSEWHERE = "http://there"
+"""In sessions about a service that other machines reach."""
+ASSIGNMENT = re.compile(r"[A-Z]+=")
+JOB = re.compile(r"/v1/jobs/([0-9a-f]{32})")
+VARYING = (
+    r'"created":"[^"]*"',
+    r'"request_id":"[^"]*"',
+    r'"progress": ?[\d.]+',
+    r'"seconds":[\d.e-]+',
+    r"dur=[\d.]+",
+    r"\nid: \d+",
+    r"took .*",
+)
+"""What differs from run to run."""
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(shutil.which("curl") is None, reason="to run it, install curl"),
+]
+
+
+def sessions() -> Iterator[tuple[str, str]]:
+    """Yield the commands of the documents, each with what it is to print."""
+    text = "".join((ROOT / "docs" / name).read_text() for name in DOCUMENTS)
+    for block in re.findall(r"```console\n(.*?)```", text, re.DOTALL):
+        if ELSEWHERE in block:
+            continue
+        for part in re.split(r"(?m)^\$ ", block)[1:]:
+            command, printed = re.fullmatch(r"(.*(?:\n    .*)*)\n([\s\S]*)", part).groups()  # type: ignore[union-attr]
+            yield command, printed
+
+
+def squeezed(text: str) -> str:
+    """Return a text without what varies, and without white space, where lines are wrapped."""
+    for pattern in VARYING:
+        text = re.sub(pattern, "", text)
+    return re.sub(r"\s+", "", text)
+
+
+def check_printed(printed: str, expected: str) -> None:
+    """Check a text against one in which ``…`` stands for anything."""
+    pieces = [re.escape(squeezed(piece)) for piece in expected.split("…")]
+    assert re.fullmatch("[\\s\\S]*".join(pieces), squeezed(printed)), printed[:3000]
+
+
+def test_what_documents_print_is_what_is_printed(tmp_path: Path) -> None:
+    geodesic = f"geodesic() {{ '{sys.executable}' -c 'from app.cli import main; main()' \"$@\"; }}"
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    known = [geodesic]
+    with closing(Server(tmp_path / "store")) as server:
+        replaced = {"http://127.0.0.1:8000": server.url, ".venv/bin/geodesic": "geodesic"}
+        count = 0
+        for written, written_answer in sessions():
+            command, expected = written, written_answer
+            for old, new in replaced.items():
+                command, expected = command.replace(old, new), expected.replace(old, new)
+            if ASSIGNMENT.match(command):
+                known.append(command)
+                continue
+            ran = subprocess.run(  # noqa: S603 - our own document
+                ["/bin/bash", "-c", "\n".join([*known, command])],
+                cwd=tmp_path,
+                env=environment,
+                capture_output=True,
+                text=True,
+                check=True,
+            )
+            for old, new in zip(JOB.findall(expected), JOB.findall(ran.stdout), strict=False):
+                replaced[old] = new
+                expected = expected.replace(old, new)
+            check_printed(ran.stdout + ran.stderr, expected)
+            count += 1
+    assert count > 25
