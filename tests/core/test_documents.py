@@ -70,6 +70,21 @@ def test_files_that_documents_name_are_there(document: str, name: str) -> None:
         assert any(place.exists() or place.with_suffix(".py").exists() for place in places)
 
 
+def test_files_of_the_table_of_changes_are_there() -> None:
+    table = (ROOT / "CONTRIBUTING.md").read_text().partition("## Where to make which change")[2]
+    named = set(re.findall(r"`((?:[\w-]+/)*[\w-]+\.(?:py|ts|md|json|toml))`", table))
+    folders = ("app", "benchmarks", "geodesic_core", "client", "docs", "openapi", "tests")
+    paths = [
+        "/" + path.relative_to(ROOT).as_posix()
+        for folder in folders
+        for path in (ROOT / folder).rglob("*.*")
+        if "node_modules" not in path.parts
+    ]
+    paths += [f"/{path.name}" for path in ROOT.glob("*.*")]
+    assert len(named) > 50
+    assert {name for name in named if not any(path.endswith(f"/{name}") for path in paths)} == set()
+
+
 def test_tests_that_documents_name_are_there() -> None:
     sources = (path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
     tests = {name for source in sources for name in re.findall(r"(?m)^def (test_\w+)", source)}

@@ -10,8 +10,9 @@ from starlette.testclient import TestClient
 from app.cli.arguments import SampleName
 from app.schemas import meshes as schemas
 from app.settings import Settings
+from app.store.manifests import MANIFEST, encode_manifest, read_manifest
 from geodesic_core import samples
-from tests.support.service import check_problem, serving, stored_mesh, upload_sample
+from tests.support.service import check_problem, serving, store_mesh, stored_mesh, upload_sample
 
 TETRAHEDRON = {
     "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -131,6 +132,16 @@ def test_the_name_of_a_mesh_comes_with_its_first_upload(
         assert client.post("/v1/meshes", **again).json() == document
     with serving(tmp_path) as client:
         assert client.get("/v1/meshes").json()["meshes"] == [document]
+
+
+def test_a_mesh_that_an_earlier_release_stored_has_no_name(tmp_path: Path) -> None:
+    mesh_id = store_mesh(tmp_path, samples.plane(8))
+    path = tmp_path / "meshes" / mesh_id / MANIFEST
+    manifest = dict(read_manifest(str(path)))
+    del manifest["name"]
+    path.write_bytes(encode_manifest(manifest))
+    with serving(tmp_path) as client:
+        assert client.get(f"/v1/meshes/{mesh_id}").json()["name"] is None
 
 
 @pytest.mark.parametrize("name", ["", "x" * 201, "a\x1b[31mb", "a\x9bb", "a\n"])
