@@ -223,7 +223,7 @@ async def _add_upload(
     service: Service, parameters: UploadParameters, request: Request, context: RequestContext
 ) -> StoredMesh:
     if parameters.faces is not None:
-        fault = Fault("/query/faces", "only a sample has a wanted number of faces; leave it out for a file")
+        fault = Fault("/query/faces", "only a sample has a wanted number of faces")
         raise problem("invalid_request", fault.message, errors=(fault,))
     async with (
         service.mesh_catalog.scratch_folder() as folder,

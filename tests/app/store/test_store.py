@@ -584,15 +584,18 @@ STEPS = [
 ]
 
 
-def count_down(monkeypatch: pytest.MonkeyPatch, steps: int, error: BaseException) -> None:
-    """Fail at a step of all that change the disk."""
+def count_down(
+    monkeypatch: pytest.MonkeyPatch, root: Path, steps: int, error: BaseException
+) -> None:
+    """Fail at a step of all that change files below ``root``; other threads may change others."""
     left = steps
 
     def failing(real: Callable[..., Any]) -> Callable[..., Any]:
         def step(*args: Any, **kwargs: Any) -> Any:
             nonlocal left
-            left -= 1
+            left -= str(root) in str(args)
             if left == 0:
+                left = -1
                 raise error
             return real(*args, **kwargs)
 
@@ -612,7 +615,7 @@ def test_a_crash_at_any_step_leaves_a_mesh_whole_or_not_there(tmp_path: Path) ->
             before = files_in(root)
             folder = root / "tmp" / "crashed"
             folder.mkdir()
-            count_down(patch, step, Crash())
+            count_down(patch, root, step, Crash())
             try:
                 written = store[0].write_aside(plane(), folder / "mesh", None)
                 anyio.run(store[1].add, written)
@@ -647,7 +650,7 @@ def test_a_crash_while_a_mesh_is_healed_leaves_it_damaged_or_whole(tmp_path: Pat
         shutil.copytree(tmp_path / "before", root)
         with pytest.MonkeyPatch.context() as patch, opened(root) as store:
             (root / "tmp" / "crashed").mkdir()
-            count_down(patch, step, Crash())
+            count_down(patch, root, step, Crash())
             try:
                 written = store[0].write_aside(plane(), root / "tmp" / "crashed" / "mesh", "bob")
                 change = anyio.run(store[1].add, written)
@@ -676,7 +679,7 @@ def test_a_full_disk_at_any_step_leaves_nothing(tmp_path: Path) -> None:
         root = tmp_path / str(step)
         with pytest.MonkeyPatch.context() as patch, opened(root) as store:
             before = files_in(root)
-            count_down(patch, step, OSError(errno.ENOSPC, "full"))
+            count_down(patch, root, step, OSError(errno.ENOSPC, "full"))
             try:
                 add(store, plane())
             except OSError:
