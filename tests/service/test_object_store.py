@@ -284,7 +284,7 @@ def test_two_replicas_share_meshes_answers_and_jobs(
     )
 
 
-@pytest.mark.slow
+@pytest.mark.full
 def test_hosts_of_a_cluster_pull_meshes_and_send_answers(
     s3: S3, postgres: Postgres, url: str, tmp_path: Path
 ) -> None:

@@ -114,6 +114,7 @@ def test_lists_have_the_jobs_of_both(pair: Pair, small: str) -> None:
         assert found[:2] == jobs[::-1]
 
 
+@pytest.mark.full
 def test_the_quota_of_jobs_holds_for_both(postgres: Postgres, tmp_path: Path) -> None:
     with ExitStack() as stack:
         pair = pair_of(stack, postgres, tmp_path, GEODESIC_QUOTA_JOBS="5")
@@ -167,6 +168,7 @@ def test_a_replica_that_was_held_up_gives_its_jobs_away(pair: Pair, small: str) 
     assert len(answers) == 1
 
 
+@pytest.mark.full
 def test_a_database_that_restarts_under_load(postgres: Postgres, tmp_path: Path) -> None:
     """Each request is answered rightly or with 503, and nothing that was accepted is lost."""
     accepted: dict[str, str] = {}
