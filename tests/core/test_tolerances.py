@@ -580,7 +580,6 @@ def test_rough_vertices_are_the_fewest_of_a_rough_mesh(vertices, expected):
     assert is_rough(count, 1.0, count) == expected
 
 
-@pytest.mark.jit
 @pytest.mark.usefixtures("worn_out")
 def test_a_sweep_whose_runs_are_used_up_begins_anew_exactly():
     """With all that was asked for: paths, windows, targets, curves; progress does not go back."""

@@ -52,7 +52,6 @@ def test_any_reader_of_numpy_gets_the_distances(tmp_path: Path) -> None:
         assert file["barriers"].tolist() == list(range(100, 130))
 
 
-@pytest.mark.jit
 def test_a_file_that_is_there_is_replaced_as_a_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -92,7 +91,6 @@ def test_another_mesh_is_refused(file: Path) -> None:
             gc.load_field(file, other)
 
 
-@pytest.mark.jit
 def test_other_barriers_are_refused(tmp_path: Path) -> None:
     FIELDS["barriers"]().save(tmp_path / "field.npz")
     same = MESH.with_barriers(range(100, 130))

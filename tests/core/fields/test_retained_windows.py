@@ -97,7 +97,6 @@ def test_what_is_kept_changes_nothing_else():
     assert kept.stats.peak_bytes >= plain.stats.peak_bytes + 64 * kept.stats.windows_kept
 
 
-@pytest.mark.jit
 @pytest.mark.parametrize("solve", [gc.exact_distance, gc.approximate_distance])
 def test_kept_windows_count_against_the_memory_limit(solve):
     mesh = gc.samples.knot(500)
@@ -109,7 +108,6 @@ def test_kept_windows_count_against_the_memory_limit(solve):
     solve(mesh, 0, memory_limit=needed, retain="windows")
 
 
-@pytest.mark.jit
 def test_points_of_an_approximate_field_mean_the_same_whether_it_kept_windows_or_not():
     mesh = gc.samples.knot(500)
     source, *targets = random_points(mesh, 8, seed=25)

@@ -269,7 +269,6 @@ def test_progress_grows_from_zero_to_one_in_the_callers_thread(mesh, layout):
     assert where == {threading.get_ident()}
 
 
-@pytest.mark.jit
 @pytest.mark.slow
 @LAYOUTS
 @pytest.mark.parametrize(

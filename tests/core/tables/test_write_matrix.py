@@ -109,7 +109,6 @@ def test_each_row_is_that_of_a_field(mesh, suffix, options, tmp_path):
     assert written.error_bound == fields[0].error_bound
 
 
-@pytest.mark.jit
 @pytest.mark.usefixtures("small_blocks")
 def test_the_file_tells_what_was_asked(mesh, tmp_path):
     facts = {}
@@ -203,7 +202,6 @@ def test_files_do_not_depend_on_the_number_of_threads(mesh, tmp_path):
     assert len(digests) == 1
 
 
-@pytest.mark.jit
 def test_part_of_another_table_is_not_mixed_in(mesh, tmp_path):
     out = tmp_path / "table.npy"
     with pytest.raises(gc.errors.Cancelled):
