@@ -125,7 +125,7 @@ def mesh_document(manifest: Manifest) -> dict[str, Any]:
     names = [name for name, stored in PUBLIC_ARRAYS.items() if stored in manifest["crc32"]]
     return {
         "id": mesh_id,
-        "name": manifest.get("name"),  # which stores of earlier releases lack
+        "name": manifest.get("name"),  # earlier releases stored none
         **manifest["report"],
         "warnings": manifest["warnings"],
         "created": manifest["created"],

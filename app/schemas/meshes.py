@@ -8,8 +8,8 @@ from app.schemas.points import LARGEST_COUNT, StrictModel
 
 Merge = Literal["none", "exact"]
 MeshFormat = Literal["obj", "off", "ply", "stl", "glb"]
-LONGEST_NAME = 200
-"""Characters of the name of a mesh"""
+LONGEST_NAME = 255
+"""Characters of the name of a mesh: as many as file systems allow for that of a file"""
 MeshName = Annotated[str, Field(max_length=LONGEST_NAME, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
 """Without control characters, which a terminal would obey"""
 SampleName = Literal["knot", "sphere", "terrain", "obstacles", "plane"]
@@ -50,7 +50,7 @@ class MeshDocument(BaseModel):
     """The report of a mesh in the store."""
 
     id: str
-    name: str | None = Field(description="The one that came with its first upload, if any")
+    name: str | None = Field(description="The name given with its first upload, if any")
     vertices: int
     faces: int = Field(description="All of them, those that repeat a vertex as well")
     warnings: list[str] = Field(description="A sentence or two each, with the remedy")

@@ -35,7 +35,7 @@ class Mesh:
 
     id: str
     name: str | None
-    """The one that came with its first upload, if any"""
+    """The name given with its first upload, if any"""
     vertices: int
     faces: int
     warnings: Sequence[str]

@@ -1304,7 +1304,7 @@ export interface components {
             id: string;
             /**
              * Name
-             * @description The one that came with its first upload, if any
+             * @description The name given with its first upload, if any
              */
             name: string | null;
             /** Vertices */

@@ -315,7 +315,7 @@ class TriangleMesh:
 
     @cached_property
     def is_rough(self) -> bool:
-        """Whether its saddles are so many and so sharp that merging windows does not save time.
+        """Whether it has enough sharp saddles that merging windows saves no time.
 
         On such a mesh `approximate_distance` returns exact distances.
         """

@@ -22,7 +22,7 @@ anyway.
 
 
 class MinuteRate:
-    """Events of each caller: a bound for a minute, which is also the most that may come at once."""
+    """A limit on the events of each caller in a minute; all of them may come at once."""
 
     def __init__(self, limit: int) -> None:
         self.limit = limit

@@ -223,7 +223,7 @@ async def _add_upload(
     service: Service, parameters: UploadParameters, request: Request, context: RequestContext
 ) -> StoredMesh:
     if parameters.faces is not None:
-        fault = Fault("/query/faces", "only a sample has a wanted number of faces")
+        fault = Fault("/query/faces", "the number of faces can be chosen for a sample only")
         raise problem("invalid_request", fault.message, errors=(fault,))
     async with (
         service.mesh_catalog.scratch_folder() as folder,

@@ -3,8 +3,6 @@ import { authorization, call, getJson } from "./http";
 import { ProblemError, parseProblem } from "./problemError";
 import type { MeshDocument, MeshList } from "./types";
 
-const LONGEST_NAME = 200;
-
 /** List up to a hundred meshes, from the start or after a cursor. */
 export function listMeshes(cursor: string | null): Promise<MeshList> {
   const after = cursor === null ? {} : { cursor };
@@ -30,7 +28,7 @@ export function uploadMesh(
   signal: AbortSignal,
 ): Promise<MeshDocument> {
   const extension = file.name.split(".").pop()?.toLowerCase() ?? "";
-  const parameters = new URLSearchParams({ name: file.name.slice(0, LONGEST_NAME), merge });
+  const parameters = new URLSearchParams({ name: file.name, merge });
   if (extension !== "json") parameters.set("format", extension);
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();

@@ -13,7 +13,7 @@ import {
   ShaderMaterial,
 } from "three";
 import type { LoadedMesh } from "../mesh/loader";
-import type { Palette } from "../state/state";
+import { INITIAL, type Palette } from "../state/state";
 import { type Rgb, ramp, territory } from "./colours";
 
 const VERTEX = /* glsl */ `
@@ -65,7 +65,7 @@ const FRAGMENT = /* glsl */ `
 export function surfacePaint(): ShaderMaterial {
   return new ShaderMaterial({
     uniforms: {
-      ramp: { value: rampTexture("teal") },
+      ramp: { value: rampTexture(INITIAL.palette) },
       largest: { value: 1 },
       tinted: { value: 0 },
       clay: { value: new Color().setRGB(0.72, 0.74, 0.78) },

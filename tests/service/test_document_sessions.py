@@ -1,11 +1,11 @@
-"""The tour with curl and the command line, run as a reader would, against what they print there."""
+"""Sessions in the documents, with curl and `geodesic`, run as a reader would run them."""
 
 import os
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from tests.support.processes import Server
 DOCUMENTS = ("tour.md", "command-line.md")
 """In this order: the first makes the mesh file of the second."""
 ELSEWHERE = "http://there"
-"""In sessions about a service that other machines reach."""
+"""The host in sessions that need other machines."""
 ASSIGNMENT = re.compile(r"[A-Z]+=")
 JOB = re.compile(r"/v1/jobs/([0-9a-f]{32})")
 VARYING = (
@@ -29,7 +29,7 @@ VARYING = (
     r"\nid: \d+",
     r"took .*",
 )
-"""What differs from run to run."""
+"""Parts of the output that differ from run to run."""
 
 pytestmark = [
     pytest.mark.slow,
@@ -38,7 +38,7 @@ pytestmark = [
 
 
 def sessions() -> Iterator[tuple[str, str]]:
-    """Yield the commands of the documents, each with what it is to print."""
+    """Yield the commands of the documents, each with the output that is shown."""
     text = "".join((ROOT / "docs" / name).read_text() for name in DOCUMENTS)
     for block in re.findall(r"```console\n(.*?)```", text, re.DOTALL):
         if ELSEWHERE in block:
@@ -49,29 +49,34 @@ def sessions() -> Iterator[tuple[str, str]]:
 
 
 def squeezed(text: str) -> str:
-    """Return a text without what varies, and without white space, where lines are wrapped."""
+    """Return a text without the varying parts and without white space, since lines are wrapped."""
     for pattern in VARYING:
         text = re.sub(pattern, "", text)
     return re.sub(r"\s+", "", text)
 
 
+def with_replacements(text: str, replaced: Mapping[str, str]) -> str:
+    """Return a text of the documents as it is here: with this server, this command, these jobs."""
+    for old, new in replaced.items():
+        text = text.replace(old, new)
+    return text
+
+
 def check_printed(printed: str, expected: str) -> None:
-    """Check a text against one in which ``…`` stands for anything."""
+    """Check an output against the one shown, in which ``…`` stands for anything."""
     pieces = [re.escape(squeezed(piece)) for piece in expected.split("…")]
     assert re.fullmatch("[\\s\\S]*".join(pieces), squeezed(printed)), printed[:3000]
 
 
-def test_what_documents_print_is_what_is_printed(tmp_path: Path) -> None:
+def test_commands_print_what_the_documents_show(tmp_path: Path) -> None:
     geodesic = f"geodesic() {{ '{sys.executable}' -c 'from app.cli import main; main()' \"$@\"; }}"
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     known = [geodesic]
     with closing(Server(tmp_path / "store")) as server:
         replaced = {"http://127.0.0.1:8000": server.url, ".venv/bin/geodesic": "geodesic"}
         count = 0
-        for written, written_answer in sessions():
-            command, expected = written, written_answer
-            for old, new in replaced.items():
-                command, expected = command.replace(old, new), expected.replace(old, new)
+        for written, shown in sessions():
+            command = with_replacements(written, replaced)
             if ASSIGNMENT.match(command):
                 known.append(command)
                 continue
@@ -83,9 +88,8 @@ def test_what_documents_print_is_what_is_printed(tmp_path: Path) -> None:
                 text=True,
                 check=True,
             )
-            for old, new in zip(JOB.findall(expected), JOB.findall(ran.stdout), strict=False):
-                replaced[old] = new
-                expected = expected.replace(old, new)
+            replaced |= zip(JOB.findall(shown), JOB.findall(ran.stdout), strict=False)
+            expected = with_replacements(shown, replaced)
             check_printed(ran.stdout + ran.stderr, expected)
             count += 1
     assert count > 25
