@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numba
 from numba.core import serialize
 from numba.core.compiler import CompileResult
-from numba.core.runtime import rtsys
+from numba.core.runtime.nrt import rtsys
 
 from geodesic_core.kernels.jit import machine
 
