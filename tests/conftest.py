@@ -13,10 +13,12 @@ from hypothesis import settings
 import geodesic_core as gc
 
 pytest_plugins = [
+    "tests.support.azure",
     "tests.support.databases",
     "tests.support.logs",
     "tests.support.postgres",
     "tests.support.s3",
+    "tests.support.against",  # after those that it imports
     "tests.support.service",
 ]
 

@@ -23,6 +23,7 @@ from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
 from app.store.ownership import owned
 from geodesic_core.fields import fast_sweep, repeatable_sweep
+from tests.support.against import ClusterClient, is_against_cluster, serving_cluster
 from tests.support.processes import workers_of
 from tests.support.waiting import LONG_S, wait_until
 
@@ -75,9 +76,16 @@ def serving(store: Path, **settings: Any) -> Iterator[ServiceClient]:
 
 
 @pytest.fixture(scope="session")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:
+def client(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[ServiceClient | ClusterClient]:
     """A service that many tests share; they leave it as they found it, but for meshes."""
-    with serving(tmp_path_factory.mktemp("store")) as client:
+    if is_against_cluster(request.config):
+        servers = (request.getfixturevalue(name) for name in ("s3_server", "postgres"))
+        running = serving_cluster(*servers, tmp_path_factory.mktemp("cluster"))
+    else:
+        running = serving(tmp_path_factory.mktemp("store"))
+    with running as client:
         yield client
 
 
