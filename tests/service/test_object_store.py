@@ -274,8 +274,9 @@ def test_two_replicas_share_meshes_answers_and_jobs(
         link = job.headers["location"]
         wait_until(lambda: second.client.get(link).json()["status"] == "successful")
         assert second.client.get(f"{link}/results").content == answers[0]
+        assert first.client.get(f"/v1/meshes/{mesh_id}").status_code == 200
         assert second.client.delete(f"/v1/meshes/{mesh_id}").status_code == 204
-        wait_until(lambda: first.client.get(f"/v1/meshes/{mesh_id}").status_code == 404)
+        check_problem(first.client.get(f"/v1/meshes/{mesh_id}"), 404, "mesh_not_found")
         assert upload_sample(first.client, "plane", 30_000) == mesh_id  # type: ignore[arg-type]
     assert "belongs to another" in refused_start(
         url,  # type: ignore[arg-type]

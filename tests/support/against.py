@@ -8,7 +8,7 @@ what they use: fixtures that change this process, a service of their own, or its
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import cycle
+from itertools import cycle, repeat
 from pathlib import Path
 from typing import NoReturn
 
@@ -42,11 +42,11 @@ class _InTurn(httpx2.BaseTransport):
     """Sends each request to the next replica, with the ``Host`` that it was meant for."""
 
     def __init__(self, replicas: list[Server]) -> None:
-        self._replicas = cycle(replicas)
+        self.replicas: Iterator[Server] = cycle(replicas)
         self._transport = httpx2.HTTPTransport()
 
     def handle_request(self, request: httpx2.Request) -> httpx2.Response:
-        host, port = next(self._replicas).address
+        host, port = next(self.replicas).address
         return self._transport.handle_request(
             httpx2.Request(
                 request.method,
@@ -66,10 +66,11 @@ class ClusterClient(httpx2.Client):
 
     def __init__(self, cluster: ProcessCluster) -> None:
         self._cluster = cluster
+        self._in_turn = _InTurn(cluster.servers)
         super().__init__(
             base_url="http://localhost",
             headers={"User-Agent": "testclient"},
-            transport=_InTurn(cluster.servers),
+            transport=self._in_turn,
             follow_redirects=True,
             timeout=LONG_S,
         )
@@ -89,6 +90,14 @@ class ClusterClient(httpx2.Client):
     def wait_until_idle(self) -> None:
         """Wait until every worker is there and does nothing."""
         wait_until(lambda: self._is_idle(self.load))
+
+    @contextmanager
+    def staying(self) -> Iterator[None]:
+        """Ask one replica only inside the block."""
+        before = self._in_turn.replicas
+        self._in_turn.replicas = repeat(next(before))
+        yield
+        self._in_turn.replicas = before
 
     def _is_idle(self, load: Load) -> bool:
         return load.busy == load.missing == load.waiting == 0 and load.idle == 2 * NODES

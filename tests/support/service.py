@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -87,6 +87,13 @@ def client(
         running = serving(tmp_path_factory.mktemp("store"))
     with running as client:
         yield client
+
+
+@pytest.fixture
+def one_replica(client: Any) -> Iterator[None]:
+    """Have one replica answer all requests of a test: cheap answers are in the memory of each."""
+    with client.staying() if isinstance(client, ClusterClient) else nullcontext():
+        yield
 
 
 @pytest.fixture(scope="session")
