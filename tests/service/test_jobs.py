@@ -20,6 +20,7 @@ from tests.support.clocks import TEN_YEARS, Calendar, Clock
 from tests.support.processes import stopped
 from tests.support.service import (
     SLOW_FACES,
+    Serve,
     ServiceClient,
     check_problem,
     serving,
@@ -31,8 +32,8 @@ ASYNC = {"Prefer": "respond-async"}
 
 
 @pytest.fixture(scope="module")
-def one(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:
-    with serving(tmp_path_factory.mktemp("jobs"), queue_size=4, cancel_grace_s=LONG_S) as client:
+def one(serve: Serve, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:
+    with serve(tmp_path_factory.mktemp("jobs"), queue_size=4, cancel_grace_s=LONG_S) as client:
         client.wait_until_idle()
         yield client
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from tests.service.test_replicas import refused_start
-from tests.support.cluster import running_cluster
 from tests.support.postgres import Server as Postgres
 from tests.support.processes import Server
 from tests.support.s3 import S3
@@ -283,35 +282,3 @@ def test_two_replicas_share_meshes_answers_and_jobs(
         GEODESIC_COPIES=str(tmp_path / "one"),
         GEODESIC_STATE=postgres.new_database(),
     )
-
-
-@pytest.mark.full
-def test_hosts_of_a_cluster_pull_meshes_and_send_answers(
-    s3: S3, postgres: Postgres, url: str, tmp_path: Path
-) -> None:
-    pytest.importorskip("ray")
-    with serving(tmp_path / "alone") as alone:
-        expected = distances(alone, upload_sample(alone, "plane", 30_000), LONG).content
-    with running_cluster(tmp_path / "unused") as cluster:
-        cluster.settings |= {
-            "GEODESIC_STORE": url,
-            "GEODESIC_STATE": postgres.new_database(),
-            "GEODESIC_ENGINE": "ray",
-        }
-        pair = []
-        for name in ("one", "two"):
-            settings = cluster.settings | {"GEODESIC_COPIES": str(tmp_path / name)}
-            server = Server(url, waits_for_workers=False, **settings)  # type: ignore[arg-type]
-            cluster.servers.append(server)
-            pair.append(server)
-        node = cluster.add_node().wait()
-        assert "host of the cluster" in node.said
-        for server in pair:
-            wait_until(server.is_ready)
-        mesh = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
-        assert pair[0].client.post("/v1/meshes", json=mesh).status_code == 201
-        mesh_id = upload_sample(pair[0].client, "plane", 30_000)  # type: ignore[arg-type]
-        for server in pair:
-            answer = distances(server.client, mesh_id, LONG)  # type: ignore[arg-type]
-            assert answer.content == expected
-        assert not any(name.startswith("uploads/") for name in s3.names(url))

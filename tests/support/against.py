@@ -1,8 +1,9 @@
-"""The shared service of tests as a cluster: ``--against cluster``.
+"""The services of tests as clusters: ``--against cluster``.
 
-Two replicas in turn answer the requests of the fixture ``client``; a head and two nodes are behind
-them, an S3 server, and PostgreSQL. Tests that speak HTTP do not notice. Others are left out, by
-what they use: fixtures that change this process, a service of their own, or its inside.
+Then the fixtures ``client`` and ``serve`` are two replicas, which answer requests in turn; a head
+and two nodes are behind them, an S3 server, and PostgreSQL. Tests that speak HTTP do not notice.
+Others are left out, by what they use: fixtures that change this process, a service that is always
+in this process, or its inside.
 """
 
 from collections import Counter
@@ -10,14 +11,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import cycle, repeat
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import httpx2
 import pytest
 
 from app.engine.interface import Load
 from tests.support.cluster import ProcessCluster, running_cluster
-from tests.support.postgres import Server as Postgres
 from tests.support.processes import Server
 from tests.support.s3 import S3
 from tests.support.waiting import LONG_S, wait_until
@@ -65,7 +65,7 @@ class ClusterClient(httpx2.Client):
     """A client of the replicas of a cluster; what it shares with ``ServiceClient`` is HTTP."""
 
     def __init__(self, cluster: ProcessCluster) -> None:
-        self._cluster = cluster
+        self.cluster = cluster
         self._in_turn = _InTurn(cluster.servers)
         super().__init__(
             base_url="http://localhost",
@@ -78,14 +78,14 @@ class ClusterClient(httpx2.Client):
     @property
     def load(self) -> Load:
         """The load of all hosts, as a replica tells it."""
-        lines = self._cluster.servers[0].metrics()
+        lines = self.cluster.servers[0].metrics()
         told = dict(line.rsplit(" ", 1) for line in lines if not line.startswith("#"))
         counts = {name: int(float(told[metric])) for name, metric in _METRIC_OF_LOAD.items()}
         return Load(**counts, evictions={}, pids=())
 
     def workers(self) -> set[int]:
         """Return the ids of the worker processes of all hosts."""
-        return set[int]().union(*(node.workers() for node in self._cluster.nodes))
+        return set[int]().union(*(node.workers() for node in self.cluster.nodes))
 
     def wait_until_idle(self) -> None:
         """Wait until every worker is there and does nothing."""
@@ -110,19 +110,19 @@ class ClusterClient(httpx2.Client):
 
 
 @contextmanager
-def serving_cluster(s3: S3, postgres: Postgres, folder: Path) -> Iterator[ClusterClient]:
-    """Run two replicas and two nodes on an S3 server and PostgreSQL inside the block."""
+def serving_cluster(
+    s3: S3, store: str, state: str, folder: Path, **settings: Any
+) -> Iterator[ClusterClient]:
+    """Run two replicas and two nodes inside the block, on URLs of a store and of a database."""
     with running_cluster(folder / "unused") as cluster:
-        cluster.settings |= s3.environment | {
-            "GEODESIC_STORE": s3.new_url(),
-            "GEODESIC_STATE": postgres.new_database(),
-            "GEODESIC_ENGINE": "ray",
-        }
+        shared = {"store": store, "state": state, "engine": "ray"} | settings
+        cluster.settings |= {f"GEODESIC_{key.upper()}": str(shared[key]) for key in shared}
+        cluster.settings |= s3.environment
         for name in ("one", "two"):
-            settings = cluster.settings | {"GEODESIC_COPIES": str(folder / name)}
-            store = Path(settings["GEODESIC_STORE"])
+            own = cluster.settings | {"GEODESIC_COPIES": str(folder / name)}
             log = folder / f"{name}.log"
-            cluster.servers.append(Server(store, waits_for_workers=False, log=log, **settings))
+            server = Server(store, waits_for_workers=False, log=log, **own)  # type: ignore[arg-type]
+            cluster.servers.append(server)
         for _ in range(NODES):
             cluster.add_node()
         with ClusterClient(cluster) as client:
@@ -136,7 +136,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--against",
         choices=(SERVICE, CLUSTER),
         default=SERVICE,
-        help="what the fixture client is: a service in this process, or two replicas of a cluster",
+        help="what serves tests: a service in this process, or two replicas of a cluster",
     )
 
 
@@ -146,7 +146,7 @@ def is_against_cluster(config: pytest.Config) -> bool:
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Keep the tests that only use the shared service, and count why others are left out."""
+    """Keep the tests whose service may be a cluster, and count why others are left out."""
     if not is_against_cluster(config):
         return
     left_out = config.stash[_LEFT_OUT] = Counter()
@@ -163,11 +163,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 def _reason_to_leave_out(item: pytest.Item) -> str | None:
     fixtures = getattr(item, "fixturenames", ())
-    if "client" not in fixtures:
-        return "do not use the shared service"
-    definitions = item._fixtureinfo.name2fixturedefs["client"]  # type: ignore[attr-defined]
-    if definitions[0].func.__module__ != "tests.support.service":
-        return "use a service without workers"
+    if "serve" not in fixtures:
+        return "start a service of their own, or none"
     changing = [name for name in IN_THIS_PROCESS if name in fixtures]
     return f"change this process ({', '.join(changing)})" if changing else None
 

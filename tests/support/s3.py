@@ -1,11 +1,15 @@
 """An S3 server of its own on loopback, by moto, in a process that can be stopped and held up."""
 
+import re
 import socket
 import subprocess
 import sys
+import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
+from pathlib import Path
 
 import boto3
 import httpx2
@@ -26,10 +30,11 @@ class S3:
             probe.bind(("127.0.0.1", 0))
             self.port = probe.getsockname()[1]
         self.url = f"http://127.0.0.1:{self.port}"
+        self._log = tempfile.NamedTemporaryFile(prefix="geodesic-s3-")  # noqa: SIM115 - see close
         self.process = subprocess.Popen(  # noqa: S603 - this Python
             [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(self.port)],
             stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            stderr=self._log,
         )
         wait_until(self._answers)
         self.environment = {
@@ -51,11 +56,21 @@ class S3:
         """Return the URL of a store that nobody has."""
         return f"s3://bucket/store-{next(_numbers)}"
 
-    def names(self, url: str) -> set[str]:
-        """Return the names of the objects of a store."""
+    def sizes(self, url: str) -> dict[str, int]:
+        """Return the bytes of the objects of a store, by name."""
         prefix = url.removeprefix("s3://bucket/") + "/"
         found = self.client.list_objects_v2(Bucket="bucket", Prefix=prefix).get("Contents", [])
-        return {each["Key"].removeprefix(prefix) for each in found}
+        return {each["Key"].removeprefix(prefix): each["Size"] for each in found}
+
+    def names(self, url: str) -> set[str]:
+        """Return the names of the objects of a store."""
+        return set(self.sizes(url))
+
+    def reads(self, url: str) -> Counter[str]:
+        """Return how often each object of a store was read so far, whole or in part."""
+        place = url.removeprefix("s3:/")
+        read = re.findall(rf'"GET {place}/(\S+) HTTP', Path(self._log.name).read_text())
+        return Counter(read)
 
     def damage(self, url: str, name: str) -> None:
         """Change the last byte of an object."""
@@ -79,6 +94,7 @@ class S3:
     def close(self) -> None:
         self.process.kill()
         self.process.wait()
+        self._log.close()
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -75,17 +75,27 @@ def serving(store: Path, **settings: Any) -> Iterator[ServiceClient]:
         yield client
 
 
+Serve = Callable[..., AbstractContextManager[Any]]
+
+
 @pytest.fixture(scope="session")
-def client(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[ServiceClient | ClusterClient]:
+def serve(request: pytest.FixtureRequest) -> Serve:
+    """`serving`; with ``--against cluster``, a function that runs a cluster likewise."""
+    if not is_against_cluster(request.config):
+        return serving
+    s3, postgres = (request.getfixturevalue(name) for name in ("s3_server", "postgres"))
+
+    def serve_cluster(folder: Path, **settings: Any) -> AbstractContextManager[ClusterClient]:
+        urls = s3.new_url(), postgres.new_database()
+        return serving_cluster(s3, *urls, folder, **settings)
+
+    return serve_cluster
+
+
+@pytest.fixture(scope="session")
+def client(serve: Serve, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:
     """A service that many tests share; they leave it as they found it, but for meshes."""
-    if is_against_cluster(request.config):
-        servers = (request.getfixturevalue(name) for name in ("s3_server", "postgres"))
-        running = serving_cluster(*servers, tmp_path_factory.mktemp("cluster"))
-    else:
-        running = serving(tmp_path_factory.mktemp("store"))
-    with running as client:
+    with serve(tmp_path_factory.mktemp("store")) as client:
         yield client
 
 

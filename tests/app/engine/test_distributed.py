@@ -435,7 +435,10 @@ def test_spans_name_the_host_and_lie_within_its_work_whatever_its_clock(
 
     async def scene(replica: Replica) -> None:
         begin = time_ns() + round(ahead_s * 1e9)
-        phases = {"load": Period(begin, begin + 2000), "compute": Period(begin + 2000, begin + 7000)}
+        phases = {
+            "load": Period(begin, begin + 2000),
+            "compute": Period(begin + 2000, begin + 7000),
+        }
         for engine in replica.cluster.engines.values():
             engine.periods = phases
         await replica.ask()

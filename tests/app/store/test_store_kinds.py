@@ -1,6 +1,6 @@
 """Conformance: all kinds of stores go through the same cases, as two machines see them."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ from uuid import uuid4
 import anyio
 import numpy as np
 import pytest
+from obstore.store import MemoryStore
 
 import geodesic_core as gc
 from app.errors import ProblemError
@@ -16,6 +17,8 @@ from app.settings import Settings
 from app.store.interface import Store
 from app.store.layout import RESULTS, TEMPORARY, StoreError
 from app.store.meshes import MeshStore, WrittenMesh
+from app.store.object_store import ObjectStore
+from app.store.objects import Objects
 from app.store.opening import store_of
 from app.store.results import SMALL, Result, write_result
 from tests.support.waiting import LONG_S
@@ -73,6 +76,9 @@ class Machine:
         return b"".join(parts)
 
 
+Machines = tuple[Machine, Machine]
+
+
 @pytest.fixture(
     params=[
         "folder",
@@ -87,12 +93,6 @@ def new_store(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[Path]
     if kind == "folder":
         return lambda _folder: store_of(Settings(store=tmp_path / "shared"))
     if kind == "memory":
-        pytest.importorskip("obstore")
-        from obstore.store import MemoryStore
-
-        from app.store.object_store import ObjectStore
-        from app.store.objects import Objects
-
         objects = Objects(MemoryStore())
         return lambda folder: ObjectStore(objects, folder, 10**9, "memory")
     url = request.getfixturevalue(kind).new_url()
@@ -100,28 +100,22 @@ def new_store(request: pytest.FixtureRequest, tmp_path: Path) -> Callable[[Path]
 
 
 @pytest.fixture
-def machines(
-    new_store: Callable[[Path], Store], tmp_path: Path, request: pytest.FixtureRequest
-) -> tuple[Machine, Machine]:
+def machines(new_store: Callable[[Path], Store], tmp_path: Path) -> Iterator[Machines]:
     """Two machines of one service, which has claimed the store."""
-    stack = ExitStack()
-    request.addfinalizer(stack.close)
     found = []
-    for name in ("one", "two"):
-        store = new_store(tmp_path / name)
-        share = stack.enter_context(store.owned(is_shared=True))
-        store.claim("a database")
-        if share is not None:
-            share.let_others_in()
-        folder = tmp_path / ("shared" if store.supply is None else name)
-        (folder / TEMPORARY).mkdir(exist_ok=True)
-        (folder / RESULTS).mkdir(exist_ok=True)
-        store.meshes.found()
-        found.append(Machine(store, folder))
-    return found[0], found[1]
-
-
-Machines = tuple[Machine, Machine]
+    with ExitStack() as stack:
+        for name in ("one", "two"):
+            store = new_store(tmp_path / name)
+            share = stack.enter_context(store.owned(is_shared=True))
+            store.claim("a database")
+            if share is not None:
+                share.let_others_in()
+            folder = tmp_path / ("shared" if store.supply is None else name)
+            (folder / TEMPORARY).mkdir(exist_ok=True)
+            (folder / RESULTS).mkdir(exist_ok=True)
+            store.meshes.found()
+            found.append(Machine(store, folder))
+        yield found[0], found[1]
 
 
 async def code_of(call: Any) -> str:
@@ -324,9 +318,13 @@ def test_a_store_that_others_use_is_refused(
     service: str | None,
 ) -> None:
     store = new_store(tmp_path / "three")
-    with ExitStack() as stack, pytest.raises(StoreError, match=r"GEODESIC_STATE"):
-        stack.enter_context(store.owned(is_shared=service is not None))
-        store.claim(service)
+
+    def start() -> None:
+        with store.owned(is_shared=service is not None):
+            store.claim(service)
+
+    with pytest.raises(StoreError, match="GEODESIC_STATE"):
+        start()
     for machine in machines:
         machine.store.claim("a database")
 
