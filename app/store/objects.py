@@ -43,6 +43,8 @@ _RETRIES: "RetryConfig" = {
 """A store that is away is an error after some 6 s, the longest read included"""
 _CHUNK = 2**23
 """Bytes of one request, which has ``timeout`` for them"""
+_PARTS_AT_ONCE = 1
+"""Parts of an object on their way to the store: ``read_timeout`` counts while a part is sent"""
 _ABANDONED = timedelta(days=1)
 """Age of an object that no manifest names: nobody is about to write that manifest any more"""
 
@@ -89,7 +91,7 @@ class Objects:
     def write(self, name: str, content: bytes | Path) -> None:
         """Write an object, from memory or from a file, over any that is there."""
         with _translated():
-            obstore.put(self._store, name, content)
+            obstore.put(self._store, name, content, max_concurrency=_PARTS_AT_ONCE)
 
     def read(self, name: str) -> bytes | None:
         """Return the content of a small object; None where there is none."""

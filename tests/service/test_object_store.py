@@ -1,6 +1,7 @@
 """A service whose meshes and answers are in an object store."""
 
 import threading
+from base64 import b64encode
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 from tests.service.test_replicas import refused_start
+from tests.support.azure import Azure
 from tests.support.postgres import Server as Postgres
 from tests.support.processes import Server
 from tests.support.s3 import S3
@@ -226,9 +228,10 @@ def test_a_mesh_that_is_deleted_while_it_is_pulled_is_gone(service: ServiceClien
 @pytest.mark.parametrize(
     ("store", "environment", "said"),
     [
-        ("s3://no-such-bucket/x", {}, "does not exist"),
+        ("s3://no-such-bucket/x", {}, "does not exist: make its bucket"),
         ("s3://", {}, "is no URL of a store"),
         ("s3://bucket/x", {"AWS_ENDPOINT_URL": "http://127.0.0.1:9"}, "cannot be used"),
+        ("az://container/x", {}, "Account must be specified"),
     ],
 )
 @pytest.mark.usefixtures("s3")
@@ -237,6 +240,20 @@ def test_starts_that_are_refused(
 ) -> None:
     settings = {"GEODESIC_COPIES": str(tmp_path), **environment}
     assert said in refused_start(store, **settings)  # type: ignore[arg-type]
+
+
+def test_wrong_credentials_are_refused(s3: S3, url: str, tmp_path: Path) -> None:
+    with s3.asking_for_credentials():
+        said = refused_start(url, GEODESIC_COPIES=str(tmp_path))  # type: ignore[arg-type]
+    assert "cannot be used" in said
+    assert "AWS_ENDPOINT_URL and AWS_ACCESS_KEY_ID" in said
+
+
+def test_wrong_credentials_are_refused_by_azure(azure: Azure, tmp_path: Path) -> None:
+    wrong = {"AZURE_STORAGE_ACCOUNT_KEY": b64encode(b"another").decode()}
+    said = refused_start(azure.new_url(), GEODESIC_COPIES=str(tmp_path), **wrong)  # type: ignore[arg-type]
+    assert "Server failed to authenticate the request" in said
+    assert "AZURE_STORAGE_ACCOUNT_NAME and AZURE_STORAGE_ACCOUNT_KEY" in said
 
 
 @pytest.mark.full

@@ -80,6 +80,14 @@ class S3:
         self.client.put_object(Bucket="bucket", Key=key, Body=bytes(content))
 
     @contextmanager
+    def asking_for_credentials(self) -> Iterator[None]:
+        """Have the server refuse all credentials inside the block; else it takes any."""
+        link = f"{self.url}/moto-api/reset-auth"
+        httpx2.post(link, content=b"0").raise_for_status()
+        yield
+        httpx2.post(link, content=b"inf").raise_for_status()
+
+    @contextmanager
     def away(self) -> Iterator[None]:
         """Have the server answer nothing inside the block."""
         with stopped([self.process.pid]):
