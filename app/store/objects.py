@@ -47,7 +47,7 @@ _CHUNK = 2**23
 _PATIENT: "ClientConfig" = {**_CLIENT, "read_timeout": "60s", "timeout": "120s"}
 """For writing: the time counts while a part is sent, and while the store puts the parts together"""
 _PARTS_AT_ONCE = 4
-"""Parts of an object on their way at the same time, so that the store has time for other requests"""
+"""Parts of an object on their way at the same time: the store has time for other requests"""
 _PROBE_S = 3.0
 """Seconds of a write after which the store is asked whether it is still there"""
 _ABANDONED = timedelta(days=1)
