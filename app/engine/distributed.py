@@ -250,8 +250,9 @@ class DistributedEngine:
         self.on_wait(queued)
         self.on_work(task.client, seconds - queued)
         working, host = Period(begun, period.end), {"host.id": name}
-        record_span("queue", Period(period.start, begun), **host)
-        record_span("worker", working, _within(working, parts), failed=failed, **host)
+        record_span("queue", Period(period.start, begun), attributes=host)
+        parts = _within(working, parts)
+        record_span("worker", working, parts, failed=failed, attributes=host)
 
     async def _stop(self, name: str, ticket: str) -> None:
         """Stop work that nobody waits for: ask until the host answers, or the lease has ended."""

@@ -430,8 +430,8 @@ def test_spans_name_the_host_and_lie_within_its_work_whatever_its_clock(
 ) -> None:
     spans: dict[str, tuple[Period, dict[str, Period], dict[str, Any]]] = {}
 
-    def note(name: str, period: Period, parts: Any = None, **attributes: Any) -> None:
-        spans[name] = period, parts or {}, attributes
+    def note(name: str, period: Period, parts: Any = None, **more: Any) -> None:
+        spans[name] = period, parts or {}, more["attributes"]
 
     async def scene(replica: Replica) -> None:
         begin = time_ns() + round(ahead_s * 1e9)
