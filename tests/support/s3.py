@@ -69,8 +69,8 @@ class S3:
     def reads(self, url: str) -> Counter[str]:
         """Return how often each object of a store was read so far, whole or in part."""
         place = url.removeprefix("s3:/")
-        read = re.findall(rf'"GET {place}/(\S+) HTTP', Path(self._log.name).read_text())
-        return Counter(read)
+        log = re.sub(r"\x1b\[\d+m", "", Path(self._log.name).read_text())  # it has colours
+        return Counter(re.findall(rf'"GET {place}/(\S+) HTTP', log))
 
     def damage(self, url: str, name: str) -> None:
         """Change the last byte of an object."""
