@@ -34,7 +34,7 @@ def record_span(
     parts: Mapping[str, Period] | None = None,
     *,
     failed: bool = False,
-    **attributes: int,
+    attributes: Mapping[str, int | str] = {},
 ) -> None:
     """Record a span below the present one, and a span below it for each of its ``parts``."""
     if not trace.get_current_span().get_span_context().is_valid:

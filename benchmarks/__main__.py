@@ -7,6 +7,7 @@ from pathlib import Path
 from benchmarks import (
     approximate,
     attacks,
+    cluster,
     exact,
     fast,
     gate,
@@ -42,6 +43,7 @@ BENCHMARKS = {
     "service": service.run,
     "load": load.run,
     "attacks": attacks.run,
+    "cluster": cluster.run,
     "large-answers": service.run_large,
     "page": page.run,
 }

@@ -16,10 +16,12 @@ import geodesic_core
 gc.disable()  # until all tests are collected: to look for garbage would take half of the time
 
 pytest_plugins = [
+    "tests.support.azure",
     "tests.support.databases",
     "tests.support.logs",
     "tests.support.postgres",
     "tests.support.s3",
+    "tests.support.against",  # after those that it imports
     "tests.support.service",
 ]
 

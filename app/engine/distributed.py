@@ -229,15 +229,17 @@ class DistributedEngine:
         finally:
             calling.cancel()
             del host.flights[ticket]
-            self._account(task, flight, Period(start_ns, time_ns()), outcome)
+            self._account(name, task, flight, Period(start_ns, time_ns()), outcome)
         if outcome is None:  # stopped there, since no beat had come from here
             raise HostLostError
         if isinstance(outcome, TaskResult):
             on_progress(0.0)  # it may have been over before the next beat
         return outcome
 
-    def _account(self, task: Task, flight: _Flight, period: Period, outcome: Outcome) -> None:
-        """Report the seconds of a task in a queue and with a worker."""
+    def _account(
+        self, name: str, task: Task, flight: _Flight, period: Period, outcome: Outcome
+    ) -> None:
+        """Report the seconds of a task in the queue of a host and with a worker."""
         seconds = (period.end - period.start) / 1e9
         queued = 0.0 if flight.has_begun else seconds
         parts: Mapping[str, Period] = {}
@@ -247,8 +249,10 @@ class DistributedEngine:
         begun = period.start + round(queued * 1e9)
         self.on_wait(queued)
         self.on_work(task.client, seconds - queued)
-        record_span("queue", Period(period.start, begun))
-        record_span("worker", Period(begun, period.end), parts, failed=failed)
+        working, host = Period(begun, period.end), {"host.id": name}
+        record_span("queue", Period(period.start, begun), attributes=host)
+        parts = _within(working, parts)
+        record_span("worker", working, parts, failed=failed, attributes=host)
 
     async def _stop(self, name: str, ticket: str) -> None:
         """Stop work that nobody waits for: ask until the host answers, or the lease has ended."""
@@ -332,6 +336,16 @@ def _rising(on_progress: ProgressCallback) -> ProgressCallback:
             on_progress(share)
 
     return note
+
+
+def _within(whole: Period, parts: Mapping[str, Period]) -> Mapping[str, Period]:
+    """Return the parts of a period, moved together into it: the clock of a host may differ."""
+    if not parts:
+        return parts
+    first = min(part.start for part in parts.values())
+    last = max(part.end for part in parts.values())
+    shift = max(whole.start - first, 0) or min(whole.end - last, 0)
+    return {name: Period(part.start + shift, part.end + shift) for name, part in parts.items()}
 
 
 def _once_more(task: Task) -> Task:

@@ -153,7 +153,7 @@ class LocalEngine:
         finally:
             self.on_work(task.client, perf_counter() - start)
             period = Period(start_ns, time_ns())
-            record_span("worker", period, parts, failed=failed, **{"process.pid": pid})
+            record_span("worker", period, parts, failed=failed, attributes={"process.pid": pid})
 
     async def _hand_over(self, slot: Slot, task: Task, on_progress: ProgressCallback) -> Outcome:
         outcome = slot.begin(task.work, is_small=task.is_small)

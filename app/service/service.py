@@ -256,11 +256,13 @@ class Service:
         return None
 
     async def delete_mesh(self, mesh_id: str, caller: Caller) -> None:
-        """Remove a mesh and its results."""
+        """Remove a mesh and its results; afterwards no service that shares the store has it."""
         if not caller.may_delete(await self._owner(mesh_id)):
             raise problem("forbidden", f"mesh {mesh_id} was stored with another API key")
         await self.mesh_catalog.delete(mesh_id)
         await self._forget(mesh_id)
+        if self.database.is_shared:
+            await asyncio.sleep(self.store.meshes.trusted_s)
 
     async def _owner(self, mesh_id: str) -> str | None:
         """Return the owner of a mesh; None where it has none, or its manifest is damaged."""
@@ -470,12 +472,14 @@ class Service:
         with self.mesh_catalog.pinned(query.mesh_id):
             query.check_answer(representation.media_type, size, self.settings)
             name = result_name(query.mesh_id, result_key(query, representation))
+            is_small = query.is_small(size)
+            if self.database.is_shared and not is_small:  # small work costs less than the look
+                await self.results.index(name)
             stored = await self.results.find(name)
             self.lookups["miss" if stored is None else "hit"] += 1
             if stored is not None:
                 return stored, {}
             work = RunQuery(query, representation, name)
-            is_small = query.is_small(size)
             task = Task(work, client, query.affinity_keys, is_small, is_promised)
             start = partial(self._run, task, query.kind)
             done = await self._single_flight.join(name, start, on_progress)

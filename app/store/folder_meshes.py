@@ -21,6 +21,8 @@ from app.store.meshes import MeshStore, WrittenMesh
 class FolderMeshes:
     """The meshes in the store ``root``; see ``MeshHome``."""
 
+    trusted_s = 0.0
+
     def __init__(self, root: Path) -> None:
         self._store = MeshStore(root)
         self._temporary = root / TEMPORARY

@@ -1,11 +1,12 @@
 """The store in a folder: what all machines share, they share through its file system."""
 
-from collections.abc import AsyncIterator
-from contextlib import AbstractContextManager, asynccontextmanager
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 
+from app.settings import variable_of
 from app.store.folder_meshes import FolderMeshes
-from app.store.layout import RESULTS, StoreError, note_state
+from app.store.layout import RESULTS, StoreError, note_state, noted_state
 from app.store.ownership import Share, owned, shared
 from app.store.results import FolderResults
 
@@ -19,13 +20,25 @@ class FolderStore:
         self.folder = folder
         self.meshes = FolderMeshes(folder)
         self.results = FolderResults(folder / RESULTS)
+        self._share: Share | None = None
 
-    def owned(self, *, is_shared: bool) -> AbstractContextManager[Share | None]:
+    @contextmanager
+    def owned(self, *, is_shared: bool) -> Iterator[Share | None]:
         """Lock the folder."""
-        return shared(self.folder) if is_shared else owned(self.folder)
+        with shared(self.folder) if is_shared else owned(self.folder) as self._share:
+            yield self._share
 
     def claim(self, service: str | None) -> None:
-        """Note for `app.service.maintenance` where the jobs are; the lock keeps others away."""
+        """Note where the jobs are, unless services are here whose jobs are elsewhere.
+
+        A service that does not share the folder is kept away by the lock.
+        """
+        is_alone = self._share is None or self._share.is_first
+        if not is_alone and service != noted_state(self.folder):
+            raise StoreError(
+                f"the store {self.folder} is in use by services with another database: give this "
+                f"one the same {variable_of('state')}, or a store of its own"
+            )
         note_state(self.folder, service)
 
     def require_claimed(self) -> None:

@@ -23,6 +23,9 @@ class MeshHome(Protocol):
     A change of what is here is made by one catalog at a time.
     """
 
+    trusted_s: float
+    """Seconds for which another machine may take a mesh for present after its removal"""
+
     def found(self) -> Mapping[str, MeshRecord]:
         """Return what is here, the least recently used first."""
 

@@ -34,8 +34,6 @@ from app.store.meshes import (
 )
 from app.store.objects import Objects
 
-TRUSTED_S = 1.0
-"""Seconds for which a manifest counts as that of the store, so that few requests ask for it"""
 _AT_ONCE = 4
 """Arrays that travel at the same time"""
 _CALLS = 32
@@ -55,6 +53,9 @@ class ObjectMeshes:
 
     The folder belongs to this process.
     """
+
+    trusted_s = 1.0
+    """Seconds for which a manifest counts as that of the store, so that few requests ask for it"""
 
     def __init__(self, objects: Objects, folder: Path, capacity: int) -> None:
         self._objects = objects
@@ -172,7 +173,7 @@ class ObjectMeshes:
         known = self._known.get(mesh_id)
         if known is not None and monotonic() < known.until:
             return known
-        until = monotonic() + TRUSTED_S
+        until = monotonic() + self.trusted_s
         content = await self._call(self._objects.read, _manifest_name(mesh_id))
         if content is None:
             await self.distrust(mesh_id)

@@ -23,6 +23,13 @@ from app.store.objects import Objects
 from app.store.ownership import owned
 from app.store.results import FolderResults, Result
 
+VARIABLES = {
+    "s3": ("AWS_ENDPOINT_URL", "AWS_ACCESS_KEY_ID"),
+    "gs": ("GOOGLE_APPLICATION_CREDENTIALS",),
+    "az": ("AZURE_STORAGE_ACCOUNT_NAME", "AZURE_STORAGE_ACCOUNT_KEY"),
+}
+"""Variables of the environment from which obstore takes endpoints and credentials, by scheme"""
+
 _OWNER = "owner.json"
 _UPLOADS = "uploads"
 _IDENTITY = "identity"
@@ -56,13 +63,12 @@ class ObjectStore:
         content = orjson.dumps({"service": service or self._identity()})
         try:
             is_ours = self._objects.create(_OWNER, content)
-        except FileNotFoundError as error:
-            raise StoreError(f"the store {self._name} does not exist: {error}") from None
-        except StoreUnavailableError as error:
+        except FileNotFoundError:
             raise StoreError(
-                f"the store {self._name} cannot be used: {error}; endpoint and credentials are "
-                "those of the environment, such as AWS_ENDPOINT_URL and AWS_ACCESS_KEY_ID"
+                f"the store {self._name} does not exist: make its bucket or container first"
             ) from None
+        except StoreUnavailableError as error:
+            raise self._unusable(error) from None
         if not is_ours:
             raise StoreError(
                 f"the store {self._name} belongs to another service: give this one a prefix of "
@@ -76,7 +82,7 @@ class ObjectStore:
             if self._objects.read(_OWNER) is not None:
                 return
         except StoreUnavailableError as error:
-            raise StoreError(f"the store {self._name} cannot be used: {error}") from None
+            raise self._unusable(error) from None
         raise StoreError(
             f"there is no store at {self._name}: start geodesic serve on it first, and give all "
             f"machines the same {variable_of('store')}"
@@ -126,6 +132,13 @@ class ObjectStore:
 
     def _upload_name(self, file: Path) -> str:
         return f"{_UPLOADS}/{file.relative_to(self.folder).as_posix()}"
+
+    def _unusable(self, error: StoreUnavailableError) -> StoreError:
+        variables = " and ".join(VARIABLES[self._name.partition(":")[0]])
+        return StoreError(
+            f"the store {self._name} cannot be used: {error}; endpoint and credentials are those "
+            f"of the environment, such as {variables}"
+        )
 
     def _identity(self) -> str:
         path = self.folder / _IDENTITY

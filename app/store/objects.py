@@ -13,9 +13,10 @@ Nothing is there before its manifest, and nobody changes an object that a manife
 has read a manifest has all of one upload, or learns that it is gone.
 """
 
+import asyncio
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -43,6 +44,12 @@ _RETRIES: "RetryConfig" = {
 """A store that is away is an error after some 6 s, the longest read included"""
 _CHUNK = 2**23
 """Bytes of one request, which has ``timeout`` for them"""
+_PATIENT: "ClientConfig" = {**_CLIENT, "read_timeout": "60s", "timeout": "120s"}
+"""For writing: the time counts while a part is sent, and while the store puts the parts together"""
+_PARTS_AT_ONCE = 4
+"""Parts of an object on their way at the same time: the store has time for other requests"""
+_PROBE_S = 3.0
+"""Seconds of a write after which the store is asked whether it is still there"""
 _ABANDONED = timedelta(days=1)
 """Age of an object that no manifest names: nobody is about to write that manifest any more"""
 
@@ -62,8 +69,9 @@ class Objects:
     All methods raise ``StoreUnavailableError`` where the store does not answer, after some retries.
     """
 
-    def __init__(self, store: Any) -> None:
+    def __init__(self, store: Any, patient: Any = None) -> None:
         self._store = store
+        self._patient = patient or store
 
     @classmethod
     def at(cls, url: str) -> "Objects":
@@ -72,7 +80,10 @@ class Objects:
         Credentials and endpoints are those of the environment, such as ``AWS_ENDPOINT_URL``.
         """
         try:
-            return cls(from_url(url, client_options=_CLIENT, retry_config=_RETRIES))
+            return cls(
+                from_url(url, client_options=_CLIENT, retry_config=_RETRIES),
+                from_url(url, client_options=_PATIENT, retry_config=_RETRIES),
+            )
         except BaseError as error:
             raise ValueError(_line(error)) from None
 
@@ -87,9 +98,23 @@ class Objects:
         return True
 
     def write(self, name: str, content: bytes | Path) -> None:
-        """Write an object, from memory or from a file, over any that is there."""
+        """Write an object, from memory or from a file, over any that is there.
+
+        That takes as long as it takes, while the store answers other requests.
+        """
         with _translated():
-            obstore.put(self._store, name, content)
+            asyncio.run(self._write(name, content))
+
+    async def _write(self, name: str, content: bytes | Path) -> None:
+        put = obstore.put_async(self._patient, name, content, max_concurrency=_PARTS_AT_ONCE)
+        putting = asyncio.ensure_future(put)
+        try:
+            while not (await asyncio.wait({putting}, timeout=_PROBE_S))[0]:
+                with suppress(FileNotFoundError):
+                    await obstore.head_async(self._store, name)
+            await putting
+        finally:
+            putting.cancel()
 
     def read(self, name: str) -> bytes | None:
         """Return the content of a small object; None where there is none."""

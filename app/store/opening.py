@@ -21,5 +21,8 @@ def store_of(settings: Settings) -> Store:
     try:
         objects = Objects.at(settings.store)
     except ValueError as error:
-        raise StoreError(f"{variable_of('store')} is no URL of a store: {error}") from None
+        raise StoreError(
+            f"{variable_of('store')} is no URL of a store, or the environment lacks what it needs: "
+            f"{error}"
+        ) from None
     return ObjectStore(objects, settings.folder, settings.copies_bytes, settings.store)

@@ -124,6 +124,7 @@ def test_headers_of_binary_distances(client: TestClient, knot: str, name: str) -
 # Kept results
 
 
+@pytest.mark.usefixtures("one_replica")
 def test_each_method_and_error_has_a_result_of_its_own(client: TestClient, knot: str) -> None:
     exact = {"sources": [{"vertex": 42, "start_distance": 0.625}]}
     bodies = [
@@ -145,6 +146,7 @@ def test_each_method_and_error_has_a_result_of_its_own(client: TestClient, knot:
     assert bounds == [0, 1e-3, 2e-3, 0.02, 2e-3]  # a larger one is not used
 
 
+@pytest.mark.usefixtures("one_replica")
 def test_the_usual_error_is_one_result_with_its_spelling(client: TestClient, knot: str) -> None:
     bare = approximate(client, knot, sources=[{"vertex": 43}])
     spelt = approximate(client, knot, sources=[{"vertex": 43}], relative_error=0.001)

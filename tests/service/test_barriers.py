@@ -60,6 +60,7 @@ def test_answers_are_those_of_the_blocked_mesh(
     assert rough == gc.approximate_distance(walled, 0, 0.01).distances.tolist()
 
 
+@pytest.mark.usefixtures("one_replica")
 @pytest.mark.parametrize("operation", QUERIES)
 def test_the_mesh_itself_stays_free(client: TestClient, plane: str, operation: str) -> None:
     before = ask(client, plane, operation).content
@@ -72,6 +73,7 @@ def test_the_mesh_itself_stays_free(client: TestClient, plane: str, operation: s
         assert (again.content, again.headers["server-timing"]) == (before, "kept")
 
 
+@pytest.mark.usefixtures("one_replica")
 def test_spellings_of_barriers_are_one_query(
     client: TestClient, plane: str, walled: gc.TriangleMesh
 ) -> None:

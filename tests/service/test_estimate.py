@@ -257,6 +257,7 @@ def processor_seconds(query: Query[Any], opened: OpenMesh) -> float:
     return process_time() - start
 
 
+@pytest.mark.usefixtures("one_replica")
 def test_an_estimate_is_not_kept_and_computes_nothing(
     client: TestClient, ids: dict[str, str]
 ) -> None:

@@ -16,7 +16,7 @@ from starlette.testclient import TestClient
 
 from app.http.openapi import complete
 from tests.app.http.test_openapi import COMMITTED
-from tests.support.service import serving, wait_until
+from tests.support.service import Serve, wait_until
 
 DOCUMENT = json.loads(COMMITTED.read_bytes())
 OPERATIONS = {
@@ -52,8 +52,8 @@ OTHERS = [operation_id for operation_id in OPERATIONS if operation_id not in QUE
 
 
 @pytest.fixture(scope="module")
-def documented(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
-    with serving(tmp_path_factory.mktemp("documented")) as client:
+def documented(serve: Serve, tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    with serve(tmp_path_factory.mktemp("documented")) as client:
         client.headers["Accept-Encoding"] = "identity"
         yield client
 

@@ -65,6 +65,7 @@ def test_distances_are_never_too_short_and_seldom_longer_than_estimated(
     assert np.mean(ours <= exact * (1 + estimate) + ROUNDING) > 0.98
 
 
+@pytest.mark.usefixtures("one_replica")
 def test_the_usual_effort_is_2(client: TestClient, knot: str) -> None:
     bare = fast(client, knot, sources=[{"vertex": 43}])
     spelt = fast(client, knot, sources=[{"vertex": 43}], effort=2)

@@ -97,6 +97,7 @@ def test_found_points_are_points_of_queries(client: TestClient, knot: str) -> No
     assert by_echo.json()["length"] == gc.shortest_path(mesh, mesh.locate(position), 0).length
 
 
+@pytest.mark.usefixtures("one_replica")
 def test_the_same_points_are_not_looked_for_again(client: TestClient, knot: str) -> None:
     first, again = (locate(client, knot, points=[[0, 0, 0.125]]) for _ in range(2))
 

@@ -137,6 +137,7 @@ def test_a_reason_for_each_that_is_missing(client: TestClient, apart: str, layou
     assert components == [[0, 0, 0, 1, 1, 1], [1, 1, 1, 0, 0, 0]]
 
 
+@pytest.mark.usefixtures("one_replica")
 def test_the_same_matrix_is_not_solved_again(client: TestClient, knot: str) -> None:
     first, again = (matrix(client, knot, max_distance=3.25) for _ in range(2))
 

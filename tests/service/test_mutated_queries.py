@@ -81,7 +81,7 @@ HEADERS: Mapping[str, tuple[str, ...]] = {
     "Accept": ("application/x-npy", "text/csv", "image/*;q=0.1", "a/b", "*/*;q=0", ";;", "text/"),
     "Accept-Encoding": ("gzip", "zstd", "identity;q=0", "*;q=0", "gzip;q=nan", ",,"),
     "Prefer": ("respond-async", "respond-async, wait=1", "wait=99999999999999999999", ";", '"'),
-    "Idempotency-Key": ("", "x", "x" * 256, "\x7f"),
+    "Idempotency-Key": ("", "x", "x" * 256, "\xff"),
     "Range": ("bytes=0-9", "bytes=-5", "bytes=9-0", "bytes=", "lines=1-2", "bytes=0-,0-,0-"),
     "If-None-Match": ("*", '"x"', "W/"),
     "X-Timeout-Ms": NUMBERS,

@@ -1,6 +1,7 @@
 """A service whose meshes and answers are in an object store."""
 
 import threading
+from base64 import b64encode
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, closing
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 
 from tests.service.test_replicas import refused_start
-from tests.support.cluster import running_cluster
+from tests.support.azure import Azure
 from tests.support.postgres import Server as Postgres
 from tests.support.processes import Server
 from tests.support.s3 import S3
@@ -227,9 +228,10 @@ def test_a_mesh_that_is_deleted_while_it_is_pulled_is_gone(service: ServiceClien
 @pytest.mark.parametrize(
     ("store", "environment", "said"),
     [
-        ("s3://no-such-bucket/x", {}, "does not exist"),
+        ("s3://no-such-bucket/x", {}, "does not exist: make its bucket"),
         ("s3://", {}, "is no URL of a store"),
         ("s3://bucket/x", {"AWS_ENDPOINT_URL": "http://127.0.0.1:9"}, "cannot be used"),
+        ("az://container/x", {}, "Account must be specified"),
     ],
 )
 @pytest.mark.usefixtures("s3")
@@ -238,6 +240,20 @@ def test_starts_that_are_refused(
 ) -> None:
     settings = {"GEODESIC_COPIES": str(tmp_path), **environment}
     assert said in refused_start(store, **settings)  # type: ignore[arg-type]
+
+
+def test_wrong_credentials_are_refused(s3: S3, url: str, tmp_path: Path) -> None:
+    with s3.asking_for_credentials():
+        said = refused_start(url, GEODESIC_COPIES=str(tmp_path))  # type: ignore[arg-type]
+    assert "cannot be used" in said
+    assert "AWS_ENDPOINT_URL and AWS_ACCESS_KEY_ID" in said
+
+
+def test_wrong_credentials_are_refused_by_azure(azure: Azure, tmp_path: Path) -> None:
+    wrong = {"AZURE_STORAGE_ACCOUNT_KEY": b64encode(b"another").decode()}
+    said = refused_start(azure.new_url(), GEODESIC_COPIES=str(tmp_path), **wrong)  # type: ignore[arg-type]
+    assert "Server failed to authenticate the request" in said
+    assert "AZURE_STORAGE_ACCOUNT_NAME and AZURE_STORAGE_ACCOUNT_KEY" in said
 
 
 @pytest.mark.full
@@ -274,43 +290,12 @@ def test_two_replicas_share_meshes_answers_and_jobs(
         link = job.headers["location"]
         wait_until(lambda: second.client.get(link).json()["status"] == "successful")
         assert second.client.get(f"{link}/results").content == answers[0]
+        assert first.client.get(f"/v1/meshes/{mesh_id}").status_code == 200
         assert second.client.delete(f"/v1/meshes/{mesh_id}").status_code == 204
-        wait_until(lambda: first.client.get(f"/v1/meshes/{mesh_id}").status_code == 404)
+        check_problem(first.client.get(f"/v1/meshes/{mesh_id}"), 404, "mesh_not_found")
         assert upload_sample(first.client, "plane", 30_000) == mesh_id  # type: ignore[arg-type]
     assert "belongs to another" in refused_start(
         url,  # type: ignore[arg-type]
         GEODESIC_COPIES=str(tmp_path / "one"),
         GEODESIC_STATE=postgres.new_database(),
     )
-
-
-@pytest.mark.full
-def test_hosts_of_a_cluster_pull_meshes_and_send_answers(
-    s3: S3, postgres: Postgres, url: str, tmp_path: Path
-) -> None:
-    pytest.importorskip("ray")
-    with serving(tmp_path / "alone") as alone:
-        expected = distances(alone, upload_sample(alone, "plane", 30_000), LONG).content
-    with running_cluster(tmp_path / "unused") as cluster:
-        cluster.settings |= {
-            "GEODESIC_STORE": url,
-            "GEODESIC_STATE": postgres.new_database(),
-            "GEODESIC_ENGINE": "ray",
-        }
-        pair = []
-        for name in ("one", "two"):
-            settings = cluster.settings | {"GEODESIC_COPIES": str(tmp_path / name)}
-            server = Server(url, waits_for_workers=False, **settings)  # type: ignore[arg-type]
-            cluster.servers.append(server)
-            pair.append(server)
-        node = cluster.add_node().wait()
-        assert "host of the cluster" in node.said
-        for server in pair:
-            wait_until(server.is_ready)
-        mesh = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
-        assert pair[0].client.post("/v1/meshes", json=mesh).status_code == 201
-        mesh_id = upload_sample(pair[0].client, "plane", 30_000)  # type: ignore[arg-type]
-        for server in pair:
-            answer = distances(server.client, mesh_id, LONG)  # type: ignore[arg-type]
-            assert answer.content == expected
-        assert not any(name.startswith("uploads/") for name in s3.names(url))

@@ -230,6 +230,7 @@ def test_all_spellings_of_a_point_give_one_answer(
     assert len(tags) == len({text_of(point) for point in written})
 
 
+@pytest.mark.usefixtures("one_replica")
 def test_the_index_of_a_vertex_is_a_point(client: TestClient, knot: str) -> None:
     for name, bare in (
         ("distances", {"sources": [3, {"polyline": [0, 1]}], "targets": [5, INSIDE]}),
@@ -285,6 +286,7 @@ def test_an_answer_can_be_asked_again_by_its_echo(client: TestClient, knot: str)
     assert get_path(client, knot, text_of(found), text_of(INSIDE)).json() == first
 
 
+@pytest.mark.usefixtures("one_replica")
 def test_get_and_post_share_a_result(client: TestClient, knot: str) -> None:
     posted = path(client, knot, source={"vertex": 11})
 

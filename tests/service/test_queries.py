@@ -76,6 +76,7 @@ def test_what_is_out_of_reach(client: TestClient, apart: str) -> None:
     np.testing.assert_array_equal(binary, [0, *[np.inf] * 5])
 
 
+@pytest.mark.usefixtures("one_replica")
 def test_the_same_query_is_not_solved_again(client: TestClient, plane: str) -> None:
     first, again = (distances(client, plane, sources=[{"vertex": 11}]) for _ in range(2))
 

@@ -267,6 +267,14 @@ def test_a_mesh_of_one_is_known_to_the_other(pair: Pair) -> None:
     assert upload_sample(first.client, "plane", 300) == mesh_id  # type: ignore[arg-type]
 
 
+def test_a_long_answer_of_one_is_found_by_the_other(pair: Pair, slow: str) -> None:
+    body = {"sources": [{"vertex": 3, "start_distance": 11.0}]}
+    link = f"/v1/meshes/{slow}/distances"
+    first, second = (server.client.post(link, json=body) for server in pair)
+    assert first.headers["server-timing"] != "kept"
+    assert (second.content, second.headers["server-timing"]) == (first.content, "kept")
+
+
 def test_limits_of_a_caller_hold_for_both(postgres: Postgres, tmp_path: Path) -> None:
     with ExitStack() as stack:
         limits = {"GEODESIC_RATE_LIMIT": "30", "GEODESIC_QUOTA_UPLOADS": "1"}

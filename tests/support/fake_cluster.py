@@ -1,7 +1,7 @@
 """A cluster in this process: real hosts over engines that only sleep, and links that fail."""
 
 import asyncio
-from collections.abc import Awaitable, Callable, Collection, Sequence
+from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
@@ -13,6 +13,7 @@ from app.engine.wire import decode, encode
 from app.engine.work import Task, TaskResult
 from app.errors import ProblemError
 from app.settings import Settings
+from app.tracing import Period
 
 T = TypeVar("T")
 
@@ -27,6 +28,8 @@ class SleepingEngine:
 
     def __init__(self) -> None:
         self.seconds = 8.0
+        self.periods: Mapping[str, Period] = {}
+        """Of the phases of each task, by the clock of the host"""
         self.refusal: ProblemError | None = None
         self.begun: list[Task] = []
         self.ended: list[str] = []
@@ -67,7 +70,7 @@ class SleepingEngine:
         finally:
             self.running -= 1
         self.ended.append("done")
-        return TaskResult({"queue": 0.0, "compute": self.seconds})
+        return TaskResult({"queue": 0.0, "compute": self.seconds}, self.periods)
 
 
 class FakeCluster:

@@ -1,11 +1,15 @@
 """An S3 server of its own on loopback, by moto, in a process that can be stopped and held up."""
 
+import re
 import socket
 import subprocess
 import sys
+import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import count
+from pathlib import Path
 
 import httpx2
 import pytest
@@ -25,10 +29,11 @@ class S3:
             probe.bind(("127.0.0.1", 0))
             self.port = probe.getsockname()[1]
         self.url = f"http://127.0.0.1:{self.port}"
+        self._log = tempfile.NamedTemporaryFile(prefix="geodesic-s3-")  # noqa: SIM115 - see close
         self.process = subprocess.Popen(  # noqa: S603 - this Python
             [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(self.port)],
             stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
+            stderr=self._log,
         )
         wait_until(self._answers)
         self.environment = {
@@ -52,11 +57,21 @@ class S3:
         """Return the URL of a store that nobody has."""
         return f"s3://bucket/store-{next(_numbers)}"
 
-    def names(self, url: str) -> set[str]:
-        """Return the names of the objects of a store."""
+    def sizes(self, url: str) -> dict[str, int]:
+        """Return the bytes of the objects of a store, by name."""
         prefix = url.removeprefix("s3://bucket/") + "/"
         found = self.client.list_objects_v2(Bucket="bucket", Prefix=prefix).get("Contents", [])
-        return {each["Key"].removeprefix(prefix) for each in found}
+        return {each["Key"].removeprefix(prefix): each["Size"] for each in found}
+
+    def names(self, url: str) -> set[str]:
+        """Return the names of the objects of a store."""
+        return set(self.sizes(url))
+
+    def reads(self, url: str) -> Counter[str]:
+        """Return how often each object of a store was read so far, whole or in part."""
+        place = url.removeprefix("s3:/")
+        log = re.sub(r"\x1b\[\d+m", "", Path(self._log.name).read_text())  # it has colours
+        return Counter(re.findall(rf'"GET {place}/(\S+) HTTP', log))
 
     def damage(self, url: str, name: str) -> None:
         """Change the last byte of an object."""
@@ -64,6 +79,14 @@ class S3:
         content = bytearray(self.client.get_object(Bucket="bucket", Key=key)["Body"].read())
         content[-1] ^= 1
         self.client.put_object(Bucket="bucket", Key=key, Body=bytes(content))
+
+    @contextmanager
+    def asking_for_credentials(self) -> Iterator[None]:
+        """Have the server refuse all credentials inside the block; else it takes any."""
+        link = f"{self.url}/moto-api/reset-auth"
+        httpx2.post(link, content=b"0").raise_for_status()
+        yield
+        httpx2.post(link, content=b"inf").raise_for_status()
 
     @contextmanager
     def away(self) -> Iterator[None]:
@@ -80,6 +103,7 @@ class S3:
     def close(self) -> None:
         self.process.kill()
         self.process.wait()
+        self._log.close()
 
 
 @pytest.fixture(scope="session")

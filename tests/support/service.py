@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
 from app.store.ownership import owned
 from geodesic_core.fields import fast_sweep, repeatable_sweep
+from tests.support.against import ClusterClient, is_against_cluster, serving_cluster
 from tests.support.processes import workers_of
 from tests.support.waiting import LONG_S, wait_until
 
@@ -74,11 +75,35 @@ def serving(store: Path, **settings: Any) -> Iterator[ServiceClient]:
         yield client
 
 
+Serve = Callable[..., AbstractContextManager[Any]]
+
+
 @pytest.fixture(scope="session")
-def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:
+def serve(request: pytest.FixtureRequest) -> Serve:
+    """`serving`; with ``--against cluster``, a function that runs a cluster likewise."""
+    if not is_against_cluster(request.config):
+        return serving
+    s3, postgres = (request.getfixturevalue(name) for name in ("s3_server", "postgres"))
+
+    def serve_cluster(folder: Path, **settings: Any) -> AbstractContextManager[ClusterClient]:
+        urls = s3.new_url(), postgres.new_database()
+        return serving_cluster(s3, *urls, folder, **settings)
+
+    return serve_cluster
+
+
+@pytest.fixture(scope="session")
+def client(serve: Serve, tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:
     """A service that many tests share; they leave it as they found it, but for meshes."""
-    with serving(tmp_path_factory.mktemp("store")) as client:
+    with serve(tmp_path_factory.mktemp("store")) as client:
         yield client
+
+
+@pytest.fixture
+def one_replica(client: Any) -> Iterator[None]:
+    """Have one replica answer all requests of a test: cheap answers are in the memory of each."""
+    with client.staying() if isinstance(client, ClusterClient) else nullcontext():
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
+from time import time_ns
 from typing import Any
 
 import pytest
@@ -16,6 +17,7 @@ from app.engine.distributed import DistributedEngine
 from app.engine.work import MeshFromSample, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, problem
 from app.store.folder_store import FolderStore
+from app.tracing import Period
 from tests.support import virtual_time
 from tests.support.fake_cluster import SETTINGS, FakeCluster
 from tests.support.virtual_time import now
@@ -419,6 +421,40 @@ def test_seconds_are_reported_whatever_the_end() -> None:
         await asyncio.wait({asking})
         assert (len(waits), work) == (2, ["alice", "alice"])
 
+    play(scene)
+
+
+@pytest.mark.parametrize("ahead_s", [-3600.0, 0.0, 3600.0])
+def test_spans_name_the_host_and_lie_within_its_work_whatever_its_clock(
+    ahead_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spans: dict[str, tuple[Period, dict[str, Period], dict[str, Any]]] = {}
+
+    def note(name: str, period: Period, parts: Any = None, **more: Any) -> None:
+        spans[name] = period, parts or {}, more["attributes"]
+
+    async def scene(replica: Replica) -> None:
+        begin = time_ns() + round(ahead_s * 1e9)
+        phases = {
+            "load": Period(begin, begin + 2000),
+            "compute": Period(begin + 2000, begin + 7000),
+        }
+        for engine in replica.cluster.engines.values():
+            engine.periods = phases
+        await replica.ask()
+        (host,) = (name for name, begun in replica.begun.items() if begun)
+
+        assert list(spans) == ["queue", "worker"]
+        assert {attributes["host.id"] for _, _, attributes in spans.values()} == {host}
+        assert spans["queue"][0].end == spans["worker"][0].start
+        whole, parts, _ = spans["worker"]
+        assert whole.start <= parts["load"].start
+        assert parts["compute"].end <= whole.end
+        assert parts["load"].end == parts["compute"].start
+        lengths = {name: part.end - part.start for name, part in parts.items()}
+        assert lengths == {"load": 2000, "compute": 5000}
+
+    monkeypatch.setattr("app.engine.distributed.record_span", note)
     play(scene)
 
 
