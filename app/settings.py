@@ -23,6 +23,8 @@ from app.access import ApiKey, parse_keys
 PREFIX = "GEODESIC_"
 LIBRARY_VARIABLES = {"GEODESIC_CPU_LEVEL", "GEODESIC_QUIET"}
 """Variables that the library reads: they are no settings of the service, and no mistakes."""
+API_KEY_VARIABLE = "GEODESIC_API_KEY"
+"""The variable that commands read which ask a service: likewise"""
 MIB = 2**20
 GIB = 2**30
 LEAST_WORKER_MEMORY = 512 * MIB
@@ -262,7 +264,8 @@ class Settings(BaseSettings):
 
     @model_validator(mode="after")
     def _no_unknown_variable(self) -> Self:
-        known = {variable_of(name) for name in type(self).model_fields} | LIBRARY_VARIABLES
+        known = {variable_of(name) for name in type(self).model_fields}
+        known |= LIBRARY_VARIABLES | {API_KEY_VARIABLE}
         unknown = sorted(
             name
             for name in os.environ

@@ -27,11 +27,13 @@ from structlog.contextvars import bound_contextvars
 
 import geodesic_core as gc
 from app import logs
-from app.encoding import JSON, encode
+from app.encoding import JSON, array_headers, encode, npy_parts, too_large_for
 from app.engine.memory import limit_memory, refuse_beyond_limit
 from app.engine.mesh_json import read_json_mesh
 from app.engine.work import (
+    ComputePart,
     EstimateQuery,
+    JoinParts,
     MeshFromFile,
     MeshFromSample,
     MeshInput,
@@ -56,12 +58,14 @@ from app.settings import Settings, variable_of
 from app.store.fields import FieldStore
 from app.store.lru_cache import LRUCache
 from app.store.meshes import MeshStore, OpenMesh
-from app.store.results import Buffer, write_result
+from app.store.results import Buffer, body_path, write_result, write_result_file
 from app.tracing import Period
 
 logger = structlog.get_logger(module=__name__)
 
 TITLE = "geodesic-worker"
+REACHED = "Geodesic-Reached"
+"""Header of a part of a matrix: the number of finite distances"""
 SIZE_BYTES = 8
 """Length of the number before each outcome"""
 
@@ -146,6 +150,10 @@ class Worker:
                     fields = self.fields.take_unwritten()
                     if fields:
                         self._writer.submit(self._write_fields, fields)  # while the answer is sent
+            case ComputePart():
+                return self._compute_part(work, clock, is_cancelled)
+            case JoinParts():
+                return self._join_parts(work, clock, is_cancelled)
             case EstimateQuery():
                 return self._estimate(work, clock, is_cancelled)
 
@@ -188,6 +196,53 @@ class Worker:
                     code_version(),
                     is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
                 )
+        return TaskResult(clock.seconds, clock.periods, result=result)
+
+    def _compute_part(
+        self, work: ComputePart, clock: "Clock", cancel: Callable[[], bool]
+    ) -> TaskResult:
+        with clock.phase("load"):
+            opened = self._open(work.query)
+        with self._blaming_damage(opened):
+            with clock.phase("compute"), _refusing_overflow(work.dtype):
+                parts = work.query.parts(opened, work.dtype, cancel)
+                rows = parts.compute(
+                    work.part,
+                    progress=self._report,
+                    cancel=cancel,
+                    memory_limit=self.settings.query_memory_bytes,
+                )
+            with clock.phase("encode"):
+                result = write_result(
+                    self.config.results,
+                    work.result_name,
+                    self._verified_parts(npy_parts(rows), opened),
+                    {REACHED: str(parts.reached(rows))},
+                    code_version(),
+                    is_cheap=False,
+                )
+        return TaskResult(clock.seconds, clock.periods, result=result)
+
+    def _join_parts(
+        self, work: JoinParts, clock: "Clock", cancel: Callable[[], bool]
+    ) -> TaskResult:
+        root = self.config.results
+        with clock.phase("load"):
+            opened = self._open(work.query)
+
+        def part(number: int) -> NDArray[Any]:
+            if cancel():
+                raise gc.errors.Cancelled("cancelled while parts were joined")
+            rows: NDArray[Any] = np.load(body_path(root, work.parts[number]), mmap_mode="r")
+            return rows
+
+        with clock.phase("compute"):
+            parts = work.query.parts(opened, work.dtype, cancel)
+            answer = work.query.answer_of_parts(opened, work.reached, cancel)
+        with clock.phase("encode"):
+            headers = array_headers(answer, np.dtype(work.dtype), parts.shape)
+            write = partial(parts.write, part=part)
+            result = write_result_file(root, work.result_name, write, headers, code_version())
         return TaskResult(clock.seconds, clock.periods, result=result)
 
     def _estimate(
@@ -256,6 +311,15 @@ class Worker:
         """Empty all caches."""
         for name in list(self.meshes):
             self._close(name)
+
+
+@contextmanager
+def _refusing_overflow(dtype: str) -> Iterator[None]:
+    with np.errstate(over="raise"):
+        try:
+            yield
+        except FloatingPointError:
+            raise too_large_for(dtype) from None
 
 
 class Clock:
