@@ -34,7 +34,7 @@ def write_matrix(
     The same command goes on where it was, both in the computation and in the transfer. Raises
     `Failure` where the service refuses or does not answer.
     """
-    from app.settings import API_KEY_VARIABLE
+    from app.settings import SERVICE_KEY_VARIABLE
 
     try:
         from geodesic_client import Client, GeodesicClientError
@@ -42,7 +42,7 @@ def write_matrix(
         raise Failure("--service needs the package geodesic-client: pip install ./client") from None
 
     try:
-        with Client(service, api_key=os.environ.get(API_KEY_VARIABLE)) as client:
+        with Client(service, api_key=os.environ.get(SERVICE_KEY_VARIABLE)) as client:
             with showing("Sending the mesh") as step:
                 stored = client.upload((mesh.vertices, mesh.faces), progress=_watched(step))
             with showing(f"Computing the matrix at {service}") as step:

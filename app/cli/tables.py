@@ -93,7 +93,7 @@ def matrix(
         typer.Option(
             metavar="URL",
             help="Have this service compute it, on all its machines: exact, to a .npy; for points "
-            "from files. Its key: GEODESIC_API_KEY.",
+            "from files. Its key: GEODESIC_SERVICE_KEY.",
         ),
     ] = None,
     max_distance: MaxDistance = None,

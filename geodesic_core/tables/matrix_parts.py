@@ -129,7 +129,7 @@ class MatrixParts:
         Returns
         -------
         numpy.ndarray
-            Two-dimensional, a row for each sweep, mesh units, infinite where unreachable.
+            float64 or float32, (sweeps, columns), mesh units, infinite where unreachable.
 
         Raises
         ------
