@@ -17,7 +17,7 @@ from gc import freeze
 from io import BufferedRWPair
 from pathlib import Path
 from time import perf_counter, time_ns
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import structlog
@@ -95,6 +95,15 @@ class Signals(Structure):
     )
 
 
+class _Matrix(NamedTuple):
+    """A matrix whose parts were asked for last."""
+
+    opened: OpenMesh
+    question: tuple[bytes, str]
+    """The query as JSON, and the type of numbers"""
+    parts: gc.MatrixParts
+
+
 @dataclass
 class Worker:
     """The state of a worker process: open meshes and fields, cached while they fit."""
@@ -110,6 +119,7 @@ class Worker:
         self.meshes = LRUCache(self.settings.worker_mesh_bytes, lambda opened: opened.nbytes)
         self._stored = FieldStore(self.settings.folder, self.settings.fields_bytes)
         self.fields = FieldCache(self.settings.worker_field_bytes, self._stored, code_version())
+        self._matrix: _Matrix | None = None
         self._writer = _low_priority_thread()
         self._before = Signals.from_buffer_copy(self.signals)  # what former workers have counted
 
@@ -205,7 +215,7 @@ class Worker:
             opened = self._open(work.query)
         with self._blaming_damage(opened):
             with clock.phase("compute"), _refusing_overflow(work.dtype):
-                parts = work.query.parts(opened, work.dtype, cancel)
+                parts = self._parts_of(work, opened, cancel)
                 rows = parts.compute(
                     work.part,
                     progress=self._report,
@@ -237,13 +247,23 @@ class Worker:
             return rows
 
         with clock.phase("compute"):
-            parts = work.query.parts(opened, work.dtype, cancel)
+            parts = self._parts_of(work, opened, cancel)
             answer = work.query.answer_of_parts(opened, work.reached, cancel)
         with clock.phase("encode"):
             headers = array_headers(answer, np.dtype(work.dtype), parts.shape)
             write = partial(parts.write, part=part)
             result = write_result_file(root, work.result_name, write, headers, code_version())
         return TaskResult(clock.seconds, clock.periods, result=result)
+
+    def _parts_of(
+        self, work: ComputePart | JoinParts, opened: OpenMesh, cancel: Callable[[], bool]
+    ) -> gc.MatrixParts:
+        """Return the parts of a matrix; many of them come one after the other."""
+        made, question = self._matrix, (work.query.written, work.dtype)
+        if made is None or made.opened is not opened or made.question != question:
+            parts = work.query.parts(opened, work.dtype, cancel)
+            made = self._matrix = _Matrix(opened, question, parts)
+        return made.parts
 
     def _estimate(
         self, work: EstimateQuery, clock: "Clock", cancel: Callable[[], bool]
@@ -300,12 +320,18 @@ class Worker:
             self._close(name)
             opened = self.meshes.find(name, open_mesh)
         for evicted in self.meshes.evict(spare=1):
-            self.fields.forget(evicted)
+            self._forget(evicted)
         return opened
 
     def _close(self, name: tuple[str, bytes]) -> None:
-        self.fields.forget(name)
+        self._forget(name)
         self.meshes.drop(name)
+
+    def _forget(self, name: tuple[str, bytes]) -> None:
+        """Drop what was made of a mesh."""
+        self.fields.forget(name)
+        if self._matrix is not None and self._matrix.opened.name == name:
+            self._matrix = None
 
     def _forget_all(self) -> None:
         """Empty all caches."""

@@ -50,7 +50,8 @@ class MatrixInParts:
 
         def note(part: int, share: float) -> None:
             shares[part] = share
-            on_progress(sum(map(float.__mul__, shares, map(float, areas))) / whole)
+            done = sum(area * share for area, share in zip(areas, shares, strict=True))
+            on_progress(done / whole)
 
         needed = query.bytes_in_parts(self.representation, self.size)
         with self.results.reserving(needed), self._using_parts():
