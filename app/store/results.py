@@ -218,15 +218,18 @@ class FolderResults:
     def found(self, *, is_alone: bool) -> Iterator[tuple[str, int]]:
         """Yield what is there, see ``ResultFiles``."""
         self._root.mkdir(parents=True, exist_ok=True)
-        bodies = sorted(self._root.glob("*/*.body"), key=lambda path: order_of_use(path.stat()))
-        for path in bodies:
+        complete = []
+        for path in self._root.glob("*/*.body"):
             name = path.relative_to(self._root).with_suffix("").as_posix()
-            if _manifest_path(self._root, name).exists():
-                yield name, path.stat().st_size
+            manifest = _manifest_path(self._root, name)
+            if manifest.exists():
+                complete.append((order_of_use(manifest.stat()), name, path.stat().st_size))
             elif is_alone:
                 path.unlink()
         if is_alone:
             remove_partial(self._root)
+        for _, name, size in sorted(complete):
+            yield name, size
 
     async def read(self, name: str) -> Result | None:
         """Return a result; None where it is missing or damaged."""
@@ -241,8 +244,8 @@ class FolderResults:
         await to_thread.run_sync(_write, self._root, name, [body], manifest.headers, manifest.code)
 
     def note_use(self, name: str) -> None:
-        """Note a use as the time of the file."""
-        note_use(body_path(self._root, name))
+        """Note a use as the time of the manifest: that of the body tells whether it was changed."""
+        note_use(_manifest_path(self._root, name))
 
     def remove(self, name: str) -> None:
         """Remove the files of a result."""
