@@ -23,6 +23,8 @@ from app.access import ApiKey, parse_keys
 PREFIX = "GEODESIC_"
 LIBRARY_VARIABLES = {"GEODESIC_CPU_LEVEL", "GEODESIC_QUIET"}
 """Variables that the library reads: they are no settings of the service, and no mistakes."""
+SERVICE_KEY_VARIABLE = "GEODESIC_SERVICE_KEY"
+"""The variable that commands read which ask a service: likewise"""
 MIB = 2**20
 GIB = 2**30
 LEAST_WORKER_MEMORY = 512 * MIB
@@ -163,9 +165,9 @@ class Settings(BaseSettings):
     max_faces: PositiveInt = 5_000_000
     """Most faces of a mesh."""
     max_sources: PositiveInt = 10_000
-    """Most sources of a query; each point of a curve counts."""
+    """Most sources of a query, each point of a curve; of a matrix as a job, as its body holds."""
     max_matrix_cells: PositiveInt = 10_000_000
-    """Most cells of a matrix: sources times targets, pairs, or the reached ones if sparse."""
+    """Most cells of a matrix in memory: sources times targets, pairs, or what is reached."""
     max_waypoints: PositiveInt = 100
     """Most waypoints of a path."""
     max_levels: PositiveInt = 1000
@@ -262,7 +264,8 @@ class Settings(BaseSettings):
 
     @model_validator(mode="after")
     def _no_unknown_variable(self) -> Self:
-        known = {variable_of(name) for name in type(self).model_fields} | LIBRARY_VARIABLES
+        known = {variable_of(name) for name in type(self).model_fields}
+        known |= LIBRARY_VARIABLES | {SERVICE_KEY_VARIABLE}
         unknown = sorted(
             name
             for name in os.environ

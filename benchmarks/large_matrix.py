@@ -52,7 +52,7 @@ def run(_inputs: Inputs, _runs: int) -> Section:
 
     def approximate() -> Rows:
         def solve(source: gc.SurfacePoint, _targets: object, _control: Control) -> gc.DistanceField:
-            return gc.approximate_distance(mesh, source)
+            return gc.approximate_distance(mesh, source, retain="distances")
 
         return FieldRows(plan.ends, solve)
 

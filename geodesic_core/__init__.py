@@ -42,6 +42,7 @@ from geodesic_core.solvers import (
     shortest_path,
 )
 from geodesic_core.tables.matrix_file import MatrixFile, write_matrix
+from geodesic_core.tables.matrix_parts import MatrixParts
 from geodesic_core.tolerances import WEIGHT_ERROR
 
 __all__ = [
@@ -54,6 +55,7 @@ __all__ = [
     "GeodesicPath",
     "Isoline",
     "MatrixFile",
+    "MatrixParts",
     "MeshReport",
     "Nearest",
     "Retain",

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from functools import partial
 from io import StringIO
 from itertools import chain
+from multiprocessing.synchronize import Barrier
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any, Literal, get_args, get_type_hints
@@ -40,7 +41,8 @@ from app.cli.words import with_options
 _FAILED = 1
 _PARCEL_BYTES, _PARCELS = 1 << 22, 8
 """Bytes of the files that a process is handed together, at most, but for a larger one; and parcels
-for each process, at least. Handed meshes of 2 ms one by one, processes wait for half of the time"""
+for each process of what is left, at least. Handed meshes of 2 ms one by one, processes wait for
+half of the time"""
 _AHEAD = 3
 """Parcels for each process that it is at, or gets next"""
 
@@ -126,16 +128,15 @@ def batch(
         from geodesic_core import compile_kernels
 
         compile_kernels(["exact", "paths"])
-        with _pool(1) as pool:
-            pool.submit(_load).result()
-    start = perf_counter()
+        pool = _pool(count)
+    start, seconds = perf_counter(), 0.0
     with showing(f"Solving {len(meshes)} meshes") as step:
-        for mesh, answers in _answers(meshes, questions, count):
+        for mesh, answers in _answers(meshes, questions, count, pool):
             rows[mesh] = answers
+            seconds = perf_counter() - start
             step.progress(len(rows) / len(meshes))
             if step.cancel():
                 break
-    seconds = perf_counter() - start
     ordered = [row for mesh in meshes for row in rows[mesh]]
     if as_json:
         print_json([asdict(row) for row in ordered])
@@ -156,31 +157,33 @@ def batch(
 
 
 def _answers(
-    meshes: Sequence[Path], questions: Questions, processes: int
+    meshes: Sequence[Path], questions: Questions, processes: int, pool: ProcessPoolExecutor
 ) -> Iterator[tuple[Path, list[Row]]]:
-    """Yield the rows of each mesh, as they come.
+    """Yield the rows of each mesh, as they come from a pool, which is shut down.
 
     A process that dies takes all that run with it: those are asked again, each by itself.
     """
     ask = partial(_ask_each, _QUESTION, questions)
     left, lost = deque(_parcels(meshes, processes)), list[Path]()
+    yield from _answers_of_pool(ask, left, lost, processes, pool)
     while left:
-        yield from _answers_of_pool(ask, left, lost, processes)
+        yield from _answers_of_pool(ask, left, lost, processes, _pool(processes))
     for mesh in lost:
         died: list[Path] = []
-        yield from _answers_of_pool(ask, deque([[mesh]]), died, 1)
+        yield from _answers_of_pool(ask, deque([[mesh]]), died, 1, _pool(1))
         if died:
             yield mesh, [Row(str(mesh), error="the process died: memory may be short")]
 
 
 def _parcels(meshes: Sequence[Path], processes: int) -> Iterator[list[Path]]:
-    """Yield meshes that are handed over together."""
+    """Yield meshes that are handed over together: fewer at the end, so that all end together."""
     sizes = [_size(mesh) for mesh in meshes]
-    most = min(_PARCEL_BYTES, sum(sizes) // (_PARCELS * processes))
+    left = sum(sizes)
     parcel, total = list[Path](), 0
     for mesh, size in zip(meshes, sizes, strict=True):
-        if parcel and total + size > most:
+        if parcel and total + size > min(_PARCEL_BYTES, left // (_PARCELS * processes)):
             yield parcel
+            left -= total
             parcel, total = [], 0
         parcel.append(mesh)
         total += size
@@ -200,13 +203,14 @@ def _answers_of_pool(
     left: deque[list[Path]],
     lost: list[Path],
     processes: int,
+    pool: ProcessPoolExecutor,
 ) -> Iterator[tuple[Path, list[Row]]]:
     """Take parcels that are left, and yield the rows of their meshes; stop where a process dies.
 
     The meshes that were under way then are lost.
     """
     waiting: dict[Future[list[list[Row]]], list[Path]] = {}
-    with _pool(processes) as pool:
+    with pool:
         try:
             while left or waiting:
                 while left and len(waiting) < _AHEAD * processes:
@@ -222,19 +226,28 @@ def _answers_of_pool(
 
 
 def _pool(processes: int) -> ProcessPoolExecutor:
+    """Return a pool whose processes are all there, and have loaded the kernels."""
     from app.engine import fork_server
 
-    # Ctrl-C is for the command: processes end with the question that they are at.
-    return ProcessPoolExecutor(
-        processes, fork_server.CONTEXT, signal.signal, (signal.SIGINT, signal.SIG_IGN)
-    )
+    all_are_there = fork_server.CONTEXT.Barrier(processes)
+    pool = ProcessPoolExecutor(processes, fork_server.CONTEXT, _begin, (all_are_there,))
+    for begun in [pool.submit(_begun) for _ in range(processes)]:  # each starts one process
+        begun.result()
+    return pool
 
 
-def _load() -> None:
-    """Load the kernels, unless the fork server has."""
+def _begin(all_are_there: Barrier) -> None:
+    """Load the kernels, unless the fork server has, and wait for the other processes."""
     from geodesic_core import warm_up
 
+    # Ctrl-C is for the command: processes end with the question that they are at.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     warm_up(["exact", "paths"])
+    all_are_there.wait()
+
+
+def _begun() -> None:
+    """Do nothing, in a process that has begun."""
 
 
 def _ask_each(

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from app.cli import elsewhere
 from app.cli.arguments import (
     Barriers,
     BlockedFaces,
@@ -33,6 +34,8 @@ from app.cli.steps import Failure, read, showing
 
 if TYPE_CHECKING:
     from typing import Literal
+
+    from geodesic_client import StoredMatrix
 
     from geodesic_core import SurfacePoint, TriangleMesh
 
@@ -85,6 +88,14 @@ def matrix(
     threads: Annotated[
         int | None, typer.Option(min=1, help="Most threads; one for each core if not given.")
     ] = None,
+    service: Annotated[
+        str | None,
+        typer.Option(
+            metavar="URL",
+            help="Have this service compute it, on all its machines: exact, to a .npy; for points "
+            "from files. Its key: GEODESIC_SERVICE_KEY.",
+        ),
+    ] = None,
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,
@@ -96,8 +107,10 @@ def matrix(
     if not given:
         if not source or not target:
             raise typer.BadParameter("give --source and --target, or --points with a file")
-        if method is not Method.EXACT or dtype is not Number.FLOAT64 or threads is not None:
-            raise typer.BadParameter("--method, --dtype and --threads go with points from files")
+        if method is not Method.EXACT or dtype is not Number.FLOAT64 or threads or service:
+            raise typer.BadParameter(
+                "--method, --dtype, --threads and --service go with points from files"
+            )
         output = Output(out, as_json)
         _ask_matrix(mesh_file, output, source, target, layout, max_distance, barriers, merge)
         return
@@ -110,12 +123,32 @@ def matrix(
     if out.suffix.lower() not in _OF_ANY_SIZE:
         raise typer.BadParameter(f"{out} must end in .npy, .zarr, .npz or .parquet")
     options = accuracy(method, relative_error, None, effort) | {"dtype": dtype.value}
+    is_simple = method is Method.EXACT and threads is None and out.suffix.lower() == ".npy"
+    if service is not None and not is_simple:
+        raise typer.BadParameter("--service computes exact distances, to a file .npy")
     opened, read_seconds = read(mesh_file, merge)
     import geodesic_core as gc
 
     mesh, output = opened.mesh, Output(None, as_json)
     starts = _points_of(mesh, points or sources)
     stops = None if targets is None else _points_of(mesh, targets)
+    if service is not None:
+        _print_elsewhere(
+            output,
+            mesh,
+            elsewhere.write_matrix(
+                service,
+                mesh,
+                out,
+                starts,
+                starts if stops is None else stops,
+                max_distance=max_distance,
+                barriers=() if barriers is None else barriers.of(mesh),
+                dtype=dtype.value,
+            ),
+            out,
+        )
+        return
     with showing("Computing the matrix") as step:
         written = gc.write_matrix(
             mesh,
@@ -141,6 +174,21 @@ def matrix(
     output.say(f"error bound {bound.value!r} ({bound.type}, {bound.kind})")
     output.say(f"sha256      {written.sha256}")
     output.say(f"took        {read_seconds:.3f} s to read")
+    output.say(f"written     {out}")
+
+
+def _print_elsewhere(
+    output: Output, mesh: "TriangleMesh", written: "tuple[StoredMatrix, str]", out: Path
+) -> None:
+    matrix, checksum = written
+    bound = matrix.error_bound
+    if output.as_json:
+        facts = {"shape": matrix.shape, "error_bound": asdict(bound), "sha256": checksum}
+        print_json({**facts, "written": str(out)})
+    print_size(output, mesh)
+    output.say(f"matrix      {matrix.shape[0]} by {matrix.shape[1]}")
+    output.say(f"error bound {bound.value!r} ({bound.type}, {bound.kind})")
+    output.say(f"sha256      {checksum}")
     output.say(f"written     {out}")
 
 

@@ -6,6 +6,7 @@ so that no answer is in memory as a whole twice.
 """
 
 from app.encoding.answer import Answer, Encoded
+from app.encoding.arrays import array_headers, npy_parts, too_large_for
 from app.encoding.negotiation import negotiate, negotiate_coding
 from app.encoding.registry import encode
 from app.encoding.representation import (
@@ -42,7 +43,10 @@ __all__ = [
     "Representation",
     "Surface",
     "Table",
+    "array_headers",
     "encode",
     "negotiate",
     "negotiate_coding",
+    "npy_parts",
+    "too_large_for",
 ]

@@ -1,28 +1,34 @@
 """Bare arrays: little-endian, in C order, unreachable as infinity; other members as headers."""
 
+from collections.abc import Sequence
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from app.encoding.answer import Answer, Encoded
+from app.encoding.answer import Answer, Buffer, Encoded
 from app.encoding.headers import headers_of
-from app.errors import problem
+from app.errors import ProblemError, problem
 
 
 def to_npy(answer: Answer, dtype: str) -> Encoded:
     """Encode the array in numpy's own format."""
     array = _body(answer, dtype)
+    return Encoded(npy_parts(array), array_headers(answer, array.dtype, array.shape))
+
+
+def npy_parts(array: NDArray[Any]) -> Sequence[Buffer]:
+    """Return an array in numpy's own format: a header and the bytes, in C order."""
     header = BytesIO()
     np.lib.format.write_array_header_1_0(header, np.lib.format.header_data_from_array_1_0(array))
-    return Encoded([header.getvalue(), _raw(array)], _headers(answer, array.dtype, array.shape))
+    return header.getvalue(), _raw(array)
 
 
 def to_octets(answer: Answer, dtype: str) -> Encoded:
     """Encode the bytes of the array, without a header."""
     array = _body(answer, dtype)
-    return Encoded([_raw(array)], _headers(answer, array.dtype, array.shape))
+    return Encoded([_raw(array)], array_headers(answer, array.dtype, array.shape))
 
 
 def to_npz(answer: Answer, dtype: str) -> Encoded:
@@ -34,7 +40,7 @@ def to_npz(answer: Answer, dtype: str) -> Encoded:
     table = coo_array((distances, (rows, columns)), shape=answer.members["shape"]).tocsr()
     file = BytesIO()
     save_npz(file, table, compressed=False)
-    return Encoded([file.getbuffer()], _headers(answer, distances.dtype, table.shape))
+    return Encoded([file.getbuffer()], array_headers(answer, distances.dtype, table.shape))
 
 
 def _body(answer: Answer, dtype: str) -> NDArray[Any]:
@@ -45,13 +51,19 @@ def _body(answer: Answer, dtype: str) -> NDArray[Any]:
         with np.errstate(over="raise"):
             return np.ascontiguousarray(array, dtype=np.dtype(dtype).newbyteorder("<"))
     except FloatingPointError:
-        raise problem("invalid_request", f"{dtype} cannot hold numbers so large") from None
+        raise too_large_for(dtype) from None
+
+
+def too_large_for(dtype: str) -> ProblemError:
+    """Return the exception for numbers that do not fit into a type."""
+    return problem("invalid_request", f"{dtype} cannot hold numbers so large")
 
 
 def _raw(array: NDArray[Any]) -> memoryview | bytes:
     return array.data.cast("B") if array.size else b""
 
 
-def _headers(answer: Answer, dtype: np.dtype[Any], shape: tuple[int, ...]) -> dict[str, str]:
+def array_headers(answer: Answer, dtype: np.dtype[Any], shape: tuple[int, ...]) -> dict[str, str]:
+    """Return the headers of an array: its form, and the small members of its answer."""
     own = {"Geodesic-Dtype": dtype.str, "Geodesic-Shape": ",".join(map(str, shape))}
     return own | headers_of(answer, (*answer.arrays, "shape"))

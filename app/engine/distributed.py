@@ -17,7 +17,7 @@ from app.engine.cluster import BEAT_S, LEASE_S, SILENCE_S, Cluster, HostLostErro
 from app.engine.interface import Load, ProgressCallback
 from app.engine.placement import Occupancy, choose
 from app.engine.wire import Message, Wire, WireError, decode
-from app.engine.work import MeshFromFile, Outcome, RunQuery, StoreMesh, Task, TaskResult
+from app.engine.work import MeshFromFile, Outcome, StoreMesh, Task, TaskResult, WritesResult
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.queries import code_version
 from app.settings import Settings
@@ -198,7 +198,7 @@ class DistributedEngine:
             )
             for name, report in (ready or usable).items()
         }
-        if isinstance(task.work, RunQuery):
+        if isinstance(task.work, WritesResult):
             for name in hosts:
                 if task.work.result_name in usable[name].computing:
                     return name  # where it joins that computation, however full the host is

@@ -12,7 +12,7 @@ from app.engine.cluster import BEAT_S, LEASE_S, HostReport
 from app.engine.interface import Engine, ProgressCallback
 from app.engine.single_flight import SingleFlight
 from app.engine.wire import Wire, WireError, encode
-from app.engine.work import Outcome, RunQuery, Task, TaskResult
+from app.engine.work import Outcome, Task, TaskResult, WritesResult
 from app.errors import Problem, ProblemError, problem_of
 from app.queries import code_version
 from app.settings import Settings
@@ -116,7 +116,7 @@ class Host:
     async def _run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
         """Do a task; replicas that ask for one result at the same time share its computation."""
         run = partial(self._engine.run, task)
-        if not isinstance(task.work, RunQuery):
+        if not isinstance(task.work, WritesResult):
             return await run(on_progress)
         return await self._flights.join(task.work.result_name, run, on_progress)
 

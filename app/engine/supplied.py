@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from app.engine.interface import Engine, Load, ProgressCallback
-from app.engine.work import MeshFromFile, StoreMesh, Task, TaskResult
+from app.engine.work import JoinParts, MeshFromFile, StoreMesh, Task, TaskResult
 from app.errors import ProblemError
 from app.store.interface import Supply
 
@@ -72,7 +72,8 @@ class SuppliedEngine:
         if isinstance(task.work, StoreMesh):
             return await self._store(task, task.work, on_progress)
         mesh_id = task.work.query.mesh_id
-        async with self._supply.holding(mesh_id):
+        parts = task.work.parts if isinstance(task.work, JoinParts) else ()
+        async with self._supply.holding(mesh_id), self._supply.bringing_results(parts):
             try:
                 done = await self._engine.run(task, on_progress)
             except ProblemError as error:

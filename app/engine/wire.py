@@ -16,7 +16,7 @@ Paths of the store travel relative to it: machines may have it in different plac
 
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path, PurePosixPath
@@ -26,7 +26,9 @@ import msgspec
 
 from app.encoding import Representation
 from app.engine.work import (
+    ComputePart,
     EstimateQuery,
+    JoinParts,
     MeshFromFile,
     MeshFromSample,
     MeshInput,
@@ -38,13 +40,13 @@ from app.engine.work import (
     Work,
 )
 from app.errors import CODES, Problem
-from app.queries import KINDS, Estimate, Query
+from app.queries import KINDS, Estimate, MatrixQuery, Query
 from app.schemas.meshes import Merge
 from app.store.meshes import WrittenMesh
 from app.store.results import Result, ResultManifest
 from app.tracing import Period
 
-VERSION = 2
+VERSION = 3
 """To be raised with every change of the types below, and of what they mean"""
 
 _MAGIC = b"GEOD"
@@ -104,13 +106,31 @@ class _Run(msgspec.Struct, frozen=True, tag="run"):
     result_name: str
 
 
+class _Part(msgspec.Struct, frozen=True, tag="part"):
+    query: _Query
+    dtype: str
+    part: int
+    result_name: str
+
+
+class _Join(msgspec.Struct, frozen=True, tag="join"):
+    query: _Query
+    dtype: str
+    parts: Sequence[str]
+    reached: int
+    result_name: str
+
+
 class _Estimate(msgspec.Struct, frozen=True, tag="estimate"):
     query: _Query
     representation: Representation
 
 
+_Work = _Store | _Run | _Part | _Join | _Estimate
+
+
 class _Task(msgspec.Struct, frozen=True):
-    work: _Store | _Run | _Estimate
+    work: _Work
     client: str
     affinity_keys: tuple[str, ...]
     is_small: bool
@@ -227,22 +247,30 @@ class Wire:
             case _:
                 return None
 
-    def _work_out(self, work: Work) -> _Store | _Run | _Estimate:
+    def _work_out(self, work: Work) -> _Work:
         match work:
             case StoreMesh(mesh_input, folder, owner, name):
                 return _Store(self._input_out(mesh_input), self._path_out(folder), owner, name)
             case RunQuery(query, representation, name):
                 return _Run(_query_out(query), representation, name)
+            case ComputePart(query, dtype, part, name):
+                return _Part(_query_out(query), dtype, part, name)
+            case JoinParts(query, dtype, parts, reached, name):
+                return _Join(_query_out(query), dtype, list(parts), reached, name)
             case EstimateQuery(query, representation):
                 return _Estimate(_query_out(query), representation)
 
-    def _work_in(self, work: _Store | _Run | _Estimate) -> Work:
+    def _work_in(self, work: _Work) -> Work:
         match work:
             case _Store(mesh_input, folder, owner, name):
                 return StoreMesh(self._input_in(mesh_input), self._path_in(folder), owner, name)
             case _Run(query, representation, name):
                 self._path_in(name)  # raises where it would lead out of the store
                 return RunQuery(_query_in(query), representation, name)
+            case _Part(query, dtype, part, name):
+                return ComputePart(_matrix_in(query), dtype, part, name)
+            case _Join(query, dtype, parts, reached, name):
+                return JoinParts(_matrix_in(query), dtype, tuple(parts), reached, name)
             case _Estimate(query, representation):
                 return EstimateQuery(_query_in(query), representation)
 
@@ -329,6 +357,13 @@ def _query_in(query: _Query) -> Query[Any]:
         return kind(query.mesh_id, kind.model.model_validate_json(query.request))
     except ValueError as error:
         raise DamagedMessageError(f"the query of kind {query.kind} cannot be read") from error
+
+
+def _matrix_in(query: _Query) -> MatrixQuery:
+    read = _query_in(query)
+    if not isinstance(read, MatrixQuery):
+        raise DamagedMessageError(f"a query of kind {query.kind} has no parts")
+    return read
 
 
 def _result_out(result: Result | None) -> _Result | None:

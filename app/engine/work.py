@@ -1,13 +1,13 @@
 """The work of worker processes, and its results: small values that pass through a socket."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from app.encoding import Representation
 from app.errors import Problem
-from app.queries import Estimate, Query
+from app.queries import Estimate, MatrixQuery, Query
 from app.schemas.meshes import Merge
 from app.store.meshes import WrittenMesh
 from app.store.results import Result
@@ -57,6 +57,29 @@ class RunQuery:
 
 
 @dataclass(frozen=True)
+class ComputePart:
+    """Compute a part of a large matrix, and write it as the result ``result_name``."""
+
+    query: MatrixQuery
+    dtype: str
+    part: int
+    result_name: str
+
+
+@dataclass(frozen=True)
+class JoinParts:
+    """Write a large matrix, whose parts are results, as the result ``result_name``."""
+
+    query: MatrixQuery
+    dtype: str
+    parts: Sequence[str]
+    """Names of their results"""
+    reached: int
+    """Number of finite distances"""
+    result_name: str
+
+
+@dataclass(frozen=True)
 class EstimateQuery:
     """Estimate the cost of the answer to a query."""
 
@@ -64,7 +87,10 @@ class EstimateQuery:
     representation: Representation
 
 
-Work = StoreMesh | RunQuery | EstimateQuery
+WritesResult = RunQuery | ComputePart | JoinParts
+"""Work that ends with a result of a name: whoever else asks for it can wait for the same"""
+
+Work = StoreMesh | WritesResult | EstimateQuery
 
 
 @dataclass(frozen=True)

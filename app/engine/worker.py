@@ -17,7 +17,7 @@ from gc import freeze
 from io import BufferedRWPair
 from pathlib import Path
 from time import perf_counter, time_ns
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import structlog
@@ -27,11 +27,13 @@ from structlog.contextvars import bound_contextvars
 
 import geodesic_core as gc
 from app import logs
-from app.encoding import JSON, encode
+from app.encoding import JSON, array_headers, encode, npy_parts, too_large_for
 from app.engine.memory import limit_memory, refuse_beyond_limit
 from app.engine.mesh_json import read_json_mesh
 from app.engine.work import (
+    ComputePart,
     EstimateQuery,
+    JoinParts,
     MeshFromFile,
     MeshFromSample,
     MeshInput,
@@ -56,12 +58,14 @@ from app.settings import Settings, variable_of
 from app.store.fields import FieldStore
 from app.store.lru_cache import LRUCache
 from app.store.meshes import MeshStore, OpenMesh
-from app.store.results import Buffer, write_result
+from app.store.results import Buffer, body_path, write_result, write_result_file
 from app.tracing import Period
 
 logger = structlog.get_logger(module=__name__)
 
 TITLE = "geodesic-worker"
+REACHED = "Geodesic-Reached"
+"""Header of a part of a matrix: the number of finite distances"""
 SIZE_BYTES = 8
 """Length of the number before each outcome"""
 
@@ -91,6 +95,15 @@ class Signals(Structure):
     )
 
 
+class _Matrix(NamedTuple):
+    """A matrix whose parts were asked for last."""
+
+    opened: OpenMesh
+    question: tuple[bytes, str]
+    """The query as JSON, and the type of numbers"""
+    parts: gc.MatrixParts
+
+
 @dataclass
 class Worker:
     """The state of a worker process: open meshes and fields, cached while they fit."""
@@ -106,6 +119,7 @@ class Worker:
         self.meshes = LRUCache(self.settings.worker_mesh_bytes, lambda opened: opened.nbytes)
         self._stored = FieldStore(self.settings.folder, self.settings.fields_bytes)
         self.fields = FieldCache(self.settings.worker_field_bytes, self._stored, code_version())
+        self._matrix: _Matrix | None = None
         self._writer = _low_priority_thread()
         self._before = Signals.from_buffer_copy(self.signals)  # what former workers have counted
 
@@ -146,6 +160,10 @@ class Worker:
                     fields = self.fields.take_unwritten()
                     if fields:
                         self._writer.submit(self._write_fields, fields)  # while the answer is sent
+            case ComputePart():
+                return self._compute_part(work, clock, is_cancelled)
+            case JoinParts():
+                return self._join_parts(work, clock, is_cancelled)
             case EstimateQuery():
                 return self._estimate(work, clock, is_cancelled)
 
@@ -189,6 +207,63 @@ class Worker:
                     is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
                 )
         return TaskResult(clock.seconds, clock.periods, result=result)
+
+    def _compute_part(
+        self, work: ComputePart, clock: "Clock", cancel: Callable[[], bool]
+    ) -> TaskResult:
+        with clock.phase("load"):
+            opened = self._open(work.query)
+        with self._blaming_damage(opened):
+            with clock.phase("compute"), _refusing_overflow(work.dtype):
+                parts = self._parts_of(work, opened, cancel)
+                rows = parts.compute(
+                    work.part,
+                    progress=self._report,
+                    cancel=cancel,
+                    memory_limit=self.settings.query_memory_bytes,
+                )
+            with clock.phase("encode"):
+                result = write_result(
+                    self.config.results,
+                    work.result_name,
+                    self._verified_parts(npy_parts(rows), opened),
+                    {REACHED: str(parts.reached(rows))},
+                    code_version(),
+                    is_cheap=False,
+                )
+        return TaskResult(clock.seconds, clock.periods, result=result)
+
+    def _join_parts(
+        self, work: JoinParts, clock: "Clock", cancel: Callable[[], bool]
+    ) -> TaskResult:
+        root = self.config.results
+        with clock.phase("load"):
+            opened = self._open(work.query)
+
+        def part(number: int) -> NDArray[Any]:
+            if cancel():
+                raise gc.errors.Cancelled("cancelled while parts were joined")
+            rows: NDArray[Any] = np.load(body_path(root, work.parts[number]), mmap_mode="r")
+            return rows
+
+        with clock.phase("compute"):
+            parts = self._parts_of(work, opened, cancel)
+            answer = work.query.answer_of_parts(opened, work.reached, cancel)
+        with clock.phase("encode"):
+            headers = array_headers(answer, np.dtype(work.dtype), parts.shape)
+            write = partial(parts.write, part=part)
+            result = write_result_file(root, work.result_name, write, headers, code_version())
+        return TaskResult(clock.seconds, clock.periods, result=result)
+
+    def _parts_of(
+        self, work: ComputePart | JoinParts, opened: OpenMesh, cancel: Callable[[], bool]
+    ) -> gc.MatrixParts:
+        """Return the parts of a matrix; many of them come one after the other."""
+        made, question = self._matrix, (work.query.written, work.dtype)
+        if made is None or made.opened is not opened or made.question != question:
+            parts = work.query.parts(opened, work.dtype, cancel)
+            made = self._matrix = _Matrix(opened, question, parts)
+        return made.parts
 
     def _estimate(
         self, work: EstimateQuery, clock: "Clock", cancel: Callable[[], bool]
@@ -245,17 +320,32 @@ class Worker:
             self._close(name)
             opened = self.meshes.find(name, open_mesh)
         for evicted in self.meshes.evict(spare=1):
-            self.fields.forget(evicted)
+            self._forget(evicted)
         return opened
 
     def _close(self, name: tuple[str, bytes]) -> None:
-        self.fields.forget(name)
+        self._forget(name)
         self.meshes.drop(name)
+
+    def _forget(self, name: tuple[str, bytes]) -> None:
+        """Drop what was made of a mesh."""
+        self.fields.forget(name)
+        if self._matrix is not None and self._matrix.opened.name == name:
+            self._matrix = None
 
     def _forget_all(self) -> None:
         """Empty all caches."""
         for name in list(self.meshes):
             self._close(name)
+
+
+@contextmanager
+def _refusing_overflow(dtype: str) -> Iterator[None]:
+    with np.errstate(over="raise"):
+        try:
+            yield
+        except FloatingPointError:
+            raise too_large_for(dtype) from None
 
 
 class Clock:

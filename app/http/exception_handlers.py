@@ -13,7 +13,7 @@ from starlette.routing import compile_path
 from app.errors import Fault, Problem, ProblemError, pointer, problem_of_status
 from app.http.middleware.request_id import body_too_large
 from app.http.responses import problem_response
-from app.schemas.points import BARE_TAG, POINT_TAGS
+from app.schemas.points import TAGS
 from app.settings import Settings
 
 
@@ -63,7 +63,7 @@ def validation_problem(errors: Sequence[Any]) -> Problem:
 
 
 def _pointer(location: Sequence[str | int]) -> str:
-    named = [part for part in location if part not in (BARE_TAG, *POINT_TAGS.values())]
+    named = [part for part in location if part not in TAGS]
     return pointer(*(named[1:] if named[0] == "body" else named))
 
 

@@ -116,7 +116,7 @@ class Query(ABC, Generic[R]):
             request = request.model_copy(update={"barriers": sorted(set(request.barriers))})
         query = cls(mesh_id, cls.normalized(request))
         if settings is not None:
-            query.check_limits(settings)
+            query.check_limits(size, settings)
         check_points(query.written_points(), size)
         return query
 
@@ -167,7 +167,7 @@ class Query(ABC, Generic[R]):
         """Return the request in its one spelling, or refuse members that contradict each other."""
         return request
 
-    def check_limits(self, settings: Settings) -> None:
+    def check_limits(self, size: MeshSize, settings: Settings) -> None:
         """Refuse a request that exceeds the limits of the service."""
 
     def check_format(self, media_type: str) -> None:
@@ -200,12 +200,19 @@ class Query(ABC, Generic[R]):
         blocked = PER_FACE_BLOCKED * size.faces if len(self.barriers) else 0.0
         return self.rough_seconds(size) + blocked < SMALL_SECONDS
 
-    def check_answer(self, media_type: str, size: MeshSize, settings: Settings) -> None:
-        """Refuse a media type that has no room for the answer, as far as that is known before."""
-        if media_type == JSON:
+    def check_answer(
+        self,
+        representation: Representation,
+        size: MeshSize,
+        settings: Settings,
+        *,
+        as_job: bool,
+    ) -> None:
+        """Refuse a format that has no room for the answer, as far as that is known before."""
+        if representation.media_type == JSON:
             check_json_size(self.value_count(size), settings.max_json_values, self.hint)
         else:
-            self.check_format(media_type)
+            self.check_format(representation.media_type)
 
     def with_barriers(self, opened: OpenMesh) -> OpenMesh:
         """Return a mesh with the ``barriers``, or refuse those that leave nothing of it."""
@@ -224,8 +231,11 @@ class Query(ABC, Generic[R]):
         GeodesicError
             The solver failed, or was stopped: ``Cancelled`` once ``context.cancel`` returns True.
         """
-        points = resolve_points(self.written_points(), opened.mesh, context.cancel)
-        return self.solve(opened, points, context)
+        return self.solve(opened, self.resolved(opened.mesh, context.cancel), context)
+
+    def resolved(self, mesh: gc.TriangleMesh, cancel: Callable[[], bool]) -> SurfacePoints:
+        """Return the points of the request on the mesh; raises as `resolve_points`."""
+        return resolve_points(self.written_points(), mesh, cancel)
 
 
 def _revived(kind: type[Query[Any]], mesh_id: str, request: bytes) -> Query[Any]:

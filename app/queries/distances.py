@@ -67,7 +67,7 @@ class DistancesQuery(Query[DistancesRequest]):
         included = list(dict.fromkeys(request.include))
         return with_default_accuracy(request.model_copy(update={"include": included}))
 
-    def check_limits(self, settings: Settings) -> None:
+    def check_limits(self, size: MeshSize, settings: Settings) -> None:
         """Refuse too many sources."""
         check_count("sources", point_count(*self.request.sources), settings, "max_sources")
 

@@ -7,7 +7,6 @@ from typing import Any
 from app.encoding import Representation, encode
 from app.queries.base import Query
 from app.queries.cost_model import PER_FACE_BLOCKED
-from app.queries.points import resolve_points
 from app.store.meshes import OpenMesh
 
 
@@ -32,7 +31,7 @@ def estimate(
     Cancelled
         ``cancel`` returned True.
     """
-    points = resolve_points(query.written_points(), opened.mesh, cancel)
+    points = query.resolved(opened.mesh, cancel)
     forecast = query.forecast(opened, points)
     parts = encode(forecast.answer, replace(representation, coding=None)).parts
     size = forecast.times * sum(map(len, parts))

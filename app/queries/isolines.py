@@ -76,7 +76,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
             raise invalid_fields(["/count"], "does not go with levels")
         return with_default_accuracy(request)
 
-    def check_limits(self, settings: Settings) -> None:
+    def check_limits(self, size: MeshSize, settings: Settings) -> None:
         """Refuse too many sources or levels."""
         check_count("sources", point_count(*self.request.sources), settings, "max_sources")
         check_count("levels", self._level_count, settings, "max_levels")

@@ -2,15 +2,14 @@
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from itertools import chain
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer
+from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer, Representation
 from app.errors import over_limit
 from app.queries.accuracy import CERTAIN
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
@@ -36,8 +35,11 @@ if TYPE_CHECKING:
     from scipy.sparse import coo_array
 
 _CELLS = "cells of the matrix"
+_AS_JOB = "ask for application/x-npy with `Prefer: respond-async`: such a job may have more"
 _AT_A_TIME = 2**20
 """Straight distances that are computed at a time."""
+_SAMPLED = 2**22
+"""Straight distances that are computed for the estimate of a dense matrix, at most, about"""
 
 
 class MatrixQuery(Query[MatrixRequest]):
@@ -49,10 +51,14 @@ class MatrixQuery(Query[MatrixRequest]):
     @classmethod
     def normalized(cls, request: MatrixRequest) -> MatrixRequest:
         """Refuse pairs without as many sources as targets."""
-        sources, targets = len(request.sources), len(request.targets)
-        if request.layout == "pairs" and sources != targets:
-            message = f"there are {sources} sources and {targets} targets; pairs need as many"
-            raise invalid_fields(["/targets"], message)
+        if request.layout == "pairs":
+            for name in ("sources", "targets"):
+                if getattr(request, name) == "all":
+                    raise invalid_fields([f"/{name}"], "pairs need their points one by one")
+            sources, targets = len(request.sources), len(request.targets)
+            if sources != targets:
+                message = f"there are {sources} sources and {targets} targets; pairs need as many"
+                raise invalid_fields(["/targets"], message)
         return request
 
     @property
@@ -67,33 +73,103 @@ class MatrixQuery(Query[MatrixRequest]):
             return "ask for application/x-npz, with `Accept` or with ?format=npz"
         return super().hint
 
-    def check_limits(self, settings: Settings) -> None:
-        """Refuse too many sources, or cells where their number is known before solving."""
-        check_count("sources", len(self.request.sources), settings, "max_sources")
-        if self.request.layout != "sparse" or self.request.max_distance is None:
-            check_count(_CELLS, self._cells, settings, "max_matrix_cells")
+    def check_limits(self, size: MeshSize, settings: Settings) -> None:
+        """Refuse pairs and sparse matrices that are too large; `check_answer` does dense ones."""
+        if self.request.layout != "dense":
+            self._check_in_memory(size, settings)
+
+    def check_answer(
+        self,
+        representation: Representation,
+        size: MeshSize,
+        settings: Settings,
+        *,
+        as_job: bool,
+    ) -> None:
+        """Refuse a matrix that is too large for the memory of a worker, or as a job for the store.
+
+        The parts and the file are there at the same time.
+        """
+        if self.request.layout == "dense":
+            if not (as_job and representation.media_type == NPY):
+                self._check_in_memory(size, settings)
+            elif self.is_in_parts(representation, size, settings):
+                needed = self.bytes_in_parts(representation, size)
+                if needed > settings.results_bytes:
+                    what, limit = "bytes of the matrix and its parts", settings.results_bytes
+                    raise over_limit("limit_exceeded", what, needed, limit, "results_bytes")
+        super().check_answer(representation, size, settings, as_job=as_job)
+
+    def is_in_parts(
+        self, representation: Representation, size: MeshSize, settings: Settings
+    ) -> bool:
+        """Tell whether the answer is computed in parts, since it is too large for memory."""
+        if self.request.layout != "dense" or representation.media_type != NPY:
+            return False
+        sources, targets = self._count(size)
+        return sources > settings.max_sources or sources * targets > settings.max_matrix_cells
+
+    def areas_of_parts(self, size: MeshSize) -> list[int]:
+        """Return the number of distances in each part."""
+        sources, targets = self._count(size)
+        is_symmetric = self.request.sources == self.request.targets
+        return gc.MatrixParts.areas(sources, None if is_symmetric else targets)
+
+    def bytes_in_parts(self, representation: Representation, size: MeshSize) -> int:
+        """Return the size of the parts and of the file that they become."""
+        cells = sum(self.areas_of_parts(size)) + math.prod(self._count(size))
+        return cells * np.dtype(representation.dtype).itemsize
+
+    def parts(self, opened: OpenMesh, dtype: Any, cancel: Callable[[], bool]) -> gc.MatrixParts:
+        """Return the parts of the matrix, which are still to be computed."""
+        mesh, limit = opened.mesh, self.request.max_distance
+        sources, targets = self._parted(mesh, self.resolved(mesh, cancel))
+        return gc.MatrixParts(
+            mesh, sources, targets, max_distance=limit, dtype=dtype, cancel=cancel
+        )
+
+    def answer_of_parts(self, opened: OpenMesh, reached: int, cancel: Callable[[], bool]) -> Answer:
+        """Return the answer that is in parts, but for its points and distances.
+
+        ``reached`` of the distances are finite.
+        """
+        mesh = opened.mesh
+        sources, targets = self._parted(mesh, self.resolved(mesh, cancel))
+        ends = components_of(mesh, sources), components_of(mesh, targets)
+        unreachable = self._unreachable(*ends, reached)
+        return Answer(self._about | {"unreachable": unreachable, "warnings": opened.warnings})
 
     def value_count(self, size: MeshSize) -> int:
         """Return the number of cells, and of the values of each point."""
-        points = VALUES_OF_POINT * (len(self.request.sources) + len(self.request.targets))
-        return points if self.request.layout == "sparse" else points + self._cells
+        points = VALUES_OF_POINT * sum(self._count(size))
+        return points if self.request.layout == "sparse" else points + self._cells(size)
 
     def written_points(self) -> WrittenPoints:
-        """Yield the sources, then the targets."""
-        request = self.request
-        return chain(numbered("/sources", request.sources), numbered("/targets", request.targets))
+        """Yield the sources, then the targets, where they are written one by one."""
+        for name in ("sources", "targets"):
+            points = getattr(self.request, name)
+            if points != "all":
+                yield from numbered(f"/{name}", points)
+
+    def resolved(self, mesh: gc.TriangleMesh, cancel: Callable[[], bool]) -> SurfacePoints:
+        """Return the sources, then the targets; raises as `resolve_points`."""
+        written = super().resolved(mesh, cancel)
+        before, after = (each == "all" for each in (self.request.sources, self.request.targets))
+        if not (before or after):
+            return written
+        everywhere = [mesh.point(vertex) for vertex in range(len(mesh.vertices))]
+        return [*(everywhere if before else ()), *written, *(everywhere if after else ())]
 
     def rough_seconds(self, size: MeshSize) -> float:
         """Return the cost of a sweep to the limit from each point of the smaller side."""
-        request = self.request
-        points = len(request.sources) + len(request.targets)
-        sweeps = min(len(request.sources), len(request.targets))
-        share = rough_share(size, 1, request.max_distance)
-        return sweeps_cost(size.faces, [share] * sweeps, 1).seconds + PER_POINT * points
+        count = self._count(size)
+        share = rough_share(size, 1, self.request.max_distance)
+        one = sweeps_cost(size.faces, [share], 1).seconds
+        return min(count) * one + PER_POINT * sum(count)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep from the smaller side."""
-        sources, targets = self._parted(points)
+        sources, targets = self._parted(opened.mesh, points)
         request = self.request
         found: Any = opened.solver.distance_matrix(
             sources, targets, request.max_distance, request.layout, **context.options
@@ -102,52 +178,70 @@ class MatrixQuery(Query[MatrixRequest]):
             raise over_limit(
                 "limit_exceeded", _CELLS, found.nnz, context.max_cells, "max_matrix_cells"
             )
-        return self._answer(opened, points, found)
+        return self._answer(opened, sources, targets, found)
 
     def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the cost of sweeps, each to its farthest target along a straight line."""
+        """Return the cost of sweeps, each to its farthest target along a straight line.
+
+        Of a large dense matrix some sources stand for all.
+        """
         mesh, limit = opened.mesh, self.request.max_distance
-        sources, targets = self._parted(points)
+        sources, targets = self._parted(mesh, points)
+        seconds, times = PER_POINT * len(points), 1.0
         found: Any
         if self.request.layout == "pairs":
             found = straight_along(mesh, sources, targets, limit)
             cost = _cost_of_pairs(mesh, sources, targets, found)
         elif self.request.layout == "dense":
+            count = len(sources)
+            sources = sources[:: 1 + (count * len(targets) - 1) // _SAMPLED]
+            times = count / len(sources)
             found = straight_between(mesh, sources, targets, limit)
-            from_sources = len(sources) <= len(targets)
-            cost = _cost_of_sweeps(mesh, _farthest(found if from_sources else found.T))
+            radii = _farthest(found if count <= len(targets) else found.T)
+            cost = _cost_of_sweeps(mesh, np.resize(radii, min(count, len(targets))))
         else:
             found = _straight_sparse(mesh, sources, targets, limit)
             from_sources = len(sources) <= len(targets)
             radii = np.zeros(min(found.shape))
             np.maximum.at(radii, found.row if from_sources else found.col, found.data)
             cost = _cost_of_sweeps(mesh, radii)
-        seconds = cost.seconds + PER_POINT * len(points)
         table = found.nnz * 12 if self.request.layout == "sparse" else found.nbytes
-        return Forecast(
-            Cost(seconds, cost.memory_bytes + table), self._answer(opened, points, found)
-        )
+        answer = self._answer(opened, sources, targets, found)
+        return Forecast(Cost(cost.seconds + seconds, cost.memory_bytes + table), answer, times)
 
-    @property
-    def _cells(self) -> int:
-        sources, targets = len(self.request.sources), len(self.request.targets)
+    def _check_in_memory(self, size: MeshSize, settings: Settings) -> None:
+        """Refuse too many sources, or cells where their number is known before solving."""
+        hint = _AS_JOB if self.request.layout == "dense" else None
+        check_count("sources", self._count(size)[0], settings, "max_sources", hint=hint)
+        if self.request.layout != "sparse" or self.request.max_distance is None:
+            check_count(_CELLS, self._cells(size), settings, "max_matrix_cells", hint=hint)
+
+    def _count(self, size: MeshSize) -> tuple[int, int]:
+        """Return the numbers of sources and of targets."""
+        sources, targets = (
+            size.vertices if points == "all" else len(points)
+            for points in (self.request.sources, self.request.targets)
+        )
+        return sources, targets
+
+    def _cells(self, size: MeshSize) -> int:
+        sources, targets = self._count(size)
         return sources if self.request.layout == "pairs" else sources * targets
 
-    def _parted(self, points: SurfacePoints) -> tuple[SurfacePoints, SurfacePoints]:
-        count = len(self.request.sources)
+    def _parted(
+        self, mesh: gc.TriangleMesh, points: SurfacePoints
+    ) -> tuple[SurfacePoints, SurfacePoints]:
+        sources = self.request.sources
+        count = len(mesh.vertices) if sources == "all" else len(sources)
         return points[:count], points[count:]
 
-    def _answer(self, opened: OpenMesh, points: SurfacePoints, found: Any) -> Answer:
+    def _answer(
+        self, opened: OpenMesh, sources: SurfacePoints, targets: SurfacePoints, found: Any
+    ) -> Answer:
         mesh, layout = opened.mesh, self.request.layout
-        sources, targets = self._parted(points)
         starts, ends = components_of(mesh, sources), components_of(mesh, targets)
         members: dict[str, Any] = {
-            "kind": self.kind,
-            "mesh_id": self.mesh_id,
-            "method": "exact",
-            "exact": True,
-            "error_bound": CERTAIN,
-            "layout": layout,
+            **self._about,
             "sources": _describe_ends(mesh, sources, starts),
             "targets": _describe_ends(mesh, targets, ends),
         }
@@ -160,20 +254,37 @@ class MatrixQuery(Query[MatrixRequest]):
             table = table_of_sparse(table.row, table.col, found)
         else:
             table = table_of_matrix(found)
-        if layout == "pairs":
-            connected = int(np.count_nonzero(starts == ends))
-        else:
-            connected = sum(int(np.count_nonzero(ends == component)) for component in starts)
         members |= {
             "distances": found,
-            "unreachable": {
-                "disconnected": self._cells - connected,
-                "beyond_max_distance": connected - int(np.count_nonzero(np.isfinite(found))),
-            },
+            "unreachable": self._unreachable(starts, ends, int(np.isfinite(found).sum())),
             "warnings": opened.warnings,
         }
-        values = VALUES_OF_POINT * len(points) + sum(members[name].size for name in arrays)
+        points = len(sources) + len(targets)
+        values = VALUES_OF_POINT * points + sum(members[name].size for name in arrays)
         return Answer(members, arrays, arrays, values, table)
+
+    @property
+    def _about(self) -> dict[str, Any]:
+        return {
+            "kind": self.kind,
+            "mesh_id": self.mesh_id,
+            "method": "exact",
+            "exact": True,
+            "error_bound": CERTAIN,
+            "layout": self.request.layout,
+        }
+
+    def _unreachable(
+        self, starts: NDArray[np.int64], ends: NDArray[np.int64], reached: int
+    ) -> dict[str, int]:
+        """Return the number of missing distances by reason, from the components of both sides."""
+        if self.request.layout == "pairs":
+            cells, connected = len(starts), int(np.count_nonzero(starts == ends))
+        else:
+            cells = len(starts) * len(ends)
+            counts = np.bincount(ends, minlength=int(starts.max()) + 1)
+            connected = int(counts[starts].sum())
+        return {"disconnected": cells - connected, "beyond_max_distance": connected - reached}
 
 
 def _describe_ends(

@@ -72,7 +72,7 @@ class PathQuery(Query[PathRequest]):
             return "ask without explain, or past fewer waypoints at once"
         return super().hint
 
-    def check_limits(self, settings: Settings) -> None:
+    def check_limits(self, size: MeshSize, settings: Settings) -> None:
         """Refuse too many waypoints."""
         check_count("waypoints", len(self.request.waypoints), settings, "max_waypoints")
 

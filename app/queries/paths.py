@@ -75,7 +75,7 @@ class PathsQuery(Query[PathsRequest]):
         request = self.request
         return chain(points_in("/source", request.source), numbered("/targets", request.targets))
 
-    def check_limits(self, settings: Settings) -> None:
+    def check_limits(self, size: MeshSize, settings: Settings) -> None:
         """Refuse too many points of a curve."""
         check_count("sources", point_count(self.request.source), settings, "max_sources")
 

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import geodesic_core as gc
 from app.errors import Fault, ProblemError, over_limit, problem
 from app.schemas.points import BareVertex, EdgePoint, FacePoint, Point, VertexPoint
+from app.schemas.requests import QueryBody
 from app.settings import Settings
 
 FAULTS_SHOWN = 10
@@ -33,22 +34,21 @@ def invalid_points(faults: Sequence[Fault]) -> ProblemError:
     return problem("invalid_point", detail_of(faults), errors=tuple(faults))
 
 
-def check_count(what: str, count: int, settings: Settings, setting: str) -> None:
+def check_count(
+    what: str, count: int, settings: Settings, setting: str, hint: str | None = None
+) -> None:
     """Refuse a ``count`` of something that is above a setting."""
     limit = getattr(settings, setting)
     if count > limit:
-        raise over_limit("limit_exceeded", what, count, limit, setting)
+        raise over_limit("limit_exceeded", what, count, limit, setting, hint=hint)
 
 
-def check_lengths(body: Any, settings: Settings) -> None:
+def check_lengths(body: Any, model: type[QueryBody], settings: Settings) -> None:
     """Refuse a body with a list of too many elements, before any of them is looked at."""
     if isinstance(body, dict):
-        for name, setting in _LIMIT_OF_LIST.items():
+        for name, setting in model.bounded_lists.items():
             if isinstance(elements := body.get(name), list):
                 check_count(name, len(elements), settings, setting)
-
-
-_LIMIT_OF_LIST = {"sources": "max_sources", "waypoints": "max_waypoints", "levels": "max_levels"}
 
 
 def check_json_size(values: int, limit: int, hint: str) -> None:

@@ -1,6 +1,6 @@
 """Points and curves of the surface, as clients write them."""
 
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -194,3 +194,19 @@ Source = Annotated[
     _BY_FIELD_OR_CURVE,
 ]
 """A point or a curve where distances start, at ``start_distance``."""
+
+_LIST_TAG, _NAME_TAG = "as a list", "as a name"
+TAGS = frozenset({BARE_TAG, *POINT_TAGS.values(), _LIST_TAG, _NAME_TAG})
+"""All tags: they come in the places of faults, and are no members"""
+
+
+def _tag_of_ends(value: Any) -> str:
+    return _NAME_TAG if isinstance(value, str) else _LIST_TAG
+
+
+Ends = Annotated[
+    Annotated[FailFastList[Point], Field(min_length=1), Tag(_LIST_TAG)]
+    | Annotated[Literal["all"], Tag(_NAME_TAG)],
+    Discriminator(_tag_of_ends),
+]
+"""The points on one side of a matrix, or all vertices."""

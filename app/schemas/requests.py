@@ -1,6 +1,7 @@
 """Bodies and parameters of queries."""
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import (
     BeforeValidator,
@@ -17,6 +18,7 @@ from app.schemas.points import (
     MOST_MEMBERS,
     NOT_BOOLEAN,
     Count,
+    Ends,
     FailFastList,
     NonNegative,
     Point,
@@ -72,6 +74,13 @@ class AccuracyOrEffort(Accuracy):
 
 class QueryBody(StrictModel):
     """The body of a query."""
+
+    bounded_lists: ClassVar[Mapping[str, str]] = {
+        "sources": "max_sources",
+        "waypoints": "max_waypoints",
+        "levels": "max_levels",
+    }
+    """Setting that bounds the length of a list, by its name"""
 
     @model_validator(mode="before")
     @classmethod
@@ -217,8 +226,12 @@ class MatrixRequest(AmongBarriers):
         }
     )
 
-    sources: FailFastList[Point] = Field(min_length=1)
-    targets: FailFastList[Point] = Field(min_length=1)
+    bounded_lists: ClassVar[Mapping[str, str]] = {}  # by their product, and the size of the body
+
+    sources: Ends = Field(description="Points, or `all` for every vertex")
+    targets: Ends = Field(
+        description="The same; where they are the sources, each pair is asked once"
+    )
     max_distance: NonNegative | None = Field(
         default=None, description="Points farther than this, in mesh units, count as unreachable"
     )

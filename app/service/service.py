@@ -18,7 +18,7 @@ its request has ended, and records the name of the result.
 
 import asyncio
 from collections import Counter, defaultdict
-from collections.abc import AsyncIterator, Iterator, Mapping
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Mapping
 from contextlib import asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
@@ -36,9 +36,10 @@ from app.engine.supplied import SuppliedEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
 from app.errors import ProblemError, StateUnavailableError, problem
 from app.jobs import Job, JobManager, JobRepository, JobSpec
-from app.queries import KINDS, Estimate, MeshSize, Query, fingerprint, result_key
+from app.queries import KINDS, Estimate, MatrixQuery, MeshSize, Query, fingerprint, result_key
 from app.service.concurrency import ConcurrencyLimit
 from app.service.maintenance import Damage
+from app.service.matrix_parts import MatrixInParts
 from app.service.progress import LatestProgress, ignore_progress
 from app.service.resources import share_arenas
 from app.service.scrub import scrubbing
@@ -58,6 +59,8 @@ _CATALOG_PERIOD_S = 2.0
 Manifest = Mapping[str, Any]
 PhaseSeconds = Mapping[str, float]
 """Seconds of each phase of the work; empty where the store had the answer"""
+Run = Callable[[ProgressCallback], Awaitable[TaskResult]]
+"""The computation of an answer, which reports its progress"""
 
 
 @dataclass(frozen=True)
@@ -324,7 +327,7 @@ class Service:
         context: RequestContext,
     ) -> tuple[Estimate, PhaseSeconds]:
         """Have a worker, which has the mesh, estimate the cost of the answer to a query."""
-        query.check_answer(representation.media_type, size, self.settings)
+        query.check_answer(representation, size, self.settings, as_job=True)
         task = Task(
             EstimateQuery(query, representation),
             context.caller.name,
@@ -346,7 +349,7 @@ class Service:
         idempotency_key: str | None,
     ) -> Job:
         """Accept a job that answers a query, or return the job with the same idempotency key."""
-        query.check_answer(representation.media_type, size, self.settings)
+        query.check_answer(representation, size, self.settings, as_job=True)
         client = context.caller.name
         self.engine.refuse_when_full(client)
 
@@ -470,7 +473,7 @@ class Service:
         is_promised: bool = False,
     ) -> tuple[Result, PhaseSeconds]:
         with self.mesh_catalog.pinned(query.mesh_id):
-            query.check_answer(representation.media_type, size, self.settings)
+            query.check_answer(representation, size, self.settings, as_job=is_promised)
             name = result_name(query.mesh_id, result_key(query, representation))
             is_small = query.is_small(size)
             if self.database.is_shared and not is_small:  # small work costs less than the look
@@ -479,16 +482,25 @@ class Service:
             self.lookups["miss" if stored is None else "hit"] += 1
             if stored is not None:
                 return stored, {}
-            work = RunQuery(query, representation, name)
-            task = Task(work, client, query.affinity_keys, is_small, is_promised)
-            start = partial(self._run, task, query.kind)
+            if isinstance(query, MatrixQuery) and query.is_in_parts(
+                representation, size, self.settings
+            ):
+                in_parts = MatrixInParts(
+                    query, size, representation, name, client, self.engine, self.results
+                )
+                run = in_parts.run
+            else:
+                work = RunQuery(query, representation, name)
+                task = Task(work, client, query.affinity_keys, is_small, is_promised)
+                run = partial(self.engine.run, task)
+            start = partial(self._run, run, query.kind)
             done = await self._single_flight.join(name, start, on_progress)
             assert done.result is not None, "this kind of work answers"  # noqa: S101
             result = self.results.add(done.result, is_reusable=query.is_repeatable)
             return result, done.seconds
 
-    async def _run(self, task: Task, kind: str, on_progress: ProgressCallback) -> TaskResult:
-        done = await self.engine.run(task, on_progress)
+    async def _run(self, run: Run, kind: str, on_progress: ProgressCallback) -> TaskResult:
+        done = await run(on_progress)
         self.solves[kind] += 1
         self.solve_seconds[kind] += done.seconds["compute"]
         return done

@@ -1,5 +1,6 @@
 """The interface to a store: a folder, or objects that several machines reach by URL."""
 
+from collections.abc import Sequence
 from contextlib import AbstractAsyncContextManager, AbstractContextManager
 from pathlib import Path
 from typing import Protocol
@@ -55,6 +56,9 @@ class Supply(Protocol):
 
     def bringing(self, file: Path | None, folder: Path) -> AbstractAsyncContextManager[None]:
         """Have a lent file, if any, and the parent of a folder to come, inside the block."""
+
+    def bringing_results(self, names: Sequence[str]) -> AbstractAsyncContextManager[None]:
+        """Have the bodies of some results in the folder inside the block."""
 
     async def send_mesh(self, written: WrittenMesh) -> bool:
         """Send the files of a mesh; False where it is to be written again."""

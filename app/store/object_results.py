@@ -1,7 +1,7 @@
 """The results of an object store, which are read while they are sent."""
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from app.store.log import warn
 from app.store.objects import Objects
 from app.store.results import SMALL, Result, ResultManifest
 
+_FETCHED_AT_ONCE = 4
 _CALLS = 32
 """Calls of the store at the same time"""
 
@@ -62,6 +63,14 @@ class ObjectResults:
         name, manifest = result.name, result.manifest
         await to_thread.run_sync(self._write, name, path, manifest, limiter=self._limiter)
 
+    def fetch(self, files: Mapping[str, Path]) -> None:
+        """Write the bodies of results to files of this machine, a few at a time.
+
+        Raises ``StoreUnavailableError`` where one is not what was written.
+        """
+        with ThreadPoolExecutor(_FETCHED_AT_ONCE) as pool:
+            list(pool.map(self._fetch, files, files.values()))
+
     def note_use(self, name: str) -> None:
         """Do nothing: the next start finds them by age."""
 
@@ -88,6 +97,19 @@ class ObjectResults:
         if body is None or zlib.crc32(body) != manifest.crc32:
             return None
         return Result(name, manifest, body, has_files=True)
+
+    def _fetch(self, name: str, path: Path) -> None:
+        manifest = self._manifest(name)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            if manifest is not None:
+                fetched = self._objects.fetch(_body_name(name, manifest), path)
+                if fetched == manifest.crc32:
+                    return
+        except FileNotFoundError:
+            pass
+        self.remove(name)
+        raise StoreUnavailableError(f"the stored result {name} is gone or damaged")
 
     def _manifest(self, name: str) -> ResultManifest | None:
         content = self._objects.read(_manifest_name(name))

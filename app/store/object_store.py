@@ -5,7 +5,7 @@ no database is shared.
 """
 
 import shutil
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
 from pathlib import Path
 from uuid import uuid4
@@ -21,7 +21,7 @@ from app.store.object_meshes import ObjectMeshes
 from app.store.object_results import ObjectResults
 from app.store.objects import Objects
 from app.store.ownership import owned
-from app.store.results import FolderResults, Result
+from app.store.results import FolderResults, Result, body_path
 
 VARIABLES = {
     "s3": ("AWS_ENDPOINT_URL", "AWS_ACCESS_KEY_ID"),
@@ -56,6 +56,7 @@ class ObjectStore:
         """Lock the folder, which is this process's alone."""
         with owned(self.folder):
             self.meshes.prepare()
+            _remove(self.folder / RESULTS)  # what was under way when a former process died
             yield
 
     def claim(self, service: str | None) -> None:
@@ -116,6 +117,18 @@ class ObjectStore:
         finally:
             for each in new:
                 await to_thread.run_sync(_remove, each)
+
+    @asynccontextmanager
+    async def bringing_results(self, names: Sequence[str]) -> AsyncIterator[None]:
+        """Fetch the bodies of some results, and remove them afterwards."""
+        files = {name: body_path(self.folder / RESULTS, name) for name in names}
+        try:
+            if files:
+                await to_thread.run_sync(self.results.fetch, files)
+            yield
+        finally:
+            for name in names:
+                self._local_results.remove(name)
 
     async def send_mesh(self, written: WrittenMesh) -> bool:
         """Send a mesh."""

@@ -9,18 +9,23 @@ on it.
 import errno
 import zlib
 from collections import Counter, OrderedDict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from io import SEEK_END
 from itertools import chain
 from pathlib import Path
-from typing import Protocol
+from typing import IO, Protocol
 
 from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from app.errors import problem
+from app.settings import variable_of
 from app.store.atomic import atomic_write, remove_partial
 from app.store.last_use import note_use, order_of_use
 from app.store.log import warn
+from app.store.verified import checksum_of, read_checksum
 
 Buffer = bytes | memoryview
 
@@ -115,15 +120,39 @@ def write_result(
         return in_memory
 
 
+def write_result_file(
+    root: Path,
+    name: str,
+    write: Callable[[IO[bytes]], None],
+    headers: Mapping[str, str],
+    code: str,
+) -> Result:
+    """Write a result whose body ``write`` writes into a file, in any order; see `write_result`."""
+    with atomic_write(body_path(root, name)) as file:
+        write(file)
+        file.flush()
+        size, checksum = file.seek(0, SEEK_END), read_checksum(file.name)
+    if checksum is None:
+        raise OSError(errno.EIO, "the disk cannot read what was written", name)
+    return _add_manifest(root, name, size, checksum, headers, code)
+
+
 def _write(
     root: Path, name: str, parts: Iterable[Buffer], headers: Mapping[str, str], code: str
 ) -> Result:
     """Write the files of a result, the body first and the manifest last."""
     size = checksum = 0
-    with atomic_write(_body_path(root, name)) as file:
+    with atomic_write(body_path(root, name)) as file:
         for part in parts:
             size += file.write(part)
             checksum = zlib.crc32(part, checksum)
+    return _add_manifest(root, name, size, checksum, headers, code)
+
+
+def _add_manifest(
+    root: Path, name: str, size: int, checksum: int, headers: Mapping[str, str], code: str
+) -> Result:
+    """Write the manifest of a result, which completes it."""
     manifest = ResultManifest(headers=dict(headers), size=size, crc32=checksum, code=code)
     with atomic_write(_manifest_path(root, name)) as file:
         file.write(manifest.model_dump_json().encode())
@@ -189,15 +218,18 @@ class FolderResults:
     def found(self, *, is_alone: bool) -> Iterator[tuple[str, int]]:
         """Yield what is there, see ``ResultFiles``."""
         self._root.mkdir(parents=True, exist_ok=True)
-        bodies = sorted(self._root.glob("*/*.body"), key=lambda path: order_of_use(path.stat()))
-        for path in bodies:
+        complete = []
+        for path in self._root.glob("*/*.body"):
             name = path.relative_to(self._root).with_suffix("").as_posix()
-            if _manifest_path(self._root, name).exists():
-                yield name, path.stat().st_size
+            manifest = _manifest_path(self._root, name)
+            if manifest.exists():
+                complete.append((order_of_use(manifest.stat()), name, path.stat().st_size))
             elif is_alone:
                 path.unlink()
         if is_alone:
             remove_partial(self._root)
+        for _, name, size in sorted(complete):
+            yield name, size
 
     async def read(self, name: str) -> Result | None:
         """Return a result; None where it is missing or damaged."""
@@ -212,17 +244,17 @@ class FolderResults:
         await to_thread.run_sync(_write, self._root, name, [body], manifest.headers, manifest.code)
 
     def note_use(self, name: str) -> None:
-        """Note a use as the time of the file."""
-        note_use(_body_path(self._root, name))
+        """Note a use as the time of the manifest: that of the body tells whether it was changed."""
+        note_use(_manifest_path(self._root, name))
 
     def remove(self, name: str) -> None:
         """Remove the files of a result."""
         _manifest_path(self._root, name).unlink(missing_ok=True)
-        _body_path(self._root, name).unlink(missing_ok=True)
+        body_path(self._root, name).unlink(missing_ok=True)
 
     def body(self, result: Result) -> Path:
         """Return the file of a body."""
-        return _body_path(self._root, result.name)
+        return body_path(self._root, result.name)
 
 
 class ResultStore:
@@ -243,6 +275,7 @@ class ResultStore:
         self._total = 0
         self._in_use: Counter[str] = Counter()
         self._pins: Counter[str] = Counter()
+        self._reserved = 0
         self.evictions = 0
         """Results removed so far to make room on the disk"""
         self.memory_evictions = 0
@@ -326,9 +359,39 @@ class ResultStore:
             self._small[name] = filed
         return filed
 
+    @contextmanager
+    def reserving(self, nbytes: int) -> Iterator[None]:
+        """Reserve room for results that are made, in several steps, inside the block.
+
+        Raises ``ProblemError`` where those of jobs, and what others reserve, leave not so much.
+        """
+        self.refuse_without_room(nbytes)
+        self._reserved += nbytes
+        try:
+            yield
+        finally:
+            self._reserved -= nbytes
+
+    def refuse_without_room(self, nbytes: int) -> None:
+        """Raise ``ProblemError`` where the results of jobs leave no room for so many bytes."""
+        room = self._capacity - self._reserved - self._pinned(set())
+        if nbytes > room:
+            raise problem(
+                "storage_full",
+                f"the answers that jobs hold leave {max(0, room)} of the {nbytes} bytes that this "
+                "one needs",
+                limit=self._capacity,
+                actual=self._capacity - room + nbytes,
+                setting=variable_of("results_bytes"),
+                hint="delete jobs whose answers you have",
+            )
+
     def can_pin(self, name: str) -> bool:
         """Tell whether all pinned results would fit together with this one."""
-        return sum(self._sizes.get(pinned, 0) for pinned in {*self._pins, name}) <= self._capacity
+        return self._pinned({name}) + self._reserved <= self._capacity
+
+    def _pinned(self, others: set[str]) -> int:
+        return sum(self._sizes.get(name, 0) for name in {*self._pins, *others})
 
     def pin(self, name: str) -> None:
         """Protect a result from eviction until `unpin`."""
@@ -403,14 +466,19 @@ def result_name(mesh_id: str, key: str) -> str:
     return f"{mesh_id}/{key}"
 
 
+def body_path(root: Path, name: str) -> Path:
+    """Return the file of the body of a result, under the folder of all results."""
+    return root / f"{name}.body"
+
+
 def complete_results(root: Path) -> dict[str, tuple[Path, Path]]:
     """Return manifest and body of each complete result on disk, by name."""
     manifests = sorted(root.glob("*/*.json"))
     names = [path.relative_to(root).with_suffix("").as_posix() for path in manifests]
     return {
-        name: (_manifest_path(root, name), _body_path(root, name))
+        name: (_manifest_path(root, name), body_path(root, name))
         for name in names
-        if _body_path(root, name).exists()
+        if body_path(root, name).exists()
     }
 
 
@@ -418,10 +486,6 @@ def read_manifest(root: Path, name: str) -> ResultManifest | None:
     """Return the manifest of a result; None where the result is missing or damaged."""
     result = _read(root, name)
     return None if result is None else result.manifest
-
-
-def _body_path(root: Path, name: str) -> Path:
-    return root / f"{name}.body"
 
 
 def _manifest_path(root: Path, name: str) -> Path:
@@ -433,25 +497,24 @@ def _size(root: Path, name: str) -> int | None:
     if not _manifest_path(root, name).exists():
         return None
     try:
-        return _body_path(root, name).stat().st_size
+        return body_path(root, name).stat().st_size
     except FileNotFoundError:
         return None
 
 
 def _read(root: Path, name: str) -> Result | None:
-    """Return a result from its files; None where it is missing or damaged."""
-    checksum = size = 0
-    small: list[bytes] = []
+    """Return a result from its files; None where it is missing or damaged.
+
+    A large body is read once for each version of its file: clients may read it in many ranges.
+    """
+    path = body_path(root, name)
     try:
         manifest = ResultManifest.model_validate_json(_manifest_path(root, name).read_bytes())
-        with _body_path(root, name).open("rb") as file:
-            while chunk := file.read(2**20):
-                checksum = zlib.crc32(chunk, checksum)
-                size += len(chunk)
-                if size <= SMALL:
-                    small.append(chunk)
+        body = path.read_bytes() if manifest.size <= SMALL else None
+        size = path.stat().st_size if body is None else len(body)
     except (FileNotFoundError, ValidationError):
         return None
-    if (size, checksum) != (manifest.size, manifest.crc32):
+    if size != manifest.size:
         return None
-    return Result(name, manifest, b"".join(small) if size <= SMALL else None, has_files=True)
+    checksum = checksum_of(str(path)) if body is None else zlib.crc32(body)
+    return Result(name, manifest, body, has_files=True) if checksum == manifest.crc32 else None

@@ -13,6 +13,7 @@ from geodesic_client.answers import (
     Mesh,
     Neighbour,
     Path,
+    StoredMatrix,
 )
 from geodesic_client.async_client import AsyncClient
 from geodesic_client.bars import progress_bar
@@ -37,6 +38,7 @@ __all__ = [
     "Neighbour",
     "Path",
     "ProblemError",
+    "StoredMatrix",
     "UnreachableError",
     "curve",
     "edge",

@@ -118,6 +118,27 @@ class Matrix:
 
 
 @dataclass(frozen=True)
+class StoredMatrix:
+    """A matrix that the service has in a file: the answer of a job, whose rows are read in parts.
+
+    `matrix_rows` reads some, `save_matrix` all. The service has it until the job is dismissed, or
+    has become too old.
+    """
+
+    job_id: str
+    shape: tuple[int, int]
+    """The numbers of sources and of targets"""
+    dtype: np.dtype[Any]
+    error_bound: ErrorBound
+    size: int
+    """Bytes of the file, which has numpy's format"""
+    rows_at: int
+    """Bytes before the first row"""
+    etag: str
+    """Names the content"""
+
+
+@dataclass(frozen=True)
 class Neighbour:
     """One of the nearest candidates."""
 
@@ -246,6 +267,18 @@ def to_matrix(response: httpx2.Response) -> Matrix:
     with np.load(BytesIO(response.content), allow_pickle=False) as table:  # as SciPy writes it
         rows = np.repeat(np.arange(len(table["indptr"]) - 1), np.diff(table["indptr"]))
         return Matrix(table["data"], bound, rows, table["indices"].astype(np.int64))
+
+
+def to_stored_matrix(job_id: str, response: httpx2.Response) -> StoredMatrix:
+    """Return a matrix in a file, from the first bytes of that."""
+    begin = BytesIO(response.content)
+    np.lib.format.read_magic(begin)
+    shape, _, dtype = np.lib.format.read_array_header_1_0(begin)
+    bound = ErrorBound(**_members_of_headers(response)["error_bound"])
+    rows, columns = shape
+    size = int(response.headers["content-range"].rpartition("/")[2])
+    etag = response.headers["etag"].strip('"')
+    return StoredMatrix(job_id, (rows, columns), dtype, bound, size, begin.tell(), etag)
 
 
 def to_neighbours(response: httpx2.Response) -> list[Neighbour]:

@@ -78,7 +78,13 @@ def answer(query: Query[T], progress: Progress) -> Flow[T]:
 
 
 def result_of(job: Job, progress: Progress) -> Flow[httpx2.Response]:
-    """Wait for a job, and return its result. Whatever ends the wait early, ends the job."""
+    """Wait for a job, and return its result."""
+    yield from end_of(job, progress)
+    return (yield from send(Request("GET", f"/v1/jobs/{job.id}/results")))
+
+
+def end_of(job: Job, progress: Progress) -> Flow[None]:
+    """Wait for a job. Whatever ends the wait early, ends the job."""
     link = f"/v1/jobs/{job.id}"
     pause = FIRST_PAUSE_S
     try:
@@ -93,4 +99,3 @@ def result_of(job: Job, progress: Progress) -> Flow[httpx2.Response]:
         with suppress(GeodesicClientError):
             yield from send(Request("DELETE", link))
         raise
-    return (yield from send(Request("GET", f"{link}/results")))

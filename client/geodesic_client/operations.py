@@ -2,7 +2,11 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path as FilePath
 from typing import Any, Literal, TypeVar
+from uuid import uuid4
 
 import httpx2
 import numpy as np
@@ -22,6 +26,7 @@ from geodesic_client.answers import (
     Mesh,
     Neighbour,
     Path,
+    StoredMatrix,
     to_array,
     to_distances,
     to_estimate,
@@ -33,8 +38,18 @@ from geodesic_client.answers import (
     to_neighbours,
     to_path,
     to_paths,
+    to_stored_matrix,
 )
-from geodesic_client.flow import Flow, Progress, Query, Request, answer, ignore_progress, send
+from geodesic_client.flow import (
+    Flow,
+    Progress,
+    Query,
+    Request,
+    answer,
+    end_of,
+    ignore_progress,
+    send,
+)
 from geodesic_client.method import Method
 from geodesic_client.points import Point
 
@@ -43,6 +58,10 @@ Accuracy = Literal["exact", "approximate", "fast"]
 Kind = Literal["distances", "path", "paths", "isolines", "matrix", "nearest", "locate"]
 ArrayName = Literal["vertices", "faces", "vertex_map", "face_map", "components"]
 
+_NPY_HEAD = 256
+"""Bytes that have the whole header of a matrix in numpy's format"""
+_PART_BYTES = 2**23
+"""Bytes of a stored matrix that are read at a time"""
 _PAGE = 1000
 """Meshes or jobs that are listed at a time"""
 
@@ -250,6 +269,58 @@ def matrix(
     return (yield from _ask(mesh, "matrix", body, to_matrix, progress, media_type))
 
 
+def store_matrix(
+    mesh: Mesh | str,
+    sources: Sequence[Point] | Literal["all"],
+    targets: Sequence[Point] | Literal["all"],
+    *,
+    max_distance: float | None = None,
+    barriers: Sequence[int] = (),
+    dtype: Literal["float64", "float32"] = "float64",
+    progress: Progress = ignore_progress,
+) -> Flow[StoredMatrix]:
+    """Have the service compute exact distances, and store them in a file, whatever their number.
+
+    All workers of the service share the work. Where sources and targets are the same, each pair is
+    asked once. A call that was stopped has the next one go on where it was.
+    """
+    body = _body(sources=sources, targets=targets, max_distance=max_distance, barriers=barriers)
+    request = _request(mesh, "matrix", body, NPY, {"dtype": dtype})
+    headers = {**request.headers, "Prefer": "respond-async", "Idempotency-Key": uuid4().hex}
+    job = to_job((yield from send(replace(request, headers=headers))).json())
+    yield from end_of(job, progress)
+    progress(1.0)
+    return to_stored_matrix(job.id, (yield from _part_of_result(job.id, 0, _NPY_HEAD)))
+
+
+def matrix_rows(matrix: StoredMatrix, first: int, last: int) -> Flow[NDArray[Any]]:
+    """Return the rows of a stored matrix from ``first`` to before ``last``."""
+    if not 0 <= first < last <= matrix.shape[0]:
+        raise ValueError(f"there are no rows {first} to {last} of {matrix.shape[0]}")
+    row = matrix.shape[1] * matrix.dtype.itemsize
+    begin, end = (matrix.rows_at + row * number for number in (first, last))
+    part = (yield from _part_of_result(matrix.job_id, begin, end)).content
+    return np.frombuffer(part, matrix.dtype).reshape(last - first, matrix.shape[1])
+
+
+def save_matrix(
+    matrix: StoredMatrix, path: str | PathLike[str], *, progress: Progress = ignore_progress
+) -> Flow[None]:
+    """Write a stored matrix to a file, which `numpy.load` can map into memory.
+
+    A call that was stopped has the next one go on where it was: what has come lies in a hidden
+    file beside.
+    """
+    out = FilePath(path)
+    scratch = out.with_name(f".{out.name}.{matrix.etag}.part")
+    with scratch.open("ab") as file:
+        while (begin := file.tell()) < matrix.size:
+            end = min(begin + _PART_BYTES, matrix.size)
+            file.write((yield from _part_of_result(matrix.job_id, begin, end)).content)
+            progress(end / matrix.size)
+    scratch.replace(out)
+
+
 def nearest(
     mesh: Mesh | str,
     source: Point,
@@ -299,6 +370,12 @@ def dismiss_job(job: Job | str) -> Flow[Job]:
     """Stop a job that waits or runs; remove one that has finished."""
     job_id = job.id if isinstance(job, Job) else job
     return to_job((yield from send(Request("DELETE", f"/v1/jobs/{job_id}"))).json())
+
+
+def _part_of_result(job_id: str, begin: int, end: int) -> Flow[httpx2.Response]:
+    """Return the bytes of an answer from ``begin`` to before ``end``, or to its end."""
+    headers = {"Range": f"bytes={begin}-{end - 1}"}
+    return (yield from send(Request("GET", f"/v1/jobs/{job_id}/results", {}, headers)))
 
 
 def _ask(
@@ -373,6 +450,9 @@ class Operations:
     paths = Method(paths)
     isolines = Method(isolines)
     matrix = Method(matrix)
+    store_matrix = Method(store_matrix)
+    matrix_rows = Method(matrix_rows)
+    save_matrix = Method(save_matrix)
     nearest = Method(nearest)
     locate = Method(locate)
     estimate = Method(estimate)

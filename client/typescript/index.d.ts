@@ -101,7 +101,8 @@ export interface paths {
          * Exact distances from many points to many others
          * @description Return a distance for each source and target, or for each pair.
          *
-         *     In binary, a dense matrix and pairs come as npy and octets, a sparse matrix as npz.
+         *     In binary, a dense matrix and pairs come as npy and octets, a sparse matrix as npz. As a job, a
+         *     dense matrix in npy may be as large as the store has room for; its rows are read in ranges.
          */
         post: operations["computeMatrix"];
         delete?: never;
@@ -1279,10 +1280,16 @@ export interface components {
              *     ]
              */
             barriers?: number[];
-            /** Sources */
-            sources: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
-            /** Targets */
-            targets: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[];
+            /**
+             * Sources
+             * @description Points, or `all` for every vertex
+             */
+            sources: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[] | "all";
+            /**
+             * Targets
+             * @description The same; where they are the sources, each pair is asked once
+             */
+            targets: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[] | "all";
             /**
              * Max Distance
              * @description Points farther than this, in mesh units, count as unreachable

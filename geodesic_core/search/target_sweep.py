@@ -1,5 +1,6 @@
 """Sweeps from one point to some others, one after another in the same memory."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -91,17 +92,28 @@ def _limit_of(
 ) -> Callable[[Wavefront], float]:
     """Return the limit of a sweep for its nearest ``count`` targets, as a function of its state.
 
-    A distance known so far is that of a path: nothing beyond it can be nearer.
+    A distance known so far is that of a path: nothing beyond it can be nearer. While a target that
+    counts has none, there is no limit. So where all count, one of these is looked at first: to look
+    at all each time takes 2 % of a sweep to 30 000 vertices.
     """
     others = np.flatnonzero(reaches.any(axis=1))  # than vertices, whose corner is the vertex itself
     corners, reaches = corners[others], reaches[others]
+    all_count, vertices = count >= len(nodes), np.delete(np.arange(len(nodes)), others)
+    waited_for = -1
 
     def limit(wave: Wavefront) -> float:
-        known = wave.vertices.distance[nodes]
+        nonlocal waited_for
+        distance = wave.vertices.distance
+        if waited_for >= 0 and math.isinf(distance[waited_for]):
+            return math.inf
+        known = distance[nodes]
         if len(others):
-            past_corners = (wave.vertices.distance[corners] + reaches).min(axis=1)
+            past_corners = (distance[corners] + reaches).min(axis=1)
             known[others] = np.minimum(known[others], past_corners)
-        last = known.max() if count == len(known) else np.partition(known, count - 1)[count - 1]
+        if all_count:
+            unreached = vertices[np.isinf(known[vertices])]
+            waited_for = int(nodes[unreached[-1]]) if len(unreached) else -1
+        last = known.max() if all_count else np.partition(known, count - 1)[count - 1]
         return float(last) * (1.0 + SEARCH_SLACK)
 
     return limit

@@ -1,13 +1,12 @@
 """Dense tables: blocks of rows, and the rows of the file made from them."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.tables.blocks import Blocks
 from geodesic_core.tables.plan import Plan
 
 ARRAYS = ("rows",)
@@ -28,15 +27,17 @@ def block_of(
     return {"rows": table}
 
 
-def file_rows(plan: Plan, blocks: Blocks) -> Iterator[tuple[Longs, NDArray[Any]]]:
+def file_rows(
+    plan: Plan, rows_of: Callable[[int], NDArray[Any]]
+) -> Iterator[tuple[Longs, NDArray[Any]]]:
     """Yield rows of the file, (k,) their numbers and (k, targets) their values, all of them once.
 
-    Reads each block once for each block that comes after it, in parts.
+    Reads the rows of each block once for each block that comes after it, in parts.
     """
     if plan.is_flipped:
         for first in range(0, plan.width, plan.block_rows):
             part = slice(first, first + plan.block_rows)
-            columns = [blocks.get(k, "rows")[:, part] for k in range(plan.blocks)]
+            columns = [rows_of(k)[:, part] for k in range(plan.blocks)]
             rows = np.concatenate(columns).T
             yield np.arange(first, first + len(rows)), rows
         return
@@ -44,10 +45,10 @@ def file_rows(plan: Plan, blocks: Blocks) -> Iterator[tuple[Longs, NDArray[Any]]
     places[plan.order] = np.arange(plan.sweeps)
     for block in range(plan.blocks):
         sweeps = plan.rows_of(block)
-        rows = blocks.get(block, "rows")
+        rows = rows_of(block)
         if plan.is_symmetric:
             before = [
-                blocks.get(k, "rows")[:, sweeps[0] - plan.rows_of(k)[0] :][:, : len(sweeps)].T
+                rows_of(k)[:, sweeps[0] - plan.rows_of(k)[0] :][:, : len(sweeps)].T
                 for k in range(block)
             ]
             rows = np.concatenate([*before, rows], axis=1)[:, places]

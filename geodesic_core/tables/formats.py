@@ -3,9 +3,9 @@
 import hashlib
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,8 @@ def write_table(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], facts: Facts, 
         shutil.rmtree(scratch)
     if suffix in DENSE:
         whole = scratch.with_suffix(".npy")
-        _write_npy(plan, blocks, dtype, whole)
+        with whole.open("wb") as file:
+            write_npy(plan, lambda block: blocks.get(block, "rows"), dtype, file)
         if suffix == ".zarr":
             _write_zarr(np.load(whole, mmap_mode="r"), facts, scratch)
     elif suffix == ".npz":
@@ -53,6 +54,20 @@ def write_table(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], facts: Facts, 
     scratch.replace(out)
 
 
+def write_npy(
+    plan: Plan, rows_of: Callable[[int], NDArray[Any]], dtype: np.dtype[Any], file: IO[bytes]
+) -> None:
+    """Write a dense table in numpy's format, from the rows of its blocks."""
+    # Written, not mapped: pages of a map would count as memory of the process.
+    header = {"descr": dtype.str, "fortran_order": False, "shape": plan.shape}
+    np.lib.format.write_array_header_1_0(file, header)
+    begin, row_bytes = file.tell(), plan.shape[1] * dtype.itemsize
+    for numbers, rows in dense.file_rows(plan, rows_of):
+        for number, row in zip(numbers.tolist(), np.ascontiguousarray(rows), strict=True):
+            file.seek(begin + number * row_bytes)
+            file.write(row.data.cast("B"))
+
+
 def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file, hexadecimal; of a folder, of its files by their names."""
     digest = hashlib.sha256()
@@ -62,18 +77,6 @@ def sha256_of(path: Path) -> str:
             while part := file.read(1 << 20):
                 digest.update(part)
     return digest.hexdigest()
-
-
-def _write_npy(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], path: Path) -> None:
-    # Written, not mapped: pages of a map would count as memory of the process.
-    with path.open("wb") as file:
-        header = {"descr": dtype.str, "fortran_order": False, "shape": plan.shape}
-        np.lib.format.write_array_header_1_0(file, header)
-        begin, row_bytes = file.tell(), plan.shape[1] * dtype.itemsize
-        for numbers, rows in dense.file_rows(plan, blocks):
-            for number, row in zip(numbers.tolist(), np.ascontiguousarray(rows), strict=True):
-                file.seek(begin + number * row_bytes)
-                file.write(row.data.cast("B"))
 
 
 def _write_zarr(table: NDArray[Any], facts: Facts, folder: Path) -> None:

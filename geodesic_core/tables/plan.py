@@ -18,6 +18,11 @@ _BLOCK_ROWS = 256
 """Rows of a block, at most: its columns are as wide where a symmetric table is mirrored"""
 
 
+def block_rows(width: int) -> int:
+    """Return the number of sweeps in a block, for a table of this width."""
+    return max(1, min(_BLOCK_ROWS, _BLOCK_BYTES // (8 * width)))
+
+
 @dataclass(frozen=True)
 class Plan:
     """Sweeps from the smaller side of a table; of a symmetric one, to what comes after."""
@@ -64,7 +69,7 @@ class Plan:
             is_flipped,
             targets is None,
             order,
-            max(1, min(_BLOCK_ROWS, _BLOCK_BYTES // (8 * width))),
+            block_rows(width),
         )
 
     @property

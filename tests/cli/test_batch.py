@@ -83,21 +83,26 @@ def test_a_process_that_dies_costs_its_own_mesh_alone(
 ) -> None:
     questions = batch.Questions([batch.Point.parse("0")], [], {"method": "exact"}, "none")
     monkeypatch.setattr(batch, "_QUESTION", dying)
-    rows = dict(batch._answers(meshes, questions, 2))
+    rows = dict(batch._answers(meshes, questions, 2, batch._pool(2)))
     assert "the process died" in str(rows[meshes[1]][0].error)
     for path in (meshes[0], meshes[2]):
         assert rows[path][0].farthest == gc.exact_distance(gc.load_mesh(path), 0).distances.max()
 
 
 def test_small_meshes_are_handed_over_together_and_large_ones_alone(tmp_path: Path) -> None:
-    sizes = [1000, 1000, 9 << 20, 0, 500, 1000]
+    sizes = [1000, 1000, 9 << 20, 0, *[1000] * 40]
     meshes = [tmp_path / f"{number}.ply" for number in range(len(sizes))]
     for mesh, size in zip(meshes, sizes, strict=True):
         mesh.touch()
         os.truncate(mesh, size)
     missing = tmp_path / "missing.ply"
     parcels = list(batch._parcels([*meshes, missing], 1))
-    assert parcels == [meshes[:2], [meshes[2]], [*meshes[3:], missing]]
+    assert parcels[:2] == [meshes[:2], [meshes[2]]]
+    assert [mesh for parcel in parcels for mesh in parcel] == [*meshes, missing]
+    lengths = [len(parcel) for parcel in parcels[2:]]
+    assert lengths[0] == 6, "one without a size, and an eighth of the others"
+    assert lengths == sorted(lengths, reverse=True), "fewer at the end"
+    assert lengths[-9:] == [1] * 9
     # Of a few meshes each process gets some.
     some = [meshes[0], meshes[1], meshes[5]]
     assert list(batch._parcels(some, 2)) == [[mesh] for mesh in some]

@@ -6,9 +6,13 @@ The cluster is real: a head, two nodes and a replica, each a process of its own 
 import json
 import os
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -128,6 +132,25 @@ def test_answers_are_the_same_to_the_bit(local: Place, spread: Place, kind: str)
         assert response.status_code == 200, response.text
         bodies.add(response.content)
     assert len(bodies) == 1
+
+
+@pytest.mark.full
+def test_all_hosts_share_a_large_matrix(spread: Place, tmp_path: Path) -> None:
+    """The command has the cluster compute it; the file is that of one machine, to the bit."""
+    spread.wait_until_idle()
+    mesh = tmp_path / "mesh.ply"
+    command = [sys.executable, "-c", "from app.cli import main; main()"]
+    run = partial(subprocess.run, check=True, capture_output=True)
+    run([*command, "sample", "sphere", "--faces", "6500", mesh])  # 10.6 million distances
+    before = spread.times()
+    matrix = [*command, "matrix", mesh, "--points", "all", "--dtype", "float32", "--out"]
+    run([*matrix, tmp_path / "there.npy", "--service", str(spread.client.base_url)])
+    busy = [pid for pid, taken in spread.times().items() if taken > before[pid] + 500e6]
+    nodes = [node for node in spread.cluster.living() if set(busy) & node.workers()]
+    assert len(nodes) == 2, "both hosts have computed"
+    run([*matrix, tmp_path / "here.npy"])
+    assert (tmp_path / "there.npy").read_bytes() == (tmp_path / "here.npy").read_bytes()
+    assert not spread.client.get("/v1/jobs").json()["jobs"], "the service need not hold it"
 
 
 def test_refusals_are_the_same(local: Place, spread: Place) -> None:

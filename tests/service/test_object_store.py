@@ -12,6 +12,7 @@ import anyio
 import numpy as np
 import pytest
 
+import geodesic_core as gc
 from tests.service.test_replicas import refused_start
 from tests.support.azure import Azure
 from tests.support.postgres import Server as Postgres
@@ -23,6 +24,7 @@ from tests.support.service import (
     check_problem,
     distances,
     serving,
+    stored_mesh,
     upload_sample,
 )
 from tests.support.waiting import LONG_S, wait_until
@@ -91,6 +93,24 @@ def test_ranges_of_an_answer_are_streamed(service: ServiceClient) -> None:
     several = service.get(f"{link}/results", headers={"Range": "bytes=0-9,50-59"})
     assert several.status_code == 206
     assert whole[50:60] in several.content
+
+
+def test_a_large_matrix_is_joined_from_objects(url: str, s3: S3, tmp_path: Path) -> None:
+    settings = {"copies": tmp_path / "copies", "max_matrix_cells": 100}
+    with serving(url, **settings) as service:  # type: ignore[arg-type]
+        mesh_id = upload_sample(service, "sphere", 1280)
+        link = f"/v1/meshes/{mesh_id}/matrix?format=npy"
+        ends = {"sources": "all", "targets": "all"}
+        job = service.post(link, json=ends, headers={"Prefer": "respond-async"}).json()["links"]
+        wait_until(lambda: service.get(job["self"]).json()["finished"] is not None)
+        gc.write_matrix(stored_mesh(service, mesh_id), tmp_path / "table.npy", "all")
+        expected = (tmp_path / "table.npy").read_bytes()
+        assert service.get(job["results"]).content == expected
+        part = service.get(job["results"], headers={"Range": "bytes=100000-2100000"})
+        assert (part.status_code, part.content) == (206, expected[100_000:2_100_001])
+        assert not [*(tmp_path / "copies" / "results").glob("*/*")]
+        results = f"results/{mesh_id}/"
+        wait_until(lambda: sum(name.startswith(results) for name in s3.names(url)) == 2)
 
 
 @pytest.mark.full

@@ -219,7 +219,8 @@ async def compute_matrix(
 ) -> Response:
     """Return a distance for each source and target, or for each pair.
 
-    In binary, a dense matrix and pairs come as npy and octets, a sparse matrix as npz.
+    In binary, a dense matrix and pairs come as npy and octets, a sparse matrix as npz. As a job, a
+    dense matrix in npy may be as large as the store has room for; its rows are read in ranges.
     """
     return await query_request.answer(MatrixQuery, body, parameters)
 

@@ -70,7 +70,8 @@ def read(model: type[BaseModel], head: dict[str, Any], body: bytes, settings: Se
     """
     if body:
         head = {**head, "body": parse_json(body, settings)}
-        check_lengths(head["body"], settings)
+        kind: Any = model.model_fields["body"].annotation
+        check_lengths(head["body"], kind, settings)
     try:
         return model.model_validate(head)
     except ValidationError as error:

@@ -13,7 +13,9 @@ from app.encoding import Representation
 from app.engine import wire
 from app.engine.wire import DamagedMessageError, Message, VersionError, Wire, WireError
 from app.engine.work import (
+    ComputePart,
     EstimateQuery,
+    JoinParts,
     MeshFromFile,
     MeshFromSample,
     Outcome,
@@ -24,7 +26,7 @@ from app.engine.work import (
     Work,
 )
 from app.errors import Fault, Problem
-from app.queries import KINDS, Estimate, Query
+from app.queries import KINDS, Estimate, MatrixQuery, Query
 from app.store.meshes import WrittenMesh
 from app.store.results import Result, ResultManifest
 from app.tracing import Period
@@ -62,6 +64,23 @@ def test_queries_of_each_kind_arrive(query: Query[Any]) -> None:
         task = Task(work, "alice", query.affinity_keys, is_small=True, is_promised=True)
 
         assert sent(task) == task
+
+
+def test_parts_of_matrices_arrive() -> None:
+    query = next(each for each in QUERIES if isinstance(each, MatrixQuery))
+    parts = (f"{MESH_ID}/key-0", f"{MESH_ID}/key-1")
+    for work in (
+        ComputePart(query, "float32", 1, parts[1]),
+        JoinParts(query, "float32", parts, 77, f"{MESH_ID}/key"),
+    ):
+        assert sent(Task(work, "alice", query.affinity_keys, is_promised=True)).work == work
+
+
+def test_other_queries_have_no_parts() -> None:
+    query: Any = QUERIES[0]
+    message = Wire(HERE).encode_task(Message(Task(ComputePart(query, "float64", 0, "a/b"), ""), {}))
+    with pytest.raises(DamagedMessageError, match="has no parts"):
+        Wire(HERE).decode_task(message)
 
 
 @pytest.mark.parametrize("where", [MeshFromFile, MeshFromSample], ids=["a file", "a sample"])

@@ -83,7 +83,7 @@ def test_the_next_start_finds_meshes_and_results_in_the_same_order(tmp_path: Pat
         (tmp_path / "meshes" / name).mkdir(parents=True)
         write_result(tmp_path / "results", f"m/{name}", [b"x" * 40], {}, "code", is_cheap=False)
     set_ahead(tmp_path / "meshes" / "b")
-    set_ahead(tmp_path / "results" / "m" / "b.body")
+    set_ahead(tmp_path / "results" / "m" / "b.json")
     assert list(MeshStore(tmp_path).sizes()) == ["b", "a"]
 
     results = ResultStore(FolderResults(tmp_path / "results"), 50, memory=0)

@@ -1,6 +1,7 @@
 import os
 import shutil
 import tracemalloc
+import zlib
 from pathlib import Path
 
 import anyio
@@ -9,9 +10,18 @@ import pytest
 
 import geodesic_core as gc
 from app.errors import ProblemError
+from app.store import verified
 from app.store.manifests import encode_manifest, read_manifest
 from app.store.meshes import MeshStore
-from app.store.results import FolderResults, Result, ResultStore, write_result
+from app.store.results import (
+    SMALL,
+    FolderResults,
+    Result,
+    ResultStore,
+    write_result,
+    write_result_file,
+)
+from tests.support.faults import flip_bytes
 from tests.support.service import store_mesh
 
 SQUARE = (
@@ -209,7 +219,7 @@ def test_the_answer_of_a_job_stays_where_a_start_has_to_make_room(
 ) -> None:
     for key, second in (("job", 1), ("new", 2)):
         put(results, tmp_path, f"m/{key}")
-        os.utime(tmp_path / "results" / "m" / f"{key}.body", (second, second))
+        os.utime(tmp_path / "results" / "m" / f"{key}.json", (second, second))
 
     restarted = ResultStore(FolderResults(tmp_path / "results"), 50, memory=0)
     restarted.prepare()
@@ -223,7 +233,7 @@ def test_the_answer_of_a_job_stays_where_a_start_has_to_make_room(
 def test_results_survive_a_restart(results: ResultStore, tmp_path: Path) -> None:
     for key, second in (("old", 1), ("new", 2)):
         put(results, tmp_path, f"m/{key}")
-        os.utime(tmp_path / "results" / "m" / f"{key}.body", (second, second))
+        os.utime(tmp_path / "results" / "m" / f"{key}.json", (second, second))
     (tmp_path / "results" / "m" / "incomplete.body").write_bytes(b"x")
     (tmp_path / "results" / "m" / "tmpabc").write_bytes(b"x")
 
@@ -357,3 +367,42 @@ def test_what_gets_no_files_is_given_back(roomy: ResultStore, tmp_path: Path) ->
     assert find(roomy, "m/a") is not None
     roomy.forget_mesh("m")
     assert find(roomy, "m/a") is None, "what is in use would stay"
+
+
+def test_a_large_result_is_read_once_for_each_version_of_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Clients read it in many ranges, each of which finds it again."""
+    root, reads = tmp_path / "results", list[str]()
+    read = verified.read_checksum
+    monkeypatch.setattr(verified, "read_checksum", lambda path: reads.append(path) or read(path))
+    body = bytes(3 * SMALL)
+    result = write_result_file(root, "m/a", lambda file: file.write(body), {}, "code")
+    assert (result.manifest.size, result.manifest.crc32) == (len(body), zlib.crc32(body))
+    store = ResultStore(FolderResults(root), 10**6, memory=0)
+    store.prepare()
+    for _ in range(3):
+        assert anyio.run(store.find, "m/a") == result
+    assert len(reads) == 1
+    for _ in range(3):
+        store.release(result)
+    flip_bytes(root / "m" / "a.body")
+    assert anyio.run(store.find, "m/a") is None
+    assert store.nbytes == 0
+
+
+def test_room_is_reserved_among_pinned_results(tmp_path: Path) -> None:
+    store = ResultStore(FolderResults(tmp_path / "results"), 100, memory=0)
+    store.add(write(tmp_path, "m/pinned", 40))
+    store.pin("m/pinned")
+    store.add(write(tmp_path, "m/other", 30))
+    with store.reserving(50):
+        assert not store.can_pin("m/other")
+        with pytest.raises(ProblemError) as refused, store.reserving(11):
+            pass
+        problem = refused.value.problem
+        assert (problem.code, problem.limit, problem.actual) == ("storage_full", 100, 101)
+        assert problem.setting == "GEODESIC_RESULTS_BYTES"
+        with store.reserving(10):
+            pass
+    assert store.can_pin("m/other")

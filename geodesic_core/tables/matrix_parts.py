@@ -1,0 +1,201 @@
+"""A matrix in parts, which may be computed on several machines and are then joined to one file."""
+
+from collections.abc import Callable, Sequence
+from typing import IO, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geodesic_core.control import Control
+from geodesic_core.fields.sources import as_points
+from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.mesh.surface_point import Point
+from geodesic_core.search.target_sweep import TargetSweep
+from geodesic_core.tables import dense
+from geodesic_core.tables.formats import write_npy
+from geodesic_core.tables.plan import Plan, block_rows
+from geodesic_core.tables.rows import ExactRows
+from geodesic_core.validation import as_limit, check_choice
+
+
+class MatrixParts:
+    """A dense matrix of exact distances in parts, each with the rows of some sweeps.
+
+    The parts may be computed in any order, by several processes or machines. Joined, they are the
+    file that `write_matrix` writes, to the bit.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
+    sources, targets
+        N and M vertex indices or `SurfacePoint`. Where both are the same, each pair is asked once.
+    max_distance
+        Limit of the sweeps, mesh units; None for no limit. Points beyond it count as unreachable.
+    dtype
+        Of the distances.
+    cancel
+        See `Control`.
+
+    Raises
+    ------
+    InvalidPoint, InvalidArgument, Cancelled
+        As in `write_matrix`.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
+    >>> parts = gc.MatrixParts(mesh, [0, 1], [2, 3])
+    >>> [parts.compute(part).round(3).tolist() for part in range(parts.count)]
+    [[[1.0, 1.414], [1.414, 1.0]]]
+    """
+
+    def __init__(
+        self,
+        mesh: MeshLike,
+        sources: Sequence[Point],
+        targets: Sequence[Point],
+        *,
+        max_distance: float | None = None,
+        dtype: Literal["float64", "float32"] = "float64",
+        cancel: Callable[[], bool] | None = None,
+    ) -> None:
+        check_choice("dtype", dtype, ("float64", "float32"))
+        control = Control(cancel=cancel)
+        self._mesh = as_mesh(mesh)
+        self._limit = as_limit(max_distance)
+        self._dtype = np.dtype(dtype)
+        starts = as_points(self._mesh, sources, "source", control)
+        stops = as_points(self._mesh, targets, "target", control)
+        self._plan = Plan.of(
+            self._mesh, starts, None if starts == stops else stops, control, in_order=False
+        )
+
+    @staticmethod
+    def areas(sources: int, targets: int | None) -> list[int]:
+        """Return the number of distances in each part, by the numbers of points alone.
+
+        Parameters
+        ----------
+        sources, targets
+            Numbers of points, 1 or more; None for targets that are the sources.
+
+        Returns
+        -------
+        list of int
+            One for each part. Work and memory are about proportional to it.
+
+        Examples
+        --------
+        >>> gc.MatrixParts.areas(300, None)
+        [76800, 1936]
+        """
+        sweeps = sources if targets is None else min(sources, targets)
+        width = sources if targets is None else max(sources, targets)
+        rows = block_rows(width)
+        return [
+            min(rows, sweeps - first) * (width - (first if targets is None else 0))
+            for first in range(0, sweeps, rows)
+        ]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The numbers of sources and of targets."""
+        return self._plan.shape
+
+    @property
+    def count(self) -> int:
+        """The number of parts."""
+        return self._plan.blocks
+
+    def compute(
+        self,
+        part: int,
+        *,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> NDArray[Any]:
+        """Return the distances of a part, in a form that `write` knows.
+
+        Parameters
+        ----------
+        part
+            Number of the part, from 0.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        numpy.ndarray
+            float64 or float32, (sweeps, columns), mesh units, infinite where unreachable.
+
+        Raises
+        ------
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in `exact_distance`.
+
+        Examples
+        --------
+        >>> parts = gc.MatrixParts(gc.samples.plane(2), [0], [3])
+        >>> parts.compute(0).round(3).tolist()
+        [[1.414]]
+        """
+        control = Control(progress, cancel, deadline_s, memory_limit)
+        plan, sweeps = self._plan, self._plan.rows_of(part)
+        rows = ExactRows(plan.ends, self._limit, TargetSweep(self._mesh))
+        control = control.holding(8 * len(sweeps) * plan.width)
+        found = {
+            sweep: rows.distances(
+                sweep, plan.targets_of(sweep), control.for_part(done, len(sweeps))
+            )
+            for done, sweep in enumerate(sweeps)
+        }
+        return dense.block_of(plan, part, found, self._dtype)["rows"]
+
+    def reached(self, rows: NDArray[Any]) -> int:
+        """Return the number of finite distances of the matrix that come from a part.
+
+        Parameters
+        ----------
+        rows
+            What `compute` has returned for it.
+
+        Returns
+        -------
+        int
+            The sum over all parts is the number of finite distances of the matrix.
+
+        Examples
+        --------
+        >>> parts = gc.MatrixParts(gc.samples.plane(2), [0, 1], [0, 1], max_distance=0.5)
+        >>> parts.reached(parts.compute(0))
+        2
+        """
+        finite = int(np.count_nonzero(np.isfinite(rows)))
+        if not self._plan.is_symmetric:
+            return finite
+        # Of the sweeps among themselves both halves are there, of the others one.
+        return 2 * finite - int(np.count_nonzero(np.isfinite(rows[:, : len(rows)])))
+
+    def write(self, file: IO[bytes], part: Callable[[int], NDArray[Any]]) -> None:
+        """Write the matrix in numpy's format, (N, M), from its parts.
+
+        Parameters
+        ----------
+        file
+            An empty file, open for writing. Its rows are not written in their order.
+        part
+            Function that returns what `compute` has returned for a part, most simply a mapped
+            array. It is called often.
+
+        Examples
+        --------
+        >>> from io import BytesIO
+        >>> parts, file = gc.MatrixParts(gc.samples.plane(2), [0, 1], [2, 3]), BytesIO()
+        >>> parts.write(file, parts.compute)
+        >>> np.load(BytesIO(file.getvalue())).shape
+        (2, 2)
+        """
+        write_npy(self._plan, part, self._dtype, file)

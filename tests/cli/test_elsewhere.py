@@ -1,0 +1,92 @@
+"""Matrices that a service computes for the command line."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import geodesic_client
+import pytest
+from starlette.testclient import TestClient
+
+from tests.support.commands import Run
+
+pytestmark = pytest.mark.service
+
+SERVICE = ["--service", "http://service.test"]
+
+
+@pytest.fixture
+def plane(run: Run) -> Path:
+    """The path of a plane's file."""
+    run("sample", "plane", "--faces", 200, "plane.ply")
+    return Path("plane.ply").resolve()
+
+
+@pytest.fixture
+def asked(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, str | None]]:
+    """The addresses and keys of the services that a command asks: each is that of the tests."""
+    found: list[tuple[str, str | None]] = []
+
+    def connect(address: str, api_key: str | None) -> Any:
+        found.append((address, api_key))
+        return made(http=client)
+
+    made = geodesic_client.Client
+    monkeypatch.setattr(geodesic_client, "Client", connect)
+    return found
+
+
+@pytest.mark.parametrize("service_key", [None, "secret"])
+def test_the_file_is_the_one_of_this_machine(
+    run: Run,
+    plane: Path,
+    tmp_path: Path,
+    asked: list[tuple[str, str | None]],
+    client: TestClient,
+    monkeypatch: pytest.MonkeyPatch,
+    service_key: str | None,
+) -> None:
+    if service_key is not None:
+        monkeypatch.setenv("GEODESIC_SERVICE_KEY", service_key)
+    points = tmp_path / "points.txt"
+    points.write_text("3\nf7:0.2,0.3,0.5\n100\n")
+    options = ["--max-distance", 0.8, "--barriers", "0-5", "--dtype", "float32"]
+    for ends in (["--points", points], ["--sources", points, "--targets", "all"]):
+        assert run("matrix", plane, *ends, *options, "--out", "here.npy").code == 0
+        ran = run("matrix", plane, *ends, *options, "--out", "there.npy", *SERVICE)
+        assert ran.code == 0, ran.err
+        here, there = (plane.parent / f"{name}.npy" for name in ("here", "there"))
+        assert there.read_bytes() == here.read_bytes()
+        facts = [json.loads(Path(f"{out}.json").read_text()) for out in (here, there)]
+        for name in ("shape", "sha256", "error_bound", "max_distance", "dtype", "method"):
+            assert facts[0][name] == facts[1][name]
+        assert ran.figure("sha256") == facts[0]["sha256"]
+    assert set(asked) == {("http://service.test", service_key)}
+    assert not client.get("/v1/jobs").json()["jobs"], "the service need not hold them"
+
+
+def test_a_refusal_is_told(
+    run: Run, plane: Path, asked: list[tuple[str, str | None]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_arguments: Any, **_options: Any) -> None:
+        raise geodesic_client.ProblemError(507, {"code": "storage_full", "detail": "no room"}, None)
+
+    monkeypatch.setattr(geodesic_client.client.Client, "store_matrix", refuse)
+    ran = run("matrix", plane, "--points", "all", "--out", "there.npy", *SERVICE)
+    assert (ran.code, ran.err) == (1, "error: storage_full: no room\n")
+    assert len(asked) == 1
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--points", "all", "--out", "m.npy", "--method", "fast"],
+        ["--points", "all", "--out", "m.npy", "--threads", 2],
+        ["--points", "all", "--out", "m.parquet"],
+        ["--source", 0, "--target", 1, "--out", "m.npy"],
+    ],
+)
+def test_what_a_service_does_not_do(run: Run, plane: Path, options: list[Any]) -> None:
+    ran = run("matrix", plane, *options, *SERVICE)
+    assert ran.code == 2
+    assert "--service" in ran.err
