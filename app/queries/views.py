@@ -64,6 +64,25 @@ def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
     ]
 
 
+def lines_of_borders(borders: Sequence[Mapping[str, Any]]) -> list[Line]:
+    """Return borders as lines."""
+    return [
+        Line(
+            border["points"],
+            {
+                "line": i,
+                "first": border["sources"][0],
+                "second": border["sources"][1],
+                "closed": border["closed"],
+                "length": border["length"],
+            },
+            f"border_{border['sources'][0]}_{border['sources'][1]}",
+            is_closed=border["closed"],
+        )
+        for i, border in enumerate(borders)
+    ]
+
+
 def table_of_matrix(distances: NDArray[np.float64]) -> Table:
     """Return a row for each cell of a matrix (N, M), or for each of N pairs."""
     if distances.ndim == 1:

@@ -4,10 +4,11 @@ The territory of a source is the part of the surface that is nearer to it than t
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from geodesic_core.arrays import Flags, Floats, Ints
+from geodesic_core.arrays import Flags, Floats, Ints, Longs
 from geodesic_core.control import Control, in_slices
 from geodesic_core.fields.isolines import (
     Arrays,
@@ -123,9 +124,7 @@ def borders_of(
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says; what the lines are drawn from counts as memory of the call.
     """
-    drawing = _Drawing(
-        sweep.mesh, windows, distances, nearest, sweep, sweep.all_faces, chord_error
-    )
+    drawing = _Drawing(sweep.mesh, windows, distances, nearest, sweep, sweep.all_faces, chord_error)
     found = drawing.borders(control)
     return [] if found is None else found  # all faces have their windows
 
@@ -155,12 +154,10 @@ class _Drawing:
         """Return the borders; None where they leave the faces whose windows are there."""
         control.check_memory(self._nbytes)
         topology, field = self._mesh.topology, self._field
-        mixed = np.zeros(len(self.faces), np.bool_)
+        mixed: Any = np.zeros(len(self.faces), np.bool_)
 
         def mix(first: int, last: int) -> int:
-            territories.mixed_faces(
-                topology, field, self._nearest, self._limit, first, last, mixed
-            )
+            territories.mixed_faces(topology, field, self._nearest, self._limit, first, last, mixed)
             return len(mixed)
 
         in_slices(len(mixed), mix, control.for_part(0, 4))
@@ -179,10 +176,11 @@ class _Drawing:
 
         def trace(first: int, last: int) -> int:
             nonlocal next_node
-            *arrays, next_node = outlines.trace_borders(
+            found = outlines.trace_borders(
                 topology, divided, labelled, near, self._chord_error, first, last, next_node
             )
-            parts.append(arrays)
+            parts.append(found[:-1])
+            next_node = found[-1]
             control.check_memory(bytes_of(parts))
             return len(divided.faces)
 
@@ -203,7 +201,7 @@ class _Drawing:
 
         def divide(first: int, last: int) -> int:
             nonlocal faces
-            *arrays, more = territories.divide_faces(
+            found = territories.divide_faces(
                 self._mesh.topology,
                 self._field,
                 self._nearest,
@@ -212,8 +210,8 @@ class _Drawing:
                 len(faces),
                 rank,
             )
-            parts.append(arrays)
-            faces = np.concatenate([faces, more])
+            parts.append(found[:-1])
+            faces = np.concatenate([faces, found[-1]])
             control.check_memory(faces.nbytes + bytes_of(parts))
             return len(faces)
 
@@ -225,7 +223,7 @@ class _Drawing:
         return Territories(faces, runs, starts_of(runs_of), curves, starts_of(curves_of))
 
     def _lines(
-        self, points: Floats, faces: Ints, first: Ints, closed: Flags, sources: Ints
+        self, points: Floats, faces: Ints, first: Longs, closed: Flags, sources: Ints
     ) -> list[Border]:
         bounds = zip(
             first[:-1].tolist(), first[1:].tolist(), closed.tolist(), sources.tolist(), strict=True
@@ -258,5 +256,6 @@ def _with_rings(mesh: TriangleMesh, faces: Flags, rings: int) -> Flags:
     for _ in range(rings):
         touched = np.zeros(len(mesh.topology.flags), np.bool_)
         touched[corners[faces]] = True
-        faces = touched[corners].any(axis=1)
+        widened: Any = touched[corners].any(axis=1)
+        faces = widened
     return faces

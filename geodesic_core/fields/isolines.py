@@ -283,6 +283,7 @@ Arrays = Sequence[NDArray[Any]]
 
 
 def bytes_of(parts: Sequence[Arrays]) -> int:
+    """Return the memory of all arrays of all parts."""
     return sum(array.nbytes for part in parts for array in part)
 
 

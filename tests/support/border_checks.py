@@ -13,9 +13,7 @@ NEAR = 1e-8
 
 def fields_of_each(mesh, sources, max_distance=None):
     """An exact field of each source alone."""
-    return [
-        gc.exact_distance(mesh, source, max_distance, retain="windows") for source in sources
-    ]
+    return [gc.exact_distance(mesh, source, max_distance, retain="windows") for source in sources]
 
 
 def check_points(mesh, sources, borders, most=60):
@@ -50,19 +48,26 @@ def check_chords(mesh, sources, borders, chord_error, most=40):
 
 
 def check_crossings(mesh, field, borders):
-    """Lines cross an edge an odd number of times where its ends have different nearest sources."""
-    points = np.array(sorted({tuple(point) for line in borders for point in line.points.tolist()}))
-    points = points.reshape(-1, 3)
+    """Along each edge the lines lead from the nearest source of one end to that of the other.
+
+    A line that crosses it has the source that is the nearest before, and leads to its other one.
+    """
+    crossing = {(*point, line.sources) for line in borders for point in line.points.tolist()}
+    points = np.array([each[:3] for each in crossing]).reshape(-1, 3)
+    sources = [each[3] for each in crossing]
     for u, v in edge_kinds(mesh):
-        if field.nearest_source[u] < 0 or field.nearest_source[v] < 0:
+        nearest, last = int(field.nearest_source[u]), int(field.nearest_source[v])
+        if min(nearest, last) < 0:
             continue
         start, way = mesh.vertices[u], mesh.vertices[v] - mesh.vertices[u]
         rest = points - start
         places = rest @ way / (way @ way)
         off = np.linalg.norm(rest - places[:, None] * way, axis=1)
         on_edge = (off < 1e-10 * np.linalg.norm(way)) & (places > -1e-9) & (places < 1 + 1e-9)
-        differ = field.nearest_source[u] != field.nearest_source[v]
-        assert np.count_nonzero(on_edge) % 2 == differ, (u, v)
+        for i in sorted(np.flatnonzero(on_edge), key=lambda i: places[i]):
+            assert nearest in sources[i], (u, v)
+            nearest = sum(sources[i]) - nearest
+        assert nearest == last, (u, v)
 
 
 def check_ends(mesh, borders):

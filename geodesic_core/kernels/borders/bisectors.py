@@ -264,7 +264,7 @@ def point_on(curve: Floats, parameter: float) -> tuple[float, float]:
 
 @kernel
 def direction_at(curve: Floats, parameter: float) -> tuple[float, float]:
-    """Unit vector along a conic at a parameter, toward larger ones."""
+    """Return the unit vector along a conic at a parameter, toward larger ones."""
     cosine, sine = math.cos(parameter), math.sin(parameter)
     w = curve[K] + curve[GX] * cosine + curve[GY] * sine
     turn = curve[GX] * sine - curve[GY] * cosine  # -w'
@@ -318,9 +318,7 @@ def bisectors_within(
                 continue
             if i > j and is_line(regions[i]) == is_line(regions[j]):
                 continue
-            left = put_bisector(
-                curve, intervals, regions[i], regions[j], level, slack, middle
-            )
+            left = put_bisector(curve, intervals, regions[i], regions[j], level, slack, middle)
             for h in range(3 * face, 3 * face + 3):
                 ox, oy, ux, uy = half_edge_in_face(geometry, h)
                 depth = ux * (curve[CY] - oy) - uy * (curve[CX] - ox)

@@ -48,9 +48,7 @@ def span_of(region: Floats, edge: Any, length: float) -> tuple[float, float]:
 
 
 @kernel
-def along_edge(
-    region: Floats, level: float, edge: Any
-) -> tuple[float, float, float, float, float]:
+def along_edge(region: Floats, level: float, edge: Any) -> tuple[float, float, float, float, float]:
     """Return weight, m, h², and the linear part, start and rate, of the distance along an edge."""
     ox, oy, ux, uy = edge
     if is_line(region):
@@ -62,12 +60,10 @@ def along_edge(
 
 
 @kernel
-def crossings_of(
-    region: Floats, other: Floats, level: float, edge: Any
-) -> tuple[float, float]:
-    """Return the places along an edge at which two regions may be equally near; NaN for none.
+def crossings_of(region: Floats, other: Floats, level: float, edge: Any) -> tuple[float, float]:
+    """Return places along an edge; where two regions are equally near, it is at one of these.
 
-    Solutions of the squared equation are among them.
+    They solve the squared equation, NaN for none.
     """
     weight, m, square, start, rate = along_edge(region, level, edge)
     weight1, m1, square1, start1, rate1 = along_edge(other, level, edge)
@@ -75,28 +71,20 @@ def crossings_of(
     c, r = start1 - start, rate1 - rate
     if weight == 0.0 and weight1 == 0.0:
         return (-c / r if r != 0.0 else math.nan), math.nan
-    if weight > 0.0 and weight1 > 0.0:  # squared: the difference of the squares is linear
-        slope = 2.0 * (m1 - m)
-        rest = (m - m1) * (m + m1) + square - square1 - c * c
-        # (rest + slope t)² = 4 c² ((t - m1)² + h1²)
-        at = rest + slope * m1
-        p = slope * slope - 4.0 * c * c
-        half, last, shift = slope * at, at * at - 4.0 * c * c * square1, m1
+    if weight > 0.0 and weight1 > 0.0:  # squared: (at + slope s)² = k² (s² + h1²), s = t - m1
+        slope, k, shift = 2.0 * (m1 - m), 2.0 * c, m1
+        at = (m1 - m) * (m1 - m) + square - square1 - c * c
+        square = square1
     else:
-        if weight == 0.0:
-            m, square = m1, square1
-        at = c + r * m
-        p = r * r - 1.0
-        half, last, shift = r * at, at * at - square, m
-    # p s² + 2 half s + last = 0, for s = t - shift
+        shift = m if weight > 0.0 else m1
+        square, slope, k, at = max(square, square1), r, 1.0, c + r * shift
+    p, half = (slope - k) * (slope + k), slope * at
     if p == 0.0:
+        last = at * at - k * k * square
         return (shift - 0.5 * last / half if half != 0.0 else math.nan), math.nan
-    spare = half * half - p * last
-    if spare < 0.0:
-        spare = 0.0 if spare > -1e-12 * half * half else math.nan
-    root = -(half + math.copysign(math.sqrt(spare), half))
+    root = -(half + math.copysign(abs(k) * math.sqrt(max(at * at + square * p, 0.0)), half))
     first = shift + root / p
-    second = shift + last / root if root != 0.0 else first
+    second = shift + (at * at - k * k * square) / root if root != 0.0 else first
     return min(first, second), max(first, second)
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.kernels.borders.outlines import root_of
 from geodesic_core.kernels.isolines.lines import append_chain, faces_at, row_at
 from geodesic_core.kernels.jit import kernel
 
@@ -16,11 +17,14 @@ def link_pieces(
     """Join pieces to lines; return points, faces, first points, closed flags and sources.
 
     The faces are those that follow each point; the last point of an open line has none, -1. The
-    first points, flags and sources have a row for each line. ``nodes`` is the number of nodes. Points
-    nearer than ``shortest`` to the one before are left out, but for the ends of open lines.
+    first points, flags and sources have a row for each line. ``nodes`` is the number of nodes.
+    Points nearer than ``shortest`` to the one before are left out, but for the ends of open lines.
+    Modifies the ends of the pieces' points.
     """
-    count, partner = len(pieces.nodes), partners(links, labelled, pieces, nodes)
-    done, lines, total = np.zeros(count, np.uint8), 0, 0
+    count = len(pieces.nodes)
+    node_of, done = contract(pieces, nodes, shortest)
+    partner = partners(links, labelled, pieces, node_of, done)
+    lines, total = 0, 0
     room = len(pieces.points) + count
     points, faces = np.empty((room, 3)), np.empty(room, np.int32)
     first, closed = np.zeros(count + 1, np.int64), np.zeros(count, np.uint8)
@@ -74,22 +78,54 @@ def with_both_ends(
 
 
 @kernel
-def partners(links: Ints, labelled: Any, pieces: Any, nodes: int) -> Ints:
+def contract(pieces: Any, nodes: int, shortest: float) -> tuple[Ints, Flags]:
+    """Contract the pieces no longer than ``shortest``, which join points that differ by rounding.
+
+    Returns the node that stands for each, and which pieces are contracted. All pieces at a node get
+    the same point as their end, to the bit.
+    """
+    count = len(pieces.nodes)
+    node_of, contracted = np.arange(nodes).astype(np.int32), np.zeros(count, np.uint8)
+    for p in range(count):
+        extent, first = 0.0, pieces.first[p, 0]
+        for i in range(first, pieces.first[p + 1, 0]):
+            for axis in range(3):
+                away = abs(pieces.points[i, axis] - pieces.points[first, axis])
+                extent = max(extent, away)
+        if extent <= shortest:
+            contracted[p] = 1
+            node_of[root_of(node_of, pieces.nodes[p, 0])] = root_of(node_of, pieces.nodes[p, 1])
+    row = np.full(nodes, -1, np.int64)
+    for end in range(2 * count):
+        node = root_of(node_of, pieces.nodes[end // 2, end % 2])
+        here = row_at(pieces, end)
+        if row[node] < 0:
+            row[node] = here
+        for axis in range(3):
+            pieces.points[here, axis] = pieces.points[row[node], axis]
+    for node in range(nodes):
+        node_of[node] = root_of(node_of, node)
+    return node_of, contracted
+
+
+@kernel
+def partners(links: Ints, labelled: Any, pieces: Any, node_of: Ints, contracted: Flags) -> Ints:
     """Return the end of a piece that each end goes on with, -1 for none.
 
     The ends of piece p are 2 p and 2 p + 1. Lines go on where two pieces between the same sources
     meet, and no more; not at an edge of more than two faces.
     """
-    count = 2 * len(pieces.nodes)
-    partner, crossings = np.full(count, -1, np.int32), len(labelled.sources)
+    count, nodes = 2 * len(pieces.nodes), len(node_of)
+    partner = np.full(count, -1, np.int32)
     meeting, first = np.zeros(nodes, np.int32), np.full(nodes, -1, np.int32)
+    for c in range(len(labelled.sources)):
+        if faces_at(links, labelled.crossings.half_edges[c, 0]) > 2:
+            meeting[node_of[c]] = count  # lines end here
     for end in range(count):
-        meeting[pieces.nodes[end // 2, end % 2]] += 1
+        meeting[node_of[pieces.nodes[end // 2, end % 2]]] += 1 - contracted[end // 2]
     for end in range(count):
-        node = pieces.nodes[end // 2, end % 2]
-        if meeting[node] != 2:
-            continue
-        if node < crossings and faces_at(links, labelled.crossings.half_edges[node, 0]) > 2:
+        node = node_of[pieces.nodes[end // 2, end % 2]]
+        if meeting[node] != 2 or contracted[end // 2]:
             continue
         if first[node] < 0:
             first[node] = end

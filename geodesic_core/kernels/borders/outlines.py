@@ -5,8 +5,8 @@ counter-clockwise, leaves the territory to where it enters it again. So for each
 many ends of bisectors and crossings as starts. They are joined, the nearest first, and no bisector
 can be left over, however its ends are rounded. Where an end and its start are one point up to
 rounding, they become one node. What is left are *gaps*. A gap in the outlines of two sources, in
-opposite directions, is closed by a straight piece of border. Other gaps are drawn together to a
-node in their middle. So borders go on from edge to edge, and meet.
+opposite directions, is closed by a straight piece of border. Other gaps are drawn together to the
+most central of their nodes. So borders go on from edge to edge, and meet.
 """
 
 import math
@@ -15,7 +15,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs
-from geodesic_core.kernels.borders.bisectors import BISECTOR, END, LEFT, RIGHT, START, point_on, strays
+from geodesic_core.kernels.borders.bisectors import (
+    BISECTOR,
+    END,
+    LEFT,
+    RIGHT,
+    START,
+    point_on,
+    strays,
+)
 from geodesic_core.kernels.isolines.arcs import ROWS, with_room
 from geodesic_core.kernels.isolines.lines import Crossings, join, put_crossing, put_in_face
 from geodesic_core.kernels.isolines.regions import is_line
@@ -260,14 +268,19 @@ def close_gaps(gaps: Ints, at: Floats, crossings: int, near: float) -> tuple[Int
     for first in range(total):
         if root_of(group, first) != first:
             continue
-        size, x, y = 0, 0.0, 0.0
+        best = math.inf
         for i in range(len(gaps)):
-            u = root_of(parent, gaps[i, 0])
-            if not closed[i] and root_of(group, u) == first:
-                x, y, size = x + places[u, 0], y + places[u, 1], size + 1
-        if size == 0:
+            u, ways = root_of(parent, gaps[i, 0]), 0.0
+            if closed[i] or root_of(group, u) != first:
+                continue
+            for j in range(len(gaps)):
+                v = root_of(parent, gaps[j, 0])
+                if not closed[j] and root_of(group, v) == first:
+                    ways += math.hypot(places[u, 0] - places[v, 0], places[u, 1] - places[v, 1])
+            if ways < best:
+                best, places[hubs, 0], places[hubs, 1] = ways, places[u, 0], places[u, 1]
+        if best == math.inf:
             continue
-        places[hubs, 0], places[hubs, 1] = x / size, y / size
         for i in range(len(gaps)):
             u = root_of(parent, gaps[i, 0])
             if closed[i] or u == hubs or root_of(group, u) != first:

@@ -188,7 +188,7 @@ def divide_faces(
 @kernel
 def leads_on(runs: Floats) -> bool:
     """Whether a border of two sources crosses the edge with these runs."""
-    for i in range(1, len(runs)):
+    for i in range(1, len(runs)):  # noqa: SIM110 - numba has no generators in any()
         if runs[i - 1, 1] >= 0 and runs[i, 1] >= 0:
             return True
     return False

@@ -140,7 +140,7 @@ def test_chord_error_is_how_far_chords_stray():
     mesh = mesh_of(zoo.SMALL["hills"])
     sources = random_points(mesh, 4, seed=53)
     lengths = []
-    for chord_error in (0.05, 1e-3):
+    for chord_error in (0.05, 1e-6):
         borders = gc.exact_distance(mesh, sources).borders(chord_error * mesh.diagonal)
         check_chords(mesh, sources, borders, chord_error * mesh.diagonal)
         lengths.append(sum(len(line.points) for line in borders))
@@ -201,11 +201,11 @@ def test_barriers_and_components():
     points, faces = zoo.grid(6, 6)
     mesh = gc.TriangleMesh(points, faces)
     middle = [i for i, f in enumerate(faces) if (np.abs(points[f].mean(axis=0)[:2] - 3) < 1).all()]
-    blocked = mesh.with_barriers(middle)
+    blocked = gc.TriangleMesh(points, np.delete(faces, middle, axis=0))
     sources = [0, 6]
     borders = gc.exact_distance(mesh, sources, barriers=middle).borders()
     check_ends(blocked, borders)
-    check_points(blocked, sources, borders)
+    check_points(mesh.with_barriers(middle), sources, borders)
     assert len(borders) == 2  # below the hole, and above it
     apart = mesh_of(zoo.SMALL["two_components"])
     last = int(apart.faces[np.flatnonzero(apart.components[apart.faces[:, 0]] != 0)[0], 0])
