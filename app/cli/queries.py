@@ -265,6 +265,41 @@ def isolines(
     print_end(output, answered)
 
 
+def borders(
+    mesh_file: MeshFile,
+    source: PointOrCurveSources,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Where the lines go: .obj (polylines), .csv, .svg, .geojson or .json; - "
+            "prints .csv.",
+            callback=writable(*LINES),
+        ),
+    ] = None,
+    chord_error: Annotated[
+        float | None,
+        typer.Option(help="How far lines may stray inside faces, in mesh units."),
+    ] = None,
+    max_distance: MaxDistance = None,
+    barriers: Barriers = None,
+    merge: MergeOption = Merge.NONE,
+    as_json: AsJson = False,
+) -> None:
+    """Draw the borders between the parts of the surface that are nearest to each source."""
+    output = Output(out, as_json)
+    members = {"chord_error": chord_error, "max_distance": max_distance}
+    members |= {"barriers": barriers or BlockedFaces()}
+    points: WrittenMembers = {"sources": source}
+    answered = ask("borders", mesh_file, merge, "Drawing borders", points, members)
+    output.write(answered.answer)
+    print_size(output, answered.mesh)
+    for line in answered.answer.members["borders"]:
+        first, second = (source[i].text for i in line["sources"])
+        kind = "closed" if line["closed"] else "open"
+        output.say(f"border      {first} and {second}: {kind}, {float(line['length'])!r} long")
+    print_end(output, answered)
+
+
 def nearest(
     mesh_file: MeshFile,
     source: Source,

@@ -65,21 +65,22 @@ def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
 
 
 def lines_of_borders(borders: Sequence[Mapping[str, Any]]) -> list[Line]:
-    """Return borders as lines."""
+    """Return borders as lines, or a line without points where there are none."""
+    none = {"sources": (None, None), "closed": None, "length": None, "points": np.empty((0, 3))}
     return [
         Line(
             border["points"],
             {
-                "line": i,
+                "line": i if borders else None,
                 "first": border["sources"][0],
                 "second": border["sources"][1],
                 "closed": border["closed"],
                 "length": border["length"],
             },
             f"border_{border['sources'][0]}_{border['sources'][1]}",
-            is_closed=border["closed"],
+            is_closed=bool(border["closed"]),
         )
-        for i, border in enumerate(borders)
+        for i, border in enumerate(borders or [none])
     ]
 
 

@@ -32,7 +32,14 @@ describe("a face", () => {
   });
 
   it("is divided from side to side", () => {
-    const piece: Piece = { places: [[0.5, 0], [0.3, 0.2], [0, 0.5]], sources: [0, 1] };
+    const piece: Piece = {
+      places: [
+        [0.5, 0],
+        [0.3, 0.2],
+        [0, 0.5],
+      ],
+      sources: [0, 1],
+    };
     expectAreas(divide([0, 1, 1], [piece]), { 0: 0.1 + 0.025, 1: 0.375 });
   });
 
@@ -48,29 +55,65 @@ describe("a face", () => {
 
   it("has a part without a corner between two borders", () => {
     const pieces: Piece[] = [
-      { places: [[0.4, 0], [0, 0.4]], sources: [0, 2] },
-      { places: [[0.6, 0], [0, 0.6]], sources: [1, 2] },
+      {
+        places: [
+          [0.4, 0],
+          [0, 0.4],
+        ],
+        sources: [0, 2],
+      },
+      {
+        places: [
+          [0.6, 0],
+          [0, 0.6],
+        ],
+        sources: [1, 2],
+      },
     ];
     expectAreas(divide([0, 1, 1], pieces), { 0: 0.08, 1: 0.32, 2: 0.1 });
   });
 
   it("has a bay that a border enters and leaves over one side", () => {
-    const piece: Piece = { places: [[0.3, 0], [0.4, 0.2], [0.5, 0]], sources: [1, 5] };
+    const piece: Piece = {
+      places: [
+        [0.3, 0],
+        [0.4, 0.2],
+        [0.5, 0],
+      ],
+      sources: [1, 5],
+    };
     expectAreas(divide([1, 1, 1], [piece]), { 1: 0.48, 5: 0.02 });
   });
 
   it("has an island", () => {
-    const places: Place[] = [[0.2, 0.2], [0.3, 0.2], [0.2, 0.3], [0.2, 0.2]];
+    const places: Place[] = [
+      [0.2, 0.2],
+      [0.3, 0.2],
+      [0.2, 0.3],
+      [0.2, 0.2],
+    ];
     expectAreas(divide([1, 1, 1], [{ places, sources: [0, 1] }]), { 0: 0.005, 1: 0.495 });
   });
 
   it("is divided from a corner, whose source may be that of neither part", () => {
-    const piece: Piece = { places: [[0, 0], [0.5, 0.5]], sources: [1, 2] };
+    const piece: Piece = {
+      places: [
+        [0, 0],
+        [0.5, 0.5],
+      ],
+      sources: [1, 2],
+    };
     expectAreas(divide([0, 1, 2], [piece]), { 1: 0.25, 2: 0.25 });
   });
 
   it("is divided beside a side where a border runs along it, by rounding", () => {
-    const piece: Piece = { places: [[1e-9, -1e-12], [1, 1e-10]], sources: [1, 2] };
+    const piece: Piece = {
+      places: [
+        [1e-9, -1e-12],
+        [1, 1e-10],
+      ],
+      sources: [1, 2],
+    };
     expectAreas(divide([1, 1, 1], [piece]), { 1: 0.5 });
   });
 });

@@ -54,23 +54,32 @@ export function divide(sources: readonly number[], pieces: Piece[]): Part[] {
     });
   });
   const cycles = graph.cycles();
-  const rims = cycles.filter(({ area }) => area > 0);
-  const found = sourcesOf(rims, corners, sources);
-  if (found.some((source) => source === undefined)) return [];
-  // A border that is closed within the face is a hole in the part around it.
-  const holes = cycles.filter(({ area, nodes }) => area < 0 && !nodes.includes(corners[0]!));
-  const points = (nodes: number[]): Vector2[] =>
+  const points = ({ nodes }: Cycle): Vector2[] =>
     nodes.map((node) => new Vector2(...graph.places[node]!));
-  return rims.flatMap((rim, i) => {
-    const inside = holes
-      .map(({ nodes }) => nodes)
-      .filter((nodes) => !rim.nodes.includes(nodes[0]!) && contains(points(rim.nodes), points(nodes)));
-    const all = [rim.nodes, ...inside].flat();
-    return ShapeUtils.triangulateShape(points(rim.nodes), inside.map(points)).map((triangle) => ({
+  const parts: FacePart[] = cycles
+    .filter(({ area }) => area > 0)
+    .map((rim) => ({ rim, holes: [] }));
+  // A border that is closed within the face leaves a hole in the part around it.
+  for (const hole of cycles) {
+    if (hole.area > 0 || hole.nodes.includes(corners[0]!)) continue;
+    const isAround = ({ rim }: FacePart): boolean =>
+      !rim.nodes.includes(hole.nodes[0]!) && contains(points(rim), points(hole));
+    parts.find(isAround)?.holes.push(hole);
+  }
+  const found = sourcesOf(parts, corners, sources);
+  if (found.some((source) => source === undefined)) return [];
+  return parts.flatMap(({ rim, holes }, i) => {
+    const all = [rim, ...holes].flatMap(({ nodes }) => nodes);
+    return ShapeUtils.triangulateShape(points(rim), holes.map(points)).map((triangle) => ({
       places: triangle.map((k) => graph.places[all[k]!]!) as Part["places"],
       source: found[i]!,
     }));
   });
+}
+
+interface FacePart {
+  rim: Cycle;
+  holes: Cycle[];
 }
 
 interface Cycle {
@@ -148,15 +157,19 @@ class Graph {
 
 /** Return the source of each part: that of a corner, or by the border to a part whose is known. */
 function sourcesOf(
-  parts: Cycle[],
+  parts: FacePart[],
   corners: number[],
   sources: readonly number[],
 ): (number | undefined)[] {
   const found: (number | undefined)[] = parts.map(() => undefined);
   // A corner between two borders may belong to none of the parts there: borders go first.
-  const pairsOf = parts.map(({ pairs }) => pairs.filter((pair) => pair !== null));
-  const partOf = new Map(parts.flatMap(({ edges }, i) => edges.map((edge) => [edge, i] as const)));
-  parts.forEach(({ nodes }, i) => {
+  const pairsOf = parts.map(({ rim }) => rim.pairs.filter((pair) => pair !== null));
+  const partOf = new Map(
+    parts.flatMap(({ rim, holes }, i) =>
+      [rim, ...holes].flatMap(({ edges }) => edges.map((edge) => [edge, i] as const)),
+    ),
+  );
+  parts.forEach(({ rim: { nodes } }, i) => {
     const shared = (source: number): boolean => pairsOf[i]!.every((pair) => pair.includes(source));
     const own = corners.findIndex((node, k) => nodes.includes(node) && shared(sources[k]!));
     const [first] = pairsOf[i]!;
@@ -166,7 +179,7 @@ function sourcesOf(
   });
   for (let isChanging = true; isChanging; ) {
     isChanging = false;
-    parts.forEach(({ twins, pairs }, i) => {
+    parts.forEach(({ rim: { twins, pairs } }, i) => {
       if (found[i] !== undefined) return;
       for (const [k, pair] of pairs.entries()) {
         const beyond = pair && found[partOf.get(twins[k]!) ?? -1];

@@ -59,7 +59,8 @@ function divided(mesh: LoadedMesh, nearest: Int32Array, borders: Border[]): Buff
         const weights = [1 - v - w, v, w];
         const at = (attribute: typeof positions, axis: number): number =>
           weights.reduce(
-            (sum, weight, i) => sum + weight * attribute!.array[attribute!.itemSize * corners[i]! + axis]!,
+            (sum, weight, i) =>
+              sum + weight * attribute!.array[attribute!.itemSize * corners[i]! + axis]!,
             0,
           );
         drawn.position.push(at(positions, 0), at(positions, 1), at(positions, 2));
