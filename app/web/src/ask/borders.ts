@@ -1,5 +1,5 @@
 // Borders of territories: requested when the surface is coloured by them, then drawn.
-import { askBorders } from "../api/queries";
+import { askBorders, type BordersQuestion } from "../api/queries";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -20,7 +20,7 @@ export class Borders {
     const { mesh, sources, shade } = state;
     const nearest = this.fields.territories(state);
     const isDrawn = mesh && nearest && sources.length > 1 && shade === "territories";
-    const { method: _, ...question } = questionOf(state, "exact");
+    const question = bordersOf(state);
     const requested = isDrawn && this.sceneView.surface ? JSON.stringify([mesh, question]) : "";
     if (requested === this.requested) return;
     this.requested = requested;
@@ -40,4 +40,10 @@ export class Borders {
     this.stop.abort();
     this.requested = "";
   }
+}
+
+/** Return the body of a query for borders, which are exact by any method. */
+export function bordersOf(state: State): BordersQuestion {
+  const { method: _, ...question } = questionOf(state, "exact");
+  return question;
 }
