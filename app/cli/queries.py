@@ -226,7 +226,7 @@ def isolines(
     ] = None,
     count: Annotated[
         int | None,
-        typer.Option(min=1, help="Instead: how many levels to space evenly."),
+        typer.Option(min=1, help="In place of --level: the number of evenly spaced levels."),
     ] = None,
     chord_error: Annotated[
         float | None,

@@ -65,8 +65,7 @@ class AccuracyOrEffort(Accuracy):
 
     effort: Effort | None = Field(
         default=None,
-        description="For `fast`: the more effort, the more time and the less error; 2 where not "
-        "given",
+        description="For `fast`: more effort takes more time, and errs less; 2 by default",
     )
 
 
