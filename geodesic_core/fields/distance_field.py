@@ -726,7 +726,7 @@ class DistanceField:
         >>> mesh = gc.samples.plane(200)
         >>> field = gc.exact_distance(mesh, [0, 10, 110])  # three corners of the square
         >>> [line.sources for line in field.borders()]
-        [(0, 1), (0, 2)]
+        [(0, 1), (0, 2), (1, 2)]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
         error, sweep = resolve_chord_error(self.mesh, chord_error), self._exact_sweep
