@@ -741,7 +741,7 @@ export interface components {
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: the more effort, the more time and the less error; 2 where not given
+             * @description For `fast`: more effort takes more time, and errs less; 2 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Sources */
@@ -1737,7 +1737,7 @@ export interface components {
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: the more effort, the more time and the less error; 2 where not given
+             * @description For `fast`: more effort takes more time, and errs less; 2 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Source */
@@ -1865,7 +1865,7 @@ export interface components {
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: the more effort, the more time and the less error; 2 where not given
+             * @description For `fast`: more effort takes more time, and errs less; 2 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Source */
@@ -2522,7 +2522,7 @@ export interface operations {
                 relative_error?: number;
                 /** @description For `approximate`: the same in mesh units; where both errors are given, both hold */
                 absolute_error?: number;
-                /** @description For `fast`: the more effort, the more time and the less error; 2 where not given */
+                /** @description For `fast`: more effort takes more time, and errs less; 2 by default */
                 effort?: 1 | 2 | 4 | 8;
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
