@@ -40,6 +40,7 @@ from geodesic_core.kernels.isolines.regions import (
     FRONT,
     NX,
     NY,
+    OVER,
     RADIUS,
     SIDE,
     end_of_sides,
@@ -59,6 +60,9 @@ END = FRONT + 5
 LEFT = FRONT + 6  # the source that is nearest on the left
 RIGHT = FRONT + 7
 BISECTOR = FRONT + 8
+
+PARALLEL = 1e-6
+"""Sine of an angle below which two rays count as parallel: where they meet is not sure enough."""
 
 FARTHER, NEARER, BEYOND = -1, 1, 0
 """Another region is farther than one everywhere, nearer everywhere, or nearer beyond a bisector."""
@@ -296,6 +300,42 @@ def strays(curve: Floats, start: float, end: float, enough: float) -> float:
 
 
 @kernel
+def is_one_sided(geometry: Floats, face: int, region: Floats, other: Floats, slack: float) -> bool:
+    """Whether one of two windows is nearer wherever the rays of both meet: a cheap test.
+
+    The rays meet in a quadrilateral whose sides are rays of the one or of the other. Along a ray
+    the difference of the distances changes its sign once at most, so its corners tell.
+    """
+    if min(region[OVER], other[OVER]) < 0.0 or is_line(region) or is_line(other):
+        return False
+    _, _, ux, uy = half_edge_in_face(geometry, 3 * face + int(region[OVER]))
+    _, _, vx, vy = half_edge_in_face(geometry, 3 * face + int(other[OVER]))
+    dx, dy = other[CX] - region[CX], other[CY] - region[CY]
+    sign = 0
+    for end in range(2):
+        side = FRONT + SIDE * end
+        ex, ey = region[side + NY], -region[side + NX]  # along the ray, into the face
+        if ux * ey - uy * ex < 0.0:
+            ex, ey = -ex, -ey
+        for end1 in range(2):
+            side1 = FRONT + SIDE * end1
+            fx, fy = other[side1 + NY], -other[side1 + NX]
+            if vx * fy - vy * fx < 0.0:
+                fx, fy = -fx, -fy
+            cross = ex * fy - ey * fx
+            if abs(cross) < PARALLEL:
+                return False
+            along, along1 = (dx * fy - dy * fx) / cross, (dx * ey - dy * ex) / cross
+            if along <= 0.0 or along1 <= 0.0:
+                return False
+            difference = along - region[RADIUS] - (along1 - other[RADIUS])
+            if abs(difference) <= slack or difference * sign < 0.0:
+                return False
+            sign = 1 if difference > 0.0 else -1
+    return True
+
+
+@kernel
 def bisectors_within(
     topology: Any, face: int, regions: Floats, labels: Any, level: float, slack: float,
     shortest: float,
@@ -317,6 +357,8 @@ def bisectors_within(
             if labels[i, 0] == labels[j, 0] or is_line(regions[i]) > is_line(regions[j]):
                 continue
             if i > j and is_line(regions[i]) == is_line(regions[j]):
+                continue
+            if is_one_sided(geometry, face, regions[i], regions[j], slack):
                 continue
             left = put_bisector(curve, intervals, regions[i], regions[j], level, slack, middle)
             for h in range(3 * face, 3 * face + 3):

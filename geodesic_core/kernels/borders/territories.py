@@ -6,6 +6,7 @@ somewhere on the half-edge that it crosses, and the envelopes along the three ed
 regions count.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,10 +16,14 @@ from geodesic_core.kernels.borders import envelopes
 from geodesic_core.kernels.borders.bisectors import BISECTOR, bisectors_within
 from geodesic_core.kernels.isolines.arcs import ROWS, with_room
 from geodesic_core.kernels.isolines.regions import (
+    CX,
+    CY,
     ORIGIN,
     OVER,
     RADIUS,
     REGION,
+    is_line,
+    put_side,
     regions_of_face,
     rows_in_face,
 )
@@ -33,7 +38,7 @@ from geodesic_core.kernels.mesh.half_edges import (
 )
 from geodesic_core.kernels.sweep.state import FACE, NODE
 from geodesic_core.kernels.sweep.window import ROOT
-from geodesic_core.tolerances import CROSSING, LEVEL, PIECE
+from geodesic_core.tolerances import CROSSING, GAP, LEVEL, PIECE
 
 
 class Territories(NamedTuple):
@@ -140,7 +145,8 @@ def divide_faces(
         level = level_of_face(topology, field, f, limit)
         regions, labels = labelled_regions(topology, field, nearest, f, level, limit)
         slack = LEVEL * level
-        used = np.zeros(len(regions), np.uint8)
+        seen = np.empty((len(regions), 2))  # the stretch of its edge on which each is nearest
+        seen[:, 0], seen[:, 1] = np.inf, -np.inf
         first_run, is_divided = run_count, False
         for h in range(3 * f, 3 * f + 3):
             edge, length = half_edge_in_face(geometry, h), geometry[h, LENGTH]
@@ -148,7 +154,9 @@ def divide_faces(
             for i in range(len(stretches)):
                 region = int(stretches[i, envelopes.REGION])
                 if region >= 0 and regions[region, OVER] == h % 3:
-                    used[region] = 1
+                    end = stretches[i + 1, envelopes.START] if i + 1 < len(stretches) else length
+                    seen[region, 0] = min(seen[region, 0], stretches[i, envelopes.START])
+                    seen[region, 1] = max(seen[region, 1], end)
             ends = (
                 label_at(field, nearest, links[h, TAIL], limit),
                 label_at(field, nearest, links[h, HEAD], limit),
@@ -169,7 +177,9 @@ def divide_faces(
                 g = next_around(links, g)
         chosen, chosen_labels, size = np.empty(regions.shape), np.empty(labels.shape, np.int32), 0
         for i in range(len(regions)):
-            if used[i] or regions[i, OVER] < 0:
+            if seen[i, 0] < seen[i, 1] or regions[i, OVER] < 0:
+                if regions[i, OVER] >= 0:
+                    narrow(geometry, 3 * f + int(regions[i, OVER]), regions[i], seen[i])
                 chosen[size], chosen_labels[size, 0] = regions[i], labels[i, 0]
                 is_divided = is_divided or labels[i, 0] != runs[first_run, 1]
                 size += 1
@@ -183,6 +193,22 @@ def divide_faces(
             curve_count += len(own_curves)
             curves_of[k, 0] = len(own_curves)
     return runs[:run_count], runs_of, curves[:curve_count], curves_of, found[:count]
+
+
+@kernel
+def narrow(geometry: Floats, h: int, region: Floats, seen: Floats) -> None:
+    """Narrow the disc of a window over h to the rays through a stretch of h, widened by `GAP`."""
+    if is_line(region):
+        return
+    ox, oy, ux, uy = half_edge_in_face(geometry, h)
+    gap = GAP * geometry[h, LENGTH]
+    for end in range(2):
+        t = seen[0] - gap if end == 0 else seen[1] + gap
+        dx, dy = ox + t * ux - region[CX], oy + t * uy - region[CY]
+        length = math.hypot(dx, dy)
+        if length > 0.0:
+            turn = 1.0 if (ux * -dy + uy * dx > 0.0) == (end == 0) else -1.0
+            put_side(region, end, -turn * dy / length, turn * dx / length, 0.0)
 
 
 @kernel
