@@ -287,16 +287,21 @@ def borders(
 ) -> None:
     """Draw the borders between the parts of the surface that are nearest to each source."""
     output = Output(out, as_json)
-    members = {"chord_error": chord_error, "max_distance": max_distance}
-    members |= {"barriers": barriers or BlockedFaces()}
+    members = {
+        "chord_error": chord_error,
+        "max_distance": max_distance,
+        "barriers": barriers or BlockedFaces(),
+    }
     points: WrittenMembers = {"sources": source}
     answered = ask("borders", mesh_file, merge, "Drawing borders", points, members)
     output.write(answered.answer)
     print_size(output, answered.mesh)
     for line in answered.answer.members["borders"]:
-        first, second = (source[i].text for i in line["sources"])
+        first, second = line["sources"]
         kind = "closed" if line["closed"] else "open"
-        output.say(f"border      {first} and {second}: {kind}, {float(line['length'])!r} long")
+        output.say(
+            f"border      of sources {first} and {second}: {kind}, {float(line['length'])!r} long"
+        )
     print_end(output, answered)
 
 
