@@ -392,7 +392,7 @@ def test_territories_keep_their_colours_up_to_the_border(view: View) -> None:
     view.open("/?lines=none")
     view.upload("square.obj", square)
     (mesh,) = query_of(view)["mesh"]
-    straight = "lines=none&view=0,0,2.9,0,0,0&up=y"
+    straight = "lines=none&view=0,1.5708,2.9,0,0,0&up=y"
     view.open(f"/?mesh={mesh}&source=v0&source=v1&shade=territories&{straight}")
     pixels = view.pixels()
     for y in (-120, 0, 120):
