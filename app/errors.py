@@ -29,7 +29,7 @@ class Code:
 
 CODES: Mapping[str, Code] = {
     "malformed_body": Code(
-        400, "Malformed body", "The body is not what its media type promises, such as broken JSON."
+        400, "Malformed body", "The body does not match its media type: it is broken JSON, say."
     ),
     "malformed_request": Code(400, "Malformed request", "The bytes received are no HTTP request."),
     "unauthorized": Code(401, "Unauthorized", "The request needs an API key, or has a wrong one."),
@@ -52,7 +52,7 @@ CODES: Mapping[str, Code] = {
         413, "Body too large", "The body of the request is larger than the service accepts."
     ),
     "result_too_large": Code(
-        413, "Result too large", "The answer is too large for this format; a binary one has room."
+        413, "Result too large", "The answer is too large for this format; see `hint`."
     ),
     "unsupported_media_type": Code(
         415, "Unsupported media type", "The body comes in a format that cannot be read here."
@@ -82,8 +82,8 @@ CODES: Mapping[str, Code] = {
     "quota_exceeded": Code(
         429,
         "Quota exceeded",
-        "The caller has as much as `setting` allows: 429 for jobs, and for uploads at the same "
-        "time, see `Retry-After`; 507 for stored meshes, see `hint`.",
+        "The caller has reached the quota that `setting` names: 429 for jobs, and for uploads "
+        "under way, see `Retry-After`; 507 for stored meshes, see `hint`.",
         other_statuses=(507,),
     ),
     "header_too_large": Code(

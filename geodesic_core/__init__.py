@@ -17,6 +17,7 @@ from geodesic_core import errors, samples
 from geodesic_core.compilation import compile_kernels, warm_up
 from geodesic_core.control import Control
 from geodesic_core.errors import GeodesicError
+from geodesic_core.fields.borders import Border
 from geodesic_core.fields.distance_field import DistanceField
 from geodesic_core.fields.isolines import Isoline, resolve_chord_error, spaced_levels
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, SearchStep
@@ -47,6 +48,7 @@ from geodesic_core.tolerances import WEIGHT_ERROR
 
 __all__ = [
     "WEIGHT_ERROR",
+    "Border",
     "Control",
     "Curve",
     "DistanceField",

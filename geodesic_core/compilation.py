@@ -66,6 +66,10 @@ def _isolines() -> None:
     exact_distance(_mesh(), 0).isolines([0.1])
 
 
+def _borders() -> None:
+    exact_distance(_mesh(), [0, 1]).borders()
+
+
 def _curves() -> None:
     mesh = _mesh()
     exact_distance(mesh, _curve(mesh), targets=[_INSIDE])
@@ -80,6 +84,7 @@ WORKLOADS: dict[str, Callable[[], None]] = {
     "exact": _exact,
     "approximate": _approximate,
     "approximate-curves": _approximate_curves,
+    "borders": _borders,
     "curves": _curves,
     "fast": _fast,
     "fast-curves": _fast_curves,
@@ -98,7 +103,8 @@ def compile_kernels(
     ----------
     workloads
         Kinds of calls to compile for: ``"exact"``, ``"approximate"``, ``"paths"``, ``"curves"``,
-        ``"approximate-curves"``, ``"fast"``, ``"fast-curves"`` and ``"isolines"``; None for all.
+        ``"approximate-curves"``, ``"fast"``, ``"fast-curves"``, ``"isolines"`` and
+        ``"borders"``; None for all.
     cancel
         Called before compilation begins and then ten times a second; compilation ends once it
         returns True. Not called where no kernel is missing.

@@ -202,7 +202,7 @@ MeshFile = Annotated[
     ),
 ]
 MergeOption = Annotated[
-    Merge, typer.Option("--merge", help="'exact' joins vertices at equal positions.")
+    Merge, typer.Option("--merge", help="'exact' joins vertices at the same position.")
 ]
 MaxDistance = Annotated[
     float | None,
@@ -258,7 +258,7 @@ Barriers = Annotated[
     typer.Option(
         parser=BlockedFaces.parse,
         metavar="FACES",
-        help="Faces that are blocked, as 3,7,40-59 or @FILE: holes. Of a brain, @FILE.label or "
+        help="Blocked faces, which act as holes, as 3,7,40-59 or @FILE. Of a brain, @FILE.label or "
         "@FILE.gii blocks a label; @FILE.gii=NAME one of several.",
     ),
 ]
@@ -277,13 +277,14 @@ BoundedMethodOption = Annotated[
 RelativeError = Annotated[
     float | None,
     typer.Option(
-        help="For approximate: the allowed error, as a share of the distance; 0.001 where no "
-        "error is named."
+        help="For approximate: the allowed error, as a share of the distance; by default 0.001."
     ),
 ]
 AbsoluteError = Annotated[
     float | None,
-    typer.Option(help="For approximate: the same in mesh units; with both, both hold."),
+    typer.Option(
+        help="For approximate: the allowed error in mesh units; if both are given, both hold."
+    ),
 ]
 EffortOption = Annotated[
     int | None,
@@ -291,7 +292,7 @@ EffortOption = Annotated[
         "--effort",
         parser=effort,
         metavar="1|2|4|8",
-        help="For fast: the more, the more time and the less error; 2 where not named.",
+        help="For fast: more effort takes more time, and errs less; 2 by default.",
     ),
 ]
 

@@ -103,7 +103,9 @@ def batch(
     max_distance: MaxDistance = None,
     processes: Annotated[
         int | None,
-        typer.Option(min=1, help="Meshes at a time; one for each core if not named."),
+        typer.Option(
+            min=1, help="How many meshes to work on at a time; by default one for each core."
+        ),
     ] = None,
     merge: MergeOption = Merge.NONE,
     as_json: AsJson = False,

@@ -72,6 +72,7 @@ for command in (
     queries.path,
     queries.paths,
     queries.isolines,
+    queries.borders,
     tables.matrix,
     batch.batch,
     queries.nearest,

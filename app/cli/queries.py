@@ -226,7 +226,7 @@ def isolines(
     ] = None,
     count: Annotated[
         int | None,
-        typer.Option(min=1, help="Instead: how many levels to space evenly."),
+        typer.Option(min=1, help="In place of --level: the number of evenly spaced levels."),
     ] = None,
     chord_error: Annotated[
         float | None,
@@ -262,6 +262,46 @@ def isolines(
             f"{float(length)!r} long"
         )
     output.say(f"error bound {_bound_in_words(answered.answer.members['error_bound'])}")
+    print_end(output, answered)
+
+
+def borders(
+    mesh_file: MeshFile,
+    source: PointOrCurveSources,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Where the lines go: .obj (polylines), .csv, .svg, .geojson or .json; - "
+            "prints .csv.",
+            callback=writable(*LINES),
+        ),
+    ] = None,
+    chord_error: Annotated[
+        float | None,
+        typer.Option(help="How far lines may stray inside faces, in mesh units."),
+    ] = None,
+    max_distance: MaxDistance = None,
+    barriers: Barriers = None,
+    merge: MergeOption = Merge.NONE,
+    as_json: AsJson = False,
+) -> None:
+    """Draw the borders between the parts of the surface that are nearest to each source."""
+    output = Output(out, as_json)
+    members = {
+        "chord_error": chord_error,
+        "max_distance": max_distance,
+        "barriers": barriers or BlockedFaces(),
+    }
+    points: WrittenMembers = {"sources": source}
+    answered = ask("borders", mesh_file, merge, "Drawing borders", points, members)
+    output.write(answered.answer)
+    print_size(output, answered.mesh)
+    for line in answered.answer.members["borders"]:
+        first, second = line["sources"]
+        kind = "closed" if line["closed"] else "open"
+        output.say(
+            f"border      of sources {first} and {second}: {kind}, {float(line['length'])!r} long"
+        )
     print_end(output, answered)
 
 

@@ -63,14 +63,20 @@ def matrix(
         typer.Option(
             metavar=_FILE,
             help="A file of points, one a line, or 'all' for every vertex: the distances between "
-            "all of them. A command that was stopped goes on where it was.",
+            "all of them. A stopped command continues where it was.",
         ),
     ] = None,
     sources: Annotated[
-        Path | None, typer.Option(metavar=_FILE, help="The same, from these points; --targets.")
+        Path | None,
+        typer.Option(
+            metavar=_FILE, help="In place of --points: a file of sources, with --targets."
+        ),
     ] = None,
     targets: Annotated[
-        Path | None, typer.Option(metavar=_FILE, help="The same, to these points; --sources.")
+        Path | None,
+        typer.Option(
+            metavar=_FILE, help="In place of --points: a file of targets, with --sources."
+        ),
     ] = None,
     layout: Annotated[
         Layout,

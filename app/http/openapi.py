@@ -42,10 +42,10 @@ SERVERS = [
 TAGS = [
     {
         "name": "queries",
-        "description": "Distances, paths, isolines, matrices and nearest points on a stored mesh. "
-        "Each answers in JSON, and in other formats by `Accept` or `format`. With `estimate=true` "
-        "it answers with its expected cost instead; `kind` tells the two apart. With "
-        "`Prefer: respond-async` it becomes a job.",
+        "description": "Distances, paths, isolines, borders, matrices and nearest points on a "
+        "stored mesh. Each answers in JSON, and in other formats by `Accept` or `format`. With "
+        "`estimate=true` it answers with its expected cost instead; `kind` tells the two apart. "
+        "With `Prefer: respond-async` it becomes a job.",
     },
     {
         "name": "meshes",

@@ -15,6 +15,7 @@ from app.queries.base import (
     fingerprint,
     result_key,
 )
+from app.queries.borders import BordersQuery
 from app.queries.distances import DistancesQuery
 from app.queries.estimate import Estimate, estimate
 from app.queries.field_cache import FieldCache, Unwritten
@@ -33,6 +34,7 @@ KINDS: Mapping[str, type[Query[Any]]] = {
         PathQuery,
         PathsQuery,
         IsolinesQuery,
+        BordersQuery,
         MatrixQuery,
         NearestQuery,
         LocateQuery,
@@ -43,6 +45,7 @@ KINDS: Mapping[str, type[Query[Any]]] = {
 __all__ = [
     "KINDS",
     "SMALL_SECONDS",
+    "BordersQuery",
     "DistancesQuery",
     "Estimate",
     "ExecutionContext",

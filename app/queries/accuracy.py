@@ -36,7 +36,7 @@ def with_default_accuracy(request: A) -> A:
     return request if given else request.model_copy(update=_OPTIONS.get(request.method))
 
 
-def _options_of(request: Accuracy) -> dict[str, Any]:
+def _options_of(request: StrictModel) -> dict[str, Any]:
     """Return the members that are given of those that go with one method."""
     return request.model_dump(include=set().union(*_OPTIONS.values()), exclude_none=True)
 
@@ -93,7 +93,7 @@ def affinity_keys_of(
 ) -> tuple[str, ...]:
     """Return the affinity keys of a query that needs the field of some sources."""
     request = query.request
-    rest = request.model_dump(include={"method", "max_distance", "barriers"})
+    rest = {"method": "exact"} | request.model_dump(include={"method", "max_distance", "barriers"})
     rest |= _options_of(request)
     written = orjson.dumps([query.mesh_id, rest, *sources], _as_source, orjson.OPT_SORT_KEYS)
     return hashlib.blake2b(written, digest_size=8).hexdigest(), query.mesh_id

@@ -65,7 +65,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
     kind = "isolines"
     model = IsolinesRequest
     offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
-    hint = "ask for fewer levels at once, or context a larger chord_error"
+    hint = "ask for fewer levels at once, or for a larger chord_error"
 
     @classmethod
     def normalized(cls, request: IsolinesRequest) -> IsolinesRequest:

@@ -64,6 +64,26 @@ def lines_of(levels: Sequence[Mapping[str, Any]]) -> list[Line]:
     ]
 
 
+def lines_of_borders(borders: Sequence[Mapping[str, Any]]) -> list[Line]:
+    """Return borders as lines, or a line without points where there are none."""
+    none = {"sources": (None, None), "closed": None, "length": None, "points": np.empty((0, 3))}
+    return [
+        Line(
+            border["points"],
+            {
+                "line": i if borders else None,
+                "first": border["sources"][0],
+                "second": border["sources"][1],
+                "closed": border["closed"],
+                "length": border["length"],
+            },
+            f"border_{border['sources'][0]}_{border['sources'][1]}",
+            is_closed=bool(border["closed"]),
+        )
+        for i, border in enumerate(borders or [none])
+    ]
+
+
 def table_of_matrix(distances: NDArray[np.float64]) -> Table:
     """Return a row for each cell of a matrix (N, M), or for each of N pairs."""
     if distances.ndim == 1:

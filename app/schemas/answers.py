@@ -122,6 +122,37 @@ class IsolinesAnswer(BaseModel):
     warnings: list[str]
 
 
+class BorderDocument(BaseModel):
+    """A polyline of points that are equally near to two sources, and no nearer to a third."""
+
+    sources: tuple[int, int] = Field(
+        description="Those whose territories it separates: indices into `sources`, the lower first"
+    )
+    closed: bool = Field(
+        description="Whether it leads from its last point back to the first, which is not repeated"
+    )
+    length: float
+    points: list[tuple[float, float, float]]
+    faces: list[int] = Field(description="The face of each segment")
+
+
+class BordersAnswer(BaseModel):
+    """The borders between the territories of sources: their geodesic Voronoi diagram."""
+
+    kind: Literal["borders"]
+    mesh_id: str
+    chord_error: float = Field(
+        description="Largest distance of chords from exact lines, mesh units"
+    )
+    sources: list[ResolvedSource | ResolvedCurveSource]
+    borders: list[BorderDocument] = Field(
+        description="Closed, or open where they end: where three territories or more meet, at the "
+        "boundary, at an edge of three faces or more, or at `max_distance`"
+    )
+    stats: dict[str, Any]
+    warnings: list[str]
+
+
 class Location(BaseModel):
     """A point of the surface in a face."""
 

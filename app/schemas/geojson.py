@@ -8,7 +8,7 @@ Coordinates = tuple[float, float, float]
 
 
 class LineString(BaseModel):
-    """A line: a path, or an isoline."""
+    """A line: a path, an isoline, or a border."""
 
     type: Literal["LineString"]
     coordinates: list[Coordinates]

@@ -67,8 +67,7 @@ class AccuracyOrEffort(Accuracy):
 
     effort: Effort | None = Field(
         default=None,
-        description="For `fast`: the more effort, the more time and the less error; 2 where not "
-        "given",
+        description="For `fast`: more effort takes more time, and errs less; 2 by default",
     )
 
 
@@ -164,6 +163,25 @@ class IsolinesRequest(Accuracy, AmongBarriers):
         description="Largest distance of lines from exact ones inside faces, in mesh units: "
         "the exact ones are arcs, the answer has chords. At least a billionth of the bounding "
         "box's diagonal; a thousandth of the mean edge length if not given",
+    )
+
+
+class BordersRequest(AmongBarriers):
+    """The borders of the territories of ``sources``; always exact."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"examples": [{"sources": [{"vertex": 0}, {"vertex": 7}]}]}
+    )
+
+    sources: FailFastList[Source] = Field(min_length=1)
+    max_distance: NonNegative | None = Field(
+        default=None, description="Territories, and with them borders, end at this distance"
+    )
+    chord_error: Positive | None = Field(
+        default=None,
+        description="Largest distance of lines from exact ones inside faces, in mesh units: "
+        "the exact ones are mostly hyperbolas, the answer has chords. At least a billionth of the "
+        "bounding box's diagonal; a thousandth of the mean edge length if not given",
     )
 
 

@@ -1,6 +1,7 @@
 """A client of the service geodesic: `Client` for threads, `AsyncClient` for coroutines."""
 
 from geodesic_client.answers import (
+    Border,
     Distances,
     ErrorBound,
     Estimate,
@@ -23,6 +24,7 @@ from geodesic_client.points import curve, edge, face, position, starting_at
 
 __all__ = [
     "AsyncClient",
+    "Border",
     "Client",
     "Distances",
     "ErrorBound",

@@ -104,6 +104,18 @@ class Isolines:
 
 
 @dataclass(frozen=True)
+class Border:
+    """A line of points that are equally near to two sources, and no nearer to a third."""
+
+    sources: tuple[int, int]
+    """Those whose territories it separates: indices of the request, the lower first"""
+    points: Floats
+    faces: Integers
+    closed: bool
+    length: float
+
+
+@dataclass(frozen=True)
 class Matrix:
     """Distances between many points; infinite where they cannot be reached.
 
@@ -257,6 +269,20 @@ def to_isolines(response: httpx2.Response) -> Isolines:
         for each in document["isolines"]
     ]
     return Isolines(levels, document["chord_error"], ErrorBound(**document["error_bound"]))
+
+
+def to_borders(response: httpx2.Response) -> list[Border]:
+    """Return borders."""
+    return [
+        Border(
+            (line["sources"][0], line["sources"][1]),
+            np.array(line["points"], np.float64).reshape(-1, 3),
+            np.array(line["faces"], np.int64),
+            line["closed"],
+            line["length"],
+        )
+        for line in response.json()["borders"]
+    ]
 
 
 def to_matrix(response: httpx2.Response) -> Matrix:

@@ -17,6 +17,7 @@ from geodesic_client.answers import (
     JSON,
     NPY,
     NPZ,
+    Border,
     Distances,
     Estimate,
     Isolines,
@@ -28,6 +29,7 @@ from geodesic_client.answers import (
     Path,
     StoredMatrix,
     to_array,
+    to_borders,
     to_distances,
     to_estimate,
     to_isolines,
@@ -55,7 +57,7 @@ from geodesic_client.points import Point
 
 T = TypeVar("T")
 Accuracy = Literal["exact", "approximate", "fast"]
-Kind = Literal["distances", "path", "paths", "isolines", "matrix", "nearest", "locate"]
+Kind = Literal["distances", "path", "paths", "isolines", "borders", "matrix", "nearest", "locate"]
 ArrayName = Literal["vertices", "faces", "vertex_map", "face_map", "components"]
 
 _NPY_HEAD = 256
@@ -245,6 +247,22 @@ def isolines(
         barriers=barriers,
     )
     return (yield from _ask(mesh, "isolines", body, to_isolines, progress))
+
+
+def borders(
+    mesh: Mesh | str,
+    sources: Sequence[Point],
+    *,
+    max_distance: float | None = None,
+    chord_error: float | None = None,
+    barriers: Sequence[int] = (),
+    progress: Progress = ignore_progress,
+) -> Flow[list[Border]]:
+    """Return the lines between the parts of the surface that are nearest to each source."""
+    body = _body(
+        sources=sources, max_distance=max_distance, chord_error=chord_error, barriers=barriers
+    )
+    return (yield from _ask(mesh, "borders", body, to_borders, progress))
 
 
 def matrix(
@@ -449,6 +467,7 @@ class Operations:
     path = Method(path)
     paths = Method(paths)
     isolines = Method(isolines)
+    borders = Method(borders)
     matrix = Method(matrix)
     store_matrix = Method(store_matrix)
     matrix_rows = Method(matrix_rows)

@@ -88,6 +88,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/meshes/{mesh_id}/borders": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Borders between the territories of sources
+         * @description Return the polylines of points that are equally near to two sources, and to no other nearer.
+         *
+         *     They are exact where they cross edges and where they meet.
+         */
+        post: operations["computeBorders"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/meshes/{mesh_id}/matrix": {
         parameters: {
             query?: never;
@@ -467,6 +489,106 @@ export interface components {
             };
         };
         /**
+         * BorderDocument
+         * @description A polyline of points that are equally near to two sources, and no nearer to a third.
+         */
+        BorderDocument: {
+            /**
+             * Sources
+             * @description Those whose territories it separates: indices into `sources`, the lower first
+             */
+            sources: [
+                number,
+                number
+            ];
+            /**
+             * Closed
+             * @description Whether it leads from its last point back to the first, which is not repeated
+             */
+            closed: boolean;
+            /** Length */
+            length: number;
+            /** Points */
+            points: [
+                number,
+                number,
+                number
+            ][];
+            /**
+             * Faces
+             * @description The face of each segment
+             */
+            faces: number[];
+        };
+        /**
+         * BordersAnswer
+         * @description The borders between the territories of sources: their geodesic Voronoi diagram.
+         */
+        BordersAnswer: {
+            /**
+             * @description discriminator enum property added by openapi-typescript
+             * @enum {string}
+             */
+            kind: "borders";
+            /** Mesh Id */
+            mesh_id: string;
+            /**
+             * Chord Error
+             * @description Largest distance of chords from exact lines, mesh units
+             */
+            chord_error: number;
+            /** Sources */
+            sources: (components["schemas"]["ResolvedSource"] | components["schemas"]["ResolvedCurveSource"])[];
+            /**
+             * Borders
+             * @description Closed, or open where they end: where three territories or more meet, at the boundary, at an edge of three faces or more, or at `max_distance`
+             */
+            borders: components["schemas"]["BorderDocument"][];
+            /** Stats */
+            stats: {
+                [key: string]: unknown;
+            };
+            /** Warnings */
+            warnings: string[];
+        };
+        /**
+         * BordersRequest
+         * @description The borders of the territories of ``sources``; always exact.
+         * @example {
+         *       "sources": [
+         *         {
+         *           "vertex": 0
+         *         },
+         *         {
+         *           "vertex": 7
+         *         }
+         *       ]
+         *     }
+         */
+        BordersRequest: {
+            /**
+             * Barriers
+             * @description Indices of faces that are blocked: holes, at whose corners paths may bend. Default: `[]`
+             * @example [
+             *       7,
+             *       8
+             *     ]
+             */
+            barriers?: number[];
+            /** Sources */
+            sources: (number | components["schemas"]["VertexSource"] | components["schemas"]["EdgeSource"] | components["schemas"]["FaceSource"] | components["schemas"]["PositionSource"] | components["schemas"]["CurveSource"])[];
+            /**
+             * Max Distance
+             * @description Territories, and with them borders, end at this distance
+             */
+            max_distance?: number | null;
+            /**
+             * Chord Error
+             * @description Largest distance of lines from exact ones inside faces, in mesh units: the exact ones are mostly hyperbolas, the answer has chords. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
+             */
+            chord_error?: number | null;
+        };
+        /**
          * Curve
          * @description A curve on the surface: straight from each point to the next, in a face of both.
          */
@@ -620,7 +742,7 @@ export interface components {
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: the more effort, the more time and the less error; 2 where not given
+             * @description For `fast`: more effort takes more time, and errs less; 2 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Sources */
@@ -1622,7 +1744,7 @@ export interface components {
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: the more effort, the more time and the less error; 2 where not given
+             * @description For `fast`: more effort takes more time, and errs less; 2 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Source */
@@ -1750,7 +1872,7 @@ export interface components {
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: the more effort, the more time and the less error; 2 where not given
+             * @description For `fast`: more effort takes more time, and errs less; 2 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Source */
@@ -2071,7 +2193,7 @@ export interface components {
         };
         /**
          * LineString
-         * @description A line: a path, or an isoline.
+         * @description A line: a path, an isoline, or a border.
          */
         LineString: {
             /**
@@ -2407,7 +2529,7 @@ export interface operations {
                 relative_error?: number;
                 /** @description For `approximate`: the same in mesh units; where both errors are given, both hold */
                 absolute_error?: number;
-                /** @description For `fast`: the more effort, the more time and the less error; 2 where not given */
+                /** @description For `fast`: more effort takes more time, and errs less; 2 by default */
                 effort?: 1 | 2 | 4 | 8;
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
@@ -3214,6 +3336,256 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["IsolinesAnswer"] | components["schemas"]["Estimate"];
+                    "model/obj": string;
+                    "text/csv": string;
+                    "image/svg+xml": string;
+                    "application/geo+json": components["schemas"]["FeatureCollection"];
+                };
+            };
+            /** @description With `Prefer: respond-async`: the job */
+            202: {
+                headers: {
+                    Location: components["headers"]["Location"];
+                    "Preference-Applied": components["headers"]["Preference-Applied"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["JobDocument"];
+                };
+            };
+            /** @description The requested range */
+            206: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Content-Range": components["headers"]["Content-Range"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": string;
+                    "model/obj": string;
+                    "text/csv": string;
+                    "image/svg+xml": string;
+                    "application/geo+json": string;
+                };
+            };
+            /** @description malformed_body, malformed_request */
+            400: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description unauthorized */
+            401: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    "WWW-Authenticate": components["headers"]["WWW-Authenticate"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description origin_not_allowed */
+            403: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description mesh_not_found */
+            404: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description not_acceptable */
+            406: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description upload_too_large, result_too_large */
+            413: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description unsupported_media_type */
+            415: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description range_not_satisfiable */
+            416: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description host_not_allowed */
+            421: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description invalid_point, invalid_request, limit_exceeded, memory_limit */
+            422: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description quota_exceeded, rate_limited */
+            429: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    "Retry-After": components["headers"]["Retry-After"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description header_too_large */
+            431: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description worker_died, mesh_damaged, internal_error */
+            500: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description queue_full, engine_unavailable, draining, state_unavailable, store_unavailable, too_many_connections */
+            503: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    "Retry-After": components["headers"]["Retry-After"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description deadline_exceeded */
+            504: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description storage_full */
+            507: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+        };
+    };
+    computeBorders: {
+        parameters: {
+            query?: {
+                /** @description Overrides `Accept` */
+                format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
+                /** @description Of the numbers in `npy`, `npz` and `octets` */
+                dtype?: "float64" | "float32";
+                /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
+                estimate?: boolean;
+            };
+            header?: {
+                /** @description Milliseconds that the client waits at most */
+                "x-timeout-ms"?: number;
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
+                prefer?: string;
+                /** @description Freely chosen name of a job: a request sent again with it gets the same job */
+                "idempotency-key"?: string;
+                /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
+                Range?: string;
+            };
+            path: {
+                mesh_id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["BordersRequest"];
+            };
+        };
+        responses: {
+            /** @description The lines, closed and open. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            200: {
+                headers: {
+                    Vary: components["headers"]["Vary"];
+                    "Server-Timing": components["headers"]["Server-Timing"];
+                    "Accept-Ranges": components["headers"]["Accept-Ranges"];
+                    "Cache-Control": components["headers"]["Cache-Control"];
+                    ETag: components["headers"]["ETag"];
+                    "Last-Modified": components["headers"]["Last-Modified"];
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BordersAnswer"] | components["schemas"]["Estimate"];
                     "model/obj": string;
                     "text/csv": string;
                     "image/svg+xml": string;

@@ -15,6 +15,7 @@ from geodesic_core.control import Control
 from geodesic_core.errors import InternalError, NoPath
 from geodesic_core.facts import as_table
 from geodesic_core.fields import picture
+from geodesic_core.fields.borders import Border, borders_of, swept_borders
 from geodesic_core.fields.fast_sweep import FastSweep
 from geodesic_core.fields.field_file import write_field_file
 from geodesic_core.fields.gradient import gradient_at_vertices
@@ -307,6 +308,17 @@ class DistanceField:
         """Data of paths to vertices and targets, swept for again if not retained."""
         return Lazy((self._fast or self._sweep).find_winners, self._result.winners)
 
+    @property
+    def _exact_sweep(self) -> RepeatableSweep:
+        """The sweep of the same question that merges nothing."""
+        bounds = self._sweep.bounds
+        if not bounds.merging:
+            return self._sweep
+        exact = exact_bounds(bounds.max_distance)
+        if bounds.parallel:
+            exact = with_parallel_windows(exact, bounds.first_segment)
+        return replace(self._sweep, bounds=exact)
+
     @cached_property
     def _winners_and_windows(self) -> Lazy[tuple[Winners, FaceWindows]] | None:
         """Data by which any point is found exactly; None where a search back from it finds it."""
@@ -314,8 +326,7 @@ class DistanceField:
         if result.winners is not None and result.windows is not None and not bounds.merging:
             return Lazy(sweep.find_winners_and_windows, (result.winners, result.windows))
         if bounds.parallel:  # a sweep back from a point ends at points, not on curves
-            exact = with_parallel_windows(exact_bounds(bounds.max_distance), bounds.first_segment)
-            return Lazy(replace(sweep, bounds=exact).find_winners_and_windows)
+            return Lazy(self._exact_sweep.find_winners_and_windows)
         if self._fast is not None:  # its distances are no lower bounds, which a search back needs
             return Lazy(sweep.find_winners_and_windows)
         return None
@@ -664,6 +675,74 @@ class DistanceField:
             yield drawing.lines(min(level, highest), chord_error, part) if reached else []
         if control.progress is not None:
             control.progress(1.0)
+
+    def borders(
+        self,
+        chord_error: float | None = None,
+        *,
+        progress: Callable[[float], None] | None = None,
+        cancel: Callable[[], bool] | None = None,
+        deadline_s: float | None = None,
+        memory_limit: int | None = None,
+    ) -> list[Border]:
+        """Return the borders of the sources' territories: their geodesic Voronoi diagram.
+
+        The territory of a source is what is nearer to it than to any other; start distances count.
+        Each line separates two territories. It is closed, or ends where three of them or more meet,
+        at the boundary, at an edge of more than two faces, or at ``max_distance``. In each face it
+        consists of pieces of hyperbolas, of parabolas beside curves, and of straight lines. Its
+        ends and crossings of edges are exact, and between them pieces become chords. Where a part
+        of the surface is equally near to two sources, it belongs to the lower one. Every edge of
+        the mesh whose ends have different nearest sources is crossed. The borders of an approximate
+        or fast field are exact as well, from an exact sweep.
+
+        Parameters
+        ----------
+        chord_error
+            Largest distance of a chord from its curve, mesh units; as in `isolines`.
+        progress, cancel, deadline_s, memory_limit
+            See `Control`.
+
+        Returns
+        -------
+        list of Border
+            The lines, each with the two sources that it separates; none of a single source.
+
+        Raises
+        ------
+        InvalidArgument
+            The chord error is out of its domain.
+        Cancelled, DeadlineExceeded, MemoryLimitExceeded
+            As in `Control`; the field is as good as before.
+
+        Notes
+        -----
+        Where windows are not retained, each call runs an exact sweep again, for the windows of
+        those faces only that borders may pass. O(windows), and O(n³) in each face that a border
+        passes, for n windows that are nearest somewhere in it.
+
+        Examples
+        --------
+        >>> mesh = gc.samples.plane(200)
+        >>> field = gc.exact_distance(mesh, [0, 10, 110])  # three corners of the square
+        >>> [line.sources for line in field.borders()]
+        [(0, 1), (0, 2), (1, 2)]
+        """
+        control = Control(progress, cancel, deadline_s, memory_limit)
+        error, sweep = resolve_chord_error(self.mesh, chord_error), self._exact_sweep
+        borders: list[Border] = []
+        if len(self.sources) > 1:
+            kept = self._winners_and_windows.value if self._winners_and_windows else None
+            if kept is not None:
+                winners, windows = kept
+                borders = borders_of(
+                    sweep, windows, winners.distance, winners.nearest, error, control
+                )
+            else:
+                borders = swept_borders(sweep, self._result.nearest, error, control)
+        if control.progress is not None:
+            control.progress(1.0)
+        return borders
 
     def _windows_at(self, levels: Sequence[float], control: Control) -> FaceWindows:
         """Return the windows of all faces that some levels may pass."""

@@ -172,6 +172,22 @@ def crossed_faces(
     return crossed
 
 
+def field_of_windows(windows: FaceWindows, distances: Floats, nodes: Nodes) -> Field:
+    """Return what distances in faces follow from: a sweep's windows, and its distances by node."""
+    sites = nodes.sites
+    site_rows = np.argsort(sites.ints[: nodes.first_target, FACE], kind="stable")
+    piece_rows = np.argsort(sites.segment_ints[:, FACE], kind="stable")
+    return Field(
+        face_windows=windows,
+        distance=distances,
+        site_ints=sites.ints[site_rows],
+        site_weights=sites.weights[site_rows],
+        segment_ints=sites.segment_ints[piece_rows],
+        segment_ends=sites.segment_ends[piece_rows],
+        first_segment=nodes.first_segment,
+    )
+
+
 class Drawing:
     """Lines of a finished sweep, drawn level by level."""
 
@@ -187,18 +203,7 @@ class Drawing:
 
         ``distances`` are by node. Raises as `lines` does.
         """
-        sites = nodes.sites
-        site_rows = np.argsort(sites.ints[: nodes.first_target, FACE], kind="stable")
-        piece_rows = np.argsort(sites.segment_ints[:, FACE], kind="stable")
-        field = Field(
-            face_windows=windows,
-            distance=distances,
-            site_ints=sites.ints[site_rows],
-            site_weights=sites.weights[site_rows],
-            segment_ints=sites.segment_ints[piece_rows],
-            segment_ends=sites.segment_ends[piece_rows],
-            first_segment=nodes.first_segment,
-        )
+        field = field_of_windows(windows, distances, nodes)
         count = len(mesh.topology.links) // 3
         least, most = np.full(count, np.inf), np.full(count, np.inf)
         self._mesh, self._field, self._least, self._most = mesh, field, least, most
@@ -232,7 +237,7 @@ class Drawing:
         crossings = kernels.cross_edges(topology, distances, cuts, level, rank)
         held = sum(array.nbytes for array in (*cuts, *crossings))
         control = control.holding(held).for_part(1, 2)
-        parts: list[_Arrays] = []
+        parts: list[Arrays] = []
 
         def chain(first: int, last: int) -> int:
             parts.append(
@@ -240,12 +245,12 @@ class Drawing:
                     topology, distances, cuts, crossings, level, chord_error, first, last
                 )
             )
-            control.check_memory(_bytes_of(parts))
+            control.check_memory(bytes_of(parts))
             return len(cuts.faces)
 
         in_slices(len(cuts.faces), chain, control)
-        points, points_of, ends, faces = _joined(parts)
-        chains = Chains(points, _starts(points_of), ends, faces)
+        points, points_of, ends, faces = joined(parts)
+        chains = Chains(points, starts_of(points_of), ends, faces)
         return _lines(
             self._mesh, *kernels.link_chains(topology.links, crossings, chains, PIECE * level)
         )
@@ -257,7 +262,7 @@ class Drawing:
         """
         rank[passed] = np.arange(len(passed))
         faces = passed[:, None]
-        parts: list[_Arrays] = []
+        parts: list[Arrays] = []
 
         def cut(first: int, last: int) -> int:
             nonlocal faces
@@ -266,27 +271,28 @@ class Drawing:
             )
             parts.append((spans, spans_of, arcs, arcs_of))
             faces = np.concatenate([faces, more])
-            control.check_memory(faces.nbytes + _bytes_of(parts))
+            control.check_memory(faces.nbytes + bytes_of(parts))
             return len(faces)
 
         in_slices(len(faces), cut, control)
-        spans, spans_of, arcs, arcs_of = _joined(parts)
-        return Cuts(faces, spans, _starts(spans_of), arcs, _starts(arcs_of))
+        spans, spans_of, arcs, arcs_of = joined(parts)
+        return Cuts(faces, spans, starts_of(spans_of), arcs, starts_of(arcs_of))
 
 
-_Arrays = Sequence[NDArray[Any]]
+Arrays = Sequence[NDArray[Any]]
 
 
-def _bytes_of(parts: Sequence[_Arrays]) -> int:
+def bytes_of(parts: Sequence[Arrays]) -> int:
+    """Return the memory of all arrays of all parts."""
     return sum(array.nbytes for part in parts for array in part)
 
 
-def _joined(parts: Sequence[_Arrays]) -> list[NDArray[Any]]:
+def joined(parts: Sequence[Arrays]) -> list[NDArray[Any]]:
     """Return the first arrays of all parts as one, then the second ones, and so on."""
     return [np.concatenate(arrays) for arrays in zip(*parts, strict=True)]
 
 
-def _starts(counts: NDArray[Any]) -> NDArray[Any]:
+def starts_of(counts: NDArray[Any]) -> NDArray[Any]:
     """Return where each of some runs begins, and the last one ends, from their lengths (n, 1)."""
     starts = np.zeros((len(counts) + 1, 1), counts.dtype)
     np.cumsum(counts, axis=0, out=starts[1:])

@@ -121,6 +121,7 @@ def test_lines_in_each_format(run: Run, knot: Path) -> None:
         "path": ["--source", 3, "--target", 700],
         "paths": ["--source", 3, "--target", 700, "--target", 20],
         "isolines": ["--source", 3, "--level", 2.5],
+        "borders": ["--source", 3, "--source", 700],
     }
     for command, arguments in commands.items():
         for suffix in ("csv", "svg", "geojson"):
@@ -782,6 +783,17 @@ def test_a_wrong_command_line_says_so_in_one_line(
     assert ran.code == 2
     assert message in error_line(ran)
     assert list(Path().iterdir()) == [plane]
+
+
+def test_borders_are_drawn(run: Run, plane: Path) -> None:
+    sources = ["--source", 0, "--source", 60, "--source", 99]
+    ran = run("borders", plane, *sources, "--out", "b.json")
+    assert (ran.code, ran.err) == (0, "")
+    expected = gc.exact_distance(gc.load_mesh(plane), [0, 60, 99]).borders()
+    drawn = json.loads(Path("b.json").read_text())["borders"]
+    assert [tuple(line["sources"]) for line in drawn] == [line.sources for line in expected]
+    assert [line["points"] for line in drawn] == [line.points.tolist() for line in expected]
+    assert ran.out.count("border ") == len(expected) > 0
 
 
 def test_isolines_are_drawn(run: Run, plane: Path) -> None:

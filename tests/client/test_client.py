@@ -105,6 +105,11 @@ def test_isolines_matrices_and_candidates(
     assert [each.level for each in lines.levels] == [0.5, 1.0]
     assert lines.levels[0].lines[0].points.shape[1] == 3
 
+    borders = service.borders(mesh, [0, 7, 9])
+    expected = gc.exact_distance(same, [0, 7, 9]).borders()
+    assert [line.sources for line in borders] == [line.sources for line in expected]
+    np.testing.assert_array_equal(borders[0].points, expected[0].points)
+
     table = gc.distance_matrix(same, [0, 1], [7, 8, 9])
     np.testing.assert_array_equal(service.matrix(mesh, [0, 1], [7, 8, 9]).distances, table)
     sparse = service.matrix(mesh, [0, 1], [7, 8, 9], layout="sparse")

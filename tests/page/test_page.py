@@ -386,6 +386,21 @@ def test_alt_sets_a_target_and_shift_adds_a_source(view: View, sphere: str) -> N
     assert view.page.locator("#territories li").count() == 2
 
 
+def test_territories_keep_their_colours_up_to_the_border(view: View) -> None:
+    """Within a face, too: here two faces, which the border divides in the middle."""
+    square = "v -1 -1 0\nv 1 -1 0\nv -1 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n"
+    view.open("/?lines=none")
+    view.upload("square.obj", square)
+    (mesh,) = query_of(view)["mesh"]
+    straight = "lines=none&view=0,1.5708,2.9,0,0,0&up=y"
+    view.open(f"/?mesh={mesh}&source=v0&source=v1&shade=territories&{straight}")
+    pixels = view.pixels()
+    for y in (-120, 0, 120):
+        far, near, beyond = (view.colour(x, y, pixels) for x in (-60, -8, 8))
+        assert np.abs(near - far).max() < 20
+        assert np.abs(near - beyond).max() > 60
+
+
 def test_waypoints_and_barriers(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}")
     view.click(-100, 0)

@@ -19,6 +19,7 @@ OFFERED = {
     "path": "json npy octets obj csv svg geojson",
     "paths": "json obj csv svg geojson",
     "isolines": "json obj csv svg geojson",
+    "borders": "json obj csv svg geojson",
     "matrix": "json npy octets csv",
     "nearest": "json csv geojson",
     "locate": "json csv geojson",
@@ -28,6 +29,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "path": {"source": {"vertex": 0}, "target": {"vertex": 60}},
     "paths": {"source": {"vertex": 0}, "targets": [{"vertex": 60}, {"vertex": 0}, {"vertex": 99}]},
     "isolines": {"sources": [{"vertex": 60}], "levels": [0.25, 0.5, 9.0]},
+    "borders": {"sources": [{"vertex": 0}, {"vertex": 7}]},
     "matrix": {"sources": [{"vertex": 0}, {"vertex": 7}], "targets": [{"vertex": 60}] * 3},
     "nearest": {
         "source": {"vertex": 0},

@@ -50,6 +50,7 @@ QUESTIONS: dict[str, Callable[[], object]] = {
     "fast path": lambda: gc.fast_distance(MESH, POINT, targets=[ON_EDGE]).path_to(ON_EDGE),
     "fast curve": lambda: gc.fast_distance(MESH, CURVE, targets=[POINT]).path_to(POINT),
     "isolines": lambda: gc.exact_distance(MESH, 0).isolines([0.1, 0.2]),
+    "borders": lambda: gc.exact_distance(MESH, [0, 8]).borders(),
     "approximate isolines": lambda: gc.approximate_distance(MESH, 0).isolines([0.1]),
     "approximate targets": lambda: gc.approximate_distance(MESH, 0, targets=[POINT]).path_to(POINT),
     "curve": lambda: gc.exact_distance(MESH, CURVE, targets=[POINT]).path_to(POINT),

@@ -12,6 +12,7 @@ from app.http.responses import FILE_HEADERS, QUERY_PROBLEMS, documented, problem
 from app.http.routes.query_request import QueryRequestDep
 from app.http.routes.query_route import QueryRoute
 from app.queries import (
+    BordersQuery,
     DistancesQuery,
     IsolinesQuery,
     LocateQuery,
@@ -23,6 +24,7 @@ from app.queries import (
     written_request,
 )
 from app.schemas.answers import (
+    BordersAnswer,
     DistancesAnswer,
     Estimate,
     IsolinesAnswer,
@@ -34,6 +36,7 @@ from app.schemas.answers import (
 )
 from app.schemas.requests import (
     AnswerParameters,
+    BordersRequest,
     DistancesRequest,
     IsolinesRequest,
     LocateRequest,
@@ -197,6 +200,24 @@ async def compute_isolines(
 ) -> Response:
     """Return the polylines of points at each level, exact where they cross edges."""
     return await query_request.answer(IsolinesQuery, body, parameters)
+
+
+@router.post(
+    "/borders",
+    **_posted(
+        "computeBorders",
+        "Borders between the territories of sources",
+        _answers(BordersAnswer, "The lines, closed and open", *_LINES),
+    ),
+)
+async def compute_borders(
+    body: BordersRequest, parameters: Parameters, query_request: QueryRequestDep
+) -> Response:
+    """Return the polylines of points that are equally near to two sources, and to no other nearer.
+
+    They are exact where they cross edges and where they meet.
+    """
+    return await query_request.answer(BordersQuery, body, parameters)
 
 
 @router.post(

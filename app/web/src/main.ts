@@ -2,6 +2,7 @@
 import { getMesh, makeSample } from "./api/meshes";
 import { getAbout } from "./api/queries";
 import type { MeshDocument } from "./api/types";
+import { Borders } from "./ask/borders";
 import { Fields } from "./ask/fields";
 import { Isolines } from "./ask/isolines";
 import { Routes } from "./ask/routes";
@@ -28,6 +29,7 @@ const status = new Status(() => stage.drawn());
 const store = new Store();
 const fields = new Fields(status, sceneView);
 const isolines = new Isolines(status, sceneView, fields);
+const borders = new Borders(status, sceneView, fields);
 const routes = new Routes(status, sceneView);
 const meshes = new Meshes(store, status);
 const controls = new Controls(store, status, sceneView);
@@ -40,7 +42,10 @@ exportPanel.largest = () => fields.of(store.state)?.largest ?? 0;
 exportPanel.nearest = () => routes.source;
 controls.usualSpacing = () => Number(((exportPanel.largest() || 1) / 20).toPrecision(1));
 stage.onMove = (view) => store.update({ view, up: sceneView.mesh?.frame.up ?? null });
-fields.onPaint = (state) => isolines.follow(state);
+fields.onPaint = (state) => {
+  isolines.follow(state);
+  borders.follow(state);
+};
 setUpAppearance(() => void showWires(store.state));
 
 controls.show(store.state);
@@ -91,6 +96,7 @@ function open(mesh: string): void {
   byId("welcome").hidden = true;
   sceneView.close();
   isolines.forget();
+  borders.forget();
   report = null;
   showReport(report, sceneView, "", null);
   const stop = new AbortController();

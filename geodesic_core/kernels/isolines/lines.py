@@ -382,26 +382,31 @@ def trace_arc(
     topology: Any, face: int, arc: Floats, error: float, points: Floats, count: int
 ) -> Any:
     """Append an arc's points to ``points``, both ends included; return them and their number."""
-    links, geometry, positions = topology.links, topology.geometry, topology.positions
-    h = 3 * face
-    tail, head = positions[links[h, TAIL]], positions[links[h, HEAD]]
-    apex = positions[links[h + 1, HEAD]]
-    length = geometry[h, LENGTH]
-    ax = geometry[h, LENGTH_LEFT] * geometry[h, COS_LEFT]
-    ay = geometry[h, LENGTH_LEFT] * geometry[h, SIN_LEFT]
     width, chords = arc[END] - arc[START], 1
     if not is_line(arc):
         chords = max(math.ceil(width / step_of(arc[RADIUS], error)), 1)
     points = with_room(points, count + chords + 1)
     for i in range(chords + 1):
         x, y = point_on(arc, arc[START] + width * (i / chords))
-        up = min(max(y / ay, 0.0), 1.0) if ay > 0.0 else 0.0
-        along = min(max((x - up * ax) / length, 0.0), 1.0 - up)
-        for axis in range(3):
-            rise = along * (head[axis] - tail[axis]) + up * (apex[axis] - tail[axis])
-            points[count, axis] = tail[axis] + rise
+        put_in_face(topology, face, x, y, points[count])
         count += 1
     return points, count
+
+
+@inlined
+def put_in_face(topology: Any, face: int, x: float, y: float, point: Floats) -> None:
+    """Write the point of a face at (x, y) in its frame to ``point`` (3,), pulled into the face."""
+    links, geometry, positions = topology.links, topology.geometry, topology.positions
+    h = 3 * face
+    tail, head, apex = links[h, TAIL], links[h, HEAD], links[h + 1, HEAD]
+    ax = geometry[h, LENGTH_LEFT] * geometry[h, COS_LEFT]
+    ay = geometry[h, LENGTH_LEFT] * geometry[h, SIN_LEFT]
+    up = min(max(y / ay, 0.0), 1.0) if ay > 0.0 else 0.0
+    along = min(max((x - up * ax) / geometry[h, LENGTH], 0.0), 1.0 - up)
+    for axis in range(3):
+        start = positions[tail, axis]
+        rise = along * (positions[head, axis] - start) + up * (positions[apex, axis] - start)
+        point[axis] = start + rise
 
 
 @kernel

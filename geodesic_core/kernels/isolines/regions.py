@@ -42,7 +42,12 @@ NX = 0  # the normal, inward, a unit; zero where there is no such side
 NY = 1
 DEPTH = 2  # how far inside (CX, CY) is
 SIDE = 3
-REGION = FRONT + 3 * SIDE
+SIDES_END = FRONT + 3 * SIDE
+
+# Columns of a region, after those of its sides: what reaches it
+ORIGIN = SIDES_END  # node of the pseudosource, corner, point or segment
+OVER = SIDES_END + 1  # which half-edge of the face a window crosses, 0 to 2; -1 of all others
+REGION = SIDES_END + 2
 
 
 @kernel
@@ -54,7 +59,7 @@ def is_line(front: Floats) -> bool:
 @kernel
 def end_of_sides(region: Floats) -> int:
     """Return the column after the last side that a region may have: discs have two."""
-    return REGION if is_line(region) else REGION - SIDE
+    return SIDES_END if is_line(region) else SIDES_END - SIDE
 
 
 @inlined
@@ -62,6 +67,12 @@ def put_side(region: Floats, rank: int, nx: float, ny: float, depth: float) -> N
     """Set side number ``rank`` of ``region``: its inward unit normal, and its depth at (CX, CY)."""
     side = FRONT + SIDE * rank
     region[side + NX], region[side + NY], region[side + DEPTH] = nx, ny, depth
+
+
+@inlined
+def put_origin(region: Floats, node: int, over: int) -> None:
+    """Set the node that a region is reached from, and the half-edge of the face that is crossed."""
+    region[ORIGIN], region[OVER] = node, over
 
 
 @inlined
@@ -124,18 +135,22 @@ def regions_of_face(topology: Any, field: Any, face: int, level: float) -> Float
                 topology.geometry, 3 * face, field.segment_ends[k, SEGMENT_END:]
             )
             put_segment_bands(regions[count : count + 2], px, py, qx, qy, far)
-            count += 2
+            for _ in range(2):
+                put_origin(regions[count], field.segment_ints[k, NODE], -1)
+                count += 1
     for k in range(first_site, end_site):
         radius = level - field.distance[field.site_ints[k, NODE]]
         if radius >= 0.0:
             x, y = point_in_frame(topology.geometry, 3 * face, field.site_weights[k])
             put_disc(regions[count], x, y, radius)
+            put_origin(regions[count], field.site_ints[k, NODE], -1)
             count += 1
     for h in range(3 * face, 3 * face + 3):
         radius = level - field.distance[topology.links[h, TAIL]]
         if radius >= 0.0:
             x, y, _, _ = half_edge_in_face(topology.geometry, h)
             put_disc(regions[count], x, y, radius)
+            put_origin(regions[count], topology.links[h, TAIL], -1)
             count += 1
     return regions[:count]
 
@@ -160,6 +175,7 @@ def add_window_regions(
                 put_parallel_window(regions[count], window, gap, level, edge)
             else:
                 put_window(regions[count], window, gap, level, edge)
+            put_origin(regions[count], window.root, h % 3)
             count += 1
     return count
 

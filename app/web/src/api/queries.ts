@@ -4,6 +4,8 @@ import { answerOf } from "./jobs";
 import { parseNpy } from "./npy";
 import type {
   About,
+  Border,
+  BordersAnswer,
   DistancesAnswer,
   DistancesRequest,
   ErrorBound,
@@ -73,6 +75,20 @@ export async function askIsolines(
   const response = await answerOf(path, question, JSON_TYPE, onProgress, signal);
   const { isolines } = (await response.json()) as IsolinesAnswer;
   return isolines.flatMap(({ lines }) => lines.map(({ points }) => points));
+}
+
+export type BordersQuestion = Omit<Question, "method" | "relative_error" | "effort">;
+
+/** Return the borders between the territories of some sources. */
+export async function askBorders(
+  mesh: string,
+  question: BordersQuestion,
+  onProgress: (share: number) => void,
+  signal: AbortSignal,
+): Promise<Border[]> {
+  const path = `/v1/meshes/${mesh}/borders`;
+  const response = await answerOf(path, question, JSON_TYPE, onProgress, signal);
+  return ((await response.json()) as BordersAnswer).borders;
 }
 
 export interface RouteQuestion {

@@ -4,6 +4,8 @@ import type { components } from "./schema";
 type Schemas = components["schemas"];
 
 export type About = Schemas["About"];
+export type Border = Schemas["BorderDocument"];
+export type BordersAnswer = Schemas["BordersAnswer"];
 export type ErrorBound = Schemas["ErrorBound"];
 export type IsolinesAnswer = Schemas["IsolinesAnswer"];
 export type Job = Schemas["JobDocument"];

@@ -40,6 +40,11 @@ export class Fields {
     return this.answers[state.method] ?? null;
   }
 
+  /** Return the nearest source of each vertex, where it is drawn; else null. */
+  territories({ shade }: State): Int32Array | null {
+    return shade === "territories" ? (this.answers.nearest ?? null) : null;
+  }
+
   /** Request what ``state`` needs and has not been answered yet, and paint it. */
   follow(state: State): void {
     const { mesh, sources, barriers, maxDistance, method, error, effort, shade } = state;
@@ -87,7 +92,8 @@ export class Fields {
       if (method === "fast") answers.effort = state.effort;
     }
     if (state.shade === "territories") {
-      answers.nearest ??= await askTerritories(mesh, questionOf(state, state.method), signal);
+      // Borders are exact in any case.
+      answers.nearest ??= await askTerritories(mesh, questionOf(state, "exact"), signal);
     }
   }
 

@@ -1,6 +1,7 @@
 // Exports: links, commands, files and a picture.
 import { authorization, post } from "../api/http";
 import type { About, Point } from "../api/types";
+import { bordersOf } from "../ask/borders";
 import { questionOf } from "../ask/fields";
 import { isolinesOf } from "../ask/isolines";
 import { button, byId } from "../dom";
@@ -10,12 +11,13 @@ import type { Status } from "../status";
 import type { Stage } from "../view/scene";
 import { curlOf, pythonOf } from "./snippets";
 
-type Product = "distances" | "path" | "isolines";
+type Product = "distances" | "path" | "isolines" | "borders";
 
 const FORMATS: Record<Product, string[]> = {
   distances: ["npy", "csv", "ply"],
   path: ["obj", "svg", "csv"],
   isolines: ["obj", "svg"],
+  borders: ["obj", "svg"],
 };
 
 export class ExportPanel {
@@ -44,7 +46,7 @@ export class ExportPanel {
   offer({ answer_formats }: Pick<About, "answer_formats">): void {
     this.formats = Object.keys(answer_formats);
     const lacking = new Set<string>();
-    for (const what of ["distances", "path", "isolines"] as const) {
+    for (const what of ["distances", "path", "isolines", "borders"] as const) {
       const offered = FORMATS[what].filter((format) => this.formats.includes(format));
       for (const format of FORMATS[what]) {
         if (!offered.includes(format)) lacking.add(format);
@@ -70,6 +72,7 @@ export class ExportPanel {
       distances: hasField,
       path: hasField && state.target !== null,
       isolines: hasField && state.lines !== null,
+      borders: state.mesh !== null && state.sources.length > 1,
     };
     for (const [what, isThere] of Object.entries(has)) {
       for (const choice of byId(`download-${what}`).querySelectorAll("button"))
@@ -94,6 +97,7 @@ export class ExportPanel {
     const { state } = this.store;
     const { target, waypoints, barriers, lines } = state;
     if (what === "path") return { source: this.source(), target, waypoints, barriers };
+    if (what === "borders") return bordersOf(state);
     if (what === "distances" || lines === null) return questionOf(state, state.method);
     return isolinesOf(state, lines, this.largest());
   }

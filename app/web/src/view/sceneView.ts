@@ -1,7 +1,7 @@
 // The mesh on the stage, with points, path, barriers and faults on it.
 import { Mesh, PlaneGeometry, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
-import type { MeshDocument, Outline, Point } from "../api/types";
+import type { Border, MeshDocument, Outline, Point } from "../api/types";
 import type { Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
 import { type FacePoint, pick, positionOf } from "../mesh/picking";
@@ -15,6 +15,7 @@ import { RouteLine } from "./route";
 import { showScaleBar } from "./scalebar";
 import type { Stage } from "./scene";
 import { Surface, surfacePaint } from "./surface";
+import { Territories } from "./territories";
 
 const SOURCE: Rgb = [0.09, 0.13, 0.24];
 const TARGET: Rgb = [0.9, 0, 0.36];
@@ -33,6 +34,7 @@ export class SceneView {
   private readonly faultPoints: Markers;
   private readonly isolines: IsolineLayer;
   private readonly route: RouteLine;
+  private readonly territories: Territories;
 
   constructor(readonly stage: Stage) {
     this.barriers = new Patch(stage, 0x15181f, 0.82);
@@ -40,6 +42,7 @@ export class SceneView {
     this.faults = new Patch(stage, 0xd9121f, 0.9);
     this.isolines = new IsolineLayer(stage);
     this.route = new RouteLine(stage);
+    this.territories = new Territories(stage, this.paint);
     this.points = new Markers(stage);
     this.faultPoints = new Markers(stage);
     this.warmUp();
@@ -83,6 +86,7 @@ export class SceneView {
     this.faultPoints.show([]);
     this.isolines.show([]);
     this.route.show([]);
+    this.showBorders(new Int32Array(), []);
   }
 
   /** Return the point of the surface under a place of the canvas, or null where there is none. */
@@ -126,6 +130,11 @@ export class SceneView {
   showIsolines(lines: Triple[][]): void {
     const { mesh } = this;
     this.isolines.show(mesh ? lines.map((line) => line.map((point) => mesh.drawn(point))) : []);
+  }
+
+  /** Show the borders of territories; ``nearest`` is the nearest source of each vertex. */
+  showBorders(nearest: Int32Array, borders: Border[]): void {
+    this.territories.show(this.mesh, nearest, borders);
   }
 
   showFaults(faces: number[], points: [number, number, number][]): void {

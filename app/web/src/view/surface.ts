@@ -80,6 +80,17 @@ export function surfacePaint(): ShaderMaterial {
   });
 }
 
+/** Return a material that draws the same in front of surfaces, by the same colours. */
+export function inFront(paint: ShaderMaterial): ShaderMaterial {
+  const { uniforms } = paint;
+  return new ShaderMaterial({
+    uniforms,
+    vertexShader: VERTEX,
+    fragmentShader: FRAGMENT,
+    side: DoubleSide,
+  });
+}
+
 export class Surface {
   readonly object: Mesh<BufferGeometry, ShaderMaterial>;
   private readonly values: BufferAttribute;

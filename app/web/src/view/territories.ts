@@ -1,0 +1,111 @@
+// Territories: borders as lines, and the faces that they cross, coloured on either side.
+import { BufferAttribute, BufferGeometry, Mesh, type ShaderMaterial } from "three";
+import type { Border } from "../api/types";
+import { divide, type Piece } from "../mesh/division";
+import type { LoadedMesh } from "../mesh/loader";
+import { territory } from "./colours";
+import { IsolineLayer } from "./isolines";
+import type { Stage } from "./scene";
+import { inFront } from "./surface";
+
+export class Territories {
+  private readonly lines: IsolineLayer;
+  private readonly object: Mesh<BufferGeometry, ShaderMaterial>;
+
+  constructor(
+    private readonly stage: Stage,
+    paint: ShaderMaterial,
+  ) {
+    this.lines = new IsolineLayer(stage);
+    this.object = new Mesh(new BufferGeometry(), inFront(paint));
+    this.object.visible = false;
+    stage.add(this.object);
+  }
+
+  /** Show borders on a mesh that is coloured by ``nearest``, the nearest source of each vertex. */
+  show(mesh: LoadedMesh | null, nearest: Int32Array, borders: Border[]): void {
+    this.lines.show(
+      mesh
+        ? borders.map(({ points, closed }) =>
+            (closed ? [...points, points[0]!] : points).map((point) => mesh.drawn(point)),
+          )
+        : [],
+    );
+    this.object.geometry.dispose();
+    this.object.geometry = mesh ? divided(mesh, nearest, borders) : new BufferGeometry();
+    this.object.visible = mesh !== null && borders.length > 0;
+    this.stage.invalidate();
+  }
+}
+
+/** Return the faces that borders cross, in parts of one colour each. */
+function divided(mesh: LoadedMesh, nearest: Int32Array, borders: Border[]): BufferGeometry {
+  const whole = mesh.geometry;
+  const [positions, normals, values] = ["position", "normal", "value"].map((name) =>
+    whole.getAttribute(name),
+  );
+  const drawn: Record<"position" | "normal" | "value" | "tint", number[]> = {
+    position: [],
+    normal: [],
+    value: [],
+    tint: [],
+  };
+  for (const [face, pieces] of piecesByFace(mesh, borders)) {
+    const corners = mesh.corners(face);
+    const sources = corners.map((corner) => nearest[corner]!);
+    if (sources.some((source) => source < 0)) continue;
+    for (const { places, source } of divide(sources, pieces)) {
+      for (const [v, w] of places) {
+        const weights = [1 - v - w, v, w];
+        const at = (attribute: typeof positions, axis: number): number =>
+          weights.reduce(
+            (sum, weight, i) =>
+              sum + weight * attribute!.array[attribute!.itemSize * corners[i]! + axis]!,
+            0,
+          );
+        drawn.position.push(at(positions, 0), at(positions, 1), at(positions, 2));
+        drawn.normal.push(at(normals, 0), at(normals, 1), at(normals, 2));
+        drawn.value.push(at(values, 0));
+        drawn.tint.push(...territory(source));
+      }
+    }
+  }
+  const geometry = new BufferGeometry();
+  for (const [name, numbers] of Object.entries(drawn)) {
+    const size = name === "value" ? 1 : 3;
+    geometry.setAttribute(name, new BufferAttribute(Float32Array.from(numbers), size));
+  }
+  geometry.boundingSphere = whole.boundingSphere;
+  return geometry;
+}
+
+/** Return the pieces of borders in each face. */
+function piecesByFace(mesh: LoadedMesh, borders: Border[]): Map<number, Piece[]> {
+  const found = new Map<number, Piece[]>();
+  for (const { points, faces, sources } of borders) {
+    let last: Piece | null = null;
+    faces.forEach((face, i) => {
+      const next = points[(i + 1) % points.length]!;
+      if (last === null || face !== faces[i - 1]) {
+        last = { places: [placeIn(mesh, face, points[i]!)], sources };
+        const others = found.get(face);
+        if (others) others.push(last);
+        else found.set(face, [last]);
+      }
+      last.places.push(placeIn(mesh, face, next));
+    });
+  }
+  return found;
+}
+
+/** Return the weights of the second and third corner of a face at a position in it. */
+function placeIn(mesh: LoadedMesh, face: number, position: readonly number[]): [number, number] {
+  const [a, b, c] = mesh.corners(face).map((corner) => mesh.vertex(corner));
+  const [p, q, r] = [b!, c!, position].map((end) => end.map((x, axis) => x - a![axis]!));
+  const dot = (x: number[], y: number[]): number =>
+    x.reduce((sum, value, axis) => sum + value * y[axis]!, 0);
+  const [pp, pq, qq, rp, rq] = [dot(p!, p!), dot(p!, q!), dot(q!, q!), dot(r!, p!), dot(r!, q!)];
+  const spread = pp * qq - pq * pq;
+  if (!(spread > 0)) return [0, 0];
+  return [(qq * rp - pq * rq) / spread, (pp * rq - pq * rp) / spread];
+}

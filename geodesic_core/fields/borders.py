@@ -1,0 +1,261 @@
+"""Borders of territories: the edges of the geodesic Voronoi diagram of the sources.
+
+The territory of a source is the part of the surface that is nearer to it than to any other one.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.control import Control, in_slices
+from geodesic_core.fields.isolines import (
+    Arrays,
+    bytes_of,
+    field_of_windows,
+    joined,
+    starts_of,
+)
+from geodesic_core.fields.path import length_of
+from geodesic_core.fields.repeatable_sweep import RepeatableSweep, all_winners
+from geodesic_core.fields.sources import Nodes
+from geodesic_core.kernels.borders import lines, outlines, territories
+from geodesic_core.kernels.borders.outlines import Pieces
+from geodesic_core.kernels.borders.territories import Territories
+from geodesic_core.kernels.isolines.face_windows import FaceWindows, face_windows_of
+from geodesic_core.kernels.isolines.lines import Field
+from geodesic_core.kernels.mesh.half_edges import TAIL
+from geodesic_core.kernels.sweep.state import FACE
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.tolerances import LEVEL, PIECE
+
+RINGS = 2
+"""Rings of faces around those with vertices of several territories that borders are looked for in
+at first; where a border leads out of them, a second sweep looks farther."""
+
+
+@dataclass(frozen=True, slots=True)
+class Border:
+    """A polyline of points that are equally near to two sources, and no nearer to a third.
+
+    Between two of its points it lies in one face.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(200)  # the unit square
+    >>> (line,) = gc.exact_distance(mesh, [0, 10]).borders()  # its lower corners
+    >>> line.sources, line.closed, np.unique(line.points[:, 0].round(9)).tolist()
+    ((0, 1), False, [0.5])
+    """
+
+    sources: tuple[int, int]
+    """Indices into the sources of the field, the lower one first."""
+    points: Floats
+    """(K, 3) float64, mesh units"""
+    closed: bool
+    """True where the last point is joined to the first, which is not repeated."""
+    faces: Ints
+    """(K,) int32 of a closed line, (K - 1,) of an open one: the face behind each point."""
+
+    def __repr__(self) -> str:
+        kind = "closed" if self.closed else "open"
+        first, second = self.sources
+        return (
+            f"Border(sources {first} and {second}, {len(self.points)} points, {kind}, "
+            f"length {self.length:.6g})"
+        )
+
+    @property
+    def length(self) -> float:
+        """Sum of the distances between neighbouring points, mesh units."""
+        return length_of(np.vstack([self.points, self.points[:1]]) if self.closed else self.points)
+
+
+def swept_borders(
+    sweep: RepeatableSweep, nearest: Ints, chord_error: float, control: Control
+) -> list[Border]:
+    """Return the borders of an exact sweep, which is run for the windows near them.
+
+    ``nearest`` is the source of each inner vertex, as far as known before.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As the control says.
+    """
+    mesh, faces = sweep.mesh, _faces_of_several(sweep.mesh, sweep.nodes, nearest)
+    while True:
+        faces = _with_rings(mesh, faces, RINGS)
+        wave = sweep.run(control.for_part(0, 2), windows=faces)
+        control = control.for_part(1, 2)
+        drawn = _Drawing(
+            mesh,
+            face_windows_of(wave),
+            wave.vertices.distance,
+            all_winners(wave).nearest,
+            sweep,
+            faces,
+            chord_error,
+        )
+        part = control.for_part(0, 2)
+        borders = drawn.borders(part)
+        if borders is not None:
+            return borders
+        control = control.for_part(1, 2)
+        faces = _with_rings(mesh, drawn.faces, RINGS)
+
+
+def borders_of(
+    sweep: RepeatableSweep,
+    windows: FaceWindows,
+    distances: Floats,
+    nearest: Ints,
+    chord_error: float,
+    control: Control,
+) -> list[Border]:
+    """Return the borders of an exact sweep that retained all windows.
+
+    ``distances`` and ``nearest`` are by node. O(windows), and O(n³) for n windows that are nearest
+    somewhere in a face, in each face that borders cross.
+
+    Raises
+    ------
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As the control says; what the lines are drawn from counts as memory of the call.
+    """
+    drawing = _Drawing(sweep.mesh, windows, distances, nearest, sweep, sweep.all_faces, chord_error)
+    found = drawing.borders(control)
+    return [] if found is None else found  # all faces have their windows
+
+
+class _Drawing:
+    """Borders of a finished sweep, in the faces whose windows it retained."""
+
+    def __init__(
+        self,
+        mesh: TriangleMesh,
+        windows: FaceWindows,
+        distances: Floats,
+        nearest: Ints,
+        sweep: RepeatableSweep,
+        faces: Flags,
+        chord_error: float,
+    ) -> None:
+        self.faces = faces.copy()
+        """Faces that borders may pass; `borders` sets those that they pass, too"""
+        self._mesh, self._nearest, self._chord_error = mesh, nearest, chord_error
+        self._field: Field = field_of_windows(windows, distances, sweep.nodes)
+        # At its very limit the sweep is cut off by rounding: lines stay clear of that.
+        self._limit = sweep.bounds.max_distance * (1.0 - 3.0 * LEVEL)
+        self._nbytes = bytes_of([(*windows, distances, nearest)])
+
+    def borders(self, control: Control) -> list[Border] | None:
+        """Return the borders; None where they leave the faces whose windows are there."""
+        control.check_memory(self._nbytes)
+        topology, field = self._mesh.topology, self._field
+        mixed: Any = np.zeros(len(self.faces), np.bool_)
+
+        def mix(first: int, last: int) -> int:
+            territories.mixed_faces(topology, field, self._nearest, self._limit, first, last, mixed)
+            return len(mixed)
+
+        in_slices(len(mixed), mix, control.for_part(0, 4))
+        candidates = np.flatnonzero(mixed & self.faces).astype(np.int32)
+        if len(candidates) == 0:
+            return []
+        rank = np.full(len(mixed), -1, np.int32)
+        control = control.holding(self._nbytes + rank.nbytes)
+        divided = self._divided(candidates, rank, control.for_part(1, 4, 2))
+        if divided is None:
+            return None
+        labelled = outlines.cross_edges(topology, divided, rank)
+        parts: list[Arrays] = []
+        next_node = len(labelled.sources)
+        near = PIECE * float(field.distance.max(where=np.isfinite(field.distance), initial=0.0))
+
+        def trace(first: int, last: int) -> int:
+            nonlocal next_node
+            found = outlines.trace_borders(
+                topology, divided, labelled, near, self._chord_error, first, last, next_node
+            )
+            parts.append(found[:-1])
+            next_node = found[-1]
+            control.check_memory(bytes_of(parts))
+            return len(divided.faces)
+
+        in_slices(len(divided.faces), trace, control.for_part(3, 4))
+        points, points_of, nodes, faces, sources = joined(parts)
+        pieces = Pieces(points, starts_of(points_of), nodes, faces, sources)
+        linked = lines.link_pieces(topology.links, labelled, pieces, next_node, near)
+        return self._lines(*linked)
+
+    def _divided(self, candidates: Ints, rank: Ints, control: Control) -> Territories | None:
+        """Divide the candidates, and the neighbours that borders lead to; None as for `borders`.
+
+        ``rank`` (F,) is -1 all over; the call sets it to the row of each face among those divided.
+        """
+        rank[candidates] = np.arange(len(candidates))
+        faces = candidates[:, None]
+        retained, parts = self.faces.copy(), list[Arrays]()
+
+        def divide(first: int, last: int) -> int:
+            nonlocal faces
+            found = territories.divide_faces(
+                self._mesh.topology,
+                self._field,
+                self._nearest,
+                self._limit,
+                faces[first:last],
+                len(faces),
+                rank,
+            )
+            parts.append(found[:-1])
+            faces = np.concatenate([faces, found[-1]])
+            control.check_memory(faces.nbytes + bytes_of(parts))
+            return len(faces)
+
+        in_slices(len(faces), divide, control)
+        self.faces[faces[:, 0]] = True
+        if not retained[faces[:, 0]].all():
+            return None
+        runs, runs_of, curves, curves_of = joined(parts)
+        return Territories(faces, runs, starts_of(runs_of), curves, starts_of(curves_of))
+
+    def _lines(
+        self, points: Floats, faces: Ints, first: Longs, closed: Flags, sources: Ints
+    ) -> list[Border]:
+        bounds = zip(
+            first[:-1].tolist(), first[1:].tolist(), closed.tolist(), sources.tolist(), strict=True
+        )
+        return [
+            Border(
+                sources=(lower, higher),
+                points=points[lo:hi] + self._mesh.origin,
+                closed=bool(is_closed),
+                faces=self._mesh.topology.outer_face[faces[lo : hi if is_closed else hi - 1]],
+            )
+            for lo, hi, is_closed, (lower, higher) in bounds
+        ]
+
+
+def _faces_of_several(mesh: TriangleMesh, nodes: Nodes, nearest: Ints) -> Flags:
+    """Flag the inner faces with vertices of two territories, and those that sources lie in."""
+    corners = nearest[mesh.topology.links[:, TAIL].reshape(-1, 3)]
+    highest = corners.max(axis=1)
+    lowest = np.where(corners < 0, highest[:, None], corners).min(axis=1)
+    flags: Flags = lowest != highest
+    flags[nodes.sites.ints[: nodes.first_target, FACE]] = True
+    flags[nodes.sites.segment_ints[:, FACE]] = True
+    return flags
+
+
+def _with_rings(mesh: TriangleMesh, faces: Flags, rings: int) -> Flags:
+    """Return the flags of inner faces with those of some rings around them."""
+    corners = mesh.topology.links[:, TAIL].reshape(-1, 3)
+    for _ in range(rings):
+        touched = np.zeros(len(mesh.topology.flags), np.bool_)
+        touched[corners[faces]] = True
+        widened: Any = touched[corners].any(axis=1)
+        faces = widened
+    return faces

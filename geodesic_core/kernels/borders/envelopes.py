@@ -1,0 +1,189 @@
+"""The lower envelope along an edge: which region of a face is the nearest at each of its points.
+
+Along an edge the distance function of a region is σ + √((t - m)² + h²), or linear, within the
+interval that its sides leave. Two of them cross at most twice. The envelope is built region by
+region; of regions that are equally near, the one that came first stays.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from geodesic_core.arrays import Floats
+from geodesic_core.kernels.borders.bisectors import distance_to, linear
+from geodesic_core.kernels.isolines.arcs import ROWS, with_room
+from geodesic_core.kernels.isolines.regions import (
+    CX,
+    CY,
+    DEPTH,
+    FRONT,
+    NX,
+    NY,
+    RADIUS,
+    SIDE,
+    end_of_sides,
+    is_line,
+    span_in_half_plane,
+)
+from geodesic_core.kernels.jit import borrowed, inlined, kernel
+
+# Columns of a stretch of the envelope
+START = 0  # distance from the tail of the edge
+REGION = 1  # the nearest region; -1 where none reaches
+STRETCH = 2
+
+
+@kernel
+def span_of(region: Floats, edge: Any, length: float) -> tuple[float, float]:
+    """Return the interval of an edge between the sides of a region; empty where lo > hi."""
+    ox, oy, ux, uy = edge
+    wx, wy = ox - region[CX], oy - region[CY]
+    lo, hi = 0.0, length
+    for side in range(FRONT, end_of_sides(region), SIDE):
+        nx, ny = region[side + NX], region[side + NY]
+        depth = region[side + DEPTH] + nx * wx + ny * wy
+        lo, hi = span_in_half_plane(lo, hi, depth, nx * ux + ny * uy)
+    return lo, hi
+
+
+@kernel
+def along_edge(region: Floats, level: float, edge: Any) -> tuple[float, float, float, float, float]:
+    """Return weight, m, h², and the linear part, start and rate, of the distance along an edge."""
+    ox, oy, ux, uy = edge
+    if is_line(region):
+        m, nx, ny = linear(region, level)
+        return 0.0, 0.0, 0.0, m + nx * ox + ny * oy, nx * ux + ny * uy
+    dx, dy = region[CX] - ox, region[CY] - oy
+    height = ux * dy - uy * dx
+    return 1.0, ux * dx + uy * dy, height * height, level - region[RADIUS], 0.0
+
+
+@kernel
+def crossings_of(region: Floats, other: Floats, level: float, edge: Any) -> tuple[float, float]:
+    """Return places along an edge; where two regions are equally near, it is at one of these.
+
+    They solve the squared equation, NaN for none.
+    """
+    weight, m, square, start, rate = along_edge(region, level, edge)
+    weight1, m1, square1, start1, rate1 = along_edge(other, level, edge)
+    # weight √((t - m)² + h²) - weight1 √((t - m1)² + h1²) = c + r t
+    c, r = start1 - start, rate1 - rate
+    if weight == 0.0 and weight1 == 0.0:
+        return (-c / r if r != 0.0 else math.nan), math.nan
+    if weight > 0.0 and weight1 > 0.0:  # squared: (at + slope s)² = k² (s² + h1²), s = t - m1
+        slope, k, shift = 2.0 * (m1 - m), 2.0 * c, m1
+        at = (m1 - m) * (m1 - m) + square - square1 - c * c
+        square = square1
+    else:
+        shift = m if weight > 0.0 else m1
+        square, slope, k, at = max(square, square1), r, 1.0, c + r * shift
+    p, half = (slope - k) * (slope + k), slope * at
+    if p == 0.0:
+        last = at * at - k * k * square
+        return (shift - 0.5 * last / half if half != 0.0 else math.nan), math.nan
+    root = -(half + math.copysign(abs(k) * math.sqrt(max(at * at + square * p, 0.0)), half))
+    first = shift + root / p
+    second = shift + (at * at - k * k * square) / root if root != 0.0 else first
+    return min(first, second), max(first, second)
+
+
+@kernel
+def envelope_along(
+    regions: Floats, labels: Any, level: float, edge: Any, length: float, slack: float
+) -> Floats:
+    """Return the envelope of the regions of a face along one of its edges, by its stretches.
+
+    A region of another source must be nearer by ``slack`` to replace what is there.
+    """
+    regions, labels = borrowed(regions), borrowed(labels)
+    stretches, count = np.empty((ROWS, STRETCH)), 1
+    stretches[0, START], stretches[0, REGION] = 0.0, -1
+    other = np.empty((ROWS, STRETCH))
+    for c in range(len(regions)):
+        lo, hi = span_of(regions[c], edge, length)
+        if not lo < hi:
+            continue
+        other = with_room(other, 4 * count + 8)
+        size = insert_region(stretches[:count], regions, labels, c, (lo, hi), level, edge, length,
+                             slack, other)  # fmt: skip
+        stretches, other, count = other, stretches, size
+    return stretches[:count]
+
+
+@kernel
+def insert_region(
+    stretches: Floats, regions: Floats, labels: Any, c: int, span: Any, level: float, edge: Any,
+    length: float, slack: float, out: Floats,
+) -> int:  # fmt: skip
+    """Write the envelope with region c, within ``span``, to ``out``; return its stretches."""
+    ox, oy, ux, uy = edge
+    lo, hi = span
+    cuts, size = np.empty(6), 0
+    for k in range(len(stretches)):
+        start, i = stretches[k, START], int(stretches[k, REGION])
+        end = stretches[k + 1, START] if k + 1 < len(stretches) else length
+        if hi <= start or lo >= end:
+            size = append_stretch(out, size, start, i)
+            continue
+        a, b = max(lo, start), min(hi, end)
+        if a > start:
+            size = append_stretch(out, size, start, i)
+        cuts[0], number = a, 1
+        if i >= 0:
+            first, second = crossings_of(regions[c], regions[i], level, edge)
+            if a < first < b:
+                cuts[number] = first
+                number += 1
+            if a < second < b and second > first:
+                cuts[number] = second
+                number += 1
+        cuts[number] = b
+        for n in range(number):
+            t = 0.5 * (cuts[n] + cuts[n + 1])
+            winner = c
+            if i >= 0:
+                x, y = ox + t * ux, oy + t * uy
+                margin = slack if labels[i, 0] != labels[c, 0] else 0.0
+                if not (
+                    distance_to(regions[c], level, x, y)
+                    < distance_to(regions[i], level, x, y) - margin
+                ):
+                    winner = i
+            size = append_stretch(out, size, cuts[n], winner)
+        if b < end:
+            size = append_stretch(out, size, b, i)
+    return size
+
+
+@inlined
+def append_stretch(out: Floats, size: int, start: float, region: int) -> int:
+    """Append a stretch, or prolong the last one of the same region; return the new number."""
+    if size > 0 and out[size - 1, REGION] == region:
+        return size
+    out[size, START], out[size, REGION] = start, region
+    return size + 1
+
+
+@kernel
+def label_runs(stretches: Floats, labels: Any, ends: Any, length: float, gap: float) -> Floats:
+    """Return where the nearest source changes along an edge: rows of its place and the new source.
+
+    The first row is at the tail, 0. ``ends`` are the sources of the tail and of the head, which the
+    runs begin and end with. Runs shorter than ``gap``, and stretches that nothing reaches, are left
+    out; places keep as far from the ends.
+    """
+    runs, count = np.empty((len(stretches) + 2, 2)), 1
+    runs[0, 0], runs[0, 1] = 0.0, ends[0]
+    for k in range(len(stretches)):
+        region = int(stretches[k, REGION])
+        end = stretches[k + 1, START] if k + 1 < len(stretches) else length
+        start = min(max(stretches[k, START], gap), length - gap)
+        if region < 0 or end - start <= gap or labels[region, 0] == runs[count - 1, 1]:
+            continue
+        runs[count, 0], runs[count, 1] = start, labels[region, 0]
+        count += 1
+    if runs[count - 1, 1] != ends[1]:
+        runs[count, 0], runs[count, 1] = length - gap, ends[1]
+        count += 1
+    return runs[:count]

@@ -1,0 +1,220 @@
+"""The borders in one face, and where they cross its edges.
+
+The nearest region of each point of a face lies around its centre like a star: what is nearest at a
+point is so on the whole ray to there. So a window that is nearest anywhere in the face is nearest
+somewhere on the half-edge that it crosses, and the envelopes along the three edges tell which
+regions count.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from geodesic_core.arrays import Flags, Floats, Ints
+from geodesic_core.kernels.borders import envelopes
+from geodesic_core.kernels.borders.bisectors import BISECTOR, bisectors_within
+from geodesic_core.kernels.isolines.arcs import ROWS, with_room
+from geodesic_core.kernels.isolines.regions import (
+    CX,
+    CY,
+    ORIGIN,
+    OVER,
+    RADIUS,
+    REGION,
+    is_line,
+    put_side,
+    regions_of_face,
+    rows_in_face,
+)
+from geodesic_core.kernels.jit import borrowed, kernel
+from geodesic_core.kernels.mesh.half_edges import (
+    HEAD,
+    LENGTH,
+    LENGTH_LEFT,
+    TAIL,
+    half_edge_in_face,
+    next_around,
+)
+from geodesic_core.kernels.sweep.state import FACE, NODE
+from geodesic_core.kernels.sweep.window import ROOT
+from geodesic_core.tolerances import CROSSING, GAP, LEVEL, PIECE
+
+
+class Territories(NamedTuple):
+    """The faces that borders may pass, with the borders there and the sources along their edges."""
+
+    faces: Ints
+    """(n, 1)"""
+    runs: Floats
+    """(R, 2): runs of one nearest source along half-edges: where each begins, and the source"""
+    first_run: Ints
+    """(3n + 1, 1): of each half-edge of the faces"""
+    bisectors: Floats
+    """(B, BISECTOR)"""
+    first_bisector: Ints
+    """(n + 1, 1): of each face"""
+
+
+@kernel
+def label_at(field: Any, nearest: Ints, node: int, limit: float) -> int:
+    """Return the source of a node; -1 where it is farther away than ``limit``."""
+    return nearest[node] if field.distance[node] <= limit else -1
+
+
+@kernel
+def mixed_faces(
+    topology: Any, field: Any, nearest: Ints, limit: float, first: int, last: int, mixed: Flags
+) -> None:
+    """Flag the faces from ``first`` up to ``last`` that windows, or points, of two sources reach.
+
+    Writes to ``mixed`` (F,). O(windows of the faces).
+    """
+    windows = field.face_windows
+    ints = windows.windows.view(np.int32)
+    for face in range(first, last):
+        label = label_at(field, nearest, topology.links[3 * face, TAIL], limit)
+        for h in range(3 * face, 3 * face + 3):
+            node = topology.links[h, TAIL]
+            if label_at(field, nearest, node, limit) != label:
+                mixed[face] = True
+            for i in range(windows.first[h], windows.first[h + 1]):
+                if nearest[ints[i, ROOT]] != label:
+                    mixed[face] = True
+    for rows in (field.site_ints, field.segment_ints):
+        begin, end = rows_in_face(rows, first)[0], rows_in_face(rows, last)[0]
+        for k in range(begin, end):
+            face = rows[k, FACE]
+            label = label_at(field, nearest, topology.links[3 * face, TAIL], limit)
+            if nearest[rows[k, NODE]] != label:
+                mixed[face] = True
+
+
+@kernel
+def level_of_face(topology: Any, field: Any, face: int, limit: float) -> float:
+    """Return a distance that no point of a face exceeds, or ``limit``."""
+    level = limit
+    for h in range(3 * face, 3 * face + 3):
+        farthest = max(topology.geometry[h, LENGTH], topology.geometry[h, LENGTH_LEFT])
+        level = min(level, field.distance[topology.links[h, TAIL]] + farthest)
+    return level
+
+
+@kernel
+def labelled_regions(
+    topology: Any, field: Any, nearest: Ints, face: int, level: float, limit: float
+) -> tuple[Floats, Ints]:
+    """Return the regions of a face and the source of each, (n, 1).
+
+    The last one stands for no source, -1, where the face is not all within ``limit``: it is
+    everywhere at that distance.
+    """
+    regions = regions_of_face(topology, field, face, level)
+    count = len(regions)
+    labels = np.full((count + 1, 1), -1, np.int32)
+    for i in range(count):
+        labels[i, 0] = nearest[int(regions[i, ORIGIN])]
+    if level < limit:
+        return regions, labels[:count]
+    beyond = np.zeros((count + 1, REGION))
+    beyond[:count] = regions
+    beyond[count, RADIUS], beyond[count, OVER] = np.inf, -1
+    return beyond, labels
+
+
+@kernel
+def divide_faces(
+    topology: Any, field: Any, nearest: Ints, limit: float, faces: Ints, known: int, row_of: Ints
+) -> tuple[Floats, Ints, Floats, Ints, Ints]:
+    """Find the borders in some of the faces that they may pass; ``faces`` (n, 1) are their numbers.
+
+    Returns the runs and the bisectors, each as `Territories` has them, followed by their number for
+    each half-edge and for each face. Last come neighbours that borders lead to. ``row_of`` (F,) is
+    the row of each face among all that are to be divided, -1 for none. There are ``known`` rows;
+    those of the neighbours follow, and are written to ``row_of``.
+    """
+    topology, field = borrowed(topology), borrowed(field)
+    links, geometry = topology.links, topology.geometry
+    runs, run_count = np.empty((ROWS, 2)), 0
+    curves, curve_count = np.empty((ROWS, BISECTOR)), 0
+    runs_of = np.empty((3 * len(faces), 1), np.int32)
+    curves_of = np.empty((len(faces), 1), np.int32)
+    found, count = np.empty((ROWS, 1), np.int32), 0
+    for k in range(len(faces)):
+        f = faces[k, 0]
+        level = level_of_face(topology, field, f, limit)
+        regions, labels = labelled_regions(topology, field, nearest, f, level, limit)
+        slack = LEVEL * level
+        seen = np.empty((len(regions), 2))  # the stretch of its edge on which each is nearest
+        seen[:, 0], seen[:, 1] = np.inf, -np.inf
+        first_run, is_divided = run_count, False
+        for h in range(3 * f, 3 * f + 3):
+            edge, length = half_edge_in_face(geometry, h), geometry[h, LENGTH]
+            stretches = envelopes.envelope_along(regions, labels, level, edge, length, slack)
+            for i in range(len(stretches)):
+                region = int(stretches[i, envelopes.REGION])
+                if region >= 0 and regions[region, OVER] == h % 3:
+                    end = stretches[i + 1, envelopes.START] if i + 1 < len(stretches) else length
+                    seen[region, 0] = min(seen[region, 0], stretches[i, envelopes.START])
+                    seen[region, 1] = max(seen[region, 1], end)
+            ends = (
+                label_at(field, nearest, links[h, TAIL], limit),
+                label_at(field, nearest, links[h, HEAD], limit),
+            )
+            own = envelopes.label_runs(stretches, labels, ends, length, CROSSING * length)
+            runs = with_room(runs, run_count + len(own))
+            for i in range(len(own)):
+                runs[run_count, 0], runs[run_count, 1] = own[i, 0], own[i, 1]
+                is_divided = is_divided or own[i, 1] != runs[first_run, 1]
+                run_count += 1
+            runs_of[3 * (k - f) + h, 0] = len(own)
+            g = next_around(links, h) if leads_on(own) else -1
+            while g >= 0 and g != h:
+                if row_of[g // 3] < 0:
+                    found = with_room(found, count + 1)
+                    found[count, 0], row_of[g // 3] = g // 3, known + count
+                    count += 1
+                g = next_around(links, g)
+        chosen, chosen_labels, size = np.empty(regions.shape), np.empty(labels.shape, np.int32), 0
+        for i in range(len(regions)):
+            if seen[i, 0] < seen[i, 1] or regions[i, OVER] < 0:
+                if regions[i, OVER] >= 0:
+                    narrow(geometry, 3 * f + int(regions[i, OVER]), regions[i], seen[i])
+                chosen[size], chosen_labels[size, 0] = regions[i], labels[i, 0]
+                is_divided = is_divided or labels[i, 0] != runs[first_run, 1]
+                size += 1
+        curves_of[k, 0] = 0
+        if is_divided:
+            own_curves = bisectors_within(
+                topology, f, chosen[:size], chosen_labels[:size], level, slack, PIECE * level
+            )
+            curves = with_room(curves, curve_count + len(own_curves))
+            curves[curve_count : curve_count + len(own_curves)] = own_curves
+            curve_count += len(own_curves)
+            curves_of[k, 0] = len(own_curves)
+    return runs[:run_count], runs_of, curves[:curve_count], curves_of, found[:count]
+
+
+@kernel
+def narrow(geometry: Floats, h: int, region: Floats, seen: Floats) -> None:
+    """Narrow the disc of a window over h to the rays through a stretch of h, widened by `GAP`."""
+    if is_line(region):
+        return
+    ox, oy, ux, uy = half_edge_in_face(geometry, h)
+    gap = GAP * geometry[h, LENGTH]
+    for end in range(2):
+        t = seen[0] - gap if end == 0 else seen[1] + gap
+        dx, dy = ox + t * ux - region[CX], oy + t * uy - region[CY]
+        length = math.hypot(dx, dy)
+        if length > 0.0:
+            turn = 1.0 if (ux * -dy + uy * dx > 0.0) == (end == 0) else -1.0
+            put_side(region, end, -turn * dy / length, turn * dx / length, 0.0)
+
+
+@kernel
+def leads_on(runs: Floats) -> bool:
+    """Whether a border of two sources crosses the edge with these runs."""
+    for i in range(1, len(runs)):  # noqa: SIM110 - numba has no generators in any()
+        if runs[i - 1, 1] >= 0 and runs[i, 1] >= 0:
+            return True
+    return False
