@@ -16,6 +16,7 @@ pytest_plugins = [
     "tests.support.databases",
     "tests.support.logs",
     "tests.support.postgres",
+    "tests.support.redis",
     "tests.support.s3",
     "tests.support.service",
 ]

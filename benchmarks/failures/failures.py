@@ -1,0 +1,134 @@
+"""What can fail in a deployment, and the refusals that are documented for it."""
+
+import os
+import signal
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from tests.support.deployment import Deployment, Part, Replica
+from tests.support.processes import total_time
+from tests.support.waiting import wait_until
+
+AWAY_S = 10.0
+LONG_AWAY_S = 300.0
+RESTART_S = 2.0
+"""Seconds until whatever supervises a command runs it again"""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Something that fails, until it is mended, or started again by whatever supervises it."""
+
+    name: str
+    happen: Callable[[Deployment], None]
+    refusals: Sequence[tuple[int, str]] = ()
+    """Statuses and codes that clients may see because of it"""
+    breaks: Callable[[Deployment], Replica | None] = field(default=lambda _: None)
+    """The replica whose connections end"""
+    orphans: Callable[[Deployment], Sequence[Part]] = field(default=lambda _: ())
+    """Nodes that may have work whose replica cannot be reached"""
+
+
+def busiest(deployment: Deployment) -> tuple[Part, int]:
+    """Return the node and the worker that compute most."""
+
+    def taken() -> dict[int, int]:
+        return {pid: total_time([pid]) for node in deployment.nodes for pid in node.workers()}
+
+    before: dict[int, int] = {}
+
+    def is_busy() -> bool:
+        nonlocal before
+        now = taken()
+        gains = {pid: now[pid] - before.get(pid, now[pid]) for pid in now}
+        before = now
+        if max(gains.values(), default=0) < 1e7:
+            return False
+        found.append(max(gains, key=lambda pid: gains[pid]))
+        return True
+
+    found: list[int] = []
+    wait_until(is_busy)
+    node = next(each for each in deployment.nodes if found[0] in each.workers())
+    return node, found[0]
+
+
+def kill_worker(deployment: Deployment) -> None:
+    """Kill the worker that computes."""
+    os.kill(busiest(deployment)[1], signal.SIGKILL)
+
+
+def kill_host(deployment: Deployment) -> None:
+    """Take the power of the machine that computes; it comes back."""
+    node, _ = busiest(deployment)
+    node.kill()
+    time.sleep(RESTART_S)
+    node.start()
+
+
+def cut_host_off(deployment: Deployment) -> None:
+    """Pull the cable of the machine that computes, and put it back."""
+    node, _ = busiest(deployment)
+    with node.machine.cut_off():
+        time.sleep(2 * AWAY_S)
+
+
+def _kill_head(seconds: float) -> Callable[[Deployment], None]:
+    def kill_head(deployment: Deployment) -> None:
+        deployment.head.kill()
+        time.sleep(seconds)
+        deployment.head.start()
+
+    return kill_head
+
+
+def take_store_away(deployment: Deployment) -> None:
+    """Have the object store answer nothing for a while."""
+    with deployment.s3.away():
+        time.sleep(AWAY_S)
+
+
+def restart_database(deployment: Deployment) -> None:
+    """Crash PostgreSQL, and start it again."""
+    deployment.postgres.stop()
+    time.sleep(RESTART_S)
+    deployment.postgres.start()
+
+
+def kill_replica(deployment: Deployment) -> None:
+    """Take the power of the machine of the second replica; it comes back."""
+    replica = deployment.replicas[1]
+    replica.kill()
+    time.sleep(AWAY_S)
+    replica.start()
+
+
+def drain_node(deployment: Deployment) -> None:
+    """End the node that computes in order, as for an upgrade, and start it again."""
+    node, _ = busiest(deployment)
+    node.end()
+    time.sleep(RESTART_S)
+    node.start()
+
+
+NO_STORE = ((503, "store_unavailable"),)
+FAILURES = (
+    Failure("nothing", lambda _: None),
+    Failure("a worker is killed", kill_worker, ((500, "worker_died"),)),
+    Failure("a host is killed, and comes back", kill_host),
+    Failure("a host is cut off for 20 s", cut_host_off, orphans=lambda each: each.nodes),
+    Failure("the head is killed, and comes back after 10 s", _kill_head(AWAY_S)),
+    Failure("the head is killed, and comes back after 5 minutes", _kill_head(LONG_AWAY_S)),
+    Failure("the store does not answer for 10 s", take_store_away, NO_STORE),
+    Failure(
+        "PostgreSQL crashes, and is started again", restart_database, ((503, "state_unavailable"),)
+    ),
+    Failure(
+        "a replica is killed, and comes back after 10 s",
+        kill_replica,
+        breaks=lambda each: each.replicas[1],
+        orphans=lambda each: each.nodes,
+    ),
+    Failure("a node is drained by SIGTERM", drain_node),
+)
