@@ -27,6 +27,8 @@ class SleepingEngine:
 
     def __init__(self) -> None:
         self.seconds = 8.0
+        self.queue_s = 0.0
+        """What results say that they have waited"""
         self.refusal: ProblemError | None = None
         self.begun: list[Task] = []
         self.ended: list[str] = []
@@ -67,7 +69,7 @@ class SleepingEngine:
         finally:
             self.running -= 1
         self.ended.append("done")
-        return TaskResult({"queue": 0.0, "compute": self.seconds})
+        return TaskResult({"queue": self.queue_s, "compute": self.seconds})
 
 
 class FakeCluster:
