@@ -3,9 +3,9 @@
 from pathlib import Path
 
 from benchmarks.failures.failures import FAILURES
+from benchmarks.failures.plan import make_load
 from benchmarks.failures.report import write_report
-from benchmarks.failures.trial import SCALE, SETTINGS, try_out
-from benchmarks.soak.reference import make_plan
+from benchmarks.failures.trial import SETTINGS, try_out
 from tests.support.deployment import deployed
 from tests.support.machines import obstacle
 
@@ -14,7 +14,9 @@ def run(path: Path) -> str:
     """Let each failure happen; write the report into ``path`` and return it."""
     if obstacle():
         raise RuntimeError(obstacle())
-    plan = make_plan(SCALE)
+    load, trials, text = make_load(), [], ""
     with deployed(**SETTINGS) as deployment:
-        trials = [try_out(deployment, plan, failure) for failure in FAILURES]
-    return write_report(trials, path)
+        for failure in FAILURES:
+            trials.append(try_out(deployment, load, failure))
+            text = write_report(trials, path)  # each time, for those who cannot wait
+    return text

@@ -16,11 +16,13 @@ import gevent
 import locust
 from locust.env import Environment
 
+from benchmarks.failures.plan import LongQuestion
 from benchmarks.soak.plan import Request
 from benchmarks.soak.traffic import ASYNC, DICE, LIMITS, LONG_S, Founder, User, recording, store
 
 NO_CONNECTION = (0, "")
 LOOK_S = 0.2
+RECONNECT_S = 1.0
 ENDED = ("successful", "failed", "dismissed")
 
 
@@ -38,8 +40,15 @@ class Client(User):
         super().__init__(environment)
 
     def note_promise(self, **promise: object) -> None:
-        """Note a job or a mesh that was answered with 2xx."""
+        """Note a job or a mesh that was answered with 2xx, or that such a job was kept."""
         self.promises.write(json.dumps({"caller": self.caller} | promise) + "\n")
+
+    def exchange(self, *arguments: Any, **options: Any) -> Any:
+        """Send something; where nobody listens, wait before anything else is sent."""
+        response = super().exchange(*arguments, **options)
+        if response.status_code == 0:
+            gevent.sleep(RECONNECT_S)
+        return response
 
     def is_refused(self, response: Any) -> bool:
         """Whether an answer is a refusal that may come, after which one asks again."""
@@ -62,11 +71,12 @@ class LongAsker(Client):
 
     fixed_count = 2
     wait_time = locust.constant(0)
+    question: ClassVar[LongQuestion]
 
     @locust.task
     def ask(self) -> None:
         """Ask for an answer of some seconds."""
-        self.send(DICE.choice(self.plan.long_queries))
+        self.send(self.question.shuffled(DICE))
 
 
 class Worker(Client):
@@ -92,7 +102,10 @@ class Worker(Client):
             if looked.status_code == 200:
                 status = looked.json()["status"]
         if status == "successful":  # how others ended is seen afterwards
-            self.send(Request("getJobResults", "GET", f"{link}/results", expected=request.expected))
+            results = Request("getJobResults", "GET", f"{link}/results", expected=request.expected)
+            if self.send(results).status_code == 200:
+                self.note_promise(kept=link)
+                self.exchange("dismissJob", "DELETE", link, 200, 404)  # or an answer went astray
 
     def submit(self, request: Request, headers: dict[str, str]) -> Any:
         """Send a query as a job; return the answer."""
@@ -118,14 +131,15 @@ class Uploader(Client):
 def main() -> None:
     """Send traffic to replicas until terminated."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.failures.traffic")
-    parser.add_argument("plan", type=Path, help="a pickled Plan")
+    parser.add_argument("load", type=Path, help="a pickled Load")
     parser.add_argument("record", type=Path, help="where each request becomes a line of JSON")
     parser.add_argument("promises", type=Path, help="where each promise becomes a line of JSON")
     parser.add_argument("urls", nargs="+", help="of the replicas")
     parser.add_argument("--refusal", action="append", default=[], metavar="STATUS,CODE")
     parser.add_argument("--breaks", action="store_true", help="connections may end")
     arguments = parser.parse_args()
-    User.plan = pickle.loads(arguments.plan.read_bytes())  # noqa: S301 - written by our parent
+    load = pickle.loads(arguments.load.read_bytes())  # noqa: S301 - written by our parent
+    User.plan, LongAsker.question = load.plan, load.long
     refusals = {(int(each[:3]), each[4:]) for each in arguments.refusal}
     User.refusals = LIMITS | refusals | ({NO_CONNECTION} if arguments.breaks else set())
     Client.hosts, kinds = arguments.urls, [Asker, LongAsker, Worker, Uploader]

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 import pytest
 
 from benchmarks.failures.failures import FAILURES, Failure
-from benchmarks.failures.trial import SCALE, SETTINGS, try_out
-from benchmarks.soak.plan import Plan
-from benchmarks.soak.reference import make_plan
+from benchmarks.failures.plan import Load, make_load
+from benchmarks.failures.trial import SETTINGS, try_out
 from tests.support.deployment import Deployment, deployed
 from tests.support.machines import obstacle
 
@@ -19,8 +18,8 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def plan() -> Plan:
-    return make_plan(SCALE)
+def load() -> Load:
+    return make_load()
 
 
 @pytest.fixture(scope="module")
@@ -31,10 +30,10 @@ def deployment() -> Iterator[Deployment]:
 
 @pytest.mark.parametrize("failure", FAILURES, ids=lambda each: each.name)
 def test_nobody_gets_a_wrong_answer_and_nothing_is_lost(
-    deployment: Deployment, plan: Plan, failure: Failure
+    deployment: Deployment, load: Load, failure: Failure
 ) -> None:
     """Answers are right or a documented refusal, and all is as before without a hand."""
-    trial = try_out(deployment, plan, failure)
+    trial = try_out(deployment, load, failure)
 
     assert list(trial.faults) == []
     assert list(trial.lost) == []
