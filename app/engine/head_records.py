@@ -1,4 +1,4 @@
-"""Where a head keeps its records: in a folder of its machine, or in a Redis or Valkey."""
+"""The records of a head, in a folder of its machine or in a Redis or Valkey."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress

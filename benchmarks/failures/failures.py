@@ -1,4 +1,4 @@
-"""What can fail in a deployment, and the refusals that are documented for it."""
+"""Failures of a deployment, and the refusals that are documented for them."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""What a trial sends: the requests of the soak, and long questions that never are the same."""
+"""The load of a trial: the requests of the soak, and long questions that never are the same."""
 
 import json
 from collections.abc import Sequence
