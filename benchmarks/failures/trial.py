@@ -103,9 +103,10 @@ def try_out(deployment: Deployment, load: Load, failure: Failure) -> Trial:
         _restore(deployment)
         with _traffic(deployment, load, failure, folder) as record:
             _wait_for_answers(record, BEFORE)
+            chosen = failure.choose(deployment)
             with _stopped_work(failure.orphans(deployment)) as orphans:
                 begin = time.monotonic()
-                failure.happen(deployment)
+                failure.happen(deployment, chosen)
                 end = time.monotonic()
                 restarts = _restore(deployment)
                 as_before = time.monotonic()
