@@ -3,7 +3,7 @@
 import re
 import subprocess
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,8 +42,8 @@ class Part:
     def kill(self) -> None:
         """End all that the machine runs, at once."""
         self.machine.kill()
-        assert self.process is not None
-        self.process.wait()
+        if self.process is not None:
+            self.process.wait()
 
     def end(self) -> int:
         """Have the command end in order; return its exit code."""
@@ -68,7 +68,6 @@ class Replica(Part):
         return httpx2.get(self.url + path, headers=headers, timeout=LONG_S)
 
     def listens(self) -> bool:
-        assert self.is_running, self.log.read_text()
         return self._answers("/livez")
 
     def is_ready(self) -> bool:
@@ -134,16 +133,25 @@ class Deployment:
     def start(self) -> None:
         """Start all parts; a replica makes the store, which nodes need."""
         self.head.start()
-        wait_until(lambda: b"the head listens" in self.head.log.read_bytes())
+        self._wait_for(lambda: b"the head listens" in self.head.log.read_bytes())
         for replica in self.replicas:
             replica.start()
-        wait_until(lambda: all(replica.listens() for replica in self.replicas))
+        self._wait_for(lambda: all(replica.listens() for replica in self.replicas))
         for node in self.nodes:
             node.start()
 
+    def _wait_for(self, condition: Callable[[], bool]) -> None:
+        """Wait, and start again what ends meanwhile: a busy machine may be too slow for Ray."""
+
+        def is_so() -> bool:
+            self.supervise()
+            return condition()
+
+        wait_until(is_so)
+
     def supervise(self) -> Sequence[str]:
         """Start again what has ended, as systemd would; return the names."""
-        ended = [part for part in self.parts if not part.is_running]
+        ended = [part for part in self.parts if part.process and not part.is_running]
         for part in ended:
             part.machine.kill()  # what the command has left of Ray
             part.start()
