@@ -1,5 +1,6 @@
 """The tiers of tests, and the kernels that they share; ``tests/__init__.py`` tells of both."""
 
+import gc
 import os
 import random
 import sys
@@ -10,7 +11,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-import geodesic_core as gc
+import geodesic_core
+
+gc.disable()  # until all tests are collected: to look for garbage would take half of the time
 
 pytest_plugins = [
     "tests.support.databases",
@@ -67,7 +70,13 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile all kernels before all tests; where only some are to run, those that they call."""
     is_controller = not hasattr(session.config, "workerinput")
     if is_controller and not WITHOUT_JIT and _runs_all(session.config):
-        gc.compile_kernels()
+        geodesic_core.compile_kernels()
+
+
+def pytest_collection_finish() -> None:
+    gc.collect()
+    gc.freeze()
+    gc.enable()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

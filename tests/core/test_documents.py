@@ -27,9 +27,10 @@ DOCUMENTS = sorted(
 )
 BLENDER = shutil.which("blender")
 HOWTO_OF_BLENDER = ROOT / "docs" / "howto" / "blender.md"
+GALLERY = pytest.param("gallery.md", 8, marks=(pytest.mark.jit, pytest.mark.full))
+"""Its pictures take 12 s, and `scripts/docs` draws them as well."""
 PAGES_OF_EXAMPLES = [
     "start.md",
-    "gallery.md",
     *(
         f"howto/{path.name}"
         for path in sorted((ROOT / "docs" / "howto").glob("*.md"))
@@ -152,6 +153,7 @@ def test_docstrings_of_modules_begin_with_a_noun_or_a_verb(folder: str) -> None:
     [
         ("algorithm.md", 4),
         ("sharing.md", 4),
+        GALLERY,
         *(pytest.param(name, 8, marks=pytest.mark.jit) for name in PAGES_OF_EXAMPLES),
     ],
 )

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-import pyvista as pv
 from PIL import Image
+from pyvista import PolyData, registered_accessors
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
@@ -71,8 +71,9 @@ def test_a_path_that_lost_its_surface_is_drawn_alone(tmp_path: Path) -> None:
 
 def test_without_a_file_a_plotter_shows_what_was_drawn(monkeypatch: pytest.MonkeyPatch) -> None:
     shown: list[Any] = []
-    monkeypatch.setattr(pv, "OFF_SCREEN", True)
-    monkeypatch.setattr(pv.Plotter, "show", lambda self: shown.append(list(self.actors.values())))
+    monkeypatch.setattr("pyvista.OFF_SCREEN", True)
+    show = lambda self: shown.append(list(self.actors.values()))  # noqa: E731
+    monkeypatch.setattr("pyvista.Plotter.show", show)
     FIELD.plot()
     PATH.plot()
     field, path = shown
@@ -115,10 +116,10 @@ def test_the_accessor_refuses_as_the_library_does() -> None:
     with pytest.raises(InvalidPoint, match="vertex 999"):
         MESH.to_pyvista().geodesics.distance(999)
     with pytest.raises(InvalidMesh, match="no faces"):
-        pv.PolyData(MESH.vertices.copy()).geodesics.path(0, 1)
+        PolyData(MESH.vertices.copy()).geodesics.path(0, 1)
 
 
 def test_the_accessor_is_found_by_its_entry_point() -> None:
-    found = {each.name: each for each in pv.registered_accessors()}
-    assert found["geodesics"].target is pv.PolyData
+    found = {each.name: each for each in registered_accessors()}
+    assert found["geodesics"].target is PolyData
     assert found["geodesics"].source.startswith("geodesic_core.")

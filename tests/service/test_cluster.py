@@ -8,6 +8,7 @@ import os
 import signal
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import pytest
@@ -17,8 +18,10 @@ from tests.support.processes import Server, is_running, stopped, total_time
 from tests.support.service import check_problem, upload_sample
 from tests.support.waiting import wait_until
 
-pytest.importorskip("ray")
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(find_spec("ray") is None, reason="needs the extra cluster"),
+]
 
 ASYNC = {"Prefer": "respond-async"}
 CANCELLED, LOST = "geodesic_cancellations_total", "geodesic_workers_lost_total"

@@ -283,10 +283,14 @@ def test_limits_of_a_caller_hold_for_both(postgres: Postgres, tmp_path: Path) ->
 
 def _upload_at_last(server: Server, sample: dict[str, Any]) -> int:
     """Upload once the rate and the uploads of the other replica allow it."""
-    status = 429
-    while status == 429:
-        status = server.client.post("/v1/meshes", params=sample).status_code
-    return status
+    answers = [429]
+
+    def is_let_in() -> bool:
+        answers.append(server.client.post("/v1/meshes", params=sample).status_code)
+        return answers[-1] != 429
+
+    wait_until(is_let_in)
+    return answers[-1]
 
 
 def _is_over_quota(server: Server, sample: dict[str, Any]) -> bool:

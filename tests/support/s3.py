@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import count
 
-import boto3
 import httpx2
 import pytest
 
@@ -41,6 +40,8 @@ class S3:
             "AWS_SECRET_ACCESS_KEY": SECRET,
             "AWS_REGION": "us-east-1",
         }
+        import boto3  # half a second
+
         self.client = boto3.client(
             "s3",
             endpoint_url=self.url,

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numba
 from numba.core import serialize
 from numba.core.compiler import CompileResult
+from numba.core.runtime.nrt import rtsys
 
 from geodesic_core.kernels.jit import machine
 
@@ -100,7 +101,9 @@ class StoredKernel:
                 continue
             digest, data = stored[:_DIGEST_BYTES], stored[_DIGEST_BYTES:]
             if hashlib.sha256(data).digest() == digest:  # else the disk lost some of it
-                context.refresh()  # numba's runtime, which the code calls, may not be there yet
+                # Numba's runtime, which the code calls, and not all of numba's functions, which
+                # `context.refresh` would load in 0.4 s.
+                rtsys.initialize(context)
                 rebuild: Any = CompileResult._rebuild
                 return rebuild(context, *serialize.loads(data))
         return None
@@ -109,7 +112,10 @@ class StoredKernel:
         """Write the compiled kernel into the user's cache, whole or not at all."""
         if self.is_storable and _is_writable():
             dump: Any = serialize.dumps
-            data = dump(compiled._reduce())
+            *parts, environments = compiled._reduce()
+            # Code reads constants from them, nothing else, and each imports its module when loaded.
+            with_constants = tuple(each for each in environments if each.consts)
+            data = dump((*parts, with_constants))
             with tempfile.NamedTemporaryFile(dir=folder(), delete=False) as part:
                 part.write(hashlib.sha256(data).digest() + data)
             Path(part.name).replace(folder() / self.file_name)

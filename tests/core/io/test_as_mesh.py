@@ -7,8 +7,8 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
-import pyvista as pv
 import trimesh
+from pyvista import ImageData, PolyData, Sphere
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidMesh
@@ -48,7 +48,7 @@ GIVEN = {
     "path": ball_file,
     "text": lambda folder: str(ball_file(folder)),
     "trimesh": lambda _: trimesh.Trimesh(V, F, process=False),
-    "pyvista": lambda _: pv.PolyData.from_regular_faces(V, F),
+    "pyvista": lambda _: PolyData.from_regular_faces(V, F),
     "meshio": lambda _: meshio.Mesh(V, [("triangle", F)]),
     "open3d": lambda _: Open3DMesh(),
 }
@@ -106,7 +106,7 @@ SQUARES = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1
 
 
 def test_polygons_of_pyvista_are_triangulated_in_place_and_lines_left_out() -> None:
-    mixed = pv.PolyData(SQUARES, faces=[4, 0, 1, 2, 3, 3, 1, 4, 5, 3, 1, 5, 2], lines=[2, 0, 5])
+    mixed = PolyData(SQUARES, faces=[4, 0, 1, 2, 3, 3, 1, 4, 5, 3, 1, 5, 2], lines=[2, 0, 5])
     mesh = gc.as_mesh(mixed)
     assert mesh.face_map is not None
     assert mesh.face_map.tolist() == [0, 0, 1, 2]
@@ -133,10 +133,10 @@ def test_points_of_meshio_may_lie_in_the_plane() -> None:
         (meshio.Mesh(SQUARES, [("tetra", [[0, 1, 2, 3]])]), "cells of type 'tetra' are no polyg"),
         (meshio.Mesh(SQUARES, [("line", [[0, 1]])]), "no faces"),
         (meshio.Mesh(SQUARES, [("triangle", [[0, 1, 9]])]), "numbered 0 to 5"),
-        (pv.Sphere().cast_to_unstructured_grid(), "UnstructuredGrid .* give data.extract_surface"),
-        (pv.ImageData(dimensions=(3, 3, 3)), "ImageData of PyVista is no surface"),
-        (pv.PolyData(SQUARES), "no faces"),
-        (pv.Sphere().strip(), "give data.triangulate()"),
+        (Sphere().cast_to_unstructured_grid(), "UnstructuredGrid .* give data.extract_surface"),
+        (ImageData(dimensions=(3, 3, 3)), "ImageData of PyVista is no surface"),
+        (PolyData(SQUARES), "no faces"),
+        (Sphere().strip(), "give data.triangulate()"),
         (trimesh.Trimesh(SQUARES, [[0, 1, 9]], process=False), "numbered 0 to 5"),
         (SimpleNamespace(vertices="abc", triangles=[[0, 1, 2]]), "vertices have type"),
         (SimpleNamespace(vertices=SQUARES, faces=[[0.5, 1, 2]]), "faces have type float64"),
