@@ -138,6 +138,8 @@ class Settings(BaseSettings):
     """Address of the head of the cluster, as `H:P`."""
     cluster_token: Annotated[SecretStr, Field(min_length=16)] | None = None
     """Secret of the cluster, the same on all its machines; who knows it runs any code there."""
+    redis: SecretStr | None = None
+    """URL of a Redis or Valkey for the records of a head; in its folder, unless set."""
     state: SecretStr | None = None
     """URL of a PostgreSQL database, for several services; SQLite in the store, unless set."""
     workers: PositiveInt = Field(default_factory=available_cores)
@@ -229,6 +231,18 @@ class Settings(BaseSettings):
         if state is not None and not state.get_secret_value().startswith(schemes):
             raise ValueError("it is no URL such as postgresql://user:secret@host:5432/database")
         return state
+
+    @field_validator("redis")
+    @classmethod
+    def _is_of_redis(cls, redis: SecretStr | None) -> SecretStr | None:
+        url = None if redis is None else urlsplit(redis.get_secret_value())
+        if url is not None and not (
+            url.scheme in ("redis", "rediss")
+            and url.hostname
+            and not (url.path.strip("/") or url.query or url.fragment)
+        ):
+            raise ValueError("it is no URL such as redis://user:secret@host:6379")
+        return redis
 
     @field_validator("cors_origins")
     @classmethod

@@ -20,6 +20,7 @@ from benchmarks import (
     sharing,
     topology,
 )
+from benchmarks.failures import measurement as failures
 from benchmarks.inputs import Inputs
 from benchmarks.paper import experiments as paper
 from benchmarks.peers import report as peers
@@ -47,9 +48,10 @@ BENCHMARKS = {
     "large-answers": service.run_large,
     "page": page.run,
 }
-SOAK, SCALING, PAPER, PEERS, GATE = "soak", "scaling", "paper", "peers", "gate"
+SOAK, SCALING, FAILURES = "soak", "scaling", "failures"
+PAPER, PEERS, GATE = "paper", "peers", "gate"
 """Run only where they are named, and write reports of their own"""
-NAMES = (*BENCHMARKS, SOAK, SCALING, PAPER, PEERS, GATE)
+NAMES = (*BENCHMARKS, SOAK, SCALING, FAILURES, PAPER, PEERS, GATE)
 ROOT = Path(__file__).parents[1]
 
 
@@ -84,6 +86,9 @@ def main() -> None:
             continue
         if name == SCALING:
             print(scaling.run(Path(__file__).with_name("results") / "scaling.md"))
+            continue
+        if name == FAILURES:
+            print(failures.run(Path(__file__).with_name("results") / "failures.md"))
             continue
         if name == GATE:
             text, is_good = gate.run(is_new=arguments.new)

@@ -20,6 +20,7 @@ pytest_plugins = [
     "tests.support.databases",
     "tests.support.logs",
     "tests.support.postgres",
+    "tests.support.redis",
     "tests.support.s3",
     "tests.support.against",  # after those that it imports
     "tests.support.service",

@@ -38,17 +38,23 @@ def head(
     host: Annotated[str, typer.Option(help="Address of this machine, as others reach it.")],
     folder: Folder,
     port: Annotated[int, typer.Option(min=1024, max=65535, help="Port to listen on.")] = 6379,
+    redis: Annotated[
+        str | None,
+        typer.Option(
+            help="URL of a Redis or Valkey for the records, in place of the folder; GEODESIC_REDIS "
+            "unless given."
+        ),
+    ] = None,
 ) -> None:
     """Run the head of a cluster, which knows all machines, until interrupted."""
-    settings = read_settings()
+    settings = read_settings(redis=redis)
     from app.engine.ray_node import running_head
 
-    with _failing_clearly(), running_head(host, port, folder, settings) as ray:
-        typer.echo(f"the head listens at {host}:{port}; its records outlive it in {folder}")
+    with _failing_clearly(), running_head(host, port, folder, settings) as running:
+        typer.echo(f"the head listens at {host}:{port}; {running.records.told}")
         stopped = _stopped()
         while not stopped.wait(_LOOK_S):
-            if not ray.are_alive:
-                raise ray.end()
+            running.check()
 
 
 def node(folder: Folder, address: Address = None, store: Store = None) -> None:
@@ -78,8 +84,7 @@ def node(folder: Folder, address: Address = None, store: Store = None) -> None:
         typer.echo(f"host of the cluster at {settings.address}, with {settings.workers} workers")
         stopped = _stopped()
         while not stopped.wait(_LOOK_S):
-            if not ray.are_alive:
-                raise ray.end()
+            ray.check()
         typer.echo("draining")
         stopped.clear()  # a second signal ends the time that running work gets
         draining, end = host.drain.remote(), time.monotonic() + settings.drain_s

@@ -42,7 +42,7 @@ def status(address: Address = None, as_json: AsJson = False) -> None:
     else:
         typer.echo(f"head        {settings.address}, {len(reports)} hosts")
         for name, report in reports.items():
-            typer.echo(f"{name:<12}{_in_words(report)}")
+            typer.echo(f"{name}  {_in_words(report)}")
     if not reports:
         raise Failure("the cluster has no hosts: start `geodesic node` on each machine")
     silent = [name for name, report in reports.items() if report is None]

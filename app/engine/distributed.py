@@ -240,12 +240,13 @@ class DistributedEngine:
         self, name: str, task: Task, flight: _Flight, period: Period, outcome: Outcome
     ) -> None:
         """Report the seconds of a task in the queue of a host and with a worker."""
-        seconds = (period.end - period.start) / 1e9
+        seconds = max(0.0, (period.end - period.start) / 1e9)  # the clock may be set back
         queued = 0.0 if flight.has_begun else seconds
         parts: Mapping[str, Period] = {}
         failed = outcome is None or (isinstance(outcome, Problem) and outcome.status >= 500)
         if isinstance(outcome, TaskResult):
-            queued, parts = outcome.seconds["queue"], outcome.periods
+            # The work may have waited for longer than this replica, which joined it there.
+            queued, parts = min(seconds, outcome.seconds["queue"]), outcome.periods
         begun = period.start + round(queued * 1e9)
         self.on_wait(queued)
         self.on_work(task.client, seconds - queued)

@@ -14,13 +14,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 from app.engine.cluster import ClusterError
+from app.engine.head_records import FolderRecords, RedisRecords, in_redis
 from app.queries import code_version
 from app.settings import Settings, variable_of
 
@@ -41,19 +43,38 @@ _MADE_OF = "geodesic "
 """Begins the name of the resource that says which code a machine runs"""
 
 
+@dataclass(frozen=True)
+class Head:
+    """A head that runs on this machine."""
+
+    processes: "Processes"
+    records: FolderRecords | RedisRecords
+
+    def check(self) -> None:
+        """Raise ``ClusterError`` where it has ended, or may no longer run."""
+        self.processes.check()
+        self.records.renew()
+
+
 @contextmanager
-def running_head(host: str, port: int, folder: Path, settings: Settings) -> Iterator["Processes"]:
-    """Run Ray's control store at an address inside the block; ``folder`` keeps its records."""
+def running_head(host: str, port: int, folder: Path, settings: Settings) -> Iterator[Head]:
+    """Run Ray's control store at an address inside the block.
+
+    Its records are in the Redis of the settings, or else in ``folder``.
+    """
     _check_host(host)
     _check_free(host, port)
     # Of a head that was killed. With it, Ray takes other members on this machine for a head.
     (folder / "ray_current_cluster").unlink(missing_ok=True)
-    records = folder / "records"
-    environment = {"RAY_gcs_storage": "rocksdb", "RAY_gcs_storage_path": str(records)}
     options = ["--head", f"--node-ip-address={host}", f"--port={port}"]
     options += ["--include-dashboard=false", "--no-monitor"]  # which would scale a cluster
-    with _running(options, folder, settings, environment) as processes:
-        yield processes
+    with ExitStack() as stack:
+        records: FolderRecords | RedisRecords = FolderRecords(folder / "records")
+        if settings.redis is not None:
+            records = stack.enter_context(in_redis(settings.redis, _token(settings)))
+        options += records.options
+        running = _running(options, folder, settings, records.environment)
+        yield Head(stack.enter_context(running), records)
 
 
 @contextmanager
@@ -115,9 +136,10 @@ class Processes:
         """Whether none of them has ended: Ray ends all where one does."""
         return self._process.poll() is None
 
-    def end(self) -> ClusterError:
-        """Return the error for an end that nobody asked for."""
-        return ClusterError(f"Ray has ended on this machine; {self._log} may say why")
+    def check(self) -> None:
+        """Raise ``ClusterError`` where they have ended, which nobody asked for."""
+        if not self.are_alive:
+            raise ClusterError(f"Ray has ended on this machine; {self._log} may say why")
 
     def wait_until_started(self, address: str) -> None:
         """Wait for Ray's word that it runs; raises ``ClusterError`` where it will not."""
@@ -168,11 +190,7 @@ def _running(
 ) -> Iterator[Processes]:
     if find_spec("ray") is None:
         raise ClusterError("Ray is not installed: pip install 'geodesic[cluster]'")
-    if settings.cluster_token is None:
-        raise ClusterError(
-            f"set {variable_of('cluster_token')} to a secret, the same on all machines of the "
-            "cluster: who knows it can run any code there (openssl rand -hex 32 makes one)"
-        )
+    token = _token(settings)
     folder = folder.resolve()
     if len(str(folder)) > _LONGEST_FOLDER:
         raise ClusterError(
@@ -183,7 +201,7 @@ def _running(
     os.environ.update(
         {
             "RAY_AUTH_MODE": "token",
-            "RAY_AUTH_TOKEN": settings.cluster_token.get_secret_value(),
+            "RAY_AUTH_TOKEN": token,
             "RAY_USAGE_STATS_ENABLED": "0",
             "RAY_gcs_rpc_server_reconnect_timeout_s": str(_RECONNECT_S),
             "RAY_worker_niceness": "0",  # long work steps back by itself
@@ -214,6 +232,15 @@ def _running(
         yield processes
     finally:
         processes.stop()
+
+
+def _token(settings: Settings) -> str:
+    if settings.cluster_token is None:
+        raise ClusterError(
+            f"set {variable_of('cluster_token')} to a secret, the same on all machines of the "
+            "cluster: who knows it can run any code there (openssl rand -hex 32 makes one)"
+        )
+    return settings.cluster_token.get_secret_value()
 
 
 def _check_host(host: str) -> None:

@@ -29,7 +29,7 @@ from app.store.results import Result, ResultStore
 logger = structlog.get_logger(module=__name__)
 
 Solve = Callable[[ProgressCallback], Awaitable[Result]]
-"""The computation of a job, which reports its progress"""
+"""The computation of a job, which reports its progress; its result has files"""
 
 SolveAgain = Callable[[JobSpec, bytes, ProgressCallback], Awaitable[Result]]
 """The same for a stored job, from its query as JSON"""
@@ -395,7 +395,7 @@ class JobManager:
 
     async def _run(self, live: _LiveJob, solve: Solve) -> None:
         try:
-            result = await self._results.with_files(await solve(live.on_progress))
+            result = await solve(live.on_progress)
         except Exception as error:
             problem = problem_of(error)
             if self._is_stopping and problem.code in _SIGNS_OF_THE_END:

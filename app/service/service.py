@@ -26,6 +26,7 @@ from gc import collect, freeze
 from pathlib import Path
 from typing import Any
 
+import structlog
 from anyio import CapacityLimiter, to_thread
 
 from app.access import Caller
@@ -34,7 +35,7 @@ from app.engine.interface import Engine, ProgressCallback
 from app.engine.single_flight import SingleFlight
 from app.engine.supplied import SuppliedEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
-from app.errors import ProblemError, StateUnavailableError, problem
+from app.errors import ProblemError, StateUnavailableError, problem, problem_of
 from app.jobs import Job, JobManager, JobRepository, JobSpec
 from app.queries import KINDS, Estimate, MatrixQuery, MeshSize, Query, fingerprint, result_key
 from app.service.concurrency import ConcurrencyLimit
@@ -53,8 +54,13 @@ from app.store.opening import store_of
 from app.store.ownership import Share
 from app.store.results import Result, ResultStore, result_name
 
+logger = structlog.get_logger(module=__name__)
+
 _CATALOG_PERIOD_S = 2.0
 """Seconds between two looks at what other services did to meshes, where they are shared"""
+
+_STORE_PAUSE_S = 1.0
+"""Seconds between two attempts of a job while the object store is away"""
 
 Manifest = Mapping[str, Any]
 PhaseSeconds = Mapping[str, float]
@@ -354,11 +360,9 @@ class Service:
         self.engine.refuse_when_full(client)
 
         async def solve(on_progress: ProgressCallback) -> Result:
-            async with self.time_limit(self.settings.job_deadline_s, "job_deadline_s"):
-                result, _ = await self._answer(
-                    query, size, representation, client, on_progress, is_promised=True
-                )
-                return result
+            return await self._patiently(
+                partial(self._promised, query, size, representation, client, on_progress)
+            )
 
         spec = self._job_spec(query, representation, context, idempotency_key)
         return await self.jobs.submit(spec, query.written, solve)
@@ -386,11 +390,17 @@ class Service:
             self._answer(query, size, representation, client, progress, is_promised=True)
         )
 
+        begun = [answering]
+
+        async def attempt() -> Result:
+            if begun:
+                result, _ = await begun.pop()
+                return await self.results.with_files(result)
+            return await self._promised(query, size, representation, client, progress)
+
         async def solve(on_progress: ProgressCallback) -> Result:
-            async with self.time_limit(self.settings.job_deadline_s, "job_deadline_s"):
-                progress.follow(on_progress)
-                result, _ = await answering
-                return result
+            progress.follow(on_progress)
+            return await self._patiently(attempt)
 
         try:
             await asyncio.wait({answering}, timeout=min(wait_s, context.deadline_s))
@@ -440,17 +450,43 @@ class Service:
     ) -> Result:
         """Compute the answer of a job that was under way when the service ended."""
         representation = Representation(spec.media_type, spec.dtype, spec.coding)
-        async with self.time_limit(self.settings.job_deadline_s, "job_deadline_s"):
+
+        async def attempt() -> Result:
             with self.mesh_catalog.pinned(spec.mesh_id):
                 size = await self.size(spec.mesh_id)
                 # One at a time: each may take a tenth of a second, and others want to be served.
                 query = await to_thread.run_sync(
                     self._stored_query, spec, size, written, limiter=self._reading
                 )
-                result, _ = await self._answer(
-                    query, size, representation, spec.client, on_progress, is_promised=True
-                )
-                return result
+                return await self._promised(query, size, representation, spec.client, on_progress)
+
+        return await self._patiently(attempt)
+
+    async def _patiently(self, attempt: Callable[[], Awaitable[Result]]) -> Result:
+        """Return the answer of a job, which waits while the object store is away."""
+        async with self.time_limit(self.settings.job_deadline_s, "job_deadline_s"):
+            while True:
+                try:
+                    return await attempt()
+                except (OSError, ProblemError) as error:
+                    if problem_of(error).code != "store_unavailable":
+                        raise
+                    logger.warning("job waits, since the store does not answer", error=str(error))
+                await asyncio.sleep(_STORE_PAUSE_S)
+
+    async def _promised(
+        self,
+        query: Query[Any],
+        size: MeshSize,
+        representation: Representation,
+        client: str,
+        on_progress: ProgressCallback,
+    ) -> Result:
+        """Answer the query of a job, with files."""
+        result, _ = await self._answer(
+            query, size, representation, client, on_progress, is_promised=True
+        )
+        return await self.results.with_files(result)
 
     def _stored_query(self, spec: JobSpec, size: MeshSize, written: bytes) -> Query[Any]:
         """Return the query of a job, which an older release may have written."""

@@ -9,7 +9,8 @@ import json
 import pickle
 import socket
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 from random import Random
@@ -47,6 +48,8 @@ class User(locust.FastHttpUser):
     network_timeout = connection_timeout = LONG_S
     wait_time = locust.between(0.0, 0.1)
     callers: ClassVar = ("alice", "bob")
+    refusals: ClassVar[Collection[tuple[int, str]]] = LIMITS
+    """Statuses and codes that are right answers to anything"""
     plan: ClassVar[Plan]
     numbers: ClassVar = count()
 
@@ -85,7 +88,7 @@ class User(locust.FastHttpUser):
         with self.client.request(
             method, path, name=operation, data=data, headers=own, catch_response=True
         ) as response:
-            fault = fault_of(response, statuses, request)
+            fault = fault_of(response, statuses, request, self.refusals)
             if fault:
                 response.failure(f"{method} {path}: {fault}")
             else:
@@ -315,11 +318,17 @@ def long_query(plan: Plan) -> Request:
     )
 
 
-def fault_of(response: Any, statuses: tuple[int, ...], request: Request | None) -> str:
-    """Return what is wrong with an answer; nothing where it is right, or a limit was met."""
+def fault_of(
+    response: Any,
+    statuses: tuple[int, ...],
+    request: Request | None,
+    refusals: Collection[tuple[int, str]],
+) -> str:
+    """Return what is wrong with an answer; nothing where it is right, or one of the refusals."""
     status, code = response.status_code, code_of(response)
-    if (status, code) in LIMITS:
-        return "" if "retry-after" in response.headers else f"{code} without Retry-After"
+    if (status, code) in refusals:
+        says_when = status not in (429, 503) or "retry-after" in response.headers
+        return "" if says_when else f"{code} without Retry-After"
     if status not in statuses:
         what = (response.content or b"")[:300] if status else getattr(response, "error", "")
         return f"{status} instead of {statuses}: {what!r}"
@@ -359,7 +368,28 @@ def main() -> None:
     environment = Environment(user_classes=kinds, stop_timeout=LONG_S)
     runner = environment.create_local_runner()
     sent = count(1)
-    with arguments.record.open("w") as record:
+
+    def end_in_time() -> None:
+        if next(sent) == arguments.requests:
+            gevent.spawn(runner.quit)
+
+    with recording(environment, arguments.record, end_in_time):
+        founder = Founder(environment)
+        for mesh in User.plan.meshes:
+            store(founder, mesh)
+        users = sum(kind.fixed_count for kind in kinds)
+        runner.start(users, spawn_rate=users)
+        if arguments.seconds:
+            gevent.spawn_later(arguments.seconds, runner.quit)
+        runner.greenlet.join()
+
+
+@contextmanager
+def recording(
+    environment: Environment, path: Path, on_request: Callable[[], None] = lambda: None
+) -> Iterator[None]:
+    """Write a line of JSON into a file for each request inside the block."""
+    with path.open("w", buffering=1) as record:
 
         def note(
             name: str, response_time: float, response: Any, context: Any, exception: Any, **_: Any
@@ -372,22 +402,14 @@ def main() -> None:
                 "fault": str(exception or ""),
             }
             record.write(json.dumps(line) + "\n")
-            if next(sent) == arguments.requests:
-                gevent.spawn(runner.quit)
+            on_request()
 
         def note_error(exception: Exception, **_: Any) -> None:
             note("none", 0.0, None, {"outcome": "failure of a user"}, repr(exception))
 
         environment.events.request.add_listener(note)
         environment.events.user_error.add_listener(note_error)
-        founder = Founder(environment)
-        for mesh in User.plan.meshes:
-            store(founder, mesh)
-        users = sum(kind.fixed_count for kind in kinds)
-        runner.start(users, spawn_rate=users)
-        if arguments.seconds:
-            gevent.spawn_later(arguments.seconds, runner.quit)
-        runner.greenlet.join()
+        yield
 
 
 def outcome_of(response: Any) -> str:

@@ -17,6 +17,7 @@ TEXTS = {
     "store": ("/somewhere", Path("/somewhere")),
     "copies": ("/elsewhere", Path("/elsewhere")),
     "state": ("postgresql://a:b@c/d", SecretStr("postgresql://a:b@c/d")),
+    "redis": ("redis://a:b@c", SecretStr("redis://a:b@c")),
     "worker_memory_bytes": ("3000000000", 3_000_000_000),
     "deadline_s": ("0.5", 0.5),
     "cancel_grace_s": ("0.25", 0.25),

@@ -11,12 +11,13 @@ from typing import Any
 import anyio
 import numpy as np
 import pytest
+from structlog.testing import capture_logs
 
 import geodesic_core as gc
 from tests.service.test_replicas import refused_start
 from tests.support.azure import Azure
 from tests.support.postgres import Server as Postgres
-from tests.support.processes import Server
+from tests.support.processes import Server, stopped
 from tests.support.s3 import S3
 from tests.support.service import (
     NPY,
@@ -222,6 +223,20 @@ def test_a_store_that_is_away_is_a_clear_error_and_comes_back(
         check_problem(upload, 503, "store_unavailable")
     assert service.get(_path(mesh_id, 3)).status_code == 200
     assert upload_sample(service, "plane", 800)
+
+
+@pytest.mark.parametrize("wish", ["respond-async", "respond-async, wait=1"])
+def test_a_job_waits_for_a_store_that_is_away(service: ServiceClient, s3: S3, wish: str) -> None:
+    mesh_id = upload_sample(service, "plane", 30_000)
+    with ExitStack() as stack, capture_logs() as lines:
+        with stopped(service.workers()):
+            job = distances(service, mesh_id, {**LONG, "Prefer": wish})
+            stack.enter_context(s3.away())  # before the work is done
+        link = job.headers["location"]
+        wait_until(lambda: any(line["event"].startswith("job waits") for line in lines))
+        assert service.get(link).json()["status"] == "running"
+    wait_until(lambda: service.get(link).json()["finished"])
+    assert service.get(f"{link}/results").content == distances(service, mesh_id, LONG).content
 
 
 @pytest.mark.full

@@ -67,7 +67,7 @@ class Command:
 class ProcessCluster:
     """The processes of a cluster, whose machines share one store."""
 
-    def __init__(self, store: Path, folder: Path) -> None:
+    def __init__(self, store: Path, folder: Path, **settings: str) -> None:
         with socket.socket() as probe:
             probe.bind((HOST, 0))
             self.port = probe.getsockname()[1]
@@ -77,6 +77,7 @@ class ProcessCluster:
             "GEODESIC_ADDRESS": f"{HOST}:{self.port}",
             "GEODESIC_CLUSTER_TOKEN": TOKEN,
             "GEODESIC_WORKERS": "1",
+            **settings,
         }
         self.store = store
         self.nodes: list[Command] = []
@@ -134,11 +135,11 @@ def kill_at_once(process: "subprocess.Popen[bytes]") -> None:
 
 
 @contextmanager
-def running_cluster(store: Path) -> Iterator[ProcessCluster]:
+def running_cluster(store: Path, **settings: str) -> Iterator[ProcessCluster]:
     """Run a head inside the block; nodes and replicas are added."""
     store.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="g", ignore_cleanup_errors=True) as folder:
-        cluster = ProcessCluster(store, Path(folder))
+        cluster = ProcessCluster(store, Path(folder), **settings)
         try:
             yield cluster
         finally:

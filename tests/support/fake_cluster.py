@@ -30,6 +30,8 @@ class SleepingEngine:
         self.seconds = 8.0
         self.periods: Mapping[str, Period] = {}
         """Of the phases of each task, by the clock of the host"""
+        self.queue_s = 0.0
+        """What results say that they have waited"""
         self.refusal: ProblemError | None = None
         self.begun: list[Task] = []
         self.ended: list[str] = []
@@ -70,7 +72,7 @@ class SleepingEngine:
         finally:
             self.running -= 1
         self.ended.append("done")
-        return TaskResult({"queue": 0.0, "compute": self.seconds}, self.periods)
+        return TaskResult({"queue": self.queue_s, "compute": self.seconds}, self.periods)
 
 
 class FakeCluster:

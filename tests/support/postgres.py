@@ -6,7 +6,8 @@ import shutil
 import socket
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
 
@@ -29,14 +30,26 @@ def programs() -> Path | None:
 
 
 class Server:
-    """A server on 127.0.0.1, which can be stopped and started."""
+    """A server on an address of this machine, or of another one, which can be stopped and started.
 
-    def __init__(self, bin_folder: Path, folder: Path) -> None:
+    ``inside`` goes before commands that are to run on that machine; ``clients`` are the addresses
+    of those that may connect from elsewhere.
+    """
+
+    def __init__(
+        self,
+        bin_folder: Path,
+        folder: Path,
+        host: str = "127.0.0.1",
+        inside: Sequence[str] = (),
+        clients: str = "127.0.0.1/32",
+    ) -> None:
         self._bin = bin_folder
         self._data = folder / "data"
-        # Servers refuse to run as root.
-        self._as_user = ["runuser", "-u", "postgres", "--"] if os.geteuid() == 0 else []
-        if self._as_user:
+        self._host = host
+        self._before = list(inside)
+        if os.geteuid() == 0:  # servers refuse to run as root
+            self._before += ["runuser", "-u", "postgres", "--"]
             user = pwd.getpwnam("postgres")
             os.chown(folder, user.pw_uid, user.pw_gid)
         with socket.socket() as probe:
@@ -46,17 +59,18 @@ class Server:
         secret.write_text(SECRET)
         secret.chmod(0o644)
         self._run("initdb", "-A", "scram-sha-256", "-U", USER, f"--pwfile={secret}", "--no-sync")
-        self._process: subprocess.Popen[bytes] | None = None
+        with (self._data / "pg_hba.conf").open("a") as allowed:
+            allowed.write(f"host all all {clients} scram-sha-256\n")
 
     def _run(self, program: str, *arguments: str) -> None:
-        command = [*self._as_user, str(self._bin / program), "-D", str(self._data), *arguments]
+        command = [*self._before, str(self._bin / program), "-D", str(self._data), *arguments]
         patience = {"PGCTLTIMEOUT": str(int(LONG_S))}
         subprocess.run(command, check=True, capture_output=True, cwd="/", env=os.environ | patience)  # noqa: S603 - of the system
 
     def start(self) -> None:
         log = self._data.with_name("log")
         options = (
-            f"-p {self.port} -c listen_addresses=127.0.0.1 -k {self._data.parent} -c fsync=off"
+            f"-p {self.port} -c listen_addresses={self._host} -k {self._data.parent} -c fsync=off"
         )
         self._run("pg_ctl", "-w", "-l", str(log), "-o", options, "start")
 
@@ -65,7 +79,7 @@ class Server:
         self._run("pg_ctl", "-w", "-m", mode, "stop")
 
     def url(self, database: str, secret: str = SECRET) -> str:
-        return f"postgresql://{USER}:{secret}@127.0.0.1:{self.port}/{database}"
+        return f"postgresql://{USER}:{secret}@{self._host}:{self.port}/{database}"
 
     def new_database(self) -> str:
         """Return the URL of a new database."""
@@ -77,9 +91,11 @@ class Server:
         return self.url(name)
 
 
-@pytest.fixture(scope="session")
-def postgres() -> Iterator[Server]:
-    """A server that runs; a test that stops it starts it again."""
+@contextmanager
+def running_postgres(
+    host: str = "127.0.0.1", inside: Sequence[str] = (), clients: str = "127.0.0.1/32"
+) -> Iterator[Server]:
+    """Run a server inside the block; skip the test where none is installed."""
     pytest.importorskip("psycopg", reason="needs the extra cluster: pip install geodesic[cluster]")
     bin_folder = programs()
     if bin_folder is None:
@@ -88,10 +104,17 @@ def postgres() -> Iterator[Server]:
         pytest.skip("needs runuser: a server of PostgreSQL refuses to run as root")
     folder = Path(tempfile.mkdtemp(prefix="geodesic-postgres-"))
     folder.chmod(0o755)
-    server = Server(bin_folder, folder)
+    server = Server(bin_folder, folder, host, inside, clients)
     server.start()
     try:
         yield server
     finally:
         server.stop()
         shutil.rmtree(folder)
+
+
+@pytest.fixture(scope="session")
+def postgres() -> Iterator[Server]:
+    """A server that runs; a test that stops it starts it again."""
+    with running_postgres() as server:
+        yield server

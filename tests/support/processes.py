@@ -7,7 +7,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 import httpx2
@@ -179,8 +179,9 @@ def processor_time(pid: int) -> Counter[int]:
     """Return the nanoseconds that the threads of a process have had, by niceness above ours."""
     taken, own = Counter[int](), os.getpriority(os.PRIO_PROCESS, 0)
     for thread in Path(f"/proc/{pid}/task").iterdir():
-        niceness = int((thread / "stat").read_text().rpartition(")")[2].split()[16])
-        taken[niceness - own] += int((thread / "schedstat").read_text().split()[0])
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has just ended
+            niceness = int((thread / "stat").read_text().rpartition(")")[2].split()[16])
+            taken[niceness - own] += int((thread / "schedstat").read_text().split()[0])
     return taken
 
 

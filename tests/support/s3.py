@@ -6,7 +6,7 @@ import subprocess
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
@@ -22,16 +22,19 @@ _numbers = count(1)
 
 
 class S3:
-    """A server on 127.0.0.1; what it has is in its memory."""
+    """A server on an address of this machine, or of another one; what it has is in its memory.
 
-    def __init__(self) -> None:
+    ``inside`` goes before a command that is to run on that machine.
+    """
+
+    def __init__(self, host: str = "127.0.0.1", inside: Sequence[str] = ()) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
             self.port = probe.getsockname()[1]
-        self.url = f"http://127.0.0.1:{self.port}"
+        self.url = f"http://{host}:{self.port}"
         self._log = tempfile.NamedTemporaryFile(prefix="geodesic-s3-")  # noqa: SIM115 - see close
         self.process = subprocess.Popen(  # noqa: S603 - this Python
-            [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(self.port)],
+            [*inside, sys.executable, "-m", "moto.server", "-H", host, "-p", str(self.port)],
             stdout=subprocess.DEVNULL,
             stderr=self._log,
         )

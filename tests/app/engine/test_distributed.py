@@ -408,6 +408,24 @@ def test_the_load_is_that_of_all_hosts() -> None:
     play(scene)
 
 
+def test_seconds_of_work_that_began_before_its_replica_asked_are_not_negative() -> None:
+    """It joined what another replica had asked for, which had waited in the queue for long."""
+
+    async def scene(replica: Replica) -> None:
+        seconds: list[float] = []
+        replica.engine.on_wait = seconds.append
+        replica.engine.on_work = lambda _client, each: seconds.append(each)
+        for engine in replica.cluster.engines.values():
+            engine.queue_s = 3600.0
+
+        await replica.ask()
+        assert len(seconds) == 2
+        assert min(seconds) >= 0.0
+        assert max(seconds) < 3600.0
+
+    play(scene)
+
+
 def test_seconds_are_reported_whatever_the_end() -> None:
     async def scene(replica: Replica) -> None:
         waits: list[float] = []

@@ -1,0 +1,95 @@
+"""Records of a head in Redis: what is said where it cannot be used, and whose they are."""
+
+import pytest
+from pydantic import SecretStr, ValidationError
+
+from app.engine import head_records
+from app.engine.cluster import ClusterError
+from app.engine.head_records import in_redis
+from app.settings import Settings
+from tests.support.redis import SECRET, Redis
+
+pytestmark = pytest.mark.service
+pytest.importorskip("redis", reason="needs the extra cluster")
+
+TOKEN = "a-token-of-tests-only"  # noqa: S105 - of no other use
+
+
+def refusal(url: str) -> str:
+    with pytest.raises(ClusterError) as refused, in_redis(SecretStr(url), TOKEN):
+        pass
+    message = str(refused.value)
+    assert SECRET not in message
+    assert "\n" not in message
+    return message
+
+
+@pytest.fixture
+def short_lease(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A claim that others wait for a moment only; its holder renews none here."""
+    monkeypatch.setattr(head_records, "_LEASE_S", 0.1)
+
+
+def test_a_server_that_does_not_exist() -> None:
+    assert "the Redis at 127.0.0.1:1 cannot be used" in refusal("redis://127.0.0.1:1")
+
+
+@pytest.mark.parametrize("secret", [":wrong@", ":@", ""])
+def test_a_wrong_password(redis_server: Redis, secret: str) -> None:
+    place = f"{redis_server.host}:{redis_server.port}"
+    assert f"the Redis at {place} refuses this user or password" in refusal(
+        f"redis://{secret}{place}"
+    )
+
+
+@pytest.mark.parametrize(
+    "url", ["10.0.0.1:6379", "http://10.0.0.1", "redis://", "redis://h/1", "redis://h?db=1"]
+)
+def test_a_url_of_something_else(url: str) -> None:
+    with pytest.raises(ValidationError, match="no URL such as redis://user:secret@host:6379"):
+        Settings(redis=SecretStr(url))
+
+
+def test_ray_is_told_where_they_are_and_nobody_else(redis_server: Redis) -> None:
+    with in_redis(SecretStr(redis_server.url()), TOKEN) as records:
+        assert records.environment["RAY_REDIS_ADDRESS"].endswith(f":{redis_server.port}")
+        assert f"--redis-password={SECRET}" in records.options
+        assert SECRET not in repr(records)
+
+
+def test_it_is_told_whether_they_are_durable(redis_server: Redis) -> None:
+    url = SecretStr(redis_server.url())
+    with in_redis(url, TOKEN) as records:
+        assert records.told.endswith(f"in the Redis at {redis_server.host}:{redis_server.port}")
+    redis_server.set_log("no")
+    try:
+        with in_redis(url, TOKEN) as records:
+            assert "but not a crash of that" in records.told
+    finally:
+        redis_server.set_log("yes")
+
+
+@pytest.mark.usefixtures("short_lease")
+def test_records_belong_to_one_head_at_a_time(redis_server: Redis) -> None:
+    url = SecretStr(redis_server.url())
+    with in_redis(url, TOKEN), in_redis(url, "another-token-of-tests") as other:
+        redis_server.keep("geodesic-*-claim")
+        other.renew()
+        assert "another head uses the records geodesic-" in refusal(redis_server.url())
+        redis_server.forget("geodesic-*-claim")
+        with in_redis(url, TOKEN):
+            pass
+
+
+@pytest.mark.usefixtures("short_lease")
+def test_a_head_whose_claim_has_run_out_takes_it_again_or_ends(redis_server: Redis) -> None:
+    url = SecretStr(redis_server.url())
+    with in_redis(url, TOKEN) as records:
+        redis_server.forget("geodesic-*")
+        records.renew()
+        redis_server.forget("geodesic-*")
+        with in_redis(url, TOKEN) as successor:
+            redis_server.keep("geodesic-*")
+            with pytest.raises(ClusterError, match="another head has taken over the records"):
+                records.renew()
+            successor.renew()

@@ -1,0 +1,174 @@
+"""A whole deployment, each part on a machine of its own: head, nodes, replicas, S3, PostgreSQL."""
+
+import re
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx2
+
+from tests.support.cluster import TOKEN
+from tests.support.machines import Machine, Network, network
+from tests.support.postgres import Server as Postgres
+from tests.support.postgres import running_postgres
+from tests.support.processes import workers_of
+from tests.support.s3 import S3
+from tests.support.waiting import LONG_S, wait_until
+
+HEAD_PORT, PORT = 6379, 8000
+
+
+@dataclass(eq=False)
+class Part:
+    """A command of ``geodesic``, and the machine that runs it."""
+
+    machine: Machine
+    arguments: Sequence[str]
+    settings: Mapping[str, str]
+    log: Path
+    process: "subprocess.Popen[bytes] | None" = None
+
+    def start(self) -> None:
+        """Run the command, as whatever supervises it does at the start and after each end."""
+        self.process = self.machine.run(self.arguments, self.log, self.settings)
+
+    @property
+    def is_running(self) -> bool:
+        return self.process is not None and self.process.poll() is None
+
+    def kill(self) -> None:
+        """End all that the machine runs, at once."""
+        self.machine.kill()
+        if self.process is not None:
+            self.process.wait()
+
+    def end(self) -> int:
+        """Have the command end in order; return its exit code."""
+        assert self.process is not None
+        self.process.terminate()
+        return self.process.wait()
+
+    def workers(self) -> set[int]:
+        """Return the ids of the worker processes on the machine."""
+        return set[int]().union(*(workers_of(each.pid) for each in self.machine.processes()))
+
+
+class Replica(Part):
+    """A service that answers."""
+
+    @property
+    def url(self) -> str:
+        return f"http://{self.machine.address}:{PORT}"
+
+    def ask(self, path: str, **headers: str) -> httpx2.Response:
+        """Ask without a body, on a connection of its own."""
+        return httpx2.get(self.url + path, headers=headers, timeout=LONG_S)
+
+    def listens(self) -> bool:
+        return self._answers("/livez")
+
+    def is_ready(self) -> bool:
+        return self._answers("/readyz")
+
+    def _answers(self, path: str) -> bool:
+        try:
+            return self.ask(path).status_code == 200
+        except httpx2.TransportError:
+            return False
+
+    def metrics(self, key: str) -> Mapping[str, float]:
+        """Return the metrics, by their names with labels."""
+        text = self.ask("/metrics", Authorization=f"Bearer {key}").text
+        found = re.findall(r"^([a-z_]+(?:\{[^}]*\})?) (\S+)$", text, re.MULTILINE)
+        return {name: float(value) for name, value in found}
+
+
+class Deployment:
+    """The parts, and what they share."""
+
+    def __init__(self, stack: ExitStack, lan: Network, folder: Path, **settings: str) -> None:
+        self.folder = folder
+        head, *nodes = (lan.add() for _ in range(3))
+        replicas, shared, database = [lan.add(), lan.add()], lan.add(), lan.add()
+        self.postgres: Postgres = stack.enter_context(
+            running_postgres(database.address, database.inside, lan.addresses)
+        )
+        self.s3 = S3(shared.address, shared.inside)
+        stack.callback(self.s3.close)
+        self.settings = {
+            "GEODESIC_STORE": self.s3.new_url(),
+            "GEODESIC_STATE": self.postgres.new_database(),
+            "GEODESIC_ADDRESS": f"{head.address}:{HEAD_PORT}",
+            "GEODESIC_CLUSTER_TOKEN": TOKEN,
+            "GEODESIC_WORKERS": "1",
+            **self.s3.environment,
+            **settings,
+        }
+        listen = ["--host", head.address, "--port", str(HEAD_PORT)]
+        self.head = self._part(head, "h", ["head", *listen, "--dir", str(folder / "h")])
+        self.nodes = [
+            self._part(node, name, ["node", "--dir", str(folder / name)])
+            for name, node in zip(("n1", "n2"), nodes, strict=True)
+        ]
+        self.replicas = [
+            self._replica(name, replica)
+            for name, replica in zip(("r1", "r2"), replicas, strict=True)
+        ]
+
+    def _part(self, machine: Machine, name: str, arguments: Sequence[str]) -> Part:
+        return Part(machine, arguments, self.settings, self.folder / f"{name}.log")
+
+    def _replica(self, name: str, machine: Machine) -> Replica:
+        arguments = ["serve", "--host", machine.address, "--port", str(PORT)]
+        own = {"GEODESIC_ENGINE": "ray", "GEODESIC_COPIES": str(self.folder / f"{name}-copies")}
+        return Replica(machine, arguments, self.settings | own, self.folder / f"{name}.log")
+
+    @property
+    def parts(self) -> Sequence[Part]:
+        return [self.head, *self.nodes, *self.replicas]
+
+    def start(self) -> None:
+        """Start all parts; a replica makes the store, which nodes need."""
+        self.head.start()
+        self._wait_for(lambda: b"the head listens" in self.head.log.read_bytes())
+        for replica in self.replicas:
+            replica.start()
+        self._wait_for(lambda: all(replica.listens() for replica in self.replicas))
+        for node in self.nodes:
+            node.start()
+
+    def _wait_for(self, condition: Callable[[], bool]) -> None:
+        """Wait, and start again what ends meanwhile: a busy machine may be too slow for Ray."""
+
+        def is_so() -> bool:
+            self.supervise()
+            return condition()
+
+        wait_until(is_so)
+
+    def supervise(self) -> Sequence[str]:
+        """Start again what has ended, as systemd would; return the names."""
+        ended = [part for part in self.parts if part.process and not part.is_running]
+        for part in ended:
+            part.machine.kill()  # what the command has left of Ray
+            part.start()
+        return [part.log.stem for part in ended]
+
+    def close(self) -> None:
+        for part in reversed(self.parts):
+            part.kill()
+
+
+@contextmanager
+def deployed(**settings: str) -> Iterator[Deployment]:
+    """Have a deployment inside the block, which has been started."""
+    with ExitStack() as stack:
+        lan = stack.enter_context(network())
+        prefix = tempfile.TemporaryDirectory(prefix="g", ignore_cleanup_errors=True)
+        deployment = Deployment(stack, lan, Path(stack.enter_context(prefix)), **settings)
+        stack.callback(deployment.close)
+        deployment.start()
+        yield deployment
