@@ -57,7 +57,7 @@ class BordersQuery(Query[BordersRequest]):
     offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
     hint = "set a larger chord_error, or a max_distance"
 
-    def check_limits(self, settings: Settings) -> None:
+    def check_limits(self, size: MeshSize, settings: Settings) -> None:
         """Refuse too many sources."""
         check_count("sources", point_count(*self.request.sources), settings, "max_sources")
 
