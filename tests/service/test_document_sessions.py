@@ -69,13 +69,19 @@ def with_replacements(text: str, replaced: Mapping[str, str]) -> str:
 
 def check_printed(printed: str, expected: str) -> None:
     """Check an output against the one shown, in which ``…`` stands for anything."""
-    pieces = [squeezed(piece) for piece in expected.split("…")]
+    text, place = squeezed(printed), 0
+    *pieces, last = map(squeezed, expected.split("…"))
     patterns = [NUMBER.join(map(re.escape, LONG_NUMBER.split(piece))) for piece in pieces]
-    found = re.fullmatch("[\\s\\S]*".join(patterns), squeezed(printed))
-    assert found, printed[:3000]
-    numbers = [number for piece in pieces for number in LONG_NUMBER.findall(piece)]
-    found_and_shown = (np.array(each, dtype=float) for each in (found.groups(), numbers))
-    np.testing.assert_allclose(*found_and_shown, rtol=ROUNDING, atol=ROUNDING)
+    patterns.append(NUMBER.join(map(re.escape, LONG_NUMBER.split(last))) + r"\Z")
+    for piece, pattern in zip([*pieces, last], patterns, strict=True):
+        # One after the other, each as early as may be: one pattern for all would try each way.
+        found = re.compile(pattern).search(text, place)
+        assert found, f"{piece!r} is not in {text[place : place + 3000]!r}"
+        assert place > 0 or found.start() == 0, f"{text[:100]!r} is no {piece[:100]!r}"
+        numbers = [float(number) for number in found.groups()]
+        shown = [float(number) for number in LONG_NUMBER.findall(piece)]
+        np.testing.assert_allclose(numbers, shown, rtol=ROUNDING, atol=ROUNDING)
+        place = found.end()
 
 
 def test_commands_print_what_the_documents_show(tmp_path: Path) -> None:
