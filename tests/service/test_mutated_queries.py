@@ -38,6 +38,9 @@ MORE_SEEDS: Mapping[str, tuple[Any, ...]] = {
     "computeIsolines": (
         {"sources": [{"vertex": 0}], "count": 5, "method": "approximate", "absolute_error": 0.1},
     ),
+    "computeBorders": (
+        {"sources": [{"vertex": 0}, {"vertex": 9}], "chord_error": 0.01, "barriers": [7]},
+    ),
     "computePath": ({"source": {"vertex": 0}, "target": {"vertex": 9}, "explain": True},),
     "computePaths": (
         {"source": {"polyline": [{"vertex": 0}, {"vertex": 1}]}, "targets": [{"vertex": 9}]},

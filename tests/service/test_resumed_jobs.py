@@ -22,6 +22,7 @@ QUERIES: dict[str, dict[str, Any]] = {
     "path": {"source": VERTEX, "target": INSIDE},
     "paths": {"source": INSIDE, "targets": [{"vertex": 9}, VERTEX]},
     "isolines": {"sources": [INSIDE], "count": 3},
+    "borders": {"sources": [INSIDE, {"vertex": 9}]},
     "matrix": {"sources": [VERTEX, INSIDE], "targets": [{"vertex": 9}]},
     "nearest": {"source": INSIDE, "candidates": [{"vertex": 9}, VERTEX], "k": 2},
     "locate": {"points": [[0.1, 0.2, 0.3]]},
