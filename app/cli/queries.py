@@ -51,6 +51,16 @@ PointsOut = Annotated[
         callback=writable(".csv", ".geojson", ".json"),
     ),
 ]
+LinesOut = Annotated[
+    Path | None,
+    typer.Option(
+        help="Where the lines go: .obj (polylines), .csv, .svg, .geojson or .json; - prints .csv.",
+        callback=writable(*LINES),
+    ),
+]
+ChordError = Annotated[
+    float | None, typer.Option(help="How far lines may stray inside faces, in mesh units.")
+]
 
 
 def distance(
@@ -212,14 +222,7 @@ def paths(
 def isolines(
     mesh_file: MeshFile,
     source: PointOrCurveSources,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Where the lines go: .obj (polylines), .csv, .svg, .geojson or .json; - "
-            "prints .csv.",
-            callback=writable(*LINES),
-        ),
-    ] = None,
+    out: LinesOut = None,
     level: Annotated[
         list[float] | None,
         typer.Option(help="A distance at which to draw lines; may be given again."),
@@ -228,10 +231,7 @@ def isolines(
         int | None,
         typer.Option(min=1, help="In place of --level: the number of evenly spaced levels."),
     ] = None,
-    chord_error: Annotated[
-        float | None,
-        typer.Option(help="How far lines may stray inside faces, in mesh units."),
-    ] = None,
+    chord_error: ChordError = None,
     max_distance: MaxDistance = None,
     method: BoundedMethodOption = BoundedMethod.EXACT,
     relative_error: RelativeError = None,
@@ -268,18 +268,8 @@ def isolines(
 def borders(
     mesh_file: MeshFile,
     source: PointOrCurveSources,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Where the lines go: .obj (polylines), .csv, .svg, .geojson or .json; - "
-            "prints .csv.",
-            callback=writable(*LINES),
-        ),
-    ] = None,
-    chord_error: Annotated[
-        float | None,
-        typer.Option(help="How far lines may stray inside faces, in mesh units."),
-    ] = None,
+    out: LinesOut = None,
+    chord_error: ChordError = None,
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
     merge: MergeOption = Merge.NONE,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
+from app.encoding import Answer
 from app.queries.accuracy import affinity_keys_of, expected_stats, solve_field, stats_of
 from app.queries.base import ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
@@ -20,9 +20,16 @@ from app.queries.cost_model import (
     SEGMENTS_IN_FACE,
     Cost,
     rough_share,
-    share_within,
+    share_reached,
     straight_to_nearest,
     sweep_cost,
+)
+from app.queries.lines import (
+    OFFERS,
+    VALUES_OF_LINE_POINT,
+    describe_line,
+    resolved_chord_error,
+    straight_line,
 )
 from app.queries.points import (
     SurfacePoints,
@@ -36,7 +43,6 @@ from app.queries.validation import (
     WrittenPoints,
     check_count,
     check_json_size,
-    invalid_fields,
 )
 from app.queries.views import lines_of_borders
 from app.schemas.requests import Accuracy, BordersRequest
@@ -45,16 +51,13 @@ from app.store.meshes import OpenMesh
 
 EXACT = Accuracy()
 
-_VALUES_OF_POINT = 4
-"""Values in JSON of a point: its position, and the face of its segment."""
-
 
 class BordersQuery(Query[BordersRequest]):
     """The points that are equally near to two of ``sources``, as polylines."""
 
     kind = "borders"
     model = BordersRequest
-    offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
+    offers = OFFERS
     hint = "set a larger chord_error, or a max_distance"
 
     def check_limits(self, size: MeshSize, settings: Settings) -> None:
@@ -82,13 +85,13 @@ class BordersQuery(Query[BordersRequest]):
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw the borders, if they fit into the answer."""
         request = self.request
-        chord_error = self._chord_error(opened.mesh)
+        chord_error = resolved_chord_error(opened.mesh, request.chord_error)
         starts = to_sources(opened.mesh, request.sources, points)
         field = solve_field(
             opened, EXACT, starts, context.part(0, 2), max_distance=request.max_distance
         )
         borders = field.borders(chord_error, **context.part(1, 2).options)
-        values = _VALUES_OF_POINT * sum(len(border.points) for border in borders)
+        values = VALUES_OF_LINE_POINT * sum(len(border.points) for border in borders)
         check_json_size(values, context.max_values, self.hint)
         found = [describe_border(border) for border in borders]
         return self._answer(opened, starts, chord_error, found, stats_of(field.stats))
@@ -96,26 +99,18 @@ class BordersQuery(Query[BordersRequest]):
     def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
         """Return the cost of two sweeps and of the lines, if geodesics were straight."""
         request, mesh = self.request, opened.mesh
-        chord_error = self._chord_error(mesh)
+        chord_error = resolved_chord_error(mesh, request.chord_error)
         starts = to_sources(mesh, request.sources, points)
-        share = 1.0
-        if request.max_distance is not None:
-            share = min(1.0, len(points) * float(share_within(mesh, request.max_distance)))
+        share = share_reached(mesh, len(points), request.max_distance)
         straight, nearest = straight_to_nearest(mesh, points, None, request.max_distance)
         faces = _divided_faces(mesh, straight, nearest) if len(starts) > 1 else np.empty(0, int)
-        found = [_straight_border(mesh, faces)] if len(faces) else []
+        found = [{"sources": (0, 1), **straight_line(mesh, faces, 1.0)}] if len(faces) else []
         sweep = sweep_cost(len(mesh.faces), EXACT, share, crossed=len(faces) / len(mesh.faces))
         seconds = sweep.seconds + PER_POINT * len(points)
         seconds += _seconds_per_face(len(mesh.faces), share) * len(faces)
         answer = self._answer(opened, starts, chord_error, found, expected_stats(mesh, share))
         times = SEGMENTS_IN_FACE + SEGMENTS_BY_WINDOWS * math.sqrt(len(mesh.faces))
         return Forecast(Cost(seconds, sweep.memory_bytes), answer, times)
-
-    def _chord_error(self, mesh: gc.TriangleMesh) -> float:
-        try:
-            return gc.resolve_chord_error(mesh, self.request.chord_error)
-        except gc.errors.InvalidArgument as error:
-            raise invalid_fields(["/chord_error"], str(error)) from None
 
     def _answer(
         self,
@@ -142,13 +137,7 @@ class BordersQuery(Query[BordersRequest]):
 
 def describe_border(border: gc.Border) -> dict[str, Any]:
     """Return the members of a border."""
-    return {
-        "sources": border.sources,
-        "closed": border.closed,
-        "length": border.length,
-        "points": border.points,
-        "faces": border.faces,
-    }
+    return {"sources": border.sources, **describe_line(border)}
 
 
 def _seconds_per_face(faces: int, share: float) -> float:
@@ -162,9 +151,3 @@ def _divided_faces(
     corners = nearest[mesh.faces]
     differ = (corners != corners[:, :1]).any(axis=1)
     return np.flatnonzero(differ & np.isfinite(distances[mesh.faces]).all(axis=1))
-
-
-def _straight_border(mesh: gc.TriangleMesh, faces: NDArray[np.int64]) -> dict[str, Any]:
-    """Return a border with one point for each face that it crosses."""
-    points = mesh.vertices[mesh.faces[faces]].mean(axis=1)
-    return {"sources": (0, 1), "closed": True, "length": 1.0, "points": points, "faces": faces}

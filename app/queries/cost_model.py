@@ -181,6 +181,11 @@ def share_within(mesh: gc.TriangleMesh, radius: Any) -> Any:
     return _share(radius, _area(mesh))
 
 
+def share_reached(mesh: gc.TriangleMesh, sources: int, radius: float | None) -> float:
+    """Return the share of a flat surface within a radius of some points; 1 without a radius."""
+    return 1.0 if radius is None else min(1.0, sources * float(share_within(mesh, radius)))
+
+
 def rough_share(size: MeshSize, sources: int, radius: float | None) -> float:
     """Return the share of the surface within a radius of some points, about; 1 without a radius."""
     if radius is None:

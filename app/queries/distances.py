@@ -26,7 +26,7 @@ from app.queries.cost_model import (
     PER_POINT,
     Cost,
     rough_share,
-    share_within,
+    share_reached,
     straight_to_nearest,
     sweep_cost,
 )
@@ -138,9 +138,7 @@ class DistancesQuery(Query[DistancesRequest]):
         request, mesh = self.request, opened.mesh
         sources, targets = self._parted(points)
         starts = to_sources(mesh, request.sources, sources)
-        share = 1.0
-        if request.max_distance is not None:
-            share = min(1.0, len(sources) * float(share_within(mesh, request.max_distance)))
+        share = share_reached(mesh, len(sources), request.max_distance)
         swept = as_swept(request, mesh)
         sweep = sweep_cost(len(mesh.faces), swept, share, paths="gradient" in self._included)
         straight, nearest = straight_to_nearest(mesh, sources, targets, request.max_distance)

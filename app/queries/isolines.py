@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import geodesic_core as gc
-from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG, Answer
+from app.encoding import Answer
 from app.queries.accuracy import (
     affinity_keys_of,
     as_swept,
@@ -31,10 +31,17 @@ from app.queries.cost_model import (
     SEGMENTS_IN_FACE,
     Cost,
     rough_share,
-    share_within,
+    share_reached,
     straight_to_nearest,
     sweep_cost,
     typical_edge,
+)
+from app.queries.lines import (
+    OFFERS,
+    VALUES_OF_LINE_POINT,
+    describe_line,
+    resolved_chord_error,
+    straight_line,
 )
 from app.queries.points import (
     SurfacePoints,
@@ -55,8 +62,8 @@ from app.schemas.requests import Accuracy, IsolinesRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
-_VALUES_OF_POINT, _VALUES_OF_LEVEL = 4, 1
-"""Values in JSON of a point (position, and the face of its segment), and of a level itself."""
+_VALUES_OF_LEVEL = 1
+"""Values in JSON of a level itself."""
 
 
 class IsolinesQuery(Query[IsolinesRequest]):
@@ -64,7 +71,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
 
     kind = "isolines"
     model = IsolinesRequest
-    offers: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
+    offers = OFFERS
     hint = "ask for fewer levels at once, or for a larger chord_error"
 
     @classmethod
@@ -100,7 +107,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw level by level, as long as the lines fit into the answer."""
-        chord_error = self._chord_error(opened.mesh)
+        chord_error = resolved_chord_error(opened.mesh, self.request.chord_error)
         starts = to_sources(opened.mesh, self.request.sources, points)
         field = solve_field(
             opened,
@@ -116,7 +123,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
         drawn = field.each_isoline(levels, chord_error, **context.part(1, 2).options)
         for level, lines in zip(levels, drawn, strict=True):
             values += _VALUES_OF_LEVEL
-            values += _VALUES_OF_POINT * sum(len(line.points) for line in lines)
+            values += VALUES_OF_LINE_POINT * sum(len(line.points) for line in lines)
             check_json_size(values, context.max_values, self.hint)
             found.append(describe_level(level, lines))
         bound, stats = bound_of(field.error_bound), stats_of(field.stats)
@@ -125,16 +132,14 @@ class IsolinesQuery(Query[IsolinesRequest]):
     def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
         """Return the cost of a sweep and its lines, if geodesics were straight."""
         request, mesh = self.request, opened.mesh
-        chord_error = self._chord_error(mesh)
+        chord_error = resolved_chord_error(mesh, request.chord_error)
         starts = to_sources(mesh, request.sources, points)
-        share = 1.0
-        if request.max_distance is not None:
-            share = min(1.0, len(points) * float(share_within(mesh, request.max_distance)))
+        share = share_reached(mesh, len(points), request.max_distance)
         straight, _ = straight_to_nearest(mesh, points, None, request.max_distance)
         levels = self._levels(straight)
         crossed = [_crossed_faces(mesh, straight, level) for level in levels]
         found = [
-            {"level": level, "lines": [_straight_line(mesh, level, faces)] if len(faces) else []}
+            {"level": level, "lines": [straight_line(mesh, faces, level)] if len(faces) else []}
             for level, faces in zip(levels, crossed, strict=True)
         ]
         counts = np.array([len(faces) for faces in crossed])
@@ -166,12 +171,6 @@ class IsolinesQuery(Query[IsolinesRequest]):
             raise invalid_fields(["/count"], str(error)) from None
         return [float(level) for level in levels]
 
-    def _chord_error(self, mesh: gc.TriangleMesh) -> float:
-        try:
-            return gc.resolve_chord_error(mesh, self.request.chord_error)
-        except gc.errors.InvalidArgument as error:
-            raise invalid_fields(["/chord_error"], str(error)) from None
-
     def _answer(
         self,
         opened: OpenMesh,
@@ -200,11 +199,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
 
 def describe_level(level: float, lines: Sequence[gc.Isoline]) -> dict[str, Any]:
     """Return the members of a level."""
-    members = [
-        {"closed": each.closed, "length": each.length, "points": each.points, "faces": each.faces}
-        for each in lines
-    ]
-    return {"level": level, "lines": members}
+    return {"level": level, "lines": [describe_line(line) for line in lines]}
 
 
 def _crossed_faces(
@@ -213,12 +208,6 @@ def _crossed_faces(
     """Return the faces with corners on both sides of a level."""
     inside = distances[mesh.faces] <= level
     return np.flatnonzero(inside.any(axis=1) & ~inside.all(axis=1)).astype(np.int32)
-
-
-def _straight_line(mesh: gc.TriangleMesh, level: float, faces: NDArray[np.int32]) -> dict[str, Any]:
-    """Return a line with one point for each face that it crosses."""
-    points = mesh.vertices[mesh.faces[faces]].mean(axis=1)
-    return {"closed": True, "length": level, "points": points, "faces": faces}
 
 
 def _segments_in_face(

@@ -511,8 +511,8 @@ class Service:
         with self.mesh_catalog.pinned(query.mesh_id):
             query.check_answer(representation, size, self.settings, as_job=is_promised)
             name = result_name(query.mesh_id, result_key(query, representation))
-            is_small = query.is_small(size)
-            if self.database.is_shared and not is_small:  # small work costs less than the look
+            # Small work costs less than to look for what another service has computed.
+            if self.database.is_shared and not query.is_small(size):
                 await self.results.index(name)
             stored = await self.results.find(name)
             self.lookups["miss" if stored is None else "hit"] += 1
@@ -527,6 +527,7 @@ class Service:
                 run = in_parts.run
             else:
                 work = RunQuery(query, representation, name)
+                is_small = query.is_small(size)
                 task = Task(work, client, query.affinity_keys, is_small, is_promised)
                 run = partial(self.engine.run, task)
             start = partial(self._run, run, query.kind)

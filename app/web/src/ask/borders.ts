@@ -3,42 +3,40 @@ import { askBorders, type BordersQuestion } from "../api/queries";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
+import { Drawing } from "./drawing";
 import { type Fields, questionOf } from "./fields";
 
 export class Borders {
-  private requested = "";
-  private stop = new AbortController();
+  private readonly drawing: Drawing;
 
   constructor(
-    private readonly status: Status,
+    status: Status,
     private readonly sceneView: SceneView,
     private readonly fields: Fields,
-  ) {}
+  ) {
+    const clear = () => sceneView.showBorders(new Int32Array(), []);
+    this.drawing = new Drawing(status, "Drawing borders…", clear);
+  }
 
-  /** Request the borders that ``state`` shows and that are not drawn yet, and draw them. */
+  /** Request the borders that `state` shows and that are not drawn yet, and draw them. */
   follow(state: State): void {
     const { mesh, sources, shade } = state;
     const nearest = this.fields.territories(state);
-    const isDrawn = mesh && nearest && sources.length > 1 && shade === "territories";
+    const isDrawn = sources.length > 1 && shade === "territories" && this.sceneView.surface;
+    if (!mesh || !nearest || !isDrawn) {
+      this.drawing.clear();
+      return;
+    }
     const question = bordersOf(state);
-    const requested = isDrawn && this.sceneView.surface ? JSON.stringify([mesh, question]) : "";
-    if (requested === this.requested) return;
-    this.requested = requested;
-    this.stop.abort();
-    this.sceneView.showBorders(new Int32Array(), []);
-    if (requested === "" || !mesh || !nearest) return;
-    const stop = new AbortController();
-    this.stop = stop;
-    this.status.run("busy", "Drawing borders…", stop, async (onProgress) => {
-      const borders = await askBorders(mesh, question, onProgress, stop.signal);
-      if (!stop.signal.aborted) this.sceneView.showBorders(nearest, borders);
+    this.drawing.follow(JSON.stringify([mesh, question]), async (onProgress, signal) => {
+      const borders = await askBorders(mesh, question, onProgress, signal);
+      return () => this.sceneView.showBorders(nearest, borders);
     });
   }
 
   /** Draw them again on a mesh that has been opened anew. */
   forget(): void {
-    this.stop.abort();
-    this.requested = "";
+    this.drawing.forget();
   }
 }
 

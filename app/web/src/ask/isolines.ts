@@ -3,42 +3,40 @@ import { askIsolines, type IsolinesQuestion } from "../api/queries";
 import type { Lines, State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
+import { Drawing } from "./drawing";
 import { type Fields, questionOf } from "./fields";
 
 export class Isolines {
-  private requested = "";
-  private stop = new AbortController();
+  private readonly drawing: Drawing;
 
   constructor(
-    private readonly status: Status,
+    status: Status,
     private readonly sceneView: SceneView,
     private readonly fields: Fields,
-  ) {}
+  ) {
+    this.drawing = new Drawing(status, "Drawing isolines…", () => sceneView.showIsolines([]));
+  }
 
-  /** Request the isolines that ``state`` needs and that are not drawn yet, and draw them. */
+  /** Request the isolines that `state` needs and that are not drawn yet, and draw them. */
   follow(state: State): void {
     const { mesh, lines, shade } = state;
     const field = this.fields.of(state);
-    const isDrawn = mesh && field && lines && shade !== "difference" && this.sceneView.surface;
+    const isDrawn = field && lines && shade !== "difference" && this.sceneView.surface;
     const question = isDrawn ? isolinesOf(state, lines, field.largest) : null;
-    const requested = JSON.stringify([mesh, question]);
-    if (requested === this.requested) return;
-    this.requested = requested;
-    this.stop.abort();
-    this.sceneView.showIsolines([]);
-    if (!mesh || !question || ("levels" in question && question.levels.length === 0)) return;
-    const stop = new AbortController();
-    this.stop = stop;
-    this.status.run("busy", "Drawing isolines…", stop, async (onProgress) => {
-      const found = await askIsolines(mesh, question, onProgress, stop.signal);
-      if (!stop.signal.aborted) this.sceneView.showIsolines(found);
+    const isEmpty = question && "levels" in question && question.levels.length === 0;
+    if (!mesh || !question || isEmpty) {
+      this.drawing.clear();
+      return;
+    }
+    this.drawing.follow(JSON.stringify([mesh, question]), async (onProgress, signal) => {
+      const found = await askIsolines(mesh, question, onProgress, signal);
+      return () => this.sceneView.showIsolines(found);
     });
   }
 
   /** Draw them again on a mesh that has been opened anew. */
   forget(): void {
-    this.stop.abort();
-    this.requested = "";
+    this.drawing.forget();
   }
 }
 

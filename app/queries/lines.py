@@ -1,0 +1,39 @@
+"""Lines on the surface: the common part of queries for isolines and for borders."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from numpy.typing import NDArray
+
+import geodesic_core as gc
+from app.encoding import CSV, GEOJSON, JSON, OBJ, SVG
+from app.queries.validation import invalid_fields
+
+OFFERS: Sequence[str] = (JSON, OBJ, CSV, SVG, GEOJSON)
+"""Media types that hold lines."""
+VALUES_OF_LINE_POINT = 4
+"""Values in JSON of a point of a line: its position, and the face of its segment."""
+
+
+def resolved_chord_error(mesh: gc.TriangleMesh, chord_error: float | None) -> float:
+    """Return the chord error of a request, mesh units, or refuse it; by default the library's."""
+    try:
+        return gc.resolve_chord_error(mesh, chord_error)
+    except gc.errors.InvalidArgument as error:
+        raise invalid_fields(["/chord_error"], str(error)) from None
+
+
+def describe_line(line: gc.Isoline | gc.Border) -> dict[str, Any]:
+    """Return the members that every line has."""
+    return {
+        "closed": line.closed,
+        "length": line.length,
+        "points": line.points,
+        "faces": line.faces,
+    }
+
+
+def straight_line(mesh: gc.TriangleMesh, faces: NDArray[Any], length: float) -> dict[str, Any]:
+    """Return the members of a likely line: a point for each face that it crosses."""
+    points = mesh.vertices[mesh.faces[faces]].mean(axis=1)
+    return {"closed": True, "length": length, "points": points, "faces": faces}
