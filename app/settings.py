@@ -167,7 +167,7 @@ class Settings(BaseSettings):
     max_faces: PositiveInt = 5_000_000
     """Most faces of a mesh."""
     max_sources: PositiveInt = 10_000
-    """Most sources of a query, each point of a curve; of a matrix as a job, as its body holds."""
+    """Most sources of a query; each point of a curve counts. Large matrices may have more."""
     max_matrix_cells: PositiveInt = 10_000_000
     """Most cells of a matrix in memory: sources times targets, pairs, or what is reached."""
     max_waypoints: PositiveInt = 100

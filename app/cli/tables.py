@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.cli import elsewhere
+from app.cli import remote_matrix
 from app.cli.arguments import (
     Barriers,
     BlockedFaces,
@@ -98,8 +98,8 @@ def matrix(
         str | None,
         typer.Option(
             metavar="URL",
-            help="Have this service compute it, on all its machines: exact, to a .npy; for points "
-            "from files. Its key: GEODESIC_SERVICE_KEY.",
+            help="Have this service compute it, on all its machines: exact distances, to a .npy, "
+            "for points from files. GEODESIC_SERVICE_KEY is its key.",
         ),
     ] = None,
     max_distance: MaxDistance = None,
@@ -139,10 +139,10 @@ def matrix(
     starts = _points_of(mesh, points or sources)
     stops = None if targets is None else _points_of(mesh, targets)
     if service is not None:
-        _print_elsewhere(
+        _print_remote(
             output,
             mesh,
-            elsewhere.write_matrix(
+            remote_matrix.write_matrix(
                 service,
                 mesh,
                 out,
@@ -183,7 +183,7 @@ def matrix(
     output.say(f"written     {out}")
 
 
-def _print_elsewhere(
+def _print_remote(
     output: Output, mesh: "TriangleMesh", written: "tuple[StoredMatrix, str]", out: Path
 ) -> None:
     matrix, checksum = written

@@ -96,7 +96,7 @@ class Signals(Structure):
 
 
 class _Matrix(NamedTuple):
-    """A matrix whose parts were asked for last."""
+    """The matrix of the latest part."""
 
     opened: OpenMesh
     question: tuple[bytes, str]

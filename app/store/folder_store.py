@@ -29,9 +29,9 @@ class FolderStore:
             yield self._share
 
     def claim(self, service: str | None) -> None:
-        """Note where the jobs are, unless services are here whose jobs are elsewhere.
+        """Note which database has the jobs; refuse one other than that of services in the folder.
 
-        A service that does not share the folder is kept away by the lock.
+        The lock keeps away a service that does not share the folder.
         """
         is_alone = self._share is None or self._share.is_first
         if not is_alone and service != noted_state(self.folder):

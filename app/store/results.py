@@ -363,7 +363,7 @@ class ResultStore:
     def reserving(self, nbytes: int) -> Iterator[None]:
         """Reserve room for results that are made, in several steps, inside the block.
 
-        Raises ``ProblemError`` where those of jobs, and what others reserve, leave not so much.
+        Raises ``ProblemError`` where the results of jobs, and other reservations, leave too little.
         """
         self.refuse_without_room(nbytes)
         self._reserved += nbytes

@@ -8,7 +8,7 @@ from benchmarks.failures.trial import Trial
 from benchmarks.tables import machine, rated, table
 
 LIMIT_S = 10.0
-"""Within which a request gets its answer or refusal, and work that nobody waits for ends"""
+"""Within which a request gets its answer or refusal, and orphaned work ends"""
 
 
 ABOUT = (
@@ -16,7 +16,7 @@ ABOUT = (
     "(moto) and PostgreSQL, each in a network namespace of its own, on the same cores. Seven users "
     "ask small questions, send jobs and upload meshes; two others ask long questions. Each answer "
     "is compared with that of the library, bit by bit. One thing after the other fails under this "
-    "load; what supervises a command starts it again, and nobody else does anything."
+    "load; a supervisor starts commands again; nothing else is done by hand."
 )
 TIMES = (
     "Times count from the failure; that of a refusal from its request, if that came later. All is "
@@ -32,8 +32,8 @@ COLUMNS = (
     "slowest small answer, s",
     "promised",
     "lost",
-    "work of nobody ended after, s",
-    "all as before after, s",
+    "orphaned work ended after, s",
+    "recovered after, s",
     "started again",
 )
 

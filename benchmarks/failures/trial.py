@@ -217,7 +217,7 @@ def _is_whole(replica: Replica) -> bool:
 
 @contextmanager
 def _stopped_work(nodes: Sequence[Part]) -> Iterator[Sequence[float]]:
-    """Note the times at which the logs of hosts say that they have stopped work of nobody."""
+    """Note the times at which the logs of hosts say that they have stopped orphaned work."""
     seen: list[float] = []
     over = Event()
 
