@@ -28,6 +28,7 @@ from geodesic_core.kernels.isolines.arcs import (
     ROWS,
     TURN,
     clip,
+    clip_line,
     insert_interval,
     with_room,
 )
@@ -134,10 +135,7 @@ def clip_to_half_plane(
     if count == 0 or (nx == 0.0 and ny == 0.0):
         return count
     if is_line(curve):
-        lo, hi = intervals[0, 0], intervals[0, 1]
-        lo, hi = span_in_half_plane(lo, hi, depth, nx * curve[EX] + ny * curve[EY])
-        intervals[0, 0], intervals[0, 1] = lo, hi
-        return 1 if lo < hi else 0
+        return clip_line(intervals, depth, nx * curve[EX] + ny * curve[EY])
     alpha, q = depth * curve[K], curve[Q]
     return clip_angles(
         intervals, count, alpha, depth * curve[GX] + q * nx, depth * curve[GY] + q * ny

@@ -25,10 +25,17 @@ from geodesic_core.kernels.borders.bisectors import (
     strays,
 )
 from geodesic_core.kernels.isolines.arcs import ROWS, with_room
-from geodesic_core.kernels.isolines.lines import Crossings, join, put_crossing, put_in_face
+from geodesic_core.kernels.isolines.lines import (
+    UNKNOWN,
+    Crossings,
+    join,
+    number_around,
+    put_crossing,
+    put_in_face,
+)
 from geodesic_core.kernels.isolines.regions import is_line
 from geodesic_core.kernels.jit import borrowed, kernel
-from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL, half_edge_in_face, next_around
+from geodesic_core.kernels.mesh.half_edges import LENGTH, half_edge_in_face
 
 DEPTH = 24
 """Times that a bisector is halved at most: until its pieces are a millionth of it."""
@@ -66,10 +73,10 @@ def cross_edges(topology: Any, territories: Any, row_of: Ints) -> LabelledCrossi
     links, count, total = topology.links, 3 * len(territories.faces), 0
     positions, half_edges = np.empty((ROWS, 1)), np.empty((ROWS, 1), np.int32)
     sources = np.empty((ROWS, 2), np.int32)
-    first, number = np.zeros((count, 1), np.int32), np.zeros((count, 1), np.int32)
-    turned, known = np.zeros((count, 1), np.int32), np.zeros(count, np.uint8)
+    first, turned = np.zeros((count, 1), np.int32), np.zeros((count, 1), np.int32)
+    number = np.full((count, 1), UNKNOWN, np.int32)
     for n in range(count):
-        if known[n]:
+        if number[n, 0] != UNKNOWN:
             continue
         h, begin = 3 * territories.faces[n // 3, 0] + n % 3, total
         lo, hi = territories.first_run[n, 0], territories.first_run[n + 1, 0]
@@ -81,15 +88,7 @@ def cross_edges(topology: Any, territories: Any, row_of: Ints) -> LabelledCrossi
             sources[total, 0] = int(territories.runs[i - 1, 1])
             sources[total, 1] = int(territories.runs[i, 1])
             total += 1
-        g = h
-        while True:
-            if row_of[g // 3] >= 0:
-                m = 3 * row_of[g // 3] + g % 3
-                known[m], first[m, 0], number[m, 0] = 1, begin, total - begin
-                turned[m, 0] = links[g, TAIL] != links[h, TAIL]
-            g = next_around(links, g)
-            if g < 0 or g == h:
-                break
+        number_around(links, row_of, h, begin, total, first, number, turned)
     crossings = Crossings(positions[:total], half_edges[:total], first, number, turned)
     return LabelledCrossings(crossings, sources[:total])
 

@@ -102,6 +102,14 @@ def clip(intervals: Floats, count: int, start: float, width: float) -> int:
     return left
 
 
+@inlined
+def clip_line(intervals: Floats, depth: float, rate: float) -> int:
+    """Cut the one interval of a line to ``depth`` + t ``rate`` >= 0; return 1, or 0 for nothing."""
+    lo, hi = span_in_half_plane(intervals[0, 0], intervals[0, 1], depth, rate)
+    intervals[0, 0], intervals[0, 1] = lo, hi
+    return 1 if lo < hi else 0
+
+
 @kernel
 def clip_to_half_plane(
     intervals: Floats, count: int, front: Floats, depth: float, nx: float, ny: float
@@ -114,10 +122,7 @@ def clip_to_half_plane(
     if count == 0 or (nx == 0.0 and ny == 0.0):
         return count
     if is_line(front):
-        lo, hi = intervals[0, 0], intervals[0, 1]
-        lo, hi = span_in_half_plane(lo, hi, depth, nx * front[EX] + ny * front[EY])
-        intervals[0, 0], intervals[0, 1] = lo, hi
-        return 1 if lo < hi else 0
+        return clip_line(intervals, depth, nx * front[EX] + ny * front[EY])
     radius = front[RADIUS]
     if depth >= radius:
         return count

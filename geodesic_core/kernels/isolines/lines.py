@@ -78,6 +78,10 @@ class Cuts(NamedTuple):
     """(n + 1, 1): of each face"""
 
 
+UNKNOWN = -1
+"""Number of crossings of an edge before they are looked for"""
+
+
 class Crossings(NamedTuple):
     """The crossings of a level with the edges of the faces that it may pass."""
 
@@ -222,10 +226,10 @@ def cross_edges(
     links, geometry, reach = topology.links, topology.geometry, level * (1.0 + LEVEL)
     count, total, spans = 3 * len(cuts.faces), 0, np.empty((ROWS, 2))
     positions, half_edges = np.empty((ROWS, 1)), np.empty((ROWS, 1), np.int32)
-    first, number = np.zeros((count, 1), np.int32), np.zeros((count, 1), np.int32)
-    turned, known = np.zeros((count, 1), np.int32), np.zeros(count, np.uint8)
+    first, turned = np.zeros((count, 1), np.int32), np.zeros((count, 1), np.int32)
+    number = np.full((count, 1), UNKNOWN, np.int32)
     for n in range(count):
-        if known[n]:
+        if number[n, 0] != UNKNOWN:
             continue
         h, begin = 3 * cuts.faces[n // 3, 0] + n % 3, total
         tail_inside = distance[links[h, TAIL]] <= reach
@@ -244,16 +248,28 @@ def cross_edges(
                 if not to_head:
                     positions[total, 0], half_edges[total, 0] = hi, h
                     total += 1
-        g = h
-        while True:
-            if row_of[g // 3] >= 0:
-                m = 3 * row_of[g // 3] + g % 3
-                known[m], first[m, 0], number[m, 0] = 1, begin, total - begin
-                turned[m, 0] = links[g, TAIL] != links[h, TAIL]
-            g = next_around(links, g)
-            if g < 0 or g == h:
-                break
+        number_around(links, row_of, h, begin, total, first, number, turned)
     return Crossings(positions[:total], half_edges[:total], first, number, turned)
+
+
+@inlined
+def number_around(
+    links: Ints, row_of: Ints, h: int, begin: int, end: int, first: Ints, number: Ints, turned: Ints
+) -> None:
+    """Note that the crossings from ``begin`` to ``end`` are those of h's edge.
+
+    Modifies ``first``, ``number`` and ``turned``, as `Crossings` has them, for each half-edge of
+    the edge.
+    """
+    g = h
+    while True:
+        if row_of[g // 3] >= 0:
+            m = 3 * row_of[g // 3] + g % 3
+            first[m, 0], number[m, 0] = begin, end - begin
+            turned[m, 0] = links[g, TAIL] != links[h, TAIL]
+        g = next_around(links, g)
+        if g < 0 or g == h:
+            break
 
 
 @inlined
