@@ -83,15 +83,18 @@ def _approximate_curves() -> None:
 WORKLOADS: dict[str, Callable[[], None]] = {
     "exact": _exact,
     "approximate": _approximate,
-    "approximate-curves": _approximate_curves,
-    "borders": _borders,
     "curves": _curves,
-    "fast": _fast,
-    "fast-curves": _fast_curves,
+    "approximate-curves": _approximate_curves,
     "isolines": _isolines,
+    "fast": _fast,
+    "borders": _borders,
+    "fast-curves": _fast_curves,
     "paths": _paths,
 }
-"""Calls that together use all kernels. Neighbours share few, so their processes seldom wait."""
+"""Calls that together use all kernels, in an order that suits two processes.
+
+Each takes the next one in turn. A workload shares more with the last but one than with the last.
+"""
 
 
 def compile_kernels(
@@ -118,7 +121,7 @@ def compile_kernels(
 
     Notes
     -----
-    All kernels take about 100 s of processor time, in as many processes as there are cores. The
+    All kernels take about 80 s of processor time, in as many processes as there are cores. The
     number of compiled kernels is written to standard error, unless ``GEODESIC_QUIET`` is set. Where
     the cache cannot be written, nothing is compiled ahead.
 

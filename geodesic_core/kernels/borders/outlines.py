@@ -24,7 +24,7 @@ from geodesic_core.kernels.borders.bisectors import (
     point_on,
     strays,
 )
-from geodesic_core.kernels.isolines.arcs import ROWS, with_room
+from geodesic_core.kernels.isolines.arcs import ROWS, copy_rows, with_room
 from geodesic_core.kernels.isolines.lines import (
     UNKNOWN,
     Crossings,
@@ -194,7 +194,7 @@ def gaps_between(curves: Floats, places: Floats, ids: Ints) -> Ints:
         if first < 2 * bisectors:
             label = int(curves[first // 2, LEFT if first % 2 == 0 else RIGHT])
         seen[first] = label
-        if (seen[:first] == label).any():
+        if occurs(label, seen, first):
             continue
         ends, starts = np.empty((total, 2)), np.empty((total, 2))
         end_ids, start_ids = np.empty(total, np.int32), np.empty(total, np.int32)
@@ -229,6 +229,15 @@ def gaps_between(curves: Floats, places: Floats, ids: Ints) -> Ints:
 
 
 @kernel
+def occurs(label: int, labels: Ints, count: int) -> bool:
+    """Whether a label is among the first ``count`` labels."""
+    for i in range(count):  # noqa: SIM110 - numba has no generators in any()
+        if labels[i] == label:
+            return True
+    return False
+
+
+@kernel
 def close_gaps(gaps: Ints, at: Floats, crossings: int, near: float) -> tuple[Ints, Ints, Floats]:
     """Close the gaps of a face: unite nodes, and return straight pieces between others.
 
@@ -239,7 +248,7 @@ def close_gaps(gaps: Ints, at: Floats, crossings: int, near: float) -> tuple[Int
     total, inner = len(at), len(at) - crossings
     parent = np.arange(total + len(gaps)).astype(np.int32)
     places = np.zeros((total + len(gaps), 2))
-    places[:total] = at
+    copy_rows(at, places, 0)
     for i in range(len(gaps)):
         u, v = gaps[i, 0], gaps[i, 1]
         if max(u, v) < inner and math.hypot(at[u, 0] - at[v, 0], at[u, 1] - at[v, 1]) <= near:
@@ -357,7 +366,7 @@ def trace_borders(
         for b in range(len(curves)):
             at[2 * b, 0], at[2 * b, 1] = point_on(curves[b], curves[b, START])
             at[2 * b + 1, 0], at[2 * b + 1, 1] = point_on(curves[b], curves[b, END])
-        at[inner:] = places
+        copy_rows(places, at, inner)
         gaps = gaps_between(curves, places, ids)
         parent, straight, where = close_gaps(gaps, at, len(ids), near)
         room = pieces + len(curves) + len(straight)

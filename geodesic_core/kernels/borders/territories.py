@@ -14,7 +14,7 @@ import numpy as np
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.borders import envelopes
 from geodesic_core.kernels.borders.bisectors import BISECTOR, bisectors_within
-from geodesic_core.kernels.isolines.arcs import ROWS, with_room
+from geodesic_core.kernels.isolines.arcs import ROWS, copy_rows, with_room
 from geodesic_core.kernels.isolines.regions import (
     CX,
     CY,
@@ -117,7 +117,7 @@ def labelled_regions(
     if level < limit:
         return regions, labels[:count]
     beyond = np.zeros((count + 1, REGION))
-    beyond[:count] = regions
+    copy_rows(regions, beyond, 0)
     beyond[count, RADIUS], beyond[count, OVER] = np.inf, -1
     return beyond, labels
 
@@ -146,7 +146,8 @@ def divide_faces(
         regions, labels = labelled_regions(topology, field, nearest, f, level, limit)
         slack = LEVEL * level
         seen = np.empty((len(regions), 2))  # the stretch of its edge on which each is nearest
-        seen[:, 0], seen[:, 1] = np.inf, -np.inf
+        for i in range(len(regions)):
+            seen[i, 0], seen[i, 1] = np.inf, -np.inf
         first_run, is_divided = run_count, False
         for h in range(3 * f, 3 * f + 3):
             edge, length = half_edge_in_face(geometry, h), geometry[h, LENGTH]
@@ -180,7 +181,8 @@ def divide_faces(
             if seen[i, 0] < seen[i, 1] or regions[i, OVER] < 0:
                 if regions[i, OVER] >= 0:
                     narrow(geometry, 3 * f + int(regions[i, OVER]), regions[i], seen[i])
-                chosen[size], chosen_labels[size, 0] = regions[i], labels[i, 0]
+                copy_rows(regions[i : i + 1], chosen, size)
+                chosen_labels[size, 0] = labels[i, 0]
                 is_divided = is_divided or labels[i, 0] != runs[first_run, 1]
                 size += 1
         curves_of[k, 0] = 0
@@ -189,7 +191,7 @@ def divide_faces(
                 topology, f, chosen[:size], chosen_labels[:size], level, slack, PIECE * level
             )
             curves = with_room(curves, curve_count + len(own_curves))
-            curves[curve_count : curve_count + len(own_curves)] = own_curves
+            copy_rows(own_curves, curves, curve_count)
             curve_count += len(own_curves)
             curves_of[k, 0] = len(own_curves)
     return runs[:run_count], runs_of, curves[:curve_count], curves_of, found[:count]

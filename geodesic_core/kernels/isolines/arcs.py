@@ -62,10 +62,19 @@ def with_room(rows: Any, needed: int) -> Any:
     if needed <= len(rows):
         return rows
     larger = np.empty((max(2 * len(rows), needed), rows.shape[1]), rows.dtype)
+    copy_rows(rows, larger, 0)
+    return larger
+
+
+@kernel
+def copy_rows(rows: Any, target: Any, first: int) -> None:
+    """Copy ``rows`` into ``target``, from its row ``first`` on.
+
+    An assignment to a slice does the same, but takes half a second to compile.
+    """
     for i in range(len(rows)):
         for column in range(rows.shape[1]):
-            larger[i, column] = rows[i, column]
-    return larger
+            target[first + i, column] = rows[i, column]
 
 
 @kernel
