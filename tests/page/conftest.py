@@ -2,12 +2,11 @@
 
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from contextlib import closing
 
 import httpx2
 import pytest
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+from playwright.sync_api import Browser, BrowserContext, expect, sync_playwright
 
 from tests.support.node import alone, build_page, miss
 from tests.support.processes import Server
@@ -20,6 +19,7 @@ FLAGS = [
     "--enable-unsafe-swiftshader",
     "--disable-gpu-compositing",  # WebGL is drawn as the GPU would, the rest of the page is not
     "--no-sandbox",
+    "--process-per-site",
 ]
 
 
@@ -44,20 +44,16 @@ def browser(_built: None) -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def service(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:  # noqa: ARG001
-    """The address of a service of its own; only where there is a browser to go there."""
-    with serving(tmp_path_factory.mktemp("store")) as address:
-        yield address
+def server(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:  # noqa: ARG001
+    """A service of its own; only where there is a browser to go there."""
+    with closing(Server(tmp_path_factory.mktemp("store"))) as server:
+        yield server
 
 
-@contextmanager
-def serving(store: Path, **settings: str) -> Iterator[str]:
-    """Serve, and give the address."""
-    server = Server(store, **settings)
-    try:
-        yield server.url
-    finally:
-        server.close()
+@pytest.fixture(scope="module")
+def service(server: Server) -> str:
+    """The address of the service."""
+    return server.url
 
 
 def sample(service: str, name: str, faces: int, **headers: str) -> str:
@@ -92,16 +88,25 @@ def wedge() -> str:
     return "\n".join(lines)
 
 
-@pytest.fixture
-def view(browser: Browser, service: str) -> Iterator[View]:
-    """A new page, which must not have written errors by the end."""
+@pytest.fixture(scope="module")
+def context(browser: Browser, service: str) -> Iterator[BrowserContext]:
+    """A profile of the browser: its cache saves each page of the module half of its start."""
     context = browser.new_context(
         viewport={"width": 1100, "height": 700}, has_touch=True, base_url=service
     )
     context.set_default_timeout(1000 * LONG_S)
     context.grant_permissions(["clipboard-read", "clipboard-write"])
-    page: Page = context.new_page()
+    context.new_page().goto("/livez")  # keeps the process that draws alive
+    yield context
+    context.close()
+
+
+@pytest.fixture
+def view(context: BrowserContext) -> Iterator[View]:
+    """A new page, which remembers nothing and must not have written errors by the end."""
+    page = context.new_page()
     view = View(page)
     yield view
-    context.close()
+    page.evaluate("() => localStorage.clear()")
+    page.close()
     assert view.errors == []

@@ -1,12 +1,14 @@
 """The page of a service that asks for keys."""
 
 from collections.abc import Iterator
+from contextlib import closing
 
 import httpx2
 import pytest
 from playwright.sync_api import Browser, Page, Request, Route, expect
 
-from tests.page.conftest import sample, serving
+from tests.page.conftest import sample
+from tests.support.processes import Server
 from tests.support.viewing import PLAIN, View
 
 KEY = "of-a-page-0123456789"
@@ -16,8 +18,9 @@ BEARER = {"Authorization": f"Bearer {KEY}"}
 @pytest.fixture(scope="module")
 def service(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:  # noqa: ARG001
     """A service that has one key; ``view`` goes there."""
-    with serving(tmp_path_factory.mktemp("store"), GEODESIC_API_KEYS=f"page:{KEY}") as address:
-        yield address
+    store = tmp_path_factory.mktemp("store")
+    with closing(Server(store, GEODESIC_API_KEYS=f"page:{KEY}")) as server:
+        yield server.url
 
 
 @pytest.fixture(scope="module")

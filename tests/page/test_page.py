@@ -4,6 +4,7 @@ import json
 import math
 import subprocess
 import sys
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from playwright.sync_api import FilePayload, Route, expect
 
 from tests.page.conftest import sample
 from tests.support.paths import ROOT
+from tests.support.processes import Server, slowed
 from tests.support.viewing import PLAIN, View, angle_at, length_of, query_of
 
 PATH = np.array([230, 0, 92])
@@ -592,6 +594,14 @@ def test_wireframe_and_theme(view: View, sphere: str) -> None:
 # Wait
 
 
+@pytest.fixture
+def slow_workers(server: Server) -> Iterator[None]:
+    """Workers that need ten times as long, so that a query is long on any machine."""
+    with slowed(server.workers):
+        yield
+
+
+@pytest.mark.usefixtures("slow_workers")
 def test_a_long_query_tells_its_progress_and_can_be_cancelled(view: View, large: str) -> None:
     view.open(f"/?mesh={large}&{PLAIN}")
     streams: list[str] = []

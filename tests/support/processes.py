@@ -5,8 +5,9 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
@@ -122,13 +123,36 @@ class Server:
 def stopped(pids: Iterable[int]) -> Iterator[None]:
     """Have processes do nothing at all meanwhile; what they are given waits."""
     pids = set(pids)
-    for pid in pids:
-        os.kill(pid, signal.SIGSTOP)
+    _send(signal.SIGSTOP, pids)
     try:
         yield
     finally:
-        for pid in filter(is_running, pids):
-            os.kill(pid, signal.SIGCONT)
+        _send(signal.SIGCONT, pids)
+
+
+def _send(number: signal.Signals, pids: Iterable[int]) -> None:
+    for pid in pids:
+        with suppress(ProcessLookupError):  # it has just ended
+            os.kill(pid, number)
+
+
+@contextmanager
+def slowed(pids: Callable[[], Iterable[int]]) -> Iterator[None]:
+    """Have processes run for a tenth of the time, however fast the machine is."""
+    over = threading.Event()
+
+    def hold_up() -> None:
+        while not over.wait(0.01):
+            with stopped(pids()):
+                over.wait(0.09)
+
+    thread = threading.Thread(target=hold_up)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def workers_of(service: int) -> set[int]:
