@@ -1,10 +1,11 @@
 """The application: settings, service, middleware and routes put together."""
 
+import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
-from anyio import CapacityLimiter, to_thread
+from anyio import CapacityLimiter
 from fastapi import FastAPI
 from starlette.middleware.cors import CORSMiddleware
 
@@ -18,7 +19,7 @@ from app.http.middleware.cross_site import CrossSiteMiddleware
 from app.http.middleware.observation import ObservationMiddleware
 from app.http.middleware.probes import PROBES
 from app.http.middleware.request_id import RequestIdMiddleware
-from app.http.openapi import SERVERS, TAGS, complete
+from app.http.openapi import DOCUMENT, SERVERS, TAGS
 from app.http.routes import about, jobs, meshes, queries
 from app.service.service import Service
 from app.settings import Settings
@@ -31,9 +32,6 @@ def create_app(settings: Settings) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_app: FastAPI) -> AsyncIterator[None]:
         async with service.running(), measuring_lag(metrics.note_lag):
-            # The document takes a quarter of a second. It is made while workers start and before
-            # requests come: FastAPI silences warnings for all threads while it makes it.
-            await to_thread.run_sync(app.openapi)
             yield
 
     metrics = Metrics(service)
@@ -87,7 +85,7 @@ class _Application(FastAPI):
     _document: dict[str, Any] | None = None
 
     def openapi(self) -> dict[str, Any]:
-        """Return the OpenAPI document, made on first use."""
+        """Return the OpenAPI document, which was made ahead."""
         if self._document is None:
-            self._document = complete(super().openapi())
+            self._document = json.loads(DOCUMENT.read_bytes())
         return self._document

@@ -1,4 +1,7 @@
-"""The OpenAPI document: FastAPI's, completed with problems, headers and examples."""
+"""The OpenAPI document: FastAPI's, completed with problems, headers and examples.
+
+It is made ahead, by ``python -m app.cli.openapi``, since that takes a quarter of a second.
+"""
 
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -14,12 +17,12 @@ from app.http.middleware.admission import is_open
 from app.http.responses import documented, problems
 from app.schemas.geojson import FeatureCollection
 
-_PACKAGED = Path(__file__).parents[1] / "examples"
-EXAMPLES = _PACKAGED if _PACKAGED.is_dir() else Path(__file__).parents[2] / "openapi" / "examples"
-"""Folder of examples: a file for each operation id, with requests and answers by name.
-
-In a wheel it is inside the package, in a checkout beside the document.
-"""
+_SOURCES = Path(__file__).parents[2] / "openapi"
+_PACKAGED = Path(__file__).parents[1] / "openapi.json"
+DOCUMENT = _PACKAGED if _PACKAGED.is_file() else _SOURCES / "openapi.json"
+"""The document: inside the package where it is installed from a wheel."""
+EXAMPLES = _SOURCES / "examples"
+"""Folder of examples: a file for each operation id, with requests and answers by name."""
 
 _FASTAPI_VALIDATION = "Validation Error"  # FastAPI adds it to each operation with parameters
 _TEXT, _NUMBER = {"type": "string"}, {"type": "integer"}

@@ -1,13 +1,5 @@
-from pathlib import Path
-from typing import Any
-
-import pytest
-from starlette.testclient import TestClient
-
-from app import main
 from app.cli.openapi import openapi_text
 from app.errors import PROBLEM_JSON
-from app.settings import Settings
 from tests.support.paths import ROOT
 
 COMMITTED = ROOT / "openapi" / "openapi.json"
@@ -82,17 +74,3 @@ def test_no_code_of_a_status_is_named_twice(client) -> None:
             for status, response in operation["responses"].items():
                 codes = response["description"].split(", ")
                 assert status < "400" or len(set(codes)) == len(codes), codes
-
-
-def test_the_document_is_made_before_the_first_request(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    made: list[dict[str, Any]] = []
-    monkeypatch.setattr(main, "complete", lambda document: made.append(document) or document)
-    app = main.create_app(Settings(store=tmp_path))
-
-    assert not made
-    with TestClient(app, base_url="http://127.0.0.1") as client:
-        assert len(made) == 1
-        assert client.get("/openapi.json").json() == made[0]
-        assert len(made) == 1
