@@ -71,6 +71,7 @@ def test_never_below_the_oracle_and_paths_are_as_short(case):
 
 
 @pytest.mark.jit
+@pytest.mark.slice(8)
 @zoo.each(zoo.KNOWN)
 def test_never_below_closed_forms(case):
     """Slivers among them."""

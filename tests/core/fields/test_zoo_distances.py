@@ -62,6 +62,7 @@ def test_closed_forms(case):
 
 
 @pytest.mark.slow
+@pytest.mark.slice(1)
 @pytest.mark.jit
 @zoo.each(BOXES)
 def test_closed_forms_on_boxes(case):

@@ -38,7 +38,7 @@ def test_unfolding_and_visibility_agree_on_planar_domains(name):
 
 
 @pytest.mark.slow
-@pytest.mark.slice(2)
+@pytest.mark.slice(1)
 @pytest.mark.parametrize("name", SOLVABLE)
 def test_unfolding_reproduces_the_closed_forms(name):
     case = zoo.KNOWN[name]
