@@ -129,11 +129,8 @@ class DistributedEngine:
         usable = self._usable()
         if not usable:
             raise _no_host()
-        fullest = [
-            report
-            for report in usable.values()
-            if report.load.idle == 0 and report.load.waiting >= report.queue_size
-        ]
+        # A worker may be idle all the same: the one for small work.
+        fullest = [report for report in usable.values() if report.load.waiting >= report.queue_size]
         if len(fullest) == len(usable):
             report = fullest[0]
             waiting, size = report.load.waiting + 1, report.queue_size
