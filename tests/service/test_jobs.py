@@ -318,7 +318,9 @@ def test_a_full_queue_takes_no_jobs(one: ServiceClient, medium: str) -> None:
 
     check_problem(response, 503, "queue_full")
     assert int(response.headers["retry-after"]) > 0
-    one.delete(jobs[-1])
+    beyond = 1 if isinstance(one, ServiceClient) else len(jobs) - 2  # some came before it was known
+    for job in jobs[-beyond:]:
+        one.delete(job)
     wait_until(lambda: submit(one, medium).status_code == 202)
 
 
