@@ -40,9 +40,9 @@ class Redis:
     def url(self, secret: str = SECRET) -> str:
         return f"redis://:{secret}@{self.host}:{self.port}"
 
-    def set_log(self, keeps: str) -> None:
-        """Have the server keep a log of changes, ``yes`` or ``no``."""
-        self._client().config_set("appendonly", keeps)
+    def keep_no_log(self) -> None:
+        """Have the server keep no log of changes any more."""
+        self._client().config_set("appendonly", "no")
 
     def forget(self, pattern: str) -> None:
         """Remove keys, as if their time had run out."""
