@@ -85,7 +85,7 @@ class _Application(FastAPI):
     _document: dict[str, Any] | None = None
 
     def openapi(self) -> dict[str, Any]:
-        """Return the OpenAPI document, which was made ahead."""
+        """Return the OpenAPI document, which was generated ahead of time."""
         if self._document is None:
             self._document = json.loads(DOCUMENT.read_bytes())
         return self._document

@@ -93,7 +93,8 @@ WORKLOADS: dict[str, Callable[[], None]] = {
 }
 """Calls that together use all kernels, in an order that suits two processes.
 
-Each takes the next one in turn. A workload shares more with the last but one than with the last.
+Each process takes the next one that is free. Every other workload shares code, so that each process
+finds much of it translated.
 """
 
 

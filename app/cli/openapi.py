@@ -1,4 +1,7 @@
-"""Print the OpenAPI document: ``python -m app.cli.openapi > openapi/openapi.json``."""
+"""Generate the OpenAPI document: ``python -m app.cli.openapi > openapi/openapi.json``.
+
+It needs a checkout: the examples are not in the package.
+"""
 
 import json
 import sys

@@ -129,7 +129,7 @@ class DistributedEngine:
         usable = self._usable()
         if not usable:
             raise _no_host()
-        # A worker may be idle all the same: the one for small work.
+        # Idle workers do not count: one may be there for small work alone.
         fullest = [report for report in usable.values() if report.load.waiting >= report.queue_size]
         if len(fullest) == len(usable):
             report = fullest[0]

@@ -1,6 +1,6 @@
 """The OpenAPI document: FastAPI's, completed with problems, headers and examples.
 
-It is made ahead, by ``python -m app.cli.openapi``, since that takes a quarter of a second.
+It is generated ahead of time by ``python -m app.cli.openapi``: that takes a quarter of a second.
 """
 
 import json

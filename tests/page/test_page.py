@@ -11,7 +11,6 @@ from pathlib import Path
 import httpx2
 import numpy as np
 import pytest
-from numpy.lib.stride_tricks import sliding_window_view
 from PIL import Image
 from playwright.sync_api import FilePayload, Route, expect
 
@@ -653,8 +652,7 @@ def test_a_permalink_restores_points_and_view(view: View, sphere: str) -> None:
     changed = np.abs(view.pixels() - before).max(axis=2) > 8
     box = view.page.locator("#canvas").bounding_box()
     assert box is not None
-    patches = sliding_window_view(changed[100:600, int(box["x"]) :], (3, 3))
-    assert patches.all(axis=(2, 3)).mean() < 0.0005  # edges shift by parts of a pixel
+    assert changed[100:600, int(box["x"]) :].mean() < 0.001
 
 
 def test_a_permalink_to_nothing(view: View) -> None:

@@ -42,7 +42,7 @@ class SleepingEngine:
     @property
     def load(self) -> Load:
         busy = min(self.running, SETTINGS.workers)
-        idle = SETTINGS.workers - busy + 1  # which takes small work alone
+        idle = SETTINGS.workers - busy + 1  # one more for small work alone
         return Load(self.running - busy, idle, busy, 0, 0, 0, {"fields": 1}, {17})
 
     async def start(self) -> None:
