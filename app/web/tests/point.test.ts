@@ -54,7 +54,11 @@ describe("parsing", () => {
       { face: 0, barycentric: [0.5, 0.5, 0] },
     ]);
     expect(parsePoints("  ")).toEqual([]);
-    expect(() => parsePoints("v0, v1")).toThrow("“v0,” is not a point");
+    expect(() => parsePoints("v0,v1")).toThrow("“v0,v1” is not a point");
+  });
+
+  test("a comma may be before a blank", () => {
+    expect(parsePoints("v0, v1 , v2,")).toEqual([{ vertex: 0 }, { vertex: 1 }, { vertex: 2 }]);
   });
 });
 

@@ -24,8 +24,12 @@ export function parsePoint(text: string): WrittenPoint {
   );
 }
 
+/** Read points, with blanks between them, and commas before the blanks if there are any. */
 export function parsePoints(text: string): WrittenPoint[] {
-  return text.split(/\s+/).filter(Boolean).map(parsePoint);
+  return text
+    .split(/,?\s+|,$/)
+    .filter(Boolean)
+    .map(parsePoint);
 }
 
 export function writePoint(point: Point): string {
