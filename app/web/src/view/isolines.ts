@@ -1,20 +1,21 @@
 // Isolines as thin lines with a dark casing, so that they show on each colour.
-import { BufferGeometry, Group, type Mesh } from "three";
-import { ribbonMesh, ribbons, type Triple } from "./ribbon";
+import { BufferGeometry } from "three";
+import { ribbonMesh, ribbons } from "./ribbon";
 import type { Stage } from "./scene";
-
-const COLOUR = 0xffffff;
-const CASING = 0x1e293b;
+import type { Triple } from "./simplified";
 
 export class IsolineLayer {
-  private readonly object = new Group();
-  private geometry = new BufferGeometry();
+  private readonly object = ribbonMesh({
+    colour: 0xffffff,
+    casing: 0x1e293b,
+    inner: 1.2,
+    width: 2.6,
+    opacity: 1,
+    before: 0.001,
+    order: 1,
+  });
 
   constructor(private readonly stage: Stage) {
-    this.object.add(
-      ribbonMesh({ colour: CASING, width: 2.6, opacity: 1, before: 0.0008, order: 1 }),
-      ribbonMesh({ colour: COLOUR, width: 1.2, opacity: 1, before: 0.001, order: 2 }),
-    );
     this.object.visible = false;
     stage.add(this.object);
   }
@@ -23,9 +24,8 @@ export class IsolineLayer {
   show(lines: Triple[][]): void {
     if (lines.length === 0 && !this.object.visible) return;
     this.object.visible = lines.length > 0;
-    this.geometry.dispose();
-    this.geometry = ribbons(lines);
-    for (const layer of this.object.children) (layer as Mesh).geometry = this.geometry;
+    this.object.geometry.dispose();
+    this.object.geometry = lines.length > 0 ? ribbons(lines) : new BufferGeometry();
     this.stage.invalidate();
   }
 }

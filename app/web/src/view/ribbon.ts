@@ -1,4 +1,4 @@
-// Polylines of constant width in pixels, in front of the surface or faint behind it.
+// Polylines of constant width in pixels, with a casing, in front of the surface or faint behind it.
 import {
   BufferAttribute,
   BufferGeometry,
@@ -9,60 +9,67 @@ import {
   Vector2,
   type WebGLRenderer,
 } from "three";
+import { simplified, type Triple } from "./simplified";
 
-export type Triple = [number, number, number];
-
-// A rectangle of pixels for each segment, slightly in front of it, so that the surface does not cut
-// it. All are one mesh: three's own lines draw an instance per segment, which is slow in software.
+// Two vertices for each point, aside of the line, so that neighbouring segments share an edge and do
+// not overlap. All lines are one mesh, drawn once: vertices take most of the time in software.
 const VERTEX = /* glsl */ `
-  attribute vec3 start;
-  attribute vec3 end;
-  attribute vec2 corner;
+  attribute vec3 previous;
+  attribute vec3 next;
+  attribute float side;
   uniform vec2 resolution;
   uniform float width;
   uniform float before;
-  uniform float caps;
-  varying vec2 place;
-  varying float extent;
+  varying float away;
 
   const float NEAR = 0.01;
 
-  // The projection of an end, or of the point where the segment enters from behind the camera.
-  vec3 projected(vec4 eye, vec4 other) {
-    if (eye.z > -NEAR && other.z < -NEAR) eye = mix(eye, other, (eye.z + NEAR) / (eye.z - other.z));
-    vec4 clip = projectionMatrix * eye;
-    return clip.xyz / clip.w;
+  vec4 projected(vec3 point) {
+    return projectionMatrix * (modelViewMatrix * vec4(point, 1.0));
+  }
+
+  vec2 pixels(vec4 clip) {
+    return 0.5 * resolution * clip.xy / max(clip.w, NEAR);
+  }
+
+  vec2 unit(vec2 way) {
+    float extent = length(way);
+    return extent > 0.0 ? way / extent : vec2(0.0);
   }
 
   void main() {
-    vec4 first = modelViewMatrix * vec4(start, 1.0);
-    vec4 last = modelViewMatrix * vec4(end, 1.0);
-    vec3 from = projected(first, last);
-    vec3 to = projected(last, first);
-    vec2 along = 0.5 * resolution * (to.xy - from.xy);
-    extent = length(along);
-    along = extent > 0.0 ? along / extent : vec2(1.0, 0.0);
-    vec2 away = (0.5 * width + 1.0) * vec2(corner.x * caps, corner.y);
-    place = vec2(corner.x < 0.0 ? away.x : extent + away.x, away.y);
-    vec3 here = corner.x < 0.0 ? from : to;
-    here.xy += 2.0 * (away.x * along + away.y * vec2(-along.y, along.x)) / resolution;
-    gl_Position = vec4(here.xy, here.z - before, 1.0);
+    vec4 clip = projected(position);
+    vec2 here = pixels(clip);
+    vec2 coming = unit(here - pixels(projected(previous)));
+    vec2 going = unit(pixels(projected(next)) - here);
+    if (going == vec2(0.0)) going = coming;
+    vec2 along = unit(coming + going);
+    if (along == vec2(0.0)) along = going;
+    away = side * (0.5 * width + 1.0);
+    float mitre = away / max(dot(along, going), 0.5); // a sharp bend is cut off
+    clip.xy += 2.0 * mitre * vec2(-along.y, along.x) / resolution * clip.w;
+    clip.z -= before * clip.w; // so that the surface does not cut it
+    gl_Position = clip;
   }`;
 
 const FRAGMENT = /* glsl */ `
   uniform vec3 colour;
+  uniform vec3 casing;
   uniform float opacity;
+  uniform float inner;
   uniform float width;
-  varying vec2 place;
-  varying float extent;
+  varying float away;
   void main() {
-    float away = distance(place, vec2(clamp(place.x, 0.0, extent), 0.0));
-    gl_FragColor = vec4(colour, opacity * clamp(0.5 * width - away + 0.5, 0.0, 1.0));
+    float line = clamp(0.5 * inner - abs(away) + 0.5, 0.0, 1.0);
+    float all = clamp(0.5 * width - abs(away) + 0.5, 0.0, 1.0);
+    gl_FragColor = vec4(mix(casing, colour, line), opacity * all);
   }`;
 
 export interface Look {
   colour: number;
-  /** Pixels. */
+  casing: number;
+  /** Pixels, of the line alone and with its casing. */
+  inner: number;
   width: number;
   opacity: number;
   /** The offset in depth in front of the surface; null ignores the surface. */
@@ -71,15 +78,16 @@ export interface Look {
 }
 
 /** Return a mesh that draws a geometry of `ribbons`. */
-export function ribbonMesh({ colour, width, opacity, before, order }: Look): Mesh {
+export function ribbonMesh({ colour, casing, inner, width, opacity, before, order }: Look): Mesh {
   const resolution = new Vector2();
   const material = new ShaderMaterial({
     uniforms: {
       colour: { value: new Color(colour) },
+      casing: { value: new Color(casing) },
       opacity: { value: opacity },
+      inner: { value: inner },
       width: { value: width },
       before: { value: before ?? 0 },
-      caps: { value: before === null ? 0 : 1 }, // without depth, overlapping caps would add up
       resolution: { value: resolution },
     },
     vertexShader: VERTEX,
@@ -94,35 +102,46 @@ export function ribbonMesh({ colour, width, opacity, before, order }: Look): Mes
   line.frustumCulled = false;
   line.onBeforeRender = (renderer) => {
     (renderer as WebGLRenderer).getDrawingBufferSize(resolution);
+    material.uniforms.inner!.value = inner * renderer.getPixelRatio();
     material.uniforms.width!.value = width * renderer.getPixelRatio();
   };
   return line;
 }
 
-/** Return four corners for each segment of some polylines, with both ends as attributes. */
+/** Return two vertices for each point of some polylines, which know the points beside theirs. */
 export function ribbons(lines: Triple[][]): BufferGeometry {
-  const segments = lines.reduce((sum, line) => sum + Math.max(line.length - 1, 0), 0);
-  const [starts, ends] = [new Float32Array(12 * segments), new Float32Array(12 * segments)];
-  const corners = new Float32Array(8 * segments);
-  const index = new Uint32Array(6 * segments);
+  const drawn = lines.map(simplified).filter((line) => line.length > 1);
+  const points = drawn.reduce((sum, line) => sum + line.length, 0);
+  const [previous, here, next] = [0, 1, 2].map(() => new Float32Array(6 * points)) as [
+    Float32Array,
+    Float32Array,
+    Float32Array,
+  ];
+  const sides = new Float32Array(2 * points);
+  const index = new Uint32Array(6 * (points - drawn.length));
+  let point = 0;
   let segment = 0;
-  for (const line of lines) {
-    for (let i = 0; i + 1 < line.length; i++, segment++) {
-      for (let corner = 0; corner < 4; corner++) {
-        starts.set(line[i]!, 12 * segment + 3 * corner);
-        ends.set(line[i + 1]!, 12 * segment + 3 * corner);
+  for (const line of drawn) {
+    const last = line.length - 1;
+    const isClosed = last > 2 && line[0]!.every((x, axis) => x === line[last]![axis]);
+    for (let i = 0; i <= last; i++, point++) {
+      for (const side of [0, 1]) {
+        const at = 3 * (2 * point + side);
+        previous.set(line[i > 0 ? i - 1 : isClosed ? last - 1 : 0]!, at);
+        here.set(line[i]!, at);
+        next.set(line[i < last ? i + 1 : isClosed ? 1 : last]!, at);
+        sides[2 * point + side] = side ? 1 : -1;
       }
-      corners.set([-1, -1, -1, 1, 1, -1, 1, 1], 8 * segment);
-      index.set(
-        [0, 1, 2, 2, 1, 3].map((corner) => 4 * segment + corner),
-        6 * segment,
-      );
+      if (i === last) continue;
+      const first = 2 * point;
+      index.set([first, first + 1, first + 2, first + 2, first + 1, first + 3], 6 * segment++);
     }
   }
   const geometry = new BufferGeometry();
-  geometry.setAttribute("start", new BufferAttribute(starts, 3));
-  geometry.setAttribute("end", new BufferAttribute(ends, 3));
-  geometry.setAttribute("corner", new BufferAttribute(corners, 2));
+  geometry.setAttribute("position", new BufferAttribute(here, 3));
+  geometry.setAttribute("previous", new BufferAttribute(previous, 3));
+  geometry.setAttribute("next", new BufferAttribute(next, 3));
+  geometry.setAttribute("side", new BufferAttribute(sides, 1));
   geometry.setIndex(new BufferAttribute(index, 1));
   return geometry;
 }

@@ -1,10 +1,10 @@
 // The path as a line with a casing; faint where the surface hides it.
 import { BufferGeometry, Group, type Mesh } from "three";
-import { ribbonMesh, ribbons, type Triple } from "./ribbon";
+import { ribbonMesh, ribbons } from "./ribbon";
 import type { Stage } from "./scene";
+import type { Triple } from "./simplified";
 
-const COLOUR = 0xe6005c;
-const CASING = 0xffffff;
+const COLOURS = { colour: 0xe6005c, casing: 0xffffff };
 
 export class RouteLine {
   private readonly object = new Group();
@@ -12,9 +12,8 @@ export class RouteLine {
 
   constructor(private readonly stage: Stage) {
     this.object.add(
-      ribbonMesh({ colour: COLOUR, width: 3, opacity: 0.28, before: null, order: 3 }),
-      ribbonMesh({ colour: CASING, width: 7, opacity: 0.95, before: 0.006, order: 4 }),
-      ribbonMesh({ colour: COLOUR, width: 4, opacity: 1, before: 0.0072, order: 5 }),
+      ribbonMesh({ ...COLOURS, inner: 3, width: 3, opacity: 0.28, before: null, order: 3 }),
+      ribbonMesh({ ...COLOURS, inner: 4, width: 7, opacity: 1, before: 0.007, order: 4 }),
     );
     this.object.visible = false;
     stage.addOverlay(this.object);

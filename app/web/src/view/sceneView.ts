@@ -10,10 +10,10 @@ import { type Rgb, territory } from "./colours";
 import { IsolineLayer } from "./isolines";
 import { type Mark, Markers } from "./markers";
 import { Patch } from "./patch";
-import type { Triple } from "./ribbon";
 import { RouteLine } from "./route";
 import { showScaleBar } from "./scalebar";
 import type { Stage } from "./scene";
+import type { Triple } from "./simplified";
 import { Surface, surfacePaint } from "./surface";
 import { Territories } from "./territories";
 
