@@ -16,7 +16,6 @@ from app.queries.cost_model import (
     PER_FACE_DIVIDED,
     PER_POINT,
     PER_WINDOW_DIVIDED,
-    SEGMENTS_BY_WINDOWS,
     SEGMENTS_IN_FACE,
     Cost,
     rough_share,
@@ -109,8 +108,7 @@ class BordersQuery(Query[BordersRequest]):
         seconds = sweep.seconds + PER_POINT * len(points)
         seconds += _seconds_per_face(len(mesh.faces), share) * len(faces)
         answer = self._answer(opened, starts, chord_error, found, expected_stats(mesh, share))
-        times = SEGMENTS_IN_FACE + SEGMENTS_BY_WINDOWS * math.sqrt(len(mesh.faces))
-        return Forecast(Cost(seconds, sweep.memory_bytes), answer, times)
+        return Forecast(Cost(seconds, sweep.memory_bytes), answer, SEGMENTS_IN_FACE)
 
     def _answer(
         self,

@@ -70,8 +70,8 @@ CROSSINGS = 2.3
 """Edges that a path crosses over the length of one."""
 ARC_IN_FACE = 0.45
 """Length of a line in a face that it crosses, in edges."""
-SEGMENTS_IN_FACE, SEGMENTS_BY_WINDOWS = 2.0, 0.05
-"""Of an isoline, in a face: at least, and for √n more, by the windows of an exact sweep."""
+SEGMENTS_IN_FACE = 2.3
+"""Of an isoline or a border, in a face: at least."""
 
 
 @dataclass(frozen=True)

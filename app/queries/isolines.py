@@ -27,7 +27,6 @@ from app.queries.cost_model import (
     PER_FACE_CROSSED,
     PER_POINT,
     PER_WINDOW_CROSSED,
-    SEGMENTS_BY_WINDOWS,
     SEGMENTS_IN_FACE,
     Cost,
     rough_share,
@@ -58,7 +57,7 @@ from app.queries.validation import (
     invalid_fields,
 )
 from app.queries.views import lines_of
-from app.schemas.requests import Accuracy, IsolinesRequest
+from app.schemas.requests import IsolinesRequest
 from app.settings import Settings
 from app.store.meshes import OpenMesh
 
@@ -149,7 +148,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
         if swept.method == "exact":
             per_face += PER_WINDOW_CROSSED * math.sqrt(share * len(mesh.faces))
         seconds = sweep.seconds + PER_POINT * len(points) + per_face * float(counts.sum())
-        segments = _segments_in_face(mesh, swept, np.array(levels), chord_error)
+        segments = _segments_in_face(mesh, np.array(levels), chord_error)
         times = float(counts @ segments) / counts.sum() if counts.any() else 1.0
         bound, stats = expected_bound(swept), expected_stats(mesh, share)
         answer = self._answer(opened, starts, chord_error, found, bound, stats)
@@ -211,19 +210,15 @@ def _crossed_faces(
 
 
 def _segments_in_face(
-    mesh: gc.TriangleMesh,
-    request: Accuracy,
-    levels: NDArray[np.float64],
-    chord_error: float,
+    mesh: gc.TriangleMesh, levels: NDArray[np.float64], chord_error: float
 ) -> NDArray[np.float64]:
     """Return the number of segments in which a line of each level crosses a face.
 
-    Windows cut it into arcs. An arc of radius r turns by its length over r, by a right angle at
-    most, and each chord turns by √(8 c / r), for the error c.
+    An arc of radius r turns by its length over r, by a right angle at most, and each chord turns by
+    √(8 c / r), for the error c.
     """
-    least = SEGMENTS_IN_FACE
-    if request.method == "exact":
-        least += SEGMENTS_BY_WINDOWS * math.sqrt(len(mesh.faces))
     turns = np.minimum(ARC_IN_FACE * typical_edge(mesh) / levels, 0.5 * np.pi)
-    segments: NDArray[np.float64] = np.maximum(turns / np.sqrt(8.0 * chord_error / levels), least)
+    segments: NDArray[np.float64] = np.maximum(
+        turns / np.sqrt(8.0 * chord_error / levels), SEGMENTS_IN_FACE
+    )
     return segments

@@ -25,6 +25,7 @@ from geodesic_core.kernels.borders.outlines import Pieces
 from geodesic_core.kernels.borders.territories import Territories
 from geodesic_core.kernels.isolines.face_windows import FaceWindows, face_windows_of
 from geodesic_core.kernels.isolines.lines import Field
+from geodesic_core.kernels.isolines.thinning import thin_lines
 from geodesic_core.kernels.mesh.half_edges import TAIL
 from geodesic_core.kernels.sweep.state import FACE
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -177,7 +178,7 @@ class _Drawing:
         def trace(first: int, last: int) -> int:
             nonlocal next_node
             found = outlines.trace_borders(
-                topology, divided, labelled, near, self._chord_error, first, last, next_node
+                topology, divided, labelled, near, 0.5 * self._chord_error, first, last, next_node
             )
             parts.append(found[:-1])
             next_node = found[-1]
@@ -188,6 +189,7 @@ class _Drawing:
         points, points_of, nodes, faces, sources = joined(parts)
         pieces = Pieces(points, starts_of(points_of), nodes, faces, sources)
         linked = lines.link_pieces(topology.links, labelled, pieces, next_node, near)
+        thin_lines(*linked[:4], 0.5 * self._chord_error)
         return self._lines(*linked)
 
     def _divided(self, candidates: Ints, rank: Ints, control: Control) -> Territories | None:

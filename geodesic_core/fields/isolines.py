@@ -16,6 +16,7 @@ from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.isolines import lines as kernels
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.isolines.lines import Chains, Cuts, Field
+from geodesic_core.kernels.isolines.thinning import thin_lines
 from geodesic_core.kernels.mesh.half_edges import LENGTH, LENGTH_LEFT, TAIL
 from geodesic_core.kernels.sweep.state import FACE, NODE
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -242,7 +243,7 @@ class Drawing:
         def chain(first: int, last: int) -> int:
             parts.append(
                 kernels.chain_arcs(
-                    topology, distances, cuts, crossings, level, chord_error, first, last
+                    topology, distances, cuts, crossings, level, 0.5 * chord_error, first, last
                 )
             )
             control.check_memory(bytes_of(parts))
@@ -251,9 +252,9 @@ class Drawing:
         in_slices(len(cuts.faces), chain, control)
         points, points_of, ends, faces = joined(parts)
         chains = Chains(points, starts_of(points_of), ends, faces)
-        return _lines(
-            self._mesh, *kernels.link_chains(topology.links, crossings, chains, PIECE * level)
-        )
+        linked = kernels.link_chains(topology.links, crossings, chains, PIECE * level)
+        thin_lines(*linked, 0.5 * chord_error)
+        return _lines(self._mesh, *linked)
 
     def _cut(self, passed: Ints, level: float, rank: Ints, control: Control) -> Cuts:
         """Cut the faces that a level may pass: by their bounds, then neighbours that cuts lead to.

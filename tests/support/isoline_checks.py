@@ -136,3 +136,12 @@ def check_same(lines, expected):
         assert line.closed == other.closed
         np.testing.assert_array_equal(line.points, other.points)
         np.testing.assert_array_equal(line.faces, other.faces)
+
+
+def distances_from(line, points):
+    """Return how far points are from the chords of a line."""
+    starts = line.points if line.closed else line.points[:-1]
+    ways = (np.roll(line.points, -1, axis=0) if line.closed else line.points[1:]) - starts
+    offsets = points[:, None] - starts
+    shares = np.clip((offsets * ways).sum(axis=2) / (ways**2).sum(axis=1), 0.0, 1.0)
+    return np.linalg.norm(offsets - shares[:, :, None] * ways, axis=2).min(axis=1)

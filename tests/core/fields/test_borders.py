@@ -16,7 +16,7 @@ from tests.support.border_checks import (
     check_ends,
     check_points,
 )
-from tests.support.isoline_checks import check_pieces
+from tests.support.isoline_checks import check_pieces, distances_from
 from tests.support.meshes import mesh_of
 
 FINE = 1e-6
@@ -241,6 +241,21 @@ def test_a_call_that_is_stopped_leaves_the_field_as_it_was(retain, monkeypatch):
         field.borders(memory_limit=1000)
     for line, other in zip(field.borders(), expected, strict=True):
         np.testing.assert_array_equal(line.points, other.points)
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("share", [1e-4, 1e-2])
+def test_few_points_are_enough_for_a_chord_error(share):
+    mesh = gc.samples.knot(2000)
+    field = gc.exact_distance(mesh, [0, 300, 700])
+    chord_error = share * mesh.diagonal
+    fine, coarse = field.borders(1e-8), field.borders(chord_error)
+    for few, many in zip(coarse, fine, strict=True):
+        assert (few.sources, few.closed) == (many.sources, many.closed)
+        assert distances_from(few, many.points).max() <= chord_error * (1 + 1e-9)
+        assert distances_from(many, few.points).max() <= 2e-8
+    points = [sum(len(line.points) for line in lines) for lines in (coarse, fine)]
+    assert points[0] < 0.5 * points[1]
 
 
 @pytest.mark.parametrize("chord_error", [0.0, -1.0, 1e-12, math.inf, math.nan, "1", True])

@@ -17,6 +17,7 @@ from tests.support.isoline_checks import (
     check_found_again,
     check_pieces,
     check_points,
+    distances_from,
     some_levels,
 )
 from tests.support.meshes import mesh_of, named_mesh
@@ -291,6 +292,35 @@ def test_chord_error_is_how_far_chords_stray(chord_error):
     with_default = gc.exact_distance(mesh, 12).isolines([1.7])[0][0]
     middles = 0.5 * (with_default.points + np.roll(with_default.points, -1, axis=0))
     assert (1.7 - np.linalg.norm(middles - points[12], axis=1)).max() < 2e-3
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("share", [1e-3, 1e-2, 0.1])
+def test_few_points_are_enough_for_a_chord_error(share):
+    mesh = mesh_of(zoo.SMALL["crumpled_torus"])
+    chord_error = share * np.ptp(mesh.vertices, axis=0).max()
+    field = gc.exact_distance(mesh, 0)
+    levels = field.levels(5)
+    fine, coarse = (field.isolines(levels, error) for error in (1e-8, chord_error))
+    for finer, coarser in zip(fine, coarse, strict=True):
+        assert [line.closed for line in coarser] == [line.closed for line in finer]
+        for few, many in zip(coarser, finer, strict=True):
+            check_pieces(mesh, few)
+            assert distances_from(few, many.points).max() <= chord_error * (1 + 1e-9)
+            assert distances_from(many, few.points).max() <= 2e-8
+    few, many = (
+        sum(len(line.points) for lines in each for line in lines) for each in (coarse, fine)
+    )
+    assert few < 0.5 * many
+
+
+def test_small_loops_stay_whatever_the_chord_error():
+    mesh = gc.samples.plane(2)
+    source = gc.SurfacePoint.face(0, (0.25, 0.25, 0.5))
+    ((line,),) = gc.exact_distance(mesh, source).isolines([1e-3], 1.0)
+    assert line.closed
+    assert len(line.points) >= 3
+    np.testing.assert_allclose(np.linalg.norm(line.points - mesh.position(source), axis=1), 1e-3)
 
 
 def test_levels_are_spaced_evenly():
