@@ -25,7 +25,7 @@ cli = typer.Typer(
 def main() -> None:
     """Run the command line: every foreseeable failure is one line on standard error."""
     try:
-        code = cli(standalone_mode=False)
+        code = cli(prog_name="geodesic", standalone_mode=False)
     except TyperException as error:
         code = _say_error(f"{error.format_message()} (geodesic --help tells more)", error.exit_code)
     except Exception as error:

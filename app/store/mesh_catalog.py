@@ -194,10 +194,9 @@ class MeshCatalog:
         """
         mesh_id = written.mesh_id
         if written.folder is None:
-            if self._shared is not None:
-                async with self._table():
-                    await self._find(mesh_id)
-            return self._use_again(mesh_id)
+            async with self._table():  # it may be on its way out
+                await self._find(mesh_id)
+                return self._use_again(mesh_id)
         try:
             await self._home.settle(written)
             async with self._table():

@@ -515,6 +515,38 @@ def test_a_mesh_removed_before_its_upload_ends_is_to_be_written_again(tmp_path: 
         assert anyio.run(store[1].add, found) is None
 
 
+def test_a_mesh_on_its_way_out_is_to_be_written_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its folder is gone, and the catalog still has it, while its files are removed."""
+    with opened(tmp_path / "store") as (store, catalog):
+        mesh_id, _ = add((store, catalog), plane(50))
+        found = store.write_aside(plane(50), tmp_path / "aside", None)
+        assert found.folder is None
+
+        async def run() -> CatalogChange | None:
+            remove, may_end = FolderMeshes.remove, anyio.Event()
+
+            async def remove_slowly(home: FolderMeshes, mesh_id: str) -> None:
+                await remove(home, mesh_id)
+                await may_end.wait()
+
+            monkeypatch.setattr(FolderMeshes, "remove", remove_slowly)
+            async with anyio.create_task_group() as group:
+                group.start_soon(catalog.delete, mesh_id)
+                while (store.folder / mesh_id).exists():
+                    await anyio.sleep(0)
+                group.start_soon(_set_soon, may_end)
+                return await catalog.add(found)
+
+        assert anyio.run(run) is None
+
+
+async def _set_soon(event: anyio.Event) -> None:
+    await anyio.sleep(0.01)
+    event.set()
+
+
 @pytest.mark.service
 def test_a_mesh_evicted_while_it_is_uploaded_again_is_there_afterwards(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
