@@ -38,8 +38,8 @@ class HostReport:
     is_draining: bool
     code: str
     """Version of the code that answers there"""
-    computing: Sequence[str]
-    """Names of the results that it computes"""
+    computing: Mapping[str, bool]
+    """Names of the results that it computes, with whether a worker has begun"""
     shares: Mapping[str, float]
     """Share done of the work under each ticket, for work that has begun"""
 

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import Counter
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Collection, Coroutine, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -38,8 +38,14 @@ class _Flight:
     """A task at a host."""
 
     on_progress: ProgressCallback
+    result: str | None
+    """Name of the result that it ends with, if any"""
+    without: Collection[str]
+    """Hosts that do not take the task"""
     lost: "asyncio.Future[None]"
     """Done once the host is lost"""
+    rivalled: "asyncio.Future[None]"
+    """Done once another host, which is preferred, computes the same result"""
     has_begun: bool = False
 
     def note(self, share: float) -> None:
@@ -63,6 +69,19 @@ class _Host:
             if ticket in self.flights:
                 self.flights[ticket].note(share)
 
+    def rank(self, name: str, result: str) -> tuple[bool, str] | None:
+        """Return the rank of the host called ``name`` among those that compute a result.
+
+        The least is preferred: one that has begun, and then by name, so that all replicas prefer
+        the same. None where it does not compute it, or takes no work.
+        """
+        report = self.report
+        if report is None or not report.is_ready or report.is_draining:
+            return None
+        if result not in report.computing:
+            return None
+        return not report.computing[result], name
+
 
 class DistributedEngine:
     """The engine of a replica: the hosts of a cluster do its work.
@@ -70,6 +89,9 @@ class DistributedEngine:
     Each host has a queue and workers of its own, as on a machine that is alone: callers take turns
     there, whichever replica they asked. Work on a lost host is done once more on another one. Work
     whose worker died is not, since it may be its fault.
+
+    One result is computed by one host, which other replicas join. Replicas that ask at the same
+    time may have chosen different ones: the next beats tell, and one of the two moves.
     """
 
     def __init__(self, cluster: Cluster, settings: Settings, store: Store) -> None:
@@ -163,7 +185,7 @@ class DistributedEngine:
                 without.clear()
                 continue
             try:
-                outcome = await self._run_on(name, task, note)
+                outcome = await self._run_on(name, task, note, without)
             except HostLostError:
                 losses += 1
                 if losses > 1:
@@ -171,6 +193,8 @@ class DistributedEngine:
                 logger.warning("host lost: its work is done once more", host=name)
                 without.add(name)
                 task = _once_more(task)
+                continue
+            if outcome is None:  # another host computes the same
                 continue
             if isinstance(outcome, TaskResult):
                 return outcome
@@ -195,28 +219,35 @@ class DistributedEngine:
             )
             for name, report in (ready or usable).items()
         }
-        if isinstance(task.work, WritesResult):
-            for name in hosts:
-                if task.work.result_name in usable[name].computing:
-                    return name  # where it joins that computation, however full the host is
+        result = _result_of(task)
+        if result is not None:
+            ranks = [self._hosts[name].rank(name, result) for name in hosts]
+            computing = [rank for rank in ranks if rank is not None]
+            if computing:
+                return min(computing)[1]  # it joins the computation, however full the host is
         # The last key is the mesh. What has none, such as an upload, may go anywhere.
         key = task.affinity_keys[-1] if task.affinity_keys else uuid4().hex
         return choose(key, hosts, is_small=task.is_small)
 
     async def _run_on(
-        self, name: str, task: Task, on_progress: ProgressCallback
-    ) -> TaskResult | Problem:
-        host, ticket = self._hosts[name], uuid4().hex
-        lost = asyncio.get_running_loop().create_future()
-        flight = host.flights[ticket] = _Flight(on_progress, lost)
+        self, name: str, task: Task, on_progress: ProgressCallback, without: Collection[str]
+    ) -> TaskResult | Problem | None:
+        """Have a host do a task; None where it has been stopped there for another host."""
+        host, ticket, loop = self._hosts[name], uuid4().hex, asyncio.get_running_loop()
+        lost, rivalled = loop.create_future(), loop.create_future()
+        flight = _Flight(on_progress, _result_of(task), without, lost, rivalled)
+        host.flights[ticket] = flight
         data = self._wire.encode_task(Message(task, get_contextvars()))
         calling = asyncio.ensure_future(self._cluster.run(name, ticket, data))
         start_ns = time_ns()
         outcome: Outcome = None
         try:
-            await asyncio.wait({calling, lost}, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait({calling, lost, rivalled}, return_when=asyncio.FIRST_COMPLETED)
             if not calling.done():
-                raise HostLostError
+                if lost.done():
+                    raise HostLostError
+                self._spawn(self._stop(name, ticket), self._stopping)
+                return None
             outcome = self._wire.decode_outcome(calling.result())
         except asyncio.CancelledError:
             self._spawn(self._stop(name, ticket), self._stopping)
@@ -305,8 +336,23 @@ class DistributedEngine:
             return
         is_new = host.report is None
         host.note(report)
+        self._join_rivals(name)
         if is_new:
             logger.info("host joined", host=name, workers=report.workers)
+
+    def _join_rivals(self, name: str) -> None:
+        """End flights to other hosts that compute what the host called ``name`` does.
+
+        Only where that one is preferred.
+        """
+        for other, host in self._hosts.items():
+            for flight in host.flights.values():
+                if flight.result is None or other == name or name in flight.without:
+                    continue
+                rank = self._hosts[name].rank(name, flight.result)
+                own = host.rank(other, flight.result)
+                if rank and own and rank < own and not flight.rivalled.done():
+                    flight.rivalled.set_result(None)
 
     def _spawn(self, coroutine: Coroutine[Any, Any, None], group: set[asyncio.Task[None]]) -> None:
         background = asyncio.create_task(coroutine)
@@ -317,6 +363,11 @@ class DistributedEngine:
         group.discard(background)
         if not background.cancelled() and background.exception() is not None:
             logger.error("task of the engine failed", exc_info=background.exception())
+
+
+def _result_of(task: Task) -> str | None:
+    """Return the name of the result that a task ends with; None where it has none."""
+    return task.work.result_name if isinstance(task.work, WritesResult) else None
 
 
 def _other_release(code: str) -> str:

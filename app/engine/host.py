@@ -94,7 +94,7 @@ class Host:
             is_ready=self._engine.is_ready,
             is_draining=self._engine.is_draining,
             code=code_version(),
-            computing=tuple(self._flights),
+            computing=self._flights.under_way(),
             shares={ticket: self._shares[ticket] for ticket in tickets if ticket in self._shares},
         )
         return encode(report)

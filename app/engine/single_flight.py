@@ -1,7 +1,7 @@
 """Single-flight: concurrent requests for one result share one computation."""
 
 import asyncio
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -28,8 +28,9 @@ class SingleFlight(Generic[T]):
     def __contains__(self, name: str) -> bool:
         return name in self._flights
 
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._flights)
+    def under_way(self) -> dict[str, bool]:
+        """Return the names of all, with whether each has begun."""
+        return {name: flight.has_begun for name, flight in self._flights.items()}
 
     async def join(
         self,

@@ -141,6 +141,25 @@ def test_one_result_is_computed_once_for_all_replicas(later_s: float) -> None:
     virtual_time.run(main())
 
 
+@pytest.mark.parametrize("busy", [0, 1])
+def test_a_result_that_two_hosts_began_is_computed_by_one(busy: int) -> None:
+    """A replica knows of work of its own that the other one has not heard of yet."""
+
+    async def main() -> None:
+        cluster = FakeCluster("a", "b")
+        async with replica_of(cluster) as one, replica_of(cluster) as other:
+            task, another = different(2)
+            first = (one, other)[busy].ask(task)
+            await asyncio.sleep(0)
+            await asyncio.gather(one.ask(another), other.ask(another), first)
+            assert sum(one.begun.values()) == 3, "else they chose the same host"
+            ended = [end for engine in cluster.engines.values() for end in engine.ended]
+            assert sorted(ended) == ["done", "done", "stopped"]
+            assert now() <= 8.0 + 6 * BEAT_S  # of which the replicas wait four
+
+    virtual_time.run(main())
+
+
 def test_a_replica_that_stops_leaves_the_computation_to_the_others() -> None:
     async def main() -> None:
         cluster = FakeCluster("a")
