@@ -271,7 +271,8 @@ class DistributedEngine:
         seconds = max(0.0, (period.end - period.start) / 1e9)  # the clock may be set back
         queued = 0.0 if flight.has_begun else seconds
         parts: Mapping[str, Period] = {}
-        failed = outcome is None or (isinstance(outcome, Problem) and outcome.status >= 500)
+        failed = isinstance(outcome, Problem) and outcome.status >= 500
+        failed = failed or (outcome is None and not flight.rivalled.done())
         if isinstance(outcome, TaskResult):
             # The work may have waited for longer than this replica, which joined it there.
             queued, parts = min(seconds, outcome.seconds["queue"]), outcome.periods
