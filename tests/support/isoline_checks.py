@@ -80,6 +80,13 @@ def from_segment(point, start, end):
     return np.linalg.norm(start + t * (end - start) - point)
 
 
+def crossings(line):
+    """The points of a line between two faces, and its ends."""
+    if line.closed:
+        return line.points[line.faces != np.roll(line.faces, 1)]
+    return line.points[np.r_[True, line.faces[1:] != line.faces[:-1], True]]
+
+
 def check_crossings(mesh, sources, level, lines, samples=40):
     """On each edge the lines have as many points as its distances pass the level, sampled.
 
@@ -95,7 +102,9 @@ def check_crossings(mesh, sources, level, lines, samples=40):
     inside = inside <= level
     is_at_level = np.isclose(field.distances, level, rtol=LEVEL, atol=0.0)
     # The point of a crossing is the same to the bit in all lines through it.
-    points = np.array(sorted({tuple(point) for line in lines for point in line.points.tolist()}))
+    points = np.array(
+        sorted({tuple(point) for line in lines for point in crossings(line).tolist()})
+    )
     for (u, v), row in zip(edges, inside, strict=True):
         passed = set(np.flatnonzero(row[1:] != row[:-1]).tolist())
         start, way = mesh.vertices[u], mesh.vertices[v] - mesh.vertices[u]
