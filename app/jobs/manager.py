@@ -81,6 +81,16 @@ class _LiveJob:
         changed, self.changed = self.changed, asyncio.Event()
         changed.set()
 
+    async def shown(self) -> Job:
+        """Return the state: an end only once it is recorded, or could not be.
+
+        Else a client would be told the end here, and at another replica that the job still runs.
+        """
+        if self.job.is_finished:
+            async with self.recording:
+                pass
+        return self.job
+
     def cancel(self) -> None:
         """Stop the work."""
         for task in self.tasks:
@@ -189,7 +199,7 @@ class JobManager:
         """Return the present state of a job; raises ``ProblemError`` where the owner has none."""
         live = self._live.get(job_id)
         if live is not None and live.job.spec.owner == owner:
-            return live.job
+            return await live.shown()
         job = await self._repository.find(owner, job_id)
         if job is None:
             raise problem("job_not_found", f"there is no job {job_id!r}")
@@ -200,7 +210,8 @@ class JobManager:
     ) -> tuple[list[Job], int | None]:
         """Return ``limit`` jobs of an owner, the newest first, and the number to go on before."""
         jobs, after = await self._repository.page(owner, limit, before)
-        return [self._live[job.id].job if job.id in self._live else job for job in jobs], after
+        live = [self._live.get(job.id) for job in jobs]
+        return [await at.shown() if at else job for job, at in zip(jobs, live, strict=True)], after
 
     async def count(self) -> Counter[str]:
         """Return the number of jobs of all owners by status."""
@@ -255,7 +266,8 @@ class JobManager:
         """Yield the present and the following states of a job, except versions up to ``seen``."""
         live = self._live.get(job.id)
         while True:
-            now, changed = (live.job, live.changed) if live else (job, None)
+            changed = live.changed if live else None
+            now = await live.shown() if live else job
             if now.version > seen:
                 seen = now.version
                 yield now
