@@ -44,7 +44,7 @@ class _Flight:
     """Hosts that do not take the task"""
     lost: "asyncio.Future[None]"
     """Done once the host is lost"""
-    rivalled: "asyncio.Future[None]"
+    superseded: "asyncio.Future[None]"
     """Done once another host, which is preferred, computes the same result"""
     has_begun: bool = False
 
@@ -234,15 +234,15 @@ class DistributedEngine:
     ) -> TaskResult | Problem | None:
         """Have a host do a task; None where it has been stopped there for another host."""
         host, ticket, loop = self._hosts[name], uuid4().hex, asyncio.get_running_loop()
-        lost, rivalled = loop.create_future(), loop.create_future()
-        flight = _Flight(on_progress, _result_of(task), without, lost, rivalled)
+        lost, superseded = loop.create_future(), loop.create_future()
+        flight = _Flight(on_progress, _result_of(task), without, lost, superseded)
         host.flights[ticket] = flight
         data = self._wire.encode_task(Message(task, get_contextvars()))
         calling = asyncio.ensure_future(self._cluster.run(name, ticket, data))
         start_ns = time_ns()
         outcome: Outcome = None
         try:
-            await asyncio.wait({calling, lost, rivalled}, return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait({calling, lost, superseded}, return_when=asyncio.FIRST_COMPLETED)
             if not calling.done():
                 if lost.done():
                     raise HostLostError
@@ -271,8 +271,10 @@ class DistributedEngine:
         seconds = max(0.0, (period.end - period.start) / 1e9)  # the clock may be set back
         queued = 0.0 if flight.has_begun else seconds
         parts: Mapping[str, Period] = {}
-        failed = isinstance(outcome, Problem) and outcome.status >= 500
-        failed = failed or (outcome is None and not flight.rivalled.done())
+        if isinstance(outcome, Problem):
+            failed = outcome.status >= 500
+        else:
+            failed = outcome is None and not flight.superseded.done()
         if isinstance(outcome, TaskResult):
             # The work may have waited for longer than this replica, which joined it there.
             queued, parts = min(seconds, outcome.seconds["queue"]), outcome.periods
@@ -337,23 +339,20 @@ class DistributedEngine:
             return
         is_new = host.report is None
         host.note(report)
-        self._join_rivals(name)
+        self._supersede_flights(name)
         if is_new:
             logger.info("host joined", host=name, workers=report.workers)
 
-    def _join_rivals(self, name: str) -> None:
-        """End flights to other hosts that compute what the host called ``name`` does.
-
-        Only where that one is preferred.
-        """
+    def _supersede_flights(self, name: str) -> None:
+        """End flights to other hosts where one called ``name`` is preferred for their result."""
         for other, host in self._hosts.items():
             for flight in host.flights.values():
                 if flight.result is None or other == name or name in flight.without:
                     continue
                 rank = self._hosts[name].rank(name, flight.result)
                 own = host.rank(other, flight.result)
-                if rank and own and rank < own and not flight.rivalled.done():
-                    flight.rivalled.set_result(None)
+                if rank and own and rank < own and not flight.superseded.done():
+                    flight.superseded.set_result(None)
 
     def _spawn(self, coroutine: Coroutine[Any, Any, None], group: set[asyncio.Task[None]]) -> None:
         background = asyncio.create_task(coroutine)

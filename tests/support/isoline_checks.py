@@ -81,7 +81,7 @@ def from_segment(point, start, end):
 
 
 def crossings(line):
-    """The points of a line between two faces, and its ends."""
+    """The points of a line between two faces, and its ends: an arc may also touch an edge."""
     if line.closed:
         return line.points[line.faces != np.roll(line.faces, 1)]
     return line.points[np.r_[True, line.faces[1:] != line.faces[:-1], True]]
