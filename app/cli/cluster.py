@@ -70,13 +70,13 @@ def node(folder: Folder, address: Address = None, store: Store = None) -> None:
     from app.store.opening import store_of
 
     try:
-        store_of(settings).require_claimed()
+        store_id = store_of(settings).identity()
     except StoreError as error:
         raise Failure(str(error)) from error
     with _failing_clearly(), joined(folder, settings) as ray:
         import ray as client
 
-        host = start_host(settings)
+        host = start_host(settings, store_id)
         try:
             client.get(host.beat.remote([]))
         except client.exceptions.RayError as error:

@@ -38,6 +38,8 @@ class HostReport:
     is_draining: bool
     code: str
     """Version of the code that answers there"""
+    store: str
+    """Id of its store, see ``Store.identity``"""
     computing: Mapping[str, bool]
     """Names of the results that it computes, with whether a worker has begun"""
     shares: Mapping[str, float]

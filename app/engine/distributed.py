@@ -20,7 +20,7 @@ from app.engine.wire import Message, Wire, WireError, decode
 from app.engine.work import MeshFromFile, Outcome, StoreMesh, Task, TaskResult, WritesResult
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.queries import code_version
-from app.settings import Settings
+from app.settings import Settings, variable_of
 from app.store.interface import Store
 from app.tracing import Period, record_span
 
@@ -97,10 +97,11 @@ class DistributedEngine:
     def __init__(self, cluster: Cluster, settings: Settings, store: Store) -> None:
         self._cluster = cluster
         self._store = store
+        self._store_id = ""
         self._wire = Wire(settings.folder)
         self._hosts: dict[str, _Host] = {}
         self._refused: set[str] = set()
-        """Hosts of another release, which the log has named"""
+        """Hosts of another release or store, which the log has named"""
         self.is_draining = False
         self.on_wait: Callable[[float], None] = lambda _seconds: None
         self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
@@ -131,7 +132,8 @@ class DistributedEngine:
         return any(report.is_ready for report in self._usable().values())
 
     async def start(self) -> None:
-        """Look for hosts, in the background."""
+        """Look for hosts, in the background; the store must be claimed."""
+        self._store_id = self._store.identity()
         self._spawn(self._search(), self._background)
 
     def drain(self) -> None:
@@ -328,7 +330,7 @@ class DistributedEngine:
     def _note(self, name: str, host: _Host, data: bytes) -> None:
         try:
             report: HostReport = decode(data, HostReport)
-            fault = None if report.code == code_version() else _other_release(report.code)
+            fault = self._fault_of(report)
         except WireError as error:
             fault = str(error)
         if fault is not None:
@@ -342,6 +344,17 @@ class DistributedEngine:
         self._supersede_flights(name)
         if is_new:
             logger.info("host joined", host=name, workers=report.workers)
+
+    def _fault_of(self, report: HostReport) -> str | None:
+        """Return why a host is not to be used; None where it is."""
+        if report.code != code_version():
+            return _other_release(report.code)
+        if report.store != self._store_id:
+            return (
+                f"it has the store {report.store}, and this service {self._store_id}: give all "
+                f"machines of a cluster the same {variable_of('store')}"
+            )
+        return None
 
     def _supersede_flights(self, name: str) -> None:
         """End flights to other hosts where one called ``name`` is preferred for their result."""

@@ -28,11 +28,15 @@ class _Lease:
 
 
 class Host:
-    """Does tasks that replicas send, each as long as its lease is renewed."""
+    """Does tasks that replicas send, each as long as its lease is renewed.
 
-    def __init__(self, engine: Engine, settings: Settings) -> None:
+    ``store`` is the id of its store, see ``Store.identity``.
+    """
+
+    def __init__(self, engine: Engine, settings: Settings, store: str) -> None:
         self._engine = engine
         self._settings = settings
+        self._store = store
         self._wire = Wire(settings.folder)
         self._leases: dict[str, _Lease] = {}
         self._shares: dict[str, float] = {}
@@ -94,6 +98,7 @@ class Host:
             is_ready=self._engine.is_ready,
             is_draining=self._engine.is_draining,
             code=code_version(),
+            store=self._store,
             computing=self._flights.under_way(),
             shares={ticket: self._shares[ticket] for ticket in tickets if ticket in self._shares},
         )

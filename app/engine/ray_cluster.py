@@ -35,7 +35,7 @@ class HostActor:
     Ray starts the process anew where it died. The engine starts with the first beat.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, store: str) -> None:
         # The fork server imports the main program of its parent, which would be Ray's.
         vars(sys.modules["__main__"]).pop("__file__", None)
         logs.install(settings.log_format)
@@ -46,7 +46,7 @@ class HostActor:
             self._folder = ExitStack()
             self._folder.enter_context(supply.owned())  # as long as this process lives
             engine = SuppliedEngine(engine, supply)
-        self._host = Host(engine, settings)
+        self._host = Host(engine, settings, store)
         self._is_started = False
 
     async def run(self, ticket: str, task: bytes) -> bytes:
@@ -73,8 +73,11 @@ class HostActor:
         await self._host.close()
 
 
-def start_host(settings: Settings) -> Any:
-    """Make a host of this machine, which has joined the cluster; return its actor."""
+def start_host(settings: Settings, store: str) -> Any:
+    """Make a host of this machine, which has joined the cluster; return its actor.
+
+    ``store`` is the id of the store: an actor that starts again must not wait for it.
+    """
     import ray
     from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
@@ -86,7 +89,7 @@ def start_host(settings: Settings) -> Any:
         "max_restarts": -1,
         "scheduling_strategy": NodeAffinitySchedulingStrategy(node, soft=False),
     }
-    return ray.remote(HostActor).options(**options).remote(settings)
+    return ray.remote(HostActor).options(**options).remote(settings, store)
 
 
 class RayCluster:

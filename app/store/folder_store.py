@@ -6,7 +6,14 @@ from pathlib import Path
 
 from app.settings import variable_of
 from app.store.folder_meshes import FolderMeshes
-from app.store.layout import RESULTS, StoreError, note_state, noted_state
+from app.store.layout import (
+    RESULTS,
+    StoreError,
+    identity_of,
+    make_identity,
+    note_state,
+    noted_state,
+)
 from app.store.ownership import Share, owned, shared
 from app.store.results import FolderResults
 
@@ -40,14 +47,17 @@ class FolderStore:
                 f"one the same {variable_of('state')}, or a store of its own"
             )
         note_state(self.folder, service)
+        make_identity(self.folder)
 
-    def require_claimed(self) -> None:
-        """Raise ``StoreError`` where the folder is missing: a service makes it."""
-        if not self.folder.is_dir():
+    def identity(self) -> str:
+        """Return the id in the folder, which machines may have mounted at different paths."""
+        identity = identity_of(self.folder)
+        if identity is None:
             raise StoreError(
                 f"there is no store at {self.folder}: start geodesic serve on it first, and give "
                 "the same shared folder on all machines as --store"
             )
+        return identity
 
     @asynccontextmanager
     async def lent(self, file: Path) -> AsyncIterator[None]:  # noqa: ARG002 - it is there

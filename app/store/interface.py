@@ -38,8 +38,11 @@ class Store(Protocol):
         Raises ``StoreError`` where it is that of another, or cannot be used.
         """
 
-    def require_claimed(self) -> None:
-        """Raise ``StoreError`` where no service has made the store."""
+    def identity(self) -> str:
+        """Return an id that no other store has, and that all machines see.
+
+        Raises ``StoreError`` where no service has made the store.
+        """
 
     def lent(self, file: Path) -> AbstractAsyncContextManager[None]:
         """Have all machines reach a file of the folder inside the block."""

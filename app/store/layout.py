@@ -10,11 +10,13 @@
         fields/         see ``app.store.fields``
         jobs.sqlite3    see ``app.state.sqlite``
         state           names the shared database that has the jobs instead, if any
+        identity        a random id, by which machines tell this store from others
         jobs.reserve    see ``app.store.reserve``
         tmp/            meshes that are being written
 """
 
 from pathlib import Path
+from uuid import uuid4
 
 import orjson
 
@@ -22,7 +24,7 @@ LAYOUT = 7
 """Number of the layout that this code reads and writes. Raise it with every change of any file,
 including the tables of jobs."""
 
-STATE = "state"
+STATE, IDENTITY = "state", "identity"
 JOB_DATABASE, JOB_RESERVE = "jobs.sqlite3", "jobs.reserve"
 MESHES, RESULTS, FIELDS = "meshes", "results", "fields"
 TEMPORARY = "tmp"
@@ -71,25 +73,50 @@ def note_state(root: Path, service: str | None) -> None:
 
     Raises ``StoreError`` where the store cannot be written.
     """
-    if service == noted_state(root):
-        return
-    aside = root / f"{STATE}.new"
-    try:
-        if service is None:
-            (root / STATE).unlink()
-        else:
-            aside.write_text(service)
-            aside.replace(root / STATE)
-    except OSError as error:
-        raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
+    if service != noted_state(root):
+        _write(root, STATE, service)
 
 
 def noted_state(root: Path) -> str | None:
     """Return what `note_state` noted last."""
+    return _read(root, STATE)
+
+
+def make_identity(root: Path) -> str:
+    """Return the id of the store in ``root``, which gets one if it has none.
+
+    Raises ``StoreError`` where the store cannot be written.
+    """
+    identity = identity_of(root)
+    if identity is None:
+        identity = uuid4().hex
+        _write(root, IDENTITY, identity)
+    return identity
+
+
+def identity_of(root: Path) -> str | None:
+    """Return the id of the store in ``root``; None if no service has given it one."""
+    return _read(root, IDENTITY)
+
+
+def _read(root: Path, name: str) -> str | None:
     try:
-        return (root / STATE).read_text().strip()
+        return (root / name).read_text().strip()
     except FileNotFoundError:
         return None
+
+
+def _write(root: Path, name: str, text: str | None) -> None:
+    """Replace a file by one with this text; remove it for None."""
+    aside = root / f"{name}.new"
+    try:
+        if text is None:
+            (root / name).unlink()
+        else:
+            aside.write_text(text)
+            aside.replace(root / name)
+    except OSError as error:
+        raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
 
 
 def is_store(root: Path) -> bool:

@@ -8,14 +8,13 @@ import shutil
 from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import AbstractAsyncContextManager, asynccontextmanager, contextmanager
 from pathlib import Path
-from uuid import uuid4
 
 import orjson
 from anyio import to_thread
 
 from app.errors import StoreUnavailableError
 from app.settings import variable_of
-from app.store.layout import RESULTS, StoreError
+from app.store.layout import RESULTS, StoreError, make_identity
 from app.store.meshes import WrittenMesh
 from app.store.object_meshes import ObjectMeshes
 from app.store.object_results import ObjectResults
@@ -32,8 +31,6 @@ VARIABLES = {
 
 _OWNER = "owner.json"
 _UPLOADS = "uploads"
-_IDENTITY = "identity"
-"""File of the folder that names a service whose state is there as well"""
 
 
 class ObjectStore:
@@ -61,7 +58,7 @@ class ObjectStore:
 
     def claim(self, service: str | None) -> None:
         """Mark the store by an object that is written once."""
-        content = orjson.dumps({"service": service or self._identity()})
+        content = orjson.dumps({"service": service or make_identity(self.folder)})
         try:
             is_ours = self._objects.create(_OWNER, content)
         except FileNotFoundError:
@@ -77,17 +74,18 @@ class ObjectStore:
                 f"the other one is gone for ever, remove the object {_OWNER}"
             )
 
-    def require_claimed(self) -> None:
-        """Raise ``StoreError`` where no service has the store."""
+    def identity(self) -> str:
+        """Return the URL, with the name of the service that has the store."""
         try:
-            if self._objects.read(_OWNER) is not None:
-                return
+            owner = self._objects.read(_OWNER)
         except StoreUnavailableError as error:
             raise self._unusable(error) from None
-        raise StoreError(
-            f"there is no store at {self._name}: start geodesic serve on it first, and give all "
-            f"machines the same {variable_of('store')}"
-        )
+        if owner is None:
+            raise StoreError(
+                f"there is no store at {self._name}: start geodesic serve on it first, and give "
+                f"all machines the same {variable_of('store')}"
+            )
+        return f"{self._name} of {orjson.loads(owner)['service']}"
 
     @asynccontextmanager
     async def lent(self, file: Path) -> AsyncIterator[None]:
@@ -152,12 +150,6 @@ class ObjectStore:
             f"the store {self._name} cannot be used: {error}; endpoint and credentials are those "
             f"of the environment, such as {variables}"
         )
-
-    def _identity(self) -> str:
-        path = self.folder / _IDENTITY
-        if not path.exists():
-            path.write_text(uuid4().hex)
-        return path.read_text()
 
 
 def _remove(folder: Path) -> None:

@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from app.engine.cluster import HostLostError, HostReport
 from app.engine.host import Host
@@ -18,6 +18,7 @@ from app.tracing import Period
 T = TypeVar("T")
 
 SETTINGS = Settings(store=Path("/store"), workers=1, queue_size=2)
+STORE_ID = "the store of all"
 
 
 class SleepingEngine:
@@ -80,15 +81,15 @@ class FakeCluster:
 
     def __init__(self, *names: str) -> None:
         self.engines = {name: SleepingEngine() for name in names}
-        self.machines = {name: Host(engine, SETTINGS) for name, engine in self.engines.items()}
+        self.machines = {name: Host(engine, SETTINGS, STORE_ID) for name, engine in self.engines.items()}
         self.dead: set[str] = set()
         self.cut_off: set[str] = set()
         self.unanswered_stops = 0
         """Stops that get lost before one arrives"""
         self.slow_tasks = 0.0
         """Seconds that a task is on its way"""
-        self.code: str | None = None
-        """The version of the code that hosts claim to have, if not the true one"""
+        self.claim: Mapping[str, Any] = {}
+        """What hosts claim in their reports, where it is not the truth"""
         self.stops: list[str] = []
         self._death = asyncio.Event()
         self._is_started = False
@@ -136,9 +137,7 @@ class FakeCluster:
     async def beat(self, host: str, tickets: Sequence[str]) -> bytes:
         async def beat() -> bytes:
             data = self.machines[host].beat(tickets)
-            if self.code is None:
-                return data
-            return encode(replace(decode(data, HostReport), code=self.code))
+            return encode(replace(decode(data, HostReport), **self.claim))
 
         return await self._reach(host, beat)
 

@@ -19,7 +19,7 @@ from app.errors import ProblemError, problem
 from app.store.folder_store import FolderStore
 from app.tracing import Period
 from tests.support import virtual_time
-from tests.support.fake_cluster import SETTINGS, FakeCluster
+from tests.support.fake_cluster import SETTINGS, STORE_ID, FakeCluster
 from tests.support.virtual_time import now
 from tests.support.workers import distances_query, run_query
 
@@ -59,10 +59,17 @@ class Replica:
         return {name: len(engine.begun) for name, engine in self.cluster.engines.items()}
 
 
+class ClaimedStore(FolderStore):
+    """A store of which only the id is used."""
+
+    def identity(self) -> str:
+        return STORE_ID
+
+
 @asynccontextmanager
 async def replica_of(cluster: FakeCluster) -> AsyncIterator[Replica]:
     await cluster.start()
-    engine = DistributedEngine(cluster, SETTINGS, FolderStore(SETTINGS.folder))
+    engine = DistributedEngine(cluster, SETTINGS, ClaimedStore(SETTINGS.folder))
     await engine.start()
     await asyncio.sleep(2 * BEAT_S)
     yield Replica(cluster, engine)
@@ -380,10 +387,19 @@ def test_a_mesh_is_written_elsewhere_the_second_time() -> None:
     play(scene)
 
 
-def test_a_host_of_another_release_is_not_used_and_named_once() -> None:
+@pytest.mark.parametrize(
+    ("claim", "remedy"),
+    [
+        ({"code": "0.0+old"}, "install the same release"),
+        ({"store": "another one"}, "the same GEODESIC_STORE"),
+    ],
+)
+def test_a_host_that_does_not_fit_is_not_used_and_named_once(
+    claim: dict[str, str], remedy: str
+) -> None:
     async def main() -> None:
         cluster = FakeCluster("a")
-        cluster.code = "0.0+old"
+        cluster.claim = claim
         with capture_logs() as lines:
             async with replica_of(cluster) as replica:
                 await asyncio.sleep(5)
@@ -391,8 +407,9 @@ def test_a_host_of_another_release_is_not_used_and_named_once() -> None:
                 assert await code_of(replica.ask()) == "engine_unavailable"
         errors = [line for line in lines if line["log_level"] == "error"]
         assert len(errors) == 1
-        assert "0.0+old" in errors[0]["error"]
-        assert "the same release" in errors[0]["error"]
+        (claimed,) = claim.values()
+        assert claimed in errors[0]["error"]
+        assert remedy in errors[0]["error"]
 
     virtual_time.run(main())
 

@@ -14,6 +14,7 @@ from obstore.store import MemoryStore
 import geodesic_core as gc
 from app.errors import ProblemError
 from app.settings import Settings
+from app.store.folder_store import FolderStore
 from app.store.interface import Store
 from app.store.layout import RESULTS, TEMPORARY, StoreError
 from app.store.meshes import MeshStore, WrittenMesh
@@ -304,10 +305,26 @@ def test_a_store_that_nobody_has_made_is_refused(
 ) -> None:
     store = new_store(tmp_path / "one")
     with pytest.raises(StoreError, match="there is no store at"):
-        store.require_claimed()
+        store.identity()
     with store.owned(is_shared=True):
         store.claim("a database")
-        store.require_claimed()
+        assert store.identity() == store.identity() != ""
+
+
+def test_all_machines_see_one_identity_of_a_store(machines: Machines) -> None:
+    one, two = machines
+    assert one.store.identity() == two.store.identity()
+
+
+def test_two_stores_of_one_service_have_two_identities(tmp_path: Path) -> None:
+    stores: list[Store] = [
+        *(FolderStore(tmp_path / name) for name in ("one", "two")),
+        *(ObjectStore(Objects(MemoryStore()), tmp_path / "copies", 10**9, name) for name in ("three", "four")),
+    ]
+    for store in stores:
+        with store.owned(is_shared=True):
+            store.claim("a database")
+    assert len({store.identity() for store in stores}) == len(stores)
 
 
 @pytest.mark.parametrize("service", ["another database", None])
