@@ -322,4 +322,4 @@ def test_a_store_by_its_url(run: Run, tmp_path: Path) -> None:
     assert run("store", "ls", f"file://{tmp_path}/store").figure("meshes") == "0, 0 bytes"
     refused = run("store", "ls", "s3://bucket/store")
     assert refused.code == 2
-    assert "names no folder of this machine" in " ".join(refused.err.split())
+    assert "is not a folder of this machine" in " ".join(refused.err.split())
