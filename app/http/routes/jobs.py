@@ -172,6 +172,6 @@ def _number(cursor: str | None) -> int | None:
     if not cursor:
         return None
     if not _NUMBER.fullmatch(cursor):
-        detail = f"{cursor[:20]!r} is no next_cursor of a list of jobs"
+        detail = f"{cursor[:20]!r} is not a next_cursor of a list of jobs"
         raise problem("invalid_request", detail)
     return int(cursor)
