@@ -139,7 +139,7 @@ def _connected(url: str) -> Iterator[Connection[Any]]:
             example = "postgresql://user:secret@host:5432/database"
             raise StateError(f"{setting} is not a URL such as {example}") from None
         raise StateError(
-            f"the database of {setting} refuses the connection: {_line(error)}"
+            f"the database of {setting} refuses the request: {_line(error)}"
         ) from error
     except psycopg.Error as error:
         raise StateError(f"the database of {setting} cannot be used: {_line(error)}") from error
