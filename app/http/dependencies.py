@@ -59,7 +59,7 @@ class TimeoutHeader(BaseModel):
         default=None,
         alias="x-timeout-ms",
         gt=0,
-        description="Milliseconds that the client waits at most",
+        description="The longest time that the client waits, in milliseconds",
     )
 
 

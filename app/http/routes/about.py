@@ -47,18 +47,18 @@ _LIMITS = (
 @router.get(
     "/",
     operation_id="getIndex",
-    summary="Links to begin with",
+    summary="Links to the parts of the service",
     response_model=Index,
     responses={
         200: {
             "content": {"text/html": {}},
-            "description": "Addresses; for browsers the page",
+            "description": "The links; for browsers, the page",
             "headers": documented("Vary"),
         }
     },
 )
 async def get_index(request: Request, response: Response) -> Response | Index:
-    """Return links to begin with; to a browser, the page."""
+    """Return links to the parts of the service; to a browser, the page."""
     if page.is_built() and page.wants_page(request.headers):
         return page.page_response(request.scope)
     response.headers["Vary"] = "Accept"

@@ -142,7 +142,7 @@ async def get_job_results(
     summary="Watch a job",
     response_class=EventSourceResponse,
     responses={
-        200: {"description": "Events, the data of each of which is a `JobDocument`"},
+        200: {"description": "Events; the data of each event is a `JobDocument`"},
         **problems("job_not_found", "invalid_request", "state_unavailable"),
     },
 )
