@@ -371,8 +371,9 @@ def _result_of(task: Task) -> str | None:
 
 
 def _other_release(code: str) -> str:
-    return f"it runs {code}, but this machine runs {code_version()}: install the same release on "
-    "all"
+    return (
+        f"it runs {code}, but this machine runs {code_version()}: install the same release on all"
+    )
 
 
 def _rising(on_progress: ProgressCallback) -> ProgressCallback:

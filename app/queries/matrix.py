@@ -54,15 +54,14 @@ class MatrixQuery(Query[MatrixRequest]):
         if request.layout == "pairs":
             for name in ("sources", "targets"):
                 if getattr(request, name) == "all":
-                    raise invalid_fields(
-                        [f"/{name}"],
-                        "pairs need lists of points; give the "
-                        "indices of the vertices instead of `all`",
-                    )
+                    message = "pairs need lists of points; give vertex indices instead of `all`"
+                    raise invalid_fields([f"/{name}"], message)
             sources, targets = len(request.sources), len(request.targets)
             if sources != targets:
-                message = f"there are {sources} sources and {targets} targets; pairs need the same "
-                "number of both"
+                message = (
+                    f"there are {sources} sources and {targets} targets; pairs need the same "
+                    "number of both"
+                )
                 raise invalid_fields(["/targets"], message)
         return request
 

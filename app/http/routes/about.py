@@ -76,8 +76,7 @@ async def get_index(request: Request, response: Response) -> Response | Index:
 async def get_reference(request: Request) -> Response:
     """Return the page that shows the interface document."""
     if not page.is_built():
-        detail = "this package was built without the reference page; /openapi.json has the same "
-        "document"
+        detail = "this package has no reference page; /openapi.json has the same document"
         raise problem("not_found", detail)
     return page.page_response(request.scope, "docs.html")
 
