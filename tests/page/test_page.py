@@ -444,7 +444,7 @@ def test_exact_and_approximate_side_by_side(view: View, knot: str) -> None:
     view.page.click("#shades >> text=Difference")
     view.wait()
 
-    assert "promised: 0.2" in view.text("#legend-title")
+    assert "guaranteed: 0.2" in view.text("#legend-title")
     assert view.text("#tick-2") == view.text("#measured-approximate").split()[0]
 
 
