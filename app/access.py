@@ -82,8 +82,8 @@ def _parse(entry: str, number: int) -> ApiKey:
     name, _, secret = entry.partition(":")
     if not _NAME.fullmatch(name) or not _SECRET.fullmatch(secret):
         raise ValueError(
-            f"key {number} is not name:secret; a name has at most 64 letters, digits, - and _, the "
-            f"first a letter, and a secret letters, digits and -._~+/, with = at its end"
+            f"key {number} is not name:secret. A name has at most 64 letters, digits, - and _, and "
+            "begins with a letter. A secret has letters, digits and -._~+/, and may end with ="
         )
     if len(secret) < _SHORTEST_SECRET:
         raise ValueError(f"the secret of key {name} is shorter than {_SHORTEST_SECRET} characters")

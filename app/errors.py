@@ -29,22 +29,24 @@ class Code:
 
 CODES: Mapping[str, Code] = {
     "malformed_body": Code(
-        400, "Malformed body", "The body does not match its media type: it is broken JSON, say."
+        400, "Malformed body", "The body is not valid for its media type, for example broken JSON."
     ),
-    "malformed_request": Code(400, "Malformed request", "The bytes received are no HTTP request."),
-    "unauthorized": Code(401, "Unauthorized", "The request needs an API key, or has a wrong one."),
+    "malformed_request": Code(
+        400, "Malformed request", "The bytes received are not a valid HTTP request."
+    ),
+    "unauthorized": Code(401, "Unauthorized", "The request has no API key, or a wrong one."),
     "forbidden": Code(403, "Forbidden", "The API key does not allow this request."),
     "origin_not_allowed": Code(
-        403, "Origin not allowed", "Pages of other sites may not change anything; see `hint`."
+        403, "Origin not allowed", "Pages of other sites may not make changes here; see `hint`."
     ),
     "not_found": Code(404, "Not found", "There is nothing at this address."),
     "mesh_not_found": Code(404, "Mesh not found", "No mesh with this id is in the store."),
     "job_not_found": Code(404, "Job not found", "No job with this id is known."),
     "method_not_allowed": Code(
-        405, "Method not allowed", "The address exists, but not for this method; see `Allow`."
+        405, "Method not allowed", "The address does not support this HTTP method; see `Allow`."
     ),
     "not_acceptable": Code(
-        406, "Not acceptable", "The answer comes in none of the accepted formats."
+        406, "Not acceptable", "The answer is not available in any of the accepted formats."
     ),
     "job_not_finished": Code(409, "Job not finished", "The job has no result yet; try again."),
     "job_dismissed": Code(410, "Job dismissed", "The job was cancelled and has no result."),
@@ -55,19 +57,21 @@ CODES: Mapping[str, Code] = {
         413, "Result too large", "The answer is too large for this format; see `hint`."
     ),
     "unsupported_media_type": Code(
-        415, "Unsupported media type", "The body comes in a format that cannot be read here."
+        415, "Unsupported media type", "The service cannot read the format of the body."
     ),
     "range_not_satisfiable": Code(
         416, "Range not satisfiable", "The requested range lies outside the content."
     ),
     "host_not_allowed": Code(
-        421, "Host not allowed", "The service does not answer under this name; see `hint`."
+        421,
+        "Host not allowed",
+        "The service does not accept requests for this host name; see `hint`.",
     ),
     "invalid_request": Code(
         422, "Invalid request", "A field is missing, unknown, or outside its domain; see `errors`."
     ),
     "invalid_mesh": Code(
-        422, "Invalid mesh", "The mesh cannot be used; `errors` names elements at fault."
+        422, "Invalid mesh", "The mesh cannot be used; `errors` names the faulty elements."
     ),
     "invalid_point": Code(422, "Invalid point", "A source or target is not a point of the mesh."),
     "limit_exceeded": Code(
@@ -82,8 +86,8 @@ CODES: Mapping[str, Code] = {
     "quota_exceeded": Code(
         429,
         "Quota exceeded",
-        "The caller has reached the quota that `setting` names: 429 for jobs, and for uploads "
-        "under way, see `Retry-After`; 507 for stored meshes, see `hint`.",
+        "The caller has reached the quota that `setting` names. The status is 429 for jobs and for "
+        "uploads under way (see `Retry-After`), and 507 for stored meshes (see `hint`).",
         other_statuses=(507,),
     ),
     "header_too_large": Code(
@@ -98,7 +102,7 @@ CODES: Mapping[str, Code] = {
     "mesh_damaged": Code(
         500,
         "Mesh damaged",
-        "The stored files of this mesh are not as they were written; upload it again.",
+        "The stored files of this mesh are damaged; upload the mesh again.",
     ),
     "queue_full": Code(
         503, "Queue full", "Too many requests wait for a worker; see `Retry-After`."
@@ -112,21 +116,21 @@ CODES: Mapping[str, Code] = {
     "state_unavailable": Code(
         503,
         "State unavailable",
-        "The database of jobs and quotas does not answer; see `Retry-After`. Whether a change was "
-        "made is not known: repeat it with the same `Idempotency-Key`.",
+        "The database of jobs and quotas does not answer; see `Retry-After`. The request may or "
+        "may not have made its change: repeat it with the same `Idempotency-Key`.",
     ),
     "store_unavailable": Code(
         503,
         "Store unavailable",
-        "The object store of meshes and answers does not answer; see `Retry-After`. An upload that "
-        "is repeated stores its mesh once.",
+        "The object store of meshes and answers does not answer; see `Retry-After`. It is safe to "
+        "repeat an upload: its mesh is stored once.",
     ),
     "draining": Code(503, "Draining", "The service is shutting down."),
     "deadline_exceeded": Code(
-        504, "Deadline exceeded", "The answer was not ready in the time granted."
+        504, "Deadline exceeded", "The answer was not ready within the time limit."
     ),
     "storage_full": Code(
-        507, "Storage full", "The store has no room left, or its disk can only be read."
+        507, "Storage full", "The store has no room left, or its disk is read-only."
     ),
 }
 
@@ -222,7 +226,7 @@ def over_limit(
     members
         Further members of the problem.
     """
-    detail = f"{actual} {what}, where at most {limit} are allowed"
+    detail = f"{actual} {what}; at most {limit} are allowed"
     variable = variable_of(setting)
     return problem(code, detail, limit=limit, actual=actual, setting=variable, **members)
 
@@ -242,7 +246,7 @@ def _mesh_faults(error: core.InvalidMesh) -> Sequence[Fault]:
     faults = []
     for element in error.elements:
         index = "-".join(map(str, element)) if isinstance(element, tuple) else element
-        faults.append(Fault(pointer(array, index), f"{error.kind} {index} is at fault"))
+        faults.append(Fault(pointer(array, index), f"{error.kind} {index} is faulty"))
     return faults
 
 
@@ -270,7 +274,7 @@ def _system_error(error: OSError) -> Problem:
 
 
 _DISK_FULL = Problem("storage_full", "the store has no room left on its disk")
-_READ_ONLY = Problem("storage_full", "the disk of the store can only be read at the moment")
+_READ_ONLY = Problem("storage_full", "the disk of the store is read-only at the moment")
 _NO_DESCRIPTORS = Problem(
     "too_many_connections",
     "the service has too many files and connections open",
@@ -293,7 +297,7 @@ _NO_STORE = Problem(
 
 
 def _internal_error(_error: BaseException) -> Problem:
-    return Problem("internal_error", "the service failed at this request; its log says why")
+    return Problem("internal_error", "the service failed on this request; its log has the reason")
 
 
 # The first row whose type matches is used.

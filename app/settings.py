@@ -90,7 +90,8 @@ def folder_of(store: str) -> Path:
         return Path(store)
     if url is None or url.scheme != "file" or url.netloc not in ("", "localhost"):
         raise ValueError(
-            f"{store!r} names no folder of this machine: give its path, or a URL such as file:///srv/x"
+            f"{store!r} is not a folder of this machine: give a path, or a URL such as "
+            "file:///srv/x"
         )
     return Path(url2pathname(url.path))
 
@@ -129,21 +130,21 @@ class Settings(BaseSettings):
     store: Annotated[Path | str, BeforeValidator(_store)] = Path("geodesic-store")
     """Folder of meshes, results and fields, created if missing; or URL such as `s3://bucket/x`."""
     copies: Path = Path("geodesic-copies")
-    """Folder of this machine, for copies of meshes, where the store is at a URL."""
+    """Local folder for copies of meshes, where the store is at a URL."""
     copies_bytes: PositiveInt = 16 * GIB
-    """Size of these copies, which are pulled again where they are needed again."""
+    """Size of these copies; one that was removed is fetched again when needed."""
     engine: Literal["local", "ray"] = "local"
     """`local` computes on this machine, `ray` on the hosts of a cluster."""
     address: str | None = None
     """Address of the head of the cluster, as `H:P`."""
     cluster_token: Annotated[SecretStr, Field(min_length=16)] | None = None
-    """Secret of the cluster, the same on all its machines; who knows it runs any code there."""
+    """Secret of the cluster, the same on all its machines; anyone with it can run code there."""
     redis: SecretStr | None = None
-    """URL of a Redis or Valkey for the records of a head; in its folder, unless set."""
+    """URL of a Redis or Valkey for the records of a head; by default they are in its folder."""
     state: SecretStr | None = None
-    """URL of a PostgreSQL database, for several services; SQLite in the store, unless set."""
+    """URL of a PostgreSQL database that several services share; by default SQLite in the store."""
     workers: PositiveInt = Field(default_factory=available_cores)
-    """Worker processes; one for each core, unless set."""
+    """Worker processes; by default one for each core."""
     worker_memory_bytes: int = Field(ge=LEAST_WORKER_MEMORY, default_factory=_worker_memory)
     """Memory of a worker beyond its kernels; mapped files (meshes) do not count."""
     worker_mesh_bytes: PositiveInt = 2 * GIB
@@ -151,7 +152,7 @@ class Settings(BaseSettings):
     worker_field_bytes: PositiveInt = 512 * MIB
     """Size of the distance fields that a worker caches."""
     store_bytes: PositiveInt = 64 * GIB
-    """Size of the stored meshes; an upload that finds no room is refused."""
+    """Size of the stored meshes; an upload that does not fit is refused."""
     store_evict: Literal["off", "lru"] = "off"
     """`lru` removes the least recently used meshes instead."""
     results_bytes: PositiveInt = 4 * GIB
@@ -159,17 +160,17 @@ class Settings(BaseSettings):
     results_memory_bytes: PositiveInt = 256 * MIB
     """Size of the small results cached in memory; some of them have no files."""
     fields_bytes: PositiveInt = 4 * GIB
-    """Size of the stored distance fields, those that took more than 50 ms."""
+    """Size of the stored distance fields; only those that took more than 50 ms are stored."""
     max_upload_bytes: PositiveInt = 512 * MIB
     """Largest body of an upload."""
     max_query_bytes: PositiveInt = Field(default_factory=_query_bytes)
-    """Largest body of a query; 4 MiB, unless set."""
+    """Largest body of a query; by default 4 MiB."""
     max_faces: PositiveInt = 5_000_000
     """Most faces of a mesh."""
     max_sources: PositiveInt = 10_000
     """Most sources of a query; each point of a curve counts. Large matrices may have more."""
     max_matrix_cells: PositiveInt = 10_000_000
-    """Most cells of a matrix in memory: sources times targets, pairs, or what is reached."""
+    """Most cells of a matrix in memory: sources times targets, pairs, or finite distances."""
     max_waypoints: PositiveInt = 100
     """Most waypoints of a path."""
     max_levels: PositiveInt = 1000
@@ -177,7 +178,7 @@ class Settings(BaseSettings):
     max_json_values: PositiveInt = 2_000_000
     """Most values of an answer in JSON; binary ones have no such limit."""
     query_memory_bytes: PositiveInt = Field(default_factory=_query_memory)
-    """Memory granted to a query; half of its worker's, and 8 GiB at most, unless set."""
+    """Memory granted to a query; by default half of its worker's, at most 8 GiB."""
     queue_size: PositiveInt = 64
     """Requests that may wait for a worker."""
     deadline_s: Seconds = 120.0
@@ -193,15 +194,15 @@ class Settings(BaseSettings):
     cancel_grace_s: Seconds = 2.0
     """Seconds that work gets to stop, before its worker is killed."""
     auth: Literal["on", "off"] = "on"
-    """`off` serves without keys on any address, for instance behind a proxy with its own."""
+    """`off` serves without keys on any address, for instance behind a proxy that checks keys."""
     api_keys: Annotated[tuple[ApiKey, ...], NoDecode, BeforeValidator(_keys)] = ()
-    """Keys that clients must have, as `name:secret`, separated by commas; none on loopback."""
+    """Keys that clients must have, as `name:secret`, separated by commas; optional on loopback."""
     rate_limit: PositiveInt | None = None
-    """Requests a minute that a caller may make; as many may come at once."""
+    """Requests per minute that a caller may make; all of them may come at once."""
     max_concurrent: PositiveInt | None = None
     """Requests of a caller that may run at the same time."""
     quota_bytes: PositiveInt | None = None
-    """Size of the stored meshes that a caller stored first; without keys, of all such meshes."""
+    """Size of the meshes that a caller was the first to store; without keys, of all callers."""
     quota_jobs: PositiveInt | None = None
     """Jobs of a caller, until they are removed; without keys, of all callers together."""
     quota_uploads: PositiveInt | None = None
@@ -209,13 +210,13 @@ class Settings(BaseSettings):
     max_connections: PositiveInt = Field(default_factory=_connections)
     """Connections that may be open; 1000, or half of the process's descriptors if fewer."""
     max_caller_connections: PositiveInt = Field(default_factory=_caller_connections)
-    """Connections from one address; a quarter of all, unless set. A proxy may need more."""
+    """Connections from one address; by default a quarter of all. A proxy may need more."""
     allowed_hosts: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
-    """Names that `Host` may have, separated by commas; `*.example.org` stands for all below it."""
+    """Names that `Host` may have, separated by commas; `*.example.org` allows all subdomains."""
     cors_origins: Annotated[tuple[str, ...], NoDecode, BeforeValidator(_listed)] = ()
     """Origins whose pages may use the service, separated by commas, or `*`."""
     log_format: Literal["json", "text"] | None = None
-    """`json` or `text`; text on a terminal and JSON elsewhere, unless set."""
+    """`json` or `text`; by default text on a terminal and JSON elsewhere."""
     log_probes: Literal["on", "off"] = "off"
     """`on` logs requests for `/livez` and `/readyz` too."""
 
@@ -229,7 +230,7 @@ class Settings(BaseSettings):
     def _is_of_postgresql(cls, state: SecretStr | None) -> SecretStr | None:
         schemes = ("postgresql://", "postgres://")
         if state is not None and not state.get_secret_value().startswith(schemes):
-            raise ValueError("it is no URL such as postgresql://user:secret@host:5432/database")
+            raise ValueError("it is not a URL such as postgresql://user:secret@host:5432/database")
         return state
 
     @field_validator("redis")
@@ -241,7 +242,7 @@ class Settings(BaseSettings):
             and url.hostname
             and not (url.path.strip("/") or url.query or url.fragment)
         ):
-            raise ValueError("it is no URL such as redis://user:secret@host:6379")
+            raise ValueError("it is not a URL such as redis://user:secret@host:6379")
         return redis
 
     @field_validator("cors_origins")
@@ -265,13 +266,15 @@ class Settings(BaseSettings):
     @model_validator(mode="after")
     def _agrees_with_itself(self) -> Self:
         if self.engine == "ray" and self.address is None:
-            raise ValueError("GEODESIC_ENGINE is ray, but GEODESIC_ADDRESS names no head")
+            raise ValueError(
+                "GEODESIC_ENGINE is ray: set GEODESIC_ADDRESS to the address of the head"
+            )
         if self.auth == "off" and self.api_keys:
             raise ValueError("GEODESIC_AUTH is off, but GEODESIC_API_KEYS has keys")
         for small, large in _AT_MOST:
             if getattr(self, small) > getattr(self, large):
                 raise ValueError(
-                    f"{variable_of(small)} is {getattr(self, small)}, which is more than "
+                    f"{variable_of(small)} is {getattr(self, small)}; it must be at most "
                     f"{variable_of(large)}, {getattr(self, large)}"
                 )
         return self
@@ -287,7 +290,7 @@ class Settings(BaseSettings):
         )
         if unknown:
             raise ValueError(
-                f"unknown setting {', '.join(unknown)}; there are {', '.join(sorted(known))}"
+                f"unknown setting {', '.join(unknown)}; the settings are {', '.join(sorted(known))}"
             )
         return self
 

@@ -147,7 +147,9 @@ def compile_kernels(
                 for process in [each for each in running if each.poll() is not None]:
                     running.remove(process)
                     if process.returncode:
-                        raise InternalError(f"compiling kernels failed with {process.returncode}")
+                        raise InternalError(
+                            f"compiling kernels failed with exit code {process.returncode}"
+                        )
     finally:
         for process in running:
             process.terminate()

@@ -43,8 +43,8 @@ class Control:
     deadline_s
         Seconds granted from the start of the call, above 0; then it stops with `DeadlineExceeded`.
     memory_limit
-        Bytes granted for the state of the call, above 0, without the mesh; a call that needs more
-        stops with `MemoryLimitExceeded`.
+        Bytes granted for the state of the call, above 0, not counting the mesh; a call that needs
+        more stops with `MemoryLimitExceeded`.
     bytes_beside
         Bytes that the call holds beside the state of its present sweep.
     began

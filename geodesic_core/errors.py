@@ -76,11 +76,11 @@ class TooManyFaces(InvalidMesh):
     >>> gc.load_mesh(text, "off", max_faces=0)
     Traceback (most recent call last):
         ...
-    geodesic_core.errors.TooManyFaces: 1 faces, where at most 0 are allowed
+    geodesic_core.errors.TooManyFaces: 1 faces; at most 0 are allowed
     """
 
     def __init__(self, faces: int, max_faces: int) -> None:
-        super().__init__(f"{faces} faces, where at most {max_faces} are allowed", kind="face")
+        super().__init__(f"{faces} faces; at most {max_faces} are allowed", kind="face")
         self.faces = faces
         self.max_faces = max_faces
 
@@ -188,7 +188,7 @@ class MemoryLimitExceeded(GeodesicError):  # noqa: N818
 
 
 class MissingExtra(GeodesicError, ImportError):  # noqa: N818
-    """A call that needs a package which is not installed, and which an extra brings.
+    """A call that needs a package that is not installed; an extra brings it.
 
     Parameters
     ----------

@@ -17,7 +17,7 @@ def as_output(path: str | Path, *suffixes: str) -> Path:
         It does not, or its folder is not there.
     """
     if not isinstance(path, str | Path):
-        raise InvalidArgument(f"path is {path!r}; it must be a text or a Path")
+        raise InvalidArgument(f"path is {path!r}; it must be a string or a Path")
     file = Path(path)
     if file.suffix.lower() not in suffixes:
         *others, last = suffixes

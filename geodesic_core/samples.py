@@ -1,4 +1,4 @@
-"""Samples: procedural meshes of any number of faces, to begin with without a file.
+"""Samples: procedural meshes of any number of faces, to start without a file.
 
 Faces are counter-clockwise seen from outside, or from above.
 """

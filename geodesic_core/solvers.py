@@ -73,9 +73,8 @@ def exact_distance(
     max_distance
         Limit of the sweep, mesh units; None for no limit. Vertices beyond it count as unreachable.
     targets
-        A point or several, whose distances the same sweep finds, so that
-        `DistanceField.distance_at` and `DistanceField.path_to` know them without a search of their
-        own.
+        One or more points whose distances the same sweep finds. For these,
+        `DistanceField.distance_at` and `DistanceField.path_to` need no further search.
     barriers
         Ids of faces that act as holes, for this call. The field is that of
         `TriangleMesh.with_barriers`, which prepares the blocked mesh once for many calls.
@@ -103,7 +102,7 @@ def exact_distance(
     InvalidArgument
         Another argument is out of its domain.
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
-        The sweep was stopped; the mesh is as good as before.
+        The sweep was stopped; the mesh can still be used.
 
     Notes
     -----
@@ -149,10 +148,10 @@ def approximate_distance(
     mesh, sources
         As in `exact_distance`.
     relative_error
-        Share of the exact distance by which a distance may fall short: above 0 and below 1. None
-        for no such bound, where there is an absolute one.
+        Share of the exact distance by which a distance may be too short: above 0 and below 1. None
+        for no relative bound; then ``absolute_error`` must be given.
     absolute_error
-        The same in mesh units. Where both are given, both hold.
+        The same in mesh units. If both are given, both hold.
     max_distance, targets, barriers
         As in `exact_distance`.
     retain
@@ -167,9 +166,9 @@ def approximate_distance(
     Returns
     -------
     DistanceField
-        Distances, (V,) float64 in mesh units, and the error that they keep to: less than was
-        allowed where merging more would save nothing. On a rough mesh (`TriangleMesh.is_rough`)
-        the distances are exact, because that takes less time.
+        Distances, (V,) float64 in mesh units, and their error bound. It is smaller than allowed
+        where more merging would save nothing. On a rough mesh (`TriangleMesh.is_rough`) the
+        distances are exact, because that takes less time.
 
     Raises
     ------
@@ -178,7 +177,7 @@ def approximate_distance(
 
     Notes
     -----
-    O(F log F) in practice. docs/accuracy.md tells what is guaranteed, and why.
+    O(F log F) in practice. docs/accuracy.md explains what is guaranteed, and why.
 
     Examples
     --------
@@ -220,16 +219,16 @@ def fast_distance(
 ) -> DistanceField:
     """Return geodesic distances in one quick pass: lengths of paths, never too short.
 
-    Each distance is the length of a path over the surface. It is mostly within a per mille or a
-    per cent of the shortest, which nothing guarantees: ``error_bound`` is an estimate.
+    Each distance is the length of a path over the surface. It is usually longer than the shortest
+    by less than 0.1 % to 1 %. This is not guaranteed: ``error_bound`` is an estimate.
 
     Parameters
     ----------
     mesh, sources
         As in `exact_distance`.
     effort
-        1, 2, 4 or 8: at how many places of each half-edge windows compete. Time grows with it, and
-        the error falls.
+        1, 2, 4 or 8: the number of places on each half-edge at which windows are compared. More
+        effort takes more time and lowers the error.
     max_distance, targets, barriers
         As in `exact_distance`.
     retain
@@ -242,7 +241,7 @@ def fast_distance(
     -------
     DistanceField
         Distances, (V,) float64 in mesh units, and their estimated error. Its isolines, and
-        distances inside faces, come from an exact sweep, when they are first asked for.
+        distances inside faces, come from an exact sweep, which runs when they are first needed.
 
     Raises
     ------
@@ -251,7 +250,7 @@ def fast_distance(
 
     Notes
     -----
-    O(F) in practice. docs/accuracy.md tells how the error was measured.
+    O(F) in practice. docs/accuracy.md explains how the error was measured.
 
     Examples
     --------
@@ -304,7 +303,7 @@ def shortest_path(
         Points that the path passes in order; it is shortest from each to the next.
     max_distance
         Largest length of the path past all waypoints, mesh units; None for no limit. The search
-        ends once it is certain that no path is as short.
+        ends once it is certain that every path is longer.
     explain
         Also record the steps of the search, in `GeodesicPath.steps`.
     progress, cancel, deadline_s, memory_limit
@@ -356,7 +355,8 @@ class Solver:
     Parameters
     ----------
     mesh
-        The surface of all calls, which `as_mesh` takes; a `TriangleMesh` as ``solver.mesh``.
+        The surface of all calls: a `TriangleMesh`, or anything else that `as_mesh` takes.
+        ``solver.mesh`` is the `TriangleMesh`.
 
     Examples
     --------
@@ -461,7 +461,7 @@ class Solver:
         Returns
         -------
         DistanceField
-            Distances, (V,) float64, mesh units, and the error that they keep to.
+            Distances, (V,) float64, mesh units, and their error bound.
 
         Raises
         ------

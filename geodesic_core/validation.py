@@ -67,8 +67,8 @@ def as_barriers(barriers: Any, face_count: int) -> Longs:
         if not all(map(is_index, one_of_each_type.values())):
             i = next(i for i, face in enumerate(faces) if not is_index(face))
             raise InvalidArgument(
-                f"barrier {i} is {faces[i]!r}; it must be a face id, an integer (of a mask, "
-                f"numpy.flatnonzero makes these)"
+                f"barrier {i} is {faces[i]!r}; it must be a face id, an integer (for a mask, use "
+                "numpy.flatnonzero)"
             )
     bad = np.flatnonzero((faces < 0) | (faces >= face_count))
     if len(bad):

@@ -211,14 +211,14 @@ MaxDistance = Annotated[
         callback=lambda limit: None if limit == math.inf else limit,
     ),
 ]
-CURVES = "or a curve: points that are each in a face with the next, as 12/e13-14:0.5/15"
+CURVES = "or a curve: points separated by /, each in one face with the next, as 12/e13-14:0.5/15"
 Sources = Annotated[
     list[Point],
     typer.Option(
         "--source",
         parser=Point.parse,
         metavar="POINT",
-        help=f"A source, {SPELLINGS}; may be given again.",
+        help=f"A source, {SPELLINGS}; may be repeated.",
     ),
 ]
 PointOrCurveSources = Annotated[
@@ -227,7 +227,7 @@ PointOrCurveSources = Annotated[
         "--source",
         parser=PointOrCurve.parse,
         metavar="POINT",
-        help=f"A source, {SPELLINGS}, {CURVES}; may be given again.",
+        help=f"A source, {SPELLINGS}, {CURVES}; may be repeated.",
     ),
 ]
 PointOrCurveSource = Annotated[
@@ -249,7 +249,7 @@ Source = Annotated[
 Targets = Annotated[
     list[Point],
     typer.Option(
-        "--target", parser=Point.parse, metavar="POINT", help="A target; may be given again."
+        "--target", parser=Point.parse, metavar="POINT", help="A target; may be repeated."
     ),
 ]
 SomeTargets = Annotated[list[Point] | None, *get_args(Targets)[1:]]
@@ -258,8 +258,9 @@ Barriers = Annotated[
     typer.Option(
         parser=BlockedFaces.parse,
         metavar="FACES",
-        help="Blocked faces, which act as holes, as 3,7,40-59 or @FILE. Of a brain, @FILE.label or "
-        "@FILE.gii blocks a label; @FILE.gii=NAME one of several.",
+        help="Blocked faces, which act as holes: 3,7,40-59, or @FILE to read them from a file. For "
+        "a brain surface, @FILE.label or @FILE.gii blocks a label; @FILE.gii=NAME blocks one of "
+        "several.",
     ),
 ]
 MethodOption = Annotated[
@@ -283,7 +284,8 @@ RelativeError = Annotated[
 AbsoluteError = Annotated[
     float | None,
     typer.Option(
-        help="For approximate: the allowed error in mesh units; if both are given, both hold."
+        help="For approximate: the allowed error in mesh units; if both errors are given, both "
+        "hold."
     ),
 ]
 EffortOption = Annotated[
@@ -292,7 +294,7 @@ EffortOption = Annotated[
         "--effort",
         parser=effort,
         metavar="1|2|4|8",
-        help="For fast: more effort takes more time, and errs less; 2 by default.",
+        help="For fast: more effort takes more time and lowers the error; 2 by default.",
     ),
 ]
 

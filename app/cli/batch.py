@@ -86,7 +86,10 @@ class Questions:
 
 def batch(
     meshes: Annotated[
-        list[Path], typer.Argument(metavar="MESHES...", help="Files that `geodesic info` reads.")
+        list[Path],
+        typer.Argument(
+            metavar="MESHES...", help="Mesh files, in the formats that `geodesic info` reads."
+        ),
     ],
     source: Sources,
     out: Annotated[
@@ -110,10 +113,11 @@ def batch(
     merge: MergeOption = Merge.NONE,
     as_json: AsJson = False,
 ) -> None:
-    """Ask the same questions of many meshes; one that fails does not stop the others.
+    """Answer the same queries for many meshes; a mesh that fails does not stop the others.
 
-    For each mesh and source the table has a row with the largest and the mean distance of all
-    vertices, or, with targets, a row for each with its distance. Exit code 1 if any has failed.
+    The table has a row for each mesh and source, with the largest and the mean distance of all
+    vertices. With targets it has a row for each target, with its distance. The exit code is 1 if
+    any mesh failed.
     """
     output = Output(out, as_json)
     if out is None and not as_json:
@@ -150,7 +154,7 @@ def batch(
     busy = sum(_seconds(answers) for answers in rows.values()) / (count * seconds)
     output.say(f"meshes      {len(meshes)}, {len(failed)} of them failed")
     output.say(f"rows        {len(ordered)}")
-    output.say(f"took        {seconds:.3f} s, {busy:.0%} of {count} processes' time busy")
+    output.say(f"took        {seconds:.3f} s, {count} processes, busy {busy:.0%} of the time")
     output.say_written()
     for name, error in failed.items():
         typer.echo(f"{name}: {error}", err=True)
@@ -174,7 +178,7 @@ def _answers(
         died: list[Path] = []
         yield from _answers_of_pool(ask, deque([[mesh]]), died, 1, _pool(1))
         if died:
-            yield mesh, [Row(str(mesh), error="the process died: memory may be short")]
+            yield mesh, [Row(str(mesh), error="the process died, perhaps for lack of memory")]
 
 
 def _parcels(meshes: Sequence[Path], processes: int) -> Iterator[list[Path]]:

@@ -20,11 +20,11 @@ Folder = Annotated[
     Path, typer.Option("--dir", help="Folder of Ray's sockets and logs, and of the head's records.")
 ]
 Address = Annotated[
-    str | None, typer.Option(help="Address of the head, as H:P; GEODESIC_ADDRESS unless given.")
+    str | None, typer.Option(help="Address of the head, as H:P; by default GEODESIC_ADDRESS.")
 ]
 Store = Annotated[
     str | None,
-    typer.Option(help="Shared folder, or URL such as s3://bucket/x; GEODESIC_STORE unless given."),
+    typer.Option(help="Shared folder, or URL such as s3://bucket/x; by default GEODESIC_STORE."),
 ]
 
 if TYPE_CHECKING:
@@ -35,14 +35,14 @@ _LOOK_S = 0.5
 
 
 def head(
-    host: Annotated[str, typer.Option(help="Address of this machine, as others reach it.")],
+    host: Annotated[str, typer.Option(help="Address at which other machines reach this one.")],
     folder: Folder,
     port: Annotated[int, typer.Option(min=1024, max=65535, help="Port to listen on.")] = 6379,
     redis: Annotated[
         str | None,
         typer.Option(
-            help="URL of a Redis or Valkey for the records, in place of the folder; GEODESIC_REDIS "
-            "unless given."
+            help="URL of a Redis or Valkey for the records, in place of the folder; by default "
+            "GEODESIC_REDIS."
         ),
     ] = None,
 ) -> None:
@@ -58,7 +58,7 @@ def head(
 
 
 def node(folder: Folder, address: Address = None, store: Store = None) -> None:
-    """Make this machine a host of a cluster until interrupted; then it ends what it has begun."""
+    """Make this machine a host of a cluster until interrupted; it then finishes running work."""
     settings = read_settings(address=address, store=store)
     if isinstance(settings.store, Path):
         settings = settings.model_copy(update={"store": settings.store.resolve()})

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 _SILENCE_S = 10.0
 """Seconds after which a host does not answer"""
 
-cluster = typer.Typer(help="Look after a cluster of machines.", no_args_is_help=True)
+cluster = typer.Typer(help="Inspect a cluster of machines.", no_args_is_help=True)
 
 
 @cluster.callback()
 def _group() -> None:
-    """Look after a cluster of machines."""
+    """Inspect a cluster of machines."""
 
 
 @cluster.command()

@@ -47,7 +47,7 @@ LINES = ".obj", ".csv", ".svg", ".geojson", ".json"
 PointsOut = Annotated[
     Path | None,
     typer.Option(
-        help="Where the points go as well: .csv, .geojson or .json; - prints .csv.",
+        help="Where the points go, too: .csv, .geojson or .json; - prints .csv.",
         callback=writable(".csv", ".geojson", ".json"),
     ),
 ]
@@ -59,7 +59,8 @@ LinesOut = Annotated[
     ),
 ]
 ChordError = Annotated[
-    float | None, typer.Option(help="How far lines may stray inside faces, in mesh units.")
+    float | None,
+    typer.Option(help="How far lines may deviate from the exact ones inside faces, in mesh units."),
 ]
 
 
@@ -135,12 +136,12 @@ def path(
         typer.Option(
             parser=Point.parse,
             metavar="POINT",
-            help="A point to pass on the way; may be given again, in order.",
+            help="A point to pass on the way; may be repeated, in order.",
         ),
     ] = None,
     explain: Annotated[
         bool,
-        typer.Option("--explain", help="Tell what each step of the search did; exact paths only."),
+        typer.Option("--explain", help="Describe each step of the search; exact paths only."),
     ] = False,
     max_distance: MaxDistance = None,
     method: MethodOption = Method.EXACT,
@@ -225,7 +226,7 @@ def isolines(
     out: LinesOut = None,
     level: Annotated[
         list[float] | None,
-        typer.Option(help="A distance at which to draw lines; may be given again."),
+        typer.Option(help="A distance at which to draw lines; may be repeated."),
     ] = None,
     count: Annotated[
         int | None,
@@ -300,7 +301,7 @@ def nearest(
     source: Source,
     candidate: Annotated[
         list[Point],
-        typer.Option(parser=Point.parse, metavar="POINT", help="A candidate; may be given again."),
+        typer.Option(parser=Point.parse, metavar="POINT", help="A candidate; may be repeated."),
     ],
     k: Annotated[int, typer.Option("-k", min=1, help="How many to find.")] = 1,
     out: PointsOut = None,

@@ -24,9 +24,7 @@ def serve(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port to listen on.")] = 8000,
     engine: Annotated[
         str | None,
-        typer.Option(
-            help="local, or ray for the hosts of a cluster; GEODESIC_ENGINE unless given."
-        ),
+        typer.Option(help="local, or ray for the hosts of a cluster; by default GEODESIC_ENGINE."),
     ] = None,
     address: Address = None,
     store: Store = None,
@@ -55,8 +53,8 @@ def serve(
     settings = read_settings(engine=engine, address=address, store=store, state=state)
     if not is_loopback(host) and not settings.api_keys and settings.auth == "on":
         raise typer.BadParameter(
-            f"anybody who reaches {host} could use the service: set GEODESIC_API_KEYS, or "
-            f"GEODESIC_AUTH=off where something before it asks for keys"
+            f"anybody who can reach {host} could use the service: set GEODESIC_API_KEYS, or set "
+            "GEODESIC_AUTH=off if a proxy in front of it checks keys"
         )
     logs.install(settings.log_format)
     try:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from app.service.maintenance import Contents
 
 store = typer.Typer(
-    help="Look after the store of a service. To be run where the store is.",
+    help="Inspect and clean the store of a service. Run it on the machine that has the store.",
     rich_markup_mode=None,
 )
 
@@ -48,7 +48,8 @@ State = Annotated[
         metavar="URL",
         envvar="GEODESIC_STATE",
         show_envvar=True,
-        help="Database that the services of the store share, if they do: it has their jobs.",
+        help="URL of the database that the services of the store share, if any; it holds their "
+        "jobs.",
     ),
 ]
 
@@ -109,9 +110,10 @@ def prune(
     state: State = None,
     as_json: AsJson = False,
 ) -> None:
-    """Remove half-written files, and results and fields that are damaged, outdated or without mesh.
+    """Remove half-written files, and damaged, outdated or orphaned results and fields.
 
-    No service may run on the store. Meshes and the answers of jobs stay.
+    Orphaned ones belong to a mesh that was deleted. No service may run on the store meanwhile.
+    Meshes and the answers of jobs are kept.
     """
     from app.queries import code_version
     from app.service.maintenance import jobs_of, leftovers, remove

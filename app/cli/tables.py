@@ -50,9 +50,9 @@ def matrix(
     out: Annotated[
         Path | None,
         typer.Option(
-            help="Where the distances go: .npy, .csv or .json, - prints .csv; of a sparse matrix "
-            ".npz, .csv or .json. Of points from files .npy or .zarr; only the finite ones .npz or "
-            ".parquet.",
+            help="Where the distances go: .npy, .csv or .json; - prints .csv. For a sparse matrix: "
+            ".npz, .csv or .json. For points from files: .npy or .zarr, or .npz or .parquet for "
+            "the finite distances only.",
             callback=writable(".npy", ".npz", ".csv", ".json", ".zarr", ".parquet"),
         ),
     ] = None,
@@ -62,8 +62,9 @@ def matrix(
         Path | None,
         typer.Option(
             metavar=_FILE,
-            help="A file of points, one a line, or 'all' for every vertex: the distances between "
-            "all of them. A stopped command continues where it was.",
+            help="A file with one point per line, or 'all' for every vertex; computes the "
+            "distances between all of them. A stopped command continues where it was when run "
+            "again.",
         ),
     ] = None,
     sources: Annotated[
@@ -81,7 +82,7 @@ def matrix(
     layout: Annotated[
         Layout,
         typer.Option(
-            help="'dense': from each source to each target; 'sparse': what can be reached; "
+            help="'dense': from each source to each target; 'sparse': the finite distances only; "
             "'pairs': from each source to the target of the same number."
         ),
     ] = Layout.DENSE,
@@ -89,17 +90,18 @@ def matrix(
     relative_error: RelativeError = None,
     effort: EffortOption = None,
     dtype: Annotated[
-        Number, typer.Option(help="Of the distances, for points from files.")
+        Number, typer.Option(help="Type of the distances, for points from files.")
     ] = Number.FLOAT64,
     threads: Annotated[
-        int | None, typer.Option(min=1, help="Most threads; one for each core if not given.")
+        int | None,
+        typer.Option(min=1, help="Largest number of threads; by default one for each core."),
     ] = None,
     service: Annotated[
         str | None,
         typer.Option(
             metavar="URL",
-            help="Have this service compute it, on all its machines: exact distances, to a .npy, "
-            "for points from files. GEODESIC_SERVICE_KEY is its key.",
+            help="Let this service compute the matrix, on all its machines: exact distances for "
+            "points from files, to a .npy file. GEODESIC_SERVICE_KEY holds the API key.",
         ),
     ] = None,
     max_distance: MaxDistance = None,
@@ -107,7 +109,7 @@ def matrix(
     merge: MergeOption = Merge.NONE,
     as_json: AsJson = False,
 ) -> None:
-    """Compute the distances from several points to several others, or between all of a file."""
+    """Compute distances from several points to several others, or between all points of a file."""
     by_files = {"--points": points, "--sources": sources, "--targets": targets}
     given = [name for name, value in by_files.items() if value is not None]
     if not given:
@@ -115,7 +117,7 @@ def matrix(
             raise typer.BadParameter("give --source and --target, or --points with a file")
         if method is not Method.EXACT or dtype is not Number.FLOAT64 or threads or service:
             raise typer.BadParameter(
-                "--method, --dtype, --threads and --service go with points from files"
+                "--method, --dtype, --threads and --service apply only to points from files"
             )
         output = Output(out, as_json)
         _ask_matrix(mesh_file, output, source, target, layout, max_distance, barriers, merge)
@@ -131,7 +133,7 @@ def matrix(
     options = accuracy(method, relative_error, None, effort) | {"dtype": dtype.value}
     is_simple = method is Method.EXACT and threads is None and out.suffix.lower() == ".npy"
     if service is not None and not is_simple:
-        raise typer.BadParameter("--service computes exact distances, to a file .npy")
+        raise typer.BadParameter("--service computes exact distances, to a .npy file")
     opened, read_seconds = read(mesh_file, merge)
     import geodesic_core as gc
 
@@ -219,7 +221,7 @@ def _points_of(mesh: "TriangleMesh", file: Path | None) -> "list[SurfacePoint] |
         except (InvalidPoint, typer.BadParameter) as error:
             raise Failure(f"{file}, line {number}: {error}") from None
     if not points:
-        raise Failure(f"{file} has no points: write one a line")
+        raise Failure(f"{file} has no points: write one point per line")
     return points
 
 
@@ -240,7 +242,8 @@ def _ask_matrix(
         raise typer.BadParameter(f"{suffix} does not go with --layout {layout.value}")
     if layout is Layout.PAIRS and len(source) != len(target):
         raise typer.BadParameter(
-            f"there are {len(source)} sources and {len(target)} targets; pairs need as many"
+            f"there are {len(source)} sources and {len(target)} targets; pairs need the same "
+            "number of both"
         )
     members: Mapping[str, Any] = {
         "layout": layout.value,

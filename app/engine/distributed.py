@@ -384,7 +384,9 @@ def _result_of(task: Task) -> str | None:
 
 
 def _other_release(code: str) -> str:
-    return f"it runs {code}, and this machine {code_version()}: install the same release on all"
+    return (
+        f"it runs {code}, but this machine runs {code_version()}: install the same release on all"
+    )
 
 
 def _rising(on_progress: ProgressCallback) -> ProgressCallback:
@@ -419,14 +421,19 @@ def _once_more(task: Task) -> Task:
 
 
 def _no_host() -> ProblemError:
-    detail = "no machine of the cluster takes work at the moment"
+    detail = "no machine of the cluster accepts work at the moment"
     return problem("engine_unavailable", detail, headers=_RETRY_AFTER)
 
 
 def _lost_twice() -> ProblemError:
-    return problem("worker_died", "two machines were lost, one after the other, at this request")
+    return problem(
+        "worker_died", "two machines failed, one after the other, while they computed this answer"
+    )
 
 
 def _unreadable(name: str, error: WireError) -> Problem:
     logger.error("answer of a host not readable", host=name, error=str(error))
-    return Problem("engine_unavailable", f"a machine of the cluster sent no answer: {error}")
+    return Problem(
+        "engine_unavailable",
+        f"a machine of the cluster sent an answer that cannot be read: {error}",
+    )

@@ -39,7 +39,7 @@ class FolderRecords:
     @property
     def told(self) -> str:
         """How durable they are, in words."""
-        return f"its records outlive it in {self.folder}"
+        return f"its records stay in {self.folder} when it stops"
 
     def renew(self) -> None:
         """Nothing: the lock of RocksDB keeps others out."""
@@ -62,10 +62,10 @@ class RedisRecords:
     def told(self) -> str:
         """How durable they are, in words."""
         if self.is_durable:
-            return f"its records outlive it in the Redis at {self.place}"
+            return f"its records stay in the Redis at {self.place} when it stops"
         return (
-            f"its records outlive it in the Redis at {self.place}, but not a crash of that: it "
-            "keeps no log of changes (appendonly)"
+            f"its records stay in the Redis at {self.place} when it stops, but a crash of that "
+            "Redis loses them: it keeps no log of changes (appendonly)"
         )
 
     def renew(self) -> None:
@@ -93,7 +93,7 @@ def in_redis(url: SecretStr, token: str) -> Iterator[RedisRecords]:
         It does not answer, or refuses; or another head has these records.
     """
     if find_spec("redis") is None:
-        raise ClusterError("Redis' client is not installed: pip install 'geodesic[cluster]'")
+        raise ClusterError("the Redis client is not installed: pip install 'geodesic[cluster]'")
     from redis.exceptions import AuthenticationError, RedisError
 
     parts = urlsplit(url.get_secret_value())

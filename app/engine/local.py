@@ -357,5 +357,5 @@ class LocalEngine:
 
 
 def _unavailable() -> ProblemError:
-    detail = "no worker process can be started; the service's log says why"
+    detail = "no worker process can be started; the log of the service has the reason"
     return problem("engine_unavailable", detail, headers=_RETRY_AFTER)

@@ -50,7 +50,7 @@ def _rows(document: dict[str, Any], name: str, kinds: str, what: str) -> NDArray
         values = _as_array(row)
         if values.dtype.kind not in kinds or values.shape != (3,):
             raise _invalid(pointer(name, i), f"{name}[{i}] is not {what}")
-    raise _invalid(pointer(name), f"{name} is not a list of {what} each")
+    raise _invalid(pointer(name), f"{name} is not a list whose items are {what} each")
 
 
 def _as_array(rows: Any) -> NDArray[Any]:

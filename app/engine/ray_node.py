@@ -120,7 +120,8 @@ def host_and_port(address: str | None) -> tuple[str, int]:
     except ValueError:
         pass
     raise ClusterError(
-        f"{address!r} is no address of a head: give --address H:P or set {variable_of('address')}"
+        f"{address!r} is not the address of a head: give --address H:P or set "
+        f"{variable_of('address')}"
     )
 
 
@@ -139,7 +140,7 @@ class Processes:
     def check(self) -> None:
         """Raise ``ClusterError`` where they have ended, which nobody asked for."""
         if not self.are_alive:
-            raise ClusterError(f"Ray has ended on this machine; {self._log} may say why")
+            raise ClusterError(f"Ray has stopped on this machine; see {self._log}")
 
     def wait_until_started(self, address: str) -> None:
         """Wait for Ray's word that it runs; raises ``ClusterError`` where it will not."""
@@ -156,8 +157,8 @@ class Processes:
                 raise ClusterError(f"Ray does not start: {last[0]} (see {self._log})")
             if time.monotonic() > end:
                 raise ClusterError(
-                    f"Ray has not started within {_START_S:g} s: perhaps what listens at {address} "
-                    f"is not the head; see {self._log}"
+                    f"Ray has not started within {_START_S:g} s: perhaps another program listens "
+                    f"at {address}; see {self._log}"
                 )
             time.sleep(0.05)
 
@@ -172,8 +173,9 @@ class Processes:
 
 
 _SIGNS: Mapping[str, str] = {
-    "InvalidAuthToken": "the cluster at {address} has another token: give this machine the head's",
-    "Version mismatch": "this machine has other versions than the head at {address}: {told}",
+    "InvalidAuthToken": "the cluster at {address} has another token: give this machine the token "
+    "of the head",
+    "Version mismatch": "this machine and the head at {address} have different versions: {told}",
 }
 """What Ray's log says where it cannot start, and what that means"""
 
@@ -238,7 +240,7 @@ def _token(settings: Settings) -> str:
     if settings.cluster_token is None:
         raise ClusterError(
             f"set {variable_of('cluster_token')} to a secret, the same on all machines of the "
-            "cluster: who knows it can run any code there (openssl rand -hex 32 makes one)"
+            "cluster: anyone who knows it can run code there (openssl rand -hex 32 makes one)"
         )
     return settings.cluster_token.get_secret_value()
 
@@ -246,8 +248,8 @@ def _token(settings: Settings) -> str:
 def _check_host(host: str) -> None:
     if host in ("localhost", "127.0.0.1", "::1"):
         raise ClusterError(
-            f"Ray takes {host} for any address of this machine: give one by which other machines "
-            "reach the head, or 127.0.0.2 to try a cluster on one machine"
+            f"Ray takes {host} to mean any address of this machine: give the address at which "
+            "other machines reach the head, or 127.0.0.2 to try a cluster on one machine"
         )
 
 

@@ -68,7 +68,7 @@ class VersionError(WireError):
 
     def __init__(self, theirs: int) -> None:
         super().__init__(
-            f"a message has version {theirs} where this release has {VERSION}: run the same "
+            f"a message has version {theirs}, but this release uses {VERSION}: run the same "
             "release of geodesic on all machines"
         )
         self.theirs = theirs
@@ -327,13 +327,13 @@ def decode(data: bytes, kind: Any) -> Any:
         A release with another version wrote them.
     """
     if len(data) < _HEAD.size or not data.startswith(_MAGIC):
-        raise DamagedMessageError("the bytes are no message of geodesic")
+        raise DamagedMessageError("the bytes are not a message of geodesic")
     _, version, checksum = _HEAD.unpack_from(data)
     body = memoryview(data)[_HEAD.size :]
     if version != VERSION:
         raise VersionError(version)
     if zlib.crc32(body) != checksum:
-        raise DamagedMessageError("the message is not what was sent")
+        raise DamagedMessageError("the message was damaged on the way")
     try:
         return _decoder(kind).decode(body)
     except msgspec.DecodeError as error:

@@ -59,7 +59,7 @@ class TimeoutHeader(BaseModel):
         default=None,
         alias="x-timeout-ms",
         gt=0,
-        description="Milliseconds that the client waits at most",
+        description="The longest time that the client waits, in milliseconds",
     )
 
 
@@ -102,7 +102,7 @@ def require_json(request: Request) -> None:
     media_type = request.headers.get("content-type", "")
     if not re.match(r"application/([\w.-]+\+)?json\b", media_type, re.IGNORECASE):
         hint = "send the header Content-Type: application/json"
-        detail = f"the body of a query is JSON, not {media_type or 'without Content-Type'}"
+        detail = f"the body of a query must be JSON; it has {media_type or 'no Content-Type'}"
         raise problem("unsupported_media_type", detail, hint=hint)
 
 
@@ -113,7 +113,7 @@ def negotiated(
     headers = request.headers
     media_type = negotiate(headers.get("accept"), parameters.format, offers)
     if media_type is None:
-        raise problem("not_acceptable", f"this answer comes as {', '.join(offers)}")
+        raise problem("not_acceptable", f"this answer is available as {', '.join(offers)}")
     if parameters.dtype != Representation.dtype and media_type not in ARRAYS:
         fault = Fault("/query/dtype", f"goes with npy, npz and octets, not with {media_type}")
         raise problem("invalid_request", fault.message, errors=(fault,))

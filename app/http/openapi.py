@@ -46,9 +46,9 @@ TAGS = [
     {
         "name": "queries",
         "description": "Distances, paths, isolines, borders, matrices and nearest points on a "
-        "stored mesh. Each answers in JSON, and in other formats by `Accept` or `format`. With "
-        "`estimate=true` it answers with its expected cost instead; `kind` tells the two apart. "
-        "With `Prefer: respond-async` it becomes a job.",
+        "stored mesh. Each query answers in JSON, or in other formats by `Accept` or `format`. "
+        "With `estimate=true` it answers with its expected cost instead; `kind` tells the two "
+        "apart. With `Prefer: respond-async` it becomes a job.",
     },
     {
         "name": "meshes",
@@ -75,7 +75,7 @@ _JOB_EVENTS = {
 _SECURITY_SCHEME = {
     "type": "http",
     "scheme": "bearer",
-    "description": "An API key, where the service has any.",
+    "description": "An API key, if the service requires one.",
 }
 
 
@@ -86,21 +86,21 @@ def _header(meaning: str, schema: Mapping[str, Any] = _TEXT) -> dict[str, Any]:
 _HEADERS = {
     "Accept-Ranges": _header("`bytes` where ranges of the answer can be requested, else `none`"),
     "Cache-Control": _header("Caching of the answer: where, and for how long"),
-    "ETag": _header("Names the content of the answer, in its format and coding"),
+    "ETag": _header("Identifies the content of the answer, in its format and coding"),
     "Last-Modified": _header("When the file of the answer was written"),
     "Content-Range": _header("Range of these bytes, and the total"),
-    "Geodesic-Dtype": _header("Of the numbers in `npy`, `npz` and `octets`: `<f8` or `<f4`"),
-    "Geodesic-Shape": _header("Of the array in these formats, `rows,columns` of a matrix"),
+    "Geodesic-Dtype": _header("Type of the numbers in `npy`, `npz` and `octets`: `<f8` or `<f4`"),
+    "Geodesic-Shape": _header("Shape of the array in these formats; `rows,columns` for a matrix"),
     "Location": _header("Where the mesh or the job is"),
     "Preference-Applied": _header("`respond-async`"),
     "Retry-After": _header("Seconds to wait before the next attempt", _NUMBER),
     "Server-Timing": _header(
         "Milliseconds of each phase, as `queue;dur=0.1, load;dur=0.0, compute;dur=3.2, "
-        "encode;dur=0.3`; `kept` where the store had the answer"
+        "encode;dur=0.3`; `kept` if the store had the answer"
     ),
     "Vary": _header("Headers of the request that the answer depends on"),
     "WWW-Authenticate": _header("`Bearer`, with the error if a key was sent"),
-    "X-Request-ID": _header("The id of the request, its own or a new one; the log has it"),
+    "X-Request-ID": _header("The id of the request, from the client or newly made; the log has it"),
 }
 _HEADERS_OF_STATUS = {
     "401": ("WWW-Authenticate",),

@@ -144,7 +144,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
     def on_chunk_header(self) -> None:
         """Begin a chunk of the body, unless those before it were too small."""
         if self._chunks > FREE_CHUNKS and self._body_bytes < LEAST_CHUNK * self._chunks:
-            detail = f"the chunks of the body have fewer than {LEAST_CHUNK} bytes each"
+            detail = f"the chunks of the body have fewer than {LEAST_CHUNK} bytes on average"
             self._refusal = Problem("malformed_request", detail, limit=LEAST_CHUNK)
             raise ValueError(detail)
         self._chunks += 1

@@ -53,8 +53,8 @@ async def spool(
     coding = request.headers.get("content-encoding", "identity").strip().lower()
     is_form = media_type == "multipart/form-data"
     if coding not in ("identity", "gzip") or (is_form and coding == "gzip"):
-        detail = f"a body of Content-Encoding {coding} cannot be read here"
-        hint = "send the file itself, as it is or with gzip"
+        detail = f"the service cannot read a body with Content-Encoding {coding}"
+        hint = "send the file uncompressed, or compressed with gzip"
         headers = {"Accept-Encoding": "gzip, identity"}
         raise problem("unsupported_media_type", detail, hint=hint, headers=headers)
     name = None
@@ -70,7 +70,8 @@ async def spool(
     chosen = file_format or guess
     if chosen is None:
         hint = (
-            f"say ?format= with one of {', '.join(MESH_FORMATS)}, or send a Content-Type of a mesh"
+            f"add ?format= with one of {', '.join(MESH_FORMATS)}, or send the Content-Type of a "
+            "mesh format"
         )
         detail = f"{media_type or 'no Content-Type'} does not tell the format of the mesh"
         raise problem("unsupported_media_type", detail, hint=hint)
@@ -110,12 +111,12 @@ async def _decompress(path: Path, max_bytes: int) -> None:
         with gzip.open(compressed) as source, path.open("wb") as target:
             while block := await to_thread.run_sync(source.read, _BLOCK):
                 if target.tell() + len(block) > max_bytes:
-                    detail = f"the body is larger than {max_bytes} bytes once it is decompressed"
+                    detail = f"the body is larger than {max_bytes} bytes after decompression"
                     setting = variable_of("max_upload_bytes")
                     raise problem("upload_too_large", detail, limit=max_bytes, setting=setting)
                 await to_thread.run_sync(target.write, block)
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
-        raise problem("malformed_body", f"the body is not what gzip writes: {error}") from error
+        raise problem("malformed_body", f"the body is not valid gzip data: {error}") from error
     compressed.unlink()
 
 

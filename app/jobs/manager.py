@@ -49,15 +49,15 @@ _STOPPED = Problem(
 _STOPPED_TOO_OFTEN = Problem(
     "engine_unavailable",
     f"the service stopped while the job ran, {_MOST_RUNS} times",
-    hint="ask for less at once, if it was the job that took too much",
+    hint="if the job itself used too much, ask for less at once",
 )
 _SIGNS_OF_THE_END = frozenset({"draining", "engine_unavailable", "worker_died"})
 """Problems of jobs that the end of the service interrupts: a signal may have gone to workers too"""
 _NO_ROOM = Problem(
     "storage_full",
-    "the answers that jobs hold leave no room for this one",
+    "the answers of other jobs leave no room for this one",
     setting=variable_of("results_bytes"),
-    hint="delete jobs whose answers you have",
+    hint="delete jobs whose answers you have read",
 )
 
 
@@ -289,7 +289,7 @@ class JobManager:
         if job is None or job.status in ("failed", "dismissed"):
             return None
         if job.spec.fingerprint != spec.fingerprint:
-            message = f"{key!r} stands for another question, asked by job {job.id}"
+            message = f"{key!r} was used for a different query, by job {job.id}"
             fault = Fault("/header/Idempotency-Key", message)
             raise problem("invalid_request", message, errors=(fault,))
         return self._live[job.id].job if job.id in self._live else job

@@ -62,7 +62,7 @@ class DistancesQuery(Query[DistancesRequest]):
     def normalized(cls, request: DistancesRequest) -> DistancesRequest:
         """Name error or effort, and each included array once; refuse the gradient at targets."""
         if "gradient" in request.include and request.targets is not None:
-            message = "gradient is that of all vertices; ask for it without targets"
+            message = "gradient covers all vertices; ask for it without targets"
             raise invalid_fields(["/include"], message)
         included = list(dict.fromkeys(request.include))
         return with_default_accuracy(request.model_copy(update={"include": included}))

@@ -77,7 +77,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
     def normalized(cls, request: IsolinesRequest) -> IsolinesRequest:
         """Name the error; refuse levels and count together, or neither."""
         if request.levels is None and request.count is None:
-            raise invalid_fields(["/levels"], "give levels, or count for some evenly spaced")
+            raise invalid_fields(["/levels"], "give levels, or count for evenly spaced levels")
         if request.levels is not None and request.count is not None:
             raise invalid_fields(["/count"], "does not go with levels")
         return with_default_accuracy(request)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from scipy.sparse import coo_array
 
 _CELLS = "cells of the matrix"
-_AS_JOB = "ask for application/x-npy with `Prefer: respond-async`: such a job may have more"
+_AS_JOB = "ask for application/x-npy with `Prefer: respond-async`: such a job may have more cells"
 _AT_A_TIME = 2**20
 """Straight distances that are computed at a time."""
 _SAMPLED = 2**22
@@ -54,10 +54,14 @@ class MatrixQuery(Query[MatrixRequest]):
         if request.layout == "pairs":
             for name in ("sources", "targets"):
                 if getattr(request, name) == "all":
-                    raise invalid_fields([f"/{name}"], "pairs need their points one by one")
+                    message = "pairs need lists of points; give vertex indices instead of `all`"
+                    raise invalid_fields([f"/{name}"], message)
             sources, targets = len(request.sources), len(request.targets)
             if sources != targets:
-                message = f"there are {sources} sources and {targets} targets; pairs need as many"
+                message = (
+                    f"there are {sources} sources and {targets} targets; pairs need the same "
+                    "number of both"
+                )
                 raise invalid_fields(["/targets"], message)
         return request
 

@@ -69,7 +69,7 @@ class PathQuery(Query[PathRequest]):
     def hint(self) -> str:
         """The remedy for an answer that is too large for JSON."""
         if self.request.explain:
-            return "ask without explain, or past fewer waypoints at once"
+            return "ask without explain, or with fewer waypoints at once"
         return super().hint
 
     def check_limits(self, size: MeshSize, settings: Settings) -> None:

@@ -24,7 +24,7 @@ from app.schemas.points import (
 SurfacePoints = Sequence[gc.SurfacePoint]
 
 _GAP = (
-    "shares no face with the point before it; add those at which the curve crosses edges: a "
+    "shares no face with the point before it; add the points where the curve crosses edges: a "
     "shortest path has them"
 )
 

@@ -105,4 +105,4 @@ def _faults(pointer: str, point: Point, size: MeshSize) -> Iterator[Fault]:
 
 def _out_of_range(pointer: str, kind: str, index: int, count: int) -> Iterator[Fault]:
     if not 0 <= index < count:
-        yield Fault(pointer, f"{kind} {index} is not one of 0 to {count - 1}")
+        yield Fault(pointer, f"{kind} {index} does not exist; the indices are 0 to {count - 1}")

@@ -13,8 +13,8 @@ class ErrorBound(BaseModel):
     """Bound of the difference between an answer and the exact one.
 
     Approximate distances are too short by that much at most; the length of an approximate path is
-    too long by that much at most. In answers of the method `fast` both are too long, and the bound
-    is estimated: in 19 of 20 fields that were measured, 99 of 100 vertices lie within.
+    too long by that much at most. With the method `fast` both are too long, and the bound is an
+    estimate: in 19 of 20 measured fields, 99 of 100 vertices lie within it.
     """
 
     type: Literal["relative", "absolute"]
@@ -23,11 +23,11 @@ class ErrorBound(BaseModel):
 
 
 class ResolvedPoint(BaseModel):
-    """A resolved point, in one spelling for all that mean the same."""
+    """A resolved point, in its canonical spelling."""
 
-    vertex: int | None = Field(default=None, description="Where the point is a vertex")
+    vertex: int | None = Field(default=None, description="The vertex, if the point is one")
     face: int | None = Field(
-        default=None, description="Where it is no vertex: the lowest face that contains it"
+        default=None, description="If the point is not a vertex: the lowest face that contains it"
     )
     barycentric: tuple[float, float, float] | None = Field(
         default=None, description="The weights of that face's corners"
@@ -69,15 +69,15 @@ class DistancesAnswer(BaseModel):
     exact: bool
     error_bound: ErrorBound
     sources: list[ResolvedSource | ResolvedCurveSource]
-    targets: list[ResolvedPoint] | None = Field(default=None, description="Where given")
+    targets: list[ResolvedPoint] | None = Field(default=None, description="The targets, if given")
     distances: list[float | None]
     nearest_source: list[int | None] | None = Field(
-        default=None, description="Index into `sources` for each distance, where included"
+        default=None, description="Index into `sources` for each distance, if included"
     )
     gradient: list[tuple[float | None, float | None, float | None]] | None = Field(
         default=None,
-        description="A unit vector at each vertex, against the direction in which its shortest "
-        "path sets out, where included; `null` three times at sources and where unreachable",
+        description="If included: a unit vector at each vertex, opposite to the first segment of "
+        "its shortest path; three times `null` at sources and where unreachable",
     )
     unreachable: Unreachable
     stats: dict[str, Any]
@@ -88,7 +88,8 @@ class IsolineDocument(BaseModel):
     """A polyline of points at one distance."""
 
     closed: bool = Field(
-        description="Whether it leads from its last point back to the first, which is not repeated"
+        description="Whether the line leads from its last point back to the first, which is not "
+        "repeated"
     )
     length: float
     points: list[tuple[float, float, float]]
@@ -98,10 +99,10 @@ class IsolineDocument(BaseModel):
 class IsolineLevel(BaseModel):
     """The lines at one distance."""
 
-    level: float = Field(description="The distance, mesh units")
+    level: float = Field(description="The distance in mesh units")
     lines: list[IsolineDocument] = Field(
-        description="Closed, or open where they end at the boundary, or at an edge of three faces "
-        "or more; none where nothing is at that distance"
+        description="Closed lines, and open lines that end at the boundary or at an edge of three "
+        "faces or more; empty if no point is at that distance"
     )
 
 
@@ -112,9 +113,9 @@ class IsolinesAnswer(BaseModel):
     mesh_id: str
     method: Method
     exact: bool
-    error_bound: ErrorBound = Field(description="Of the distance that each line is at")
+    error_bound: ErrorBound = Field(description="Error bound of the distance of each line")
     chord_error: float = Field(
-        description="Largest distance of chords from exact lines, mesh units"
+        description="Largest distance of chords from the exact lines, in mesh units"
     )
     sources: list[ResolvedSource | ResolvedCurveSource]
     isolines: list[IsolineLevel]
@@ -126,10 +127,12 @@ class BorderDocument(BaseModel):
     """A polyline of points that are equally near to two sources, and no nearer to a third."""
 
     sources: tuple[int, int] = Field(
-        description="Those whose territories it separates: indices into `sources`, the lower first"
+        description="The two sources whose territories the line separates: indices into `sources`, "
+        "the lower first"
     )
     closed: bool = Field(
-        description="Whether it leads from its last point back to the first, which is not repeated"
+        description="Whether the line leads from its last point back to the first, which is not "
+        "repeated"
     )
     length: float
     points: list[tuple[float, float, float]]
@@ -142,12 +145,12 @@ class BordersAnswer(BaseModel):
     kind: Literal["borders"]
     mesh_id: str
     chord_error: float = Field(
-        description="Largest distance of chords from exact lines, mesh units"
+        description="Largest distance of chords from the exact lines, in mesh units"
     )
     sources: list[ResolvedSource | ResolvedCurveSource]
     borders: list[BorderDocument] = Field(
-        description="Closed, or open where they end: where three territories or more meet, at the "
-        "boundary, at an edge of three faces or more, or at `max_distance`"
+        description="Closed lines, and open lines that end where three territories or more meet, "
+        "at the boundary, at an edge of three faces or more, or at `max_distance`"
     )
     stats: dict[str, Any]
     warnings: list[str]
@@ -163,15 +166,15 @@ class Location(BaseModel):
 class SearchStep(BaseModel):
     """A step of the search for a leg; a leg leads from one stop to the next."""
 
-    leg: int = Field(description="From 0")
+    leg: int = Field(description="Number of the leg, from 0")
     name: StepName
     seconds: float
     bound: float = Field(
-        description="The least upper bound of the leg's length that is known after the step; after "
-        "`exact`, the length"
+        description="The smallest upper bound of the leg's length that is known after the step; "
+        "after `exact`, the length"
     )
-    windows: int = Field(description="Windows created")
-    faces: list[int] = Field(description="The region that was visited")
+    windows: int = Field(description="Number of windows created")
+    faces: list[int] = Field(description="The faces that were visited")
 
 
 class Outline(BaseModel):
@@ -227,8 +230,8 @@ class MatrixEnd(ResolvedPoint):
     """A source or target of a matrix."""
 
     component: int = Field(
-        description="The connected component of the mesh that contains it: no path joins different "
-        "components; other missing distances are beyond `max_distance`"
+        description="The connected component of the mesh that contains the point. No path joins "
+        "different components; other missing distances are beyond `max_distance`"
     )
 
 
@@ -243,7 +246,7 @@ class MatrixAnswer(BaseModel):
     layout: Layout
     sources: list[MatrixEnd]
     targets: list[MatrixEnd]
-    shape: tuple[int, int] | None = Field(default=None, description="Of a sparse matrix")
+    shape: tuple[int, int] | None = Field(default=None, description="The shape of a sparse matrix")
     rows: list[int] | None = Field(
         default=None, description="Of a sparse matrix: the source of each distance"
     )
@@ -251,8 +254,8 @@ class MatrixAnswer(BaseModel):
         default=None, description="Of a sparse matrix: the target of each distance"
     )
     distances: list[list[float | None] | float | None] = Field(
-        description="Dense: a row for each source. Pairs: one for each. Both `null` where "
-        "unreachable. Sparse: the finite ones, zeros too"
+        description="Dense: a row for each source. Pairs: one distance for each pair. In both, "
+        "`null` where unreachable. Sparse: the finite distances, zeros included"
     )
     unreachable: Unreachable
     warnings: list[str]
@@ -274,9 +277,10 @@ class NearestAnswer(BaseModel):
     exact: bool
     error_bound: ErrorBound
     source: ResolvedPoint
-    nearest: list[NearestPoint] = Field(description="Fewer than `k` where fewer are reachable")
+    nearest: list[NearestPoint] = Field(description="Fewer than `k` if fewer are reachable")
     unreachable: Unreachable | None = Field(
-        default=None, description="The reasons for those that are missing, where there are fewer"
+        default=None,
+        description="Number of missing candidates, by reason, if there are fewer than `k`",
     )
     warnings: list[str]
 
@@ -287,24 +291,25 @@ class Estimate(BaseModel):
     kind: Literal["estimate"]
     mesh_id: str
     seconds: float = Field(
-        description="On a free worker; meshes and machines differ from it by a factor of 3 and more"
+        description="Seconds on a free worker. The actual time can differ by a factor of 3 or "
+        "more, depending on the mesh and the machine"
     )
     memory_bytes: int = Field(
-        description="Beside the mesh, as `GEODESIC_QUERY_MEMORY_BYTES` limits it; within a factor "
-        "of 3"
+        description="Memory in addition to the mesh, as `GEODESIC_QUERY_MEMORY_BYTES` limits it; "
+        "within a factor of 3"
     )
     response_bytes: int = Field(
-        description="Of the body, before compression, within 5 %; with `max_distance`, and for "
-        "paths and isolines, as if geodesics were straight, so that these take some times as much "
-        "where surfaces wind"
+        description="Size of the body before compression, within 5 %. With `max_distance`, and for "
+        "paths and isolines, it assumes straight geodesics: on winding surfaces the body is "
+        "several times as large"
     )
-    media_type: str = Field(description="Of the response that is estimated")
+    media_type: str = Field(description="Media type of the estimated response")
 
 
 class LocatedPoint(ResolvedPoint):
     """The point of the surface that is nearest to a position."""
 
-    distance: float = Field(description="Distance from the position, mesh units")
+    distance: float = Field(description="Distance from the position in mesh units")
 
 
 class LocateAnswer(BaseModel):

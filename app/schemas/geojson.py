@@ -22,7 +22,7 @@ class PointGeometry(BaseModel):
 
 
 class Feature(BaseModel):
-    """A line or a point with what is known of it."""
+    """A line or a point with its properties."""
 
     type: Literal["Feature"]
     geometry: LineString | PointGeometry | None = Field(
@@ -32,7 +32,7 @@ class Feature(BaseModel):
 
 
 class FeatureCollection(BaseModel):
-    """Lines or points, in the order of the answer in JSON, whose other members it has too."""
+    """Lines or points, in the order of the JSON answer, and the other members of that answer."""
 
     type: Literal["FeatureCollection"]
     units: str

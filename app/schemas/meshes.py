@@ -20,7 +20,8 @@ class UploadParameters(StrictModel):
 
     name: MeshName | None = Field(
         default=None,
-        description="What people call it; if not given, the file's name in a form, or the sample's",
+        description="Name for people; if not given, the file name in a form, or the name of the "
+        "sample",
     )
     format: MeshFormat | None = Field(default=None, description="Overrides `Content-Type`")
     merge: Merge = Field(default="none", description="`exact` joins vertices at the same position")
@@ -28,7 +29,7 @@ class UploadParameters(StrictModel):
         default=None, description="The sample to make, instead of reading a mesh"
     )
     faces: Annotated[int, Field(ge=1, le=LARGEST_COUNT)] | None = Field(
-        default=None, description="Number of faces of the sample, about; 20000 if not given"
+        default=None, description="Approximate number of faces of the sample; 20000 if not given"
     )
 
 
@@ -52,9 +53,11 @@ class MeshDocument(BaseModel):
     id: str
     name: str | None = Field(description="The name given with its first upload, if any")
     vertices: int
-    faces: int = Field(description="All of them, those that repeat a vertex as well")
-    warnings: list[str] = Field(description="A sentence or two each, with the remedy")
-    created: str = Field(description="When it was stored, RFC 3339")
+    faces: int = Field(description="Number of all faces, including those that repeat a vertex")
+    warnings: list[str] = Field(
+        description="Warnings of one or two sentences each, with the remedy"
+    )
+    created: str = Field(description="When the mesh was stored, RFC 3339")
     arrays: dict[str, str] = Field(description="Paths of its arrays, by name")
     edges: int
     triangulated_polygons: int = Field(
@@ -66,22 +69,27 @@ class MeshDocument(BaseModel):
     euler_characteristic: int
     saddle_vertices: int
     boundary_vertices: int
-    bow_tie_vertices: Sample = Field(description="Where several fans of faces meet")
-    isolated_vertices: Sample = Field(description="Of no face of the surface")
+    bow_tie_vertices: Sample = Field(description="Vertices where several fans of faces meet")
+    isolated_vertices: Sample = Field(description="Vertices that belong to no face of the surface")
     duplicate_vertices: Sample = Field(
-        description="At the position of an earlier one; `merge=exact` joins them"
+        description="Vertices at the position of an earlier vertex; `merge=exact` joins them"
     )
     repeated_vertex_faces: Sample = Field(
-        description="Made of fewer than three different vertices: no part of the surface"
+        description="Faces with fewer than three different vertices; they are not part of the "
+        "surface"
     )
     zero_length_edges: Sample = Field(
-        description="Between different vertices at one position: their ends are one point"
+        description="Edges between different vertices at the same position: their ends are one "
+        "point"
     )
     collapsed_faces: Sample = Field(
-        description="With such an edge: they shrink to an edge of other faces, or to a vertex"
+        description="Faces with an edge of zero length: they shrink to an edge of other faces, or "
+        "to a vertex"
     )
-    duplicate_faces: Sample = Field(description="Of the same three vertices as an earlier one")
-    degenerate_faces: Sample = Field(description="Of the surface, but without area")
+    duplicate_faces: Sample = Field(
+        description="Faces with the same three vertices as an earlier face"
+    )
+    degenerate_faces: Sample = Field(description="Faces of the surface without area")
     non_manifold_edges: Sample
     inconsistent_orientation: bool
     misoriented_edges: Sample

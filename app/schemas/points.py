@@ -63,7 +63,7 @@ class EdgePoint(StrictModel):
         description="The two vertices that the edge joins", examples=[[0, 1]]
     )
     t: Coordinate = Field(
-        description="Share of the way from the first of them to the second, 0 to 1", examples=[0.3]
+        description="Share of the way from the first vertex to the second, 0 to 1", examples=[0.3]
     )
 
 
@@ -72,7 +72,8 @@ class FacePoint(StrictModel):
 
     face: StrictInt = Field(description="Index of a face, from 0", examples=[7])
     barycentric: Triple = Field(
-        description="Weights of the corners in their order: 0 or more, 1 in all, but for rounding",
+        description="Weights of the face's corners, in their order: 0 or more, with the sum 1 up "
+        "to rounding",
         examples=[[0.2, 0.3, 0.5]],
     )
 
@@ -161,11 +162,12 @@ Point = Annotated[
 
 
 class Curve(StrictModel):
-    """A curve on the surface: straight from each point to the next, in a face of both."""
+    """A curve on the surface: straight segments, each inside one face."""
 
     polyline: FailFastList[Point] = Field(
         min_length=1,
-        description="The `locations` of a path are such points",
+        description="Points, each in one face with the next; the `locations` of a path are such "
+        "points",
         examples=[[{"vertex": 0}, {"vertex": 1}]],
     )
 

@@ -47,17 +47,17 @@ class Accuracy(StrictModel):
 
     method: Method = Field(
         default="exact",
-        description="`approximate`: within an error; `fast`: in one quick pass, with an estimate "
-        "of the error",
+        description="`approximate`: within an allowed error; `fast`: in one quick pass, with an "
+        "estimate of the error",
     )
     relative_error: Annotated[FiniteFloat, Field(gt=0, lt=1), NOT_BOOLEAN] | None = Field(
         default=None,
-        description="For `approximate`: share of the exact distance by which one may fall short; "
-        "0.001 where neither error is given",
+        description="For `approximate`: the allowed error, as a share of the exact distance; 0.001 "
+        "if neither error is given",
     )
     absolute_error: Annotated[FiniteFloat, Field(gt=0), NOT_BOOLEAN] | None = Field(
         default=None,
-        description="For `approximate`: the same in mesh units; where both errors are given, "
+        description="For `approximate`: the allowed error in mesh units; if both errors are given, "
         "both hold",
     )
 
@@ -67,7 +67,7 @@ class AccuracyOrEffort(Accuracy):
 
     effort: Effort | None = Field(
         default=None,
-        description="For `fast`: more effort takes more time, and errs less; 2 by default",
+        description="For `fast`: more effort takes more time and lowers the error; 2 by default",
     )
 
 
@@ -97,7 +97,8 @@ class AmongBarriers(QueryBody):
 
     barriers: FailFastList[StrictInt] = Field(
         default=[],
-        description="Indices of faces that are blocked: holes, at whose corners paths may bend",
+        description="Indices of blocked faces. They act as holes, and paths may bend at their "
+        "corners",
         examples=[[7, 8]],
     )
 
@@ -144,7 +145,7 @@ class IsolinesRequest(Accuracy, AmongBarriers):
 
     method: BoundedMethod = Field(
         default="exact",
-        description="Not `fast`: lines need windows, which it does not have",
+        description="`fast` is not available: lines need windows, which it does not have",
     )
     sources: FailFastList[Source] = Field(min_length=1)
     levels: FailFastList[Positive] | None = Field(
@@ -160,9 +161,9 @@ class IsolinesRequest(Accuracy, AmongBarriers):
     )
     chord_error: Positive | None = Field(
         default=None,
-        description="Largest distance of lines from exact ones inside faces, in mesh units: "
-        "the exact ones are arcs, the answer has chords. At least a billionth of the bounding "
-        "box's diagonal; a thousandth of the mean edge length if not given",
+        description="Largest distance of the returned chords from the exact lines, which are arcs "
+        "inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a "
+        "thousandth of the mean edge length if not given",
     )
 
 
@@ -179,9 +180,9 @@ class BordersRequest(AmongBarriers):
     )
     chord_error: Positive | None = Field(
         default=None,
-        description="Largest distance of lines from exact ones inside faces, in mesh units: "
-        "the exact ones are mostly hyperbolas, the answer has chords. At least a billionth of the "
-        "bounding box's diagonal; a thousandth of the mean edge length if not given",
+        description="Largest distance of the returned chords from the exact lines, which are "
+        "mostly hyperbolas inside faces, in mesh units. At least a billionth of the bounding box's "
+        "diagonal; a thousandth of the mean edge length if not given",
     )
 
 
@@ -210,7 +211,7 @@ class PathRequest(AccuracyOrEffort, AmongBarriers):
     explain: StrictBool = Field(
         default=False,
         description="Add `steps`, an account of each step of the search; for `exact` and JSON "
-        "only. Such an answer is not cached, since it states seconds",
+        "only. Such an answer is not cached, since it contains timings",
     )
 
 
@@ -248,7 +249,8 @@ class MatrixRequest(AmongBarriers):
 
     sources: Ends = Field(description="Points, or `all` for every vertex")
     targets: Ends = Field(
-        description="The same; where they are the sources, each pair is asked once"
+        description="Points, or `all` for every vertex; if they are the sources, each pair is "
+        "computed once"
     )
     max_distance: NonNegative | None = Field(
         default=None, description="Points farther than this, in mesh units, count as unreachable"
@@ -261,7 +263,7 @@ class MatrixRequest(AmongBarriers):
 
 
 class NearestRequest(AmongBarriers):
-    """The ``k`` of some ``candidates`` that are geodesically nearest to ``source``."""
+    """The ``k`` candidates that are geodesically nearest to ``source``."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -302,7 +304,7 @@ class AnswerParameters(StrictModel):
 
     format: AnswerFormat | None = Field(default=None, description="Overrides `Accept`")
     dtype: Literal["float64", "float32"] = Field(
-        default="float64", description="Of the numbers in `npy`, `npz` and `octets`"
+        default="float64", description="Type of the numbers in `npy`, `npz` and `octets`"
     )
     estimate: bool = Field(
         default=False,

@@ -17,7 +17,7 @@ class FaultDocument(BaseModel):
 
 
 class ProblemDocument(BaseModel):
-    """An error, as RFC 9457 has it."""
+    """An error, as defined by RFC 9457."""
 
     type: str
     title: str
@@ -37,14 +37,14 @@ class JobDocument(BaseModel):
     """A query that is answered in the background."""
 
     id: str
-    kind: str = Field(description="Of query, such as `distances`")
+    kind: str = Field(description="Kind of the query, such as `distances`")
     mesh_id: str
     status: JobStatus
     progress: float = Field(description="Share of the work that is done, 0 to 1")
-    created: str = Field(description="RFC 3339, as all times")
-    started: str | None = Field(default=None, description="When a worker began")
+    created: str = Field(description="When the job was created, RFC 3339 as all times")
+    started: str | None = Field(default=None, description="When a worker began the job")
     finished: str | None = None
-    problem: ProblemDocument | None = Field(default=None, description="Of one that failed")
+    problem: ProblemDocument | None = Field(default=None, description="The problem of a failed job")
     links: dict[str, str] = Field(description="Paths of its results and events")
 
 
@@ -78,7 +78,9 @@ class About(BaseModel):
     mesh_formats: list[str]
     answer_formats: dict[str, str]
     samples: list[str]
-    limits: dict[str, int | float] = Field(description="By the environment variable that sets it")
+    limits: dict[str, int | float] = Field(
+        description="Each limit, by the environment variable that sets it"
+    )
 
 
 class ProblemCode(BaseModel):

@@ -97,13 +97,15 @@ def jobs_of(root: Path, state: str | None) -> list[Job]:
     if state is None:
         if service is not None:
             raise StateError(
-                f"services with a database of PostgreSQL share the store {root}: give its URL as "
-                f"--state or {variable_of('state')}, since it has their jobs"
+                f"services with a PostgreSQL database share the store {root}: give the URL of that "
+                f"database as --state or {variable_of('state')}, since it holds their jobs"
             )
         return jobs
     name, shared_jobs = read_shared_jobs(state)
     if service not in (None, name):
-        raise StateError(f"the services of the store {root} share another database than that one")
+        raise StateError(
+            f"the services of the store {root} share another database than the given one"
+        )
     return jobs + shared_jobs
 
 
@@ -147,13 +149,17 @@ def inspect(root: Path) -> Iterator[Damage | None]:
         if is_intact or not files[0].exists():  # evicted meanwhile
             yield None
         else:
-            yield Damage(RESULTS, name, f"result {name} is damaged: it is not what was written")
+            yield Damage(
+                RESULTS, name, f"result {name} is damaged: it has changed since it was written"
+            )
     for path in field_files(root):
         if code_of_field(path) is not None or not path.exists():
             yield None
         else:
             name = name_of_field(path)
-            yield Damage(FIELDS, name, f"field {name} is damaged: it is not what was written")
+            yield Damage(
+                FIELDS, name, f"field {name} is damaged: it has changed since it was written"
+            )
     try:
         require_intact(root / JOB_DATABASE)
     except StoreError as error:

@@ -137,8 +137,10 @@ def _connected(url: str) -> Iterator[Connection[Any]]:
     except psycopg.ProgrammingError as error:
         if error.sqlstate is None:  # the message could show a part of the secret
             example = "postgresql://user:secret@host:5432/database"
-            raise StateError(f"{setting} is no URL such as {example}") from None
-        raise StateError(f"the database of {setting} refuses: {_line(error)}") from error
+            raise StateError(f"{setting} is not a URL such as {example}") from None
+        raise StateError(
+            f"the database of {setting} refuses the request: {_line(error)}"
+        ) from error
     except psycopg.Error as error:
         raise StateError(f"the database of {setting} cannot be used: {_line(error)}") from error
 

@@ -209,4 +209,6 @@ def read_database(path: Path, statement: str) -> list[Any]:
 
 def _damaged(path: Path, reason: object) -> StoreError:
     line = " ".join(str(reason).split())
-    return StoreError(f"{path} is damaged ({line}): move it away, and jobs begin anew")
+    return StoreError(
+        f"{path} is damaged ({line}): move it away to start with an empty list of jobs"
+    )

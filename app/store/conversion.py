@@ -58,9 +58,9 @@ def _converted(path: Path) -> dict[str, Any]:
     for name, checksum in old["crc32"].items():
         array = np.ascontiguousarray(arrays[name])
         if (zlib.crc32(array.data) if array.size else 0) != checksum:
-            raise ValueError(f"its array {name} is not what was written")
+            raise ValueError(f"its array {name} has changed since it was written")
     if content_hash(arrays) != old["id"] or path.parent.name != old["id"]:
-        raise ValueError("its name is not that of its content")
+        raise ValueError("its id does not match its content")
     return {
         "id": old["id"],
         "owner": old.get("owner"),

@@ -53,8 +53,8 @@ def layout_of(root: Path) -> int:
     if found == LAYOUT or found in CONVERTIBLE:
         return int(found)
     raise StoreError(
-        f"the store {root} has layout {found}, and this release reads {LAYOUT}: "
-        f"use the release that wrote it, or move it away and upload its meshes again"
+        f"the store {root} has layout {found}, but this release reads {LAYOUT}: use the release "
+        "that wrote it, or move the store away and upload its meshes again"
     )
 
 
@@ -63,8 +63,8 @@ def require_layout(root: Path) -> None:
     found = layout_of(root)
     if found != LAYOUT:
         raise StoreError(
-            f"the store {root} has layout {found}, and this release reads {LAYOUT}: "
-            f"start the service on it once, which converts it"
+            f"the store {root} has layout {found}, but this release reads {LAYOUT}: start the "
+            "service on it once, which converts it"
         )
 
 

@@ -45,7 +45,7 @@ def decode_manifest(content: bytes) -> Mapping[str, Any]:
     """Return the manifest that `encode_manifest` wrote; raises ``ValueError`` for anything else."""
     manifest = orjson.loads(content)
     if not isinstance(manifest, dict) or manifest.pop(_CHECKSUM, None) != _checksum(manifest):
-        raise ValueError("its checksum is not that of its content")
+        raise ValueError("its checksum does not match its content")
     return manifest
 
 

@@ -280,7 +280,7 @@ class MeshCatalog:
                 total,
                 self._quota,
                 "quota_bytes",
-                hint="delete meshes of yours that are not needed any more",
+                hint="delete meshes of yours that you no longer need",
                 other_status=507,
             )
 
@@ -300,7 +300,7 @@ class MeshCatalog:
                 evicted.append(free[len(evicted)])
                 total -= self._entries[evicted[-1]].size
         if total > self._capacity:
-            hint = "delete meshes that are not needed any more"
+            hint = "delete meshes that you no longer need"
             raise over_limit(
                 "storage_full", "bytes of meshes", total, self._capacity, "store_bytes", hint=hint
             )

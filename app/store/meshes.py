@@ -147,9 +147,9 @@ class MeshStore:
             manifest = read(f"{self._path(mesh_id)}/{MANIFEST}")
         except (OSError, ValueError) as error:
             self._folder(mesh_id)  # raises where there is no such mesh
-            raise mesh_damaged(mesh_id, "its manifest is not what was written") from error
+            raise mesh_damaged(mesh_id, "its manifest has changed since it was written") from error
         if manifest["id"] != mesh_id:
-            raise mesh_damaged(mesh_id, "its manifest is that of another mesh")
+            raise mesh_damaged(mesh_id, "its manifest belongs to another mesh")
         return manifest
 
     def owner(self, mesh_id: str) -> str | None:
@@ -212,7 +212,7 @@ class MeshStore:
                 yield None
             else:
                 is_intact = False
-                yield mesh_damaged(mesh_id, f"its array {name} is not what was written")
+                yield mesh_damaged(mesh_id, f"its array {name} has changed since it was written")
         if not is_intact:
             return
         try:
@@ -221,7 +221,7 @@ class MeshStore:
             yield mesh_damaged(mesh_id, "an array is missing")
             return
         is_named = content_hash(arrays) == mesh_id
-        yield None if is_named else mesh_damaged(mesh_id, "its name is not that of its content")
+        yield None if is_named else mesh_damaged(mesh_id, "its id does not match its content")
 
     def is_intact(self, mesh_id: str) -> bool:
         """Read the files of a mesh; tell whether it is in the store and all are as written."""
@@ -243,7 +243,7 @@ class MeshStore:
         """Return the file of an array; raise where it is not what was written."""
         path = self._folder(mesh_id) / f"{name}.npy"
         if checksum_of(str(path)) != self.manifest(mesh_id)["crc32"][name]:
-            raise mesh_damaged(mesh_id, f"its array {name} is not what was written")
+            raise mesh_damaged(mesh_id, f"its array {name} has changed since it was written")
         return path
 
     def array_file(self, mesh_id: str, name: str) -> Path:
@@ -251,7 +251,8 @@ class MeshStore:
         self._folder(mesh_id)  # raises where there is no such mesh
         if name not in PUBLIC_ARRAYS:
             raise problem(
-                "not_found", f"there is no array {name!r}, but {', '.join(PUBLIC_ARRAYS)}"
+                "not_found",
+                f"there is no array {name!r}; the arrays are {', '.join(PUBLIC_ARRAYS)}",
             )
         if PUBLIC_ARRAYS[name] not in self.manifest(mesh_id)["crc32"]:
             # TriangleMesh has no map where it is the identity.

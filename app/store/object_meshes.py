@@ -180,7 +180,7 @@ class ObjectMeshes:
             raise mesh_not_found(mesh_id)
         manifest = known.manifest if known and known.content == content else _decoded(content)
         if manifest is None:
-            raise mesh_damaged(mesh_id, "its manifest is not what was written")
+            raise mesh_damaged(mesh_id, "its manifest has changed since it was written")
         self._known.pop(mesh_id, None)
         self._known[mesh_id] = _Known(content, manifest, until)
         if len(self._known) > _MOST_KNOWN:
@@ -232,7 +232,9 @@ class ObjectMeshes:
                 checksums = dict(zip(expected, pool.map(fetch, expected), strict=True))
             for name, checksum in checksums.items():
                 if checksum != expected[name]:
-                    raise mesh_damaged(mesh_id, f"its array {name} is not what was written")
+                    raise mesh_damaged(
+                        mesh_id, f"its array {name} has changed since it was written"
+                    )
             self._install(mesh_id, folder, known.content)
 
     def _install(self, mesh_id: str, folder: Path, content: bytes) -> None:

@@ -189,7 +189,7 @@ class VerifiedReader:
         is_end = self._read == self._manifest.size or (not data and self._at == self._read)
         if is_end and (self._read, self._checksum) != (self._manifest.size, self._manifest.crc32):
             self._on_damage()
-            raise StoreUnavailableError("a stored answer is not what was written")
+            raise StoreUnavailableError("a stored answer has changed since it was written")
         return data
 
     async def aclose(self) -> None:

@@ -63,15 +63,15 @@ class ObjectStore:
             is_ours = self._objects.create(_OWNER, content)
         except FileNotFoundError:
             raise StoreError(
-                f"the store {self._name} does not exist: make its bucket or container first"
+                f"the store {self._name} does not exist: create its bucket or container first"
             ) from None
         except StoreUnavailableError as error:
             raise self._unusable(error) from None
         if not is_ours:
             raise StoreError(
-                f"the store {self._name} belongs to another service: give this one a prefix of "
-                f"its own, see {variable_of('store')}, or the same {variable_of('state')}; where "
-                f"the other one is gone for ever, remove the object {_OWNER}"
+                f"the store {self._name} belongs to another service: give this one a prefix of its "
+                f"own, see {variable_of('store')}, or the same {variable_of('state')}; if the "
+                f"other service no longer exists, remove the object {_OWNER}"
             )
 
     def identity(self) -> str:
@@ -147,8 +147,8 @@ class ObjectStore:
     def _unusable(self, error: StoreUnavailableError) -> StoreError:
         variables = " and ".join(VARIABLES[self._name.partition(":")[0]])
         return StoreError(
-            f"the store {self._name} cannot be used: {error}; endpoint and credentials are those "
-            f"of the environment, such as {variables}"
+            f"the store {self._name} cannot be used: {error}; endpoint and credentials come from "
+            f"environment variables, such as {variables}"
         )
 
 

@@ -22,7 +22,7 @@ def store_of(settings: Settings) -> Store:
         objects = Objects.at(settings.store)
     except ValueError as error:
         raise StoreError(
-            f"{variable_of('store')} is no URL of a store, or the environment lacks what it needs: "
-            f"{error}"
+            f"{variable_of('store')} is not the URL of a store, or an environment variable for it "
+            f"is missing: {error}"
         ) from None
     return ObjectStore(objects, settings.folder, settings.copies_bytes, settings.store)

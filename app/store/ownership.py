@@ -38,9 +38,9 @@ def owned(root: Path) -> Iterator[None]:
     except Timeout:
         setting = variable_of("store")
         raise StoreError(
-            f"the store {root} is in use by another process, which must end first; "
-            f"a second service needs a store of its own, see {setting}, or both need one database "
-            f"of PostgreSQL, see {variable_of('state')}"
+            f"the store {root} is in use by another process: stop that process first. To run a "
+            f"second service, give it its own store, see {setting}, or give both the same "
+            f"PostgreSQL database, see {variable_of('state')}"
         ) from None
     except OSError as error:
         raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
@@ -87,8 +87,8 @@ def shared(root: Path) -> Iterator[Share]:
             _bring_up_to_date(root)
         elif not _is_locked(lock, fcntl.LOCK_SH, wait_s=_OTHERS_START_S):
             raise StoreError(
-                f"the store {root} is in use by another process, which must end first, "
-                f"or needs the same {variable_of('state')}"
+                f"the store {root} is in use by another process: stop that process first, or give "
+                f"both the same {variable_of('state')}"
             )
         yield Share(lock, is_first=is_first)
     finally:

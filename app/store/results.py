@@ -378,12 +378,12 @@ class ResultStore:
         if nbytes > room:
             raise problem(
                 "storage_full",
-                f"the answers that jobs hold leave {max(0, room)} of the {nbytes} bytes that this "
-                "one needs",
+                f"the answers of jobs leave {max(0, room)} of the {nbytes} bytes that this one "
+                "needs",
                 limit=self._capacity,
                 actual=self._capacity - room + nbytes,
                 setting=variable_of("results_bytes"),
-                hint="delete jobs whose answers you have",
+                hint="delete jobs whose answers you have read",
             )
 
     def can_pin(self, name: str) -> bool:

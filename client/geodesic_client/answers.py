@@ -40,7 +40,7 @@ class Mesh:
     faces: int
     warnings: Sequence[str]
     report: Mapping[str, Any] = field(repr=False)
-    """All that the service found out about it"""
+    """The report of the service about it"""
 
 
 @dataclass(frozen=True)
@@ -54,9 +54,9 @@ class Distances:
     unreachable: Mapping[str, int]
     """Number of missing distances, by reason"""
     nearest_source: Integers | None
-    """Index of the nearest source, −1 where unreachable; where it was asked for"""
+    """Index of the nearest source, −1 where unreachable; None if it was not requested"""
     gradient: Floats | None
-    """The direction in which distance grows, (V, 3); where it was asked for"""
+    """The direction in which distance grows, (V, 3); None if it was not requested"""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ class Border:
     """A line of points that are equally near to two sources, and no nearer to a third."""
 
     sources: tuple[int, int]
-    """Those whose territories it separates: indices of the request, the lower first"""
+    """The two sources whose territories it separates: indices of the request, the lower first"""
     points: Floats
     faces: Integers
     closed: bool
@@ -119,8 +119,9 @@ class Border:
 class Matrix:
     """Distances between many points; infinite where they cannot be reached.
 
-    Dense, a row for each source; of pairs, one distance for each. Sparse, the finite distances
-    only, with the source (``rows``) and the target (``columns``) of each.
+    A dense matrix has a row for each source. For pairs there is one distance for each pair. A
+    sparse matrix has the finite distances only, with the source (``rows``) and the target
+    (``columns``) of each.
     """
 
     distances: Floats
@@ -131,10 +132,10 @@ class Matrix:
 
 @dataclass(frozen=True)
 class StoredMatrix:
-    """A matrix that the service has in a file: the answer of a job, whose rows are read in parts.
+    """A matrix in a file of the service: the answer of a job, whose rows are read in parts.
 
-    `matrix_rows` reads some, `save_matrix` all. The service has it until the job is dismissed, or
-    has become too old.
+    `matrix_rows` reads some rows, `save_matrix` all. The service keeps the file until the job is
+    dismissed or expires.
     """
 
     job_id: str
@@ -147,7 +148,7 @@ class StoredMatrix:
     rows_at: int
     """Bytes before the first row"""
     etag: str
-    """Names the content"""
+    """Identifies the content"""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from geodesic_client.flow import Progress
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Progress]:
-    """Show a bar, and give what moves it, for ``progress=`` of a method."""
+    """Show a bar, and yield the function that moves it, to pass as ``progress=`` to a method."""
     try:
         from tqdm.auto import tqdm
     except ImportError:

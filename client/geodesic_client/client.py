@@ -22,10 +22,10 @@ class Client(Operations):
     address
         The address of the service.
     api_key
-        The API key, where the service has any.
+        The API key, if the service requires one.
     http
         A client of httpx2 to send with, for certificates or proxies; ``address`` and ``api_key``
-        are then its own affair. It is left open.
+        are then ignored, so set them there. It is not closed.
     """
 
     def __init__(

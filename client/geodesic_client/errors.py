@@ -38,11 +38,11 @@ class ProblemError(GeodesicClientError):
     detail
         What is wrong.
     hint
-        What to do, where the service knows it.
+        What to do, if the service knows it.
     errors
         The elements of the request at fault: each has ``pointer`` and ``message``.
     limit, actual, setting
-        Of what exceeds a limit: the limit, the number, and the setting of the service.
+        If a limit is exceeded: the limit, the actual number, and the setting of the service.
     request_id
         The id of the request in the log of the service.
     retry_after
@@ -74,7 +74,9 @@ def check(response: httpx2.Response) -> httpx2.Response:
     try:
         document = response.json()
     except ValueError:  # a proxy on the way, for example
-        document = {"detail": f"the answer has status {response.status_code}, and is no problem"}
+        document = {
+            "detail": f"the answer has status {response.status_code}, but is not a problem document"
+        }
     seconds = response.headers.get("retry-after", "")
     retry_after = float(seconds) if seconds.isdecimal() else None
     raise ProblemError(response.status_code, document, retry_after)

@@ -89,14 +89,14 @@ def upload(
         The path of an OBJ, OFF, PLY, STL or GLB file, its bytes, or a pair of arrays: vertices
         (V, 3) and triangles (F, 3).
     format
-        The format, where the end of the file's name does not tell it.
+        The format, if the suffix of the file name does not tell it.
     merge
         ``exact`` joins vertices at the same position.
     name
-        What people call the mesh; the name of the file, if not given. A mesh that is in the store
+        Name of the mesh for people; by default the name of the file. A mesh that is in the store
         already keeps its name.
     progress
-        Called with the share that is sent.
+        Called with the share that has been sent.
     """
     size, read = uploads.body_of(mesh, progress)
     parameters = {"format": uploads.format_of(mesh, format), "merge": merge}
@@ -109,7 +109,7 @@ def upload(
 
 
 def sample(name: str, faces: int = 20_000) -> Flow[Mesh]:
-    """Have a sample made, and return it; `about` has their names."""
+    """Let the service make a sample, and return it; `about` lists the names of samples."""
     parameters: dict[str, str | int] = {"sample": name, "faces": faces}
     return to_mesh((yield from send(Request("POST", "/v1/meshes", parameters))).json())
 
@@ -297,10 +297,10 @@ def store_matrix(
     dtype: Literal["float64", "float32"] = "float64",
     progress: Progress = ignore_progress,
 ) -> Flow[StoredMatrix]:
-    """Have the service compute exact distances, and store them in a file, whatever their number.
+    """Let the service compute any number of exact distances, and store them in a file.
 
-    All workers of the service share the work. Where sources and targets are the same, each pair is
-    asked once. A call that was stopped has the next one go on where it was.
+    All workers of the service share the work. If sources and targets are the same, each pair is
+    computed once. If a call was stopped, the next one continues where it stopped.
     """
     body = _body(sources=sources, targets=targets, max_distance=max_distance, barriers=barriers)
     request = _request(mesh, "matrix", body, NPY, {"dtype": dtype})
@@ -314,7 +314,7 @@ def store_matrix(
 def matrix_rows(matrix: StoredMatrix, first: int, last: int) -> Flow[NDArray[Any]]:
     """Return the rows of a stored matrix from ``first`` to before ``last``."""
     if not 0 <= first < last <= matrix.shape[0]:
-        raise ValueError(f"there are no rows {first} to {last} of {matrix.shape[0]}")
+        raise ValueError(f"rows {first} to {last} do not exist; the matrix has {matrix.shape[0]}")
     row = matrix.shape[1] * matrix.dtype.itemsize
     begin, end = (matrix.rows_at + row * number for number in (first, last))
     part = (yield from _part_of_result(matrix.job_id, begin, end)).content
@@ -326,8 +326,8 @@ def save_matrix(
 ) -> Flow[None]:
     """Write a stored matrix to a file, which `numpy.load` can map into memory.
 
-    A call that was stopped has the next one go on where it was: what has come lies in a hidden
-    file beside.
+    If a call was stopped, the next one continues where it stopped: received data are kept in a
+    hidden file beside.
     """
     out = FilePath(path)
     scratch = out.with_name(f".{out.name}.{matrix.etag}.part")
@@ -369,7 +369,7 @@ def locate(
 
 
 def estimate(mesh: Mesh | str, kind: Kind, body: Mapping[str, Any]) -> Flow[Estimate]:
-    """Return the expected cost of a query, from its body as the interface document has it."""
+    """Return the expected cost of a query, from its body as in the OpenAPI document."""
     request = _request(mesh, kind, body, JSON, {"estimate": "true"})
     return to_estimate((yield from send(request)))
 
@@ -429,7 +429,7 @@ def _as_json(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, Sequence):
         return list(value)
-    raise TypeError(f"{value!r} is no part of a query")
+    raise TypeError(f"{value!r} cannot be part of a query")
 
 
 def _link(mesh: Mesh | str) -> str:

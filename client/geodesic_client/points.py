@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 Point = int | Mapping[str, Any]
-"""The index of a vertex, or what a function of this module returns"""
+"""The index of a vertex, or the result of a function of this module"""
 
 
 def edge(start: int, end: int, t: float) -> Point:

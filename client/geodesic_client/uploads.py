@@ -24,7 +24,7 @@ def format_of(mesh: Source, file_format: str | None) -> str:
     if file_format is not None:
         return file_format
     if isinstance(mesh, bytes):
-        raise TypeError("say the format of these bytes, as format='obj'")
+        raise TypeError("give the format of these bytes, such as format='obj'")
     return Path(mesh).suffix.lower().removeprefix(".")
 
 
@@ -61,11 +61,11 @@ def ply_of(vertices: ArrayLike, faces: ArrayLike) -> bytes:
     corners = np.asarray(faces)
     for name, array in (("vertices", points), ("faces", corners)):
         if array.ndim != 2 or array.shape[1] != 3:
-            raise ValueError(f"{name} have the shape {array.shape}, where (…, 3) is needed")
+            raise ValueError(f"{name} have the shape {array.shape}; it must be (…, 3)")
     if not np.issubdtype(corners.dtype, np.integer):
-        raise ValueError(f"faces are of {corners.dtype}, where integers are needed")
+        raise ValueError(f"faces have the type {corners.dtype}; they must be integers")
     if corners.size and (corners.min() < 0 or corners.max() >= len(points)):
-        raise ValueError(f"faces name vertices outside of 0 to {len(points) - 1}")
+        raise ValueError(f"faces name vertices outside 0 to {len(points) - 1}")
     table: np.ndarray[Any, Any] = np.empty(len(corners), [("count", "u1"), ("corners", "<i4", 3)])
     table["count"], table["corners"] = 3, corners
     head = (

@@ -99,7 +99,7 @@ export interface paths {
         put?: never;
         /**
          * Borders between the territories of sources
-         * @description Return the polylines of points that are equally near to two sources, and to no other nearer.
+         * @description Return polylines of points that are equally near to two sources, and no nearer to a third.
          *
          *     They are exact where they cross edges and where they meet.
          */
@@ -144,7 +144,7 @@ export interface paths {
         put?: never;
         /**
          * The candidates that are nearest to a point along the surface
-         * @description Return the `k` nearest candidates, or as many as can be reached.
+         * @description Return the `k` nearest candidates, or fewer if fewer can be reached.
          */
         post: operations["findNearest"];
         delete?: never;
@@ -166,7 +166,7 @@ export interface paths {
          * The points of the surface that are nearest to positions
          * @description Return the nearest point for each position, `null` where it is farther than `max_distance`.
          *
-         *     A point that is nearer to a vertex or an edge than 1e-12 of the bounding box is on it.
+         *     A point counts as on a vertex or an edge if it is within 1e-12 of the bounding box from it.
          */
         post: operations["locatePoints"];
         delete?: never;
@@ -193,7 +193,7 @@ export interface paths {
          * @description Read, check and store a mesh; the id is a hash of its content.
          *
          *     The body is the file itself (with its format in `Content-Type` or `?format=`), a form with one
-         *     file, or JSON. It may be compressed (`Content-Encoding: gzip`), but for a form. Vertices and
+         *     file, or JSON. Except in a form, it may be compressed (`Content-Encoding: gzip`). Vertices and
          *     triangles keep the order they have in the file; polygons become triangles in their place, and
          *     `face_map` leads back to them.
          */
@@ -347,8 +347,8 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * Links to begin with
-         * @description Return links to begin with; to a browser, the page.
+         * Links to the parts of the service
+         * @description Return links to the parts of the service; to a browser, the page.
          */
         get: operations["getIndex"];
         put?: never;
@@ -482,7 +482,7 @@ export interface components {
             samples: string[];
             /**
              * Limits
-             * @description By the environment variable that sets it
+             * @description Each limit, by the environment variable that sets it
              */
             limits: {
                 [key: string]: number;
@@ -495,7 +495,7 @@ export interface components {
         BorderDocument: {
             /**
              * Sources
-             * @description Those whose territories it separates: indices into `sources`, the lower first
+             * @description The two sources whose territories the line separates: indices into `sources`, the lower first
              */
             sources: [
                 number,
@@ -503,7 +503,7 @@ export interface components {
             ];
             /**
              * Closed
-             * @description Whether it leads from its last point back to the first, which is not repeated
+             * @description Whether the line leads from its last point back to the first, which is not repeated
              */
             closed: boolean;
             /** Length */
@@ -534,14 +534,14 @@ export interface components {
             mesh_id: string;
             /**
              * Chord Error
-             * @description Largest distance of chords from exact lines, mesh units
+             * @description Largest distance of chords from the exact lines, in mesh units
              */
             chord_error: number;
             /** Sources */
             sources: (components["schemas"]["ResolvedSource"] | components["schemas"]["ResolvedCurveSource"])[];
             /**
              * Borders
-             * @description Closed, or open where they end: where three territories or more meet, at the boundary, at an edge of three faces or more, or at `max_distance`
+             * @description Closed lines, and open lines that end where three territories or more meet, at the boundary, at an edge of three faces or more, or at `max_distance`
              */
             borders: components["schemas"]["BorderDocument"][];
             /** Stats */
@@ -568,7 +568,7 @@ export interface components {
         BordersRequest: {
             /**
              * Barriers
-             * @description Indices of faces that are blocked: holes, at whose corners paths may bend. Default: `[]`
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
              * @example [
              *       7,
              *       8
@@ -584,18 +584,18 @@ export interface components {
             max_distance?: number | null;
             /**
              * Chord Error
-             * @description Largest distance of lines from exact ones inside faces, in mesh units: the exact ones are mostly hyperbolas, the answer has chords. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
+             * @description Largest distance of the returned chords from the exact lines, which are mostly hyperbolas inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
              */
             chord_error?: number | null;
         };
         /**
          * Curve
-         * @description A curve on the surface: straight from each point to the next, in a face of both.
+         * @description A curve on the surface: straight segments, each inside one face.
          */
         Curve: {
             /**
              * Polyline
-             * @description The `locations` of a path are such points
+             * @description Points, each in one face with the next; the `locations` of a path are such points
              * @example [
              *       {
              *         "vertex": 0
@@ -619,7 +619,7 @@ export interface components {
             start_distance?: number;
             /**
              * Polyline
-             * @description The `locations` of a path are such points
+             * @description Points, each in one face with the next; the `locations` of a path are such points
              * @example [
              *       {
              *         "vertex": 0
@@ -655,19 +655,19 @@ export interface components {
             sources: (components["schemas"]["ResolvedSource"] | components["schemas"]["ResolvedCurveSource"])[];
             /**
              * Targets
-             * @description Where given
+             * @description The targets, if given
              */
             targets?: components["schemas"]["ResolvedPoint"][] | null;
             /** Distances */
             distances: (number | null)[];
             /**
              * Nearest Source
-             * @description Index into `sources` for each distance, where included
+             * @description Index into `sources` for each distance, if included
              */
             nearest_source?: (number | null)[] | null;
             /**
              * Gradient
-             * @description A unit vector at each vertex, against the direction in which its shortest path sets out, where included; `null` three times at sources and where unreachable
+             * @description If included: a unit vector at each vertex, opposite to the first segment of its shortest path; three times `null` at sources and where unreachable
              */
             gradient?: [
                 number | null,
@@ -717,7 +717,7 @@ export interface components {
         DistancesRequest: {
             /**
              * Barriers
-             * @description Indices of faces that are blocked: holes, at whose corners paths may bend. Default: `[]`
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
              * @example [
              *       7,
              *       8
@@ -726,23 +726,23 @@ export interface components {
             barriers?: number[];
             /**
              * Method
-             * @description `approximate`: within an error; `fast`: in one quick pass, with an estimate of the error. Default: `exact`
+             * @description `approximate`: within an allowed error; `fast`: in one quick pass, with an estimate of the error. Default: `exact`
              * @enum {string}
              */
             method?: "exact" | "approximate" | "fast";
             /**
              * Relative Error
-             * @description For `approximate`: share of the exact distance by which one may fall short; 0.001 where neither error is given
+             * @description For `approximate`: the allowed error, as a share of the exact distance; 0.001 if neither error is given
              */
             relative_error?: number | null;
             /**
              * Absolute Error
-             * @description For `approximate`: the same in mesh units; where both errors are given, both hold
+             * @description For `approximate`: the allowed error in mesh units; if both errors are given, both hold
              */
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: more effort takes more time, and errs less; 2 by default
+             * @description For `fast`: more effort takes more time and lowers the error; 2 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Sources */
@@ -779,7 +779,7 @@ export interface components {
             ];
             /**
              * T
-             * @description Share of the way from the first of them to the second, 0 to 1
+             * @description Share of the way from the first vertex to the second, 0 to 1
              * @example 0.3
              */
             t: number;
@@ -808,7 +808,7 @@ export interface components {
             ];
             /**
              * T
-             * @description Share of the way from the first of them to the second, 0 to 1
+             * @description Share of the way from the first vertex to the second, 0 to 1
              * @example 0.3
              */
             t: number;
@@ -818,8 +818,8 @@ export interface components {
          * @description Bound of the difference between an answer and the exact one.
          *
          *     Approximate distances are too short by that much at most; the length of an approximate path is
-         *     too long by that much at most. In answers of the method `fast` both are too long, and the bound
-         *     is estimated: in 19 of 20 fields that were measured, 99 of 100 vertices lie within.
+         *     too long by that much at most. With the method `fast` both are too long, and the bound is an
+         *     estimate: in 19 of 20 measured fields, 99 of 100 vertices lie within it.
          */
         ErrorBound: {
             /**
@@ -849,22 +849,22 @@ export interface components {
             mesh_id: string;
             /**
              * Seconds
-             * @description On a free worker; meshes and machines differ from it by a factor of 3 and more
+             * @description Seconds on a free worker. The actual time can differ by a factor of 3 or more, depending on the mesh and the machine
              */
             seconds: number;
             /**
              * Memory Bytes
-             * @description Beside the mesh, as `GEODESIC_QUERY_MEMORY_BYTES` limits it; within a factor of 3
+             * @description Memory in addition to the mesh, as `GEODESIC_QUERY_MEMORY_BYTES` limits it; within a factor of 3
              */
             memory_bytes: number;
             /**
              * Response Bytes
-             * @description Of the body, before compression, within 5 %; with `max_distance`, and for paths and isolines, as if geodesics were straight, so that these take some times as much where surfaces wind
+             * @description Size of the body before compression, within 5 %. With `max_distance`, and for paths and isolines, it assumes straight geodesics: on winding surfaces the body is several times as large
              */
             response_bytes: number;
             /**
              * Media Type
-             * @description Of the response that is estimated
+             * @description Media type of the estimated response
              */
             media_type: string;
         };
@@ -881,7 +881,7 @@ export interface components {
             face: number;
             /**
              * Barycentric
-             * @description Weights of the corners in their order: 0 or more, 1 in all, but for rounding
+             * @description Weights of the face's corners, in their order: 0 or more, with the sum 1 up to rounding
              * @example [
              *       0.2,
              *       0.3,
@@ -912,7 +912,7 @@ export interface components {
             face: number;
             /**
              * Barycentric
-             * @description Weights of the corners in their order: 0 or more, 1 in all, but for rounding
+             * @description Weights of the face's corners, in their order: 0 or more, with the sum 1 up to rounding
              * @example [
              *       0.2,
              *       0.3,
@@ -975,7 +975,7 @@ export interface components {
         IsolineDocument: {
             /**
              * Closed
-             * @description Whether it leads from its last point back to the first, which is not repeated
+             * @description Whether the line leads from its last point back to the first, which is not repeated
              */
             closed: boolean;
             /** Length */
@@ -999,12 +999,12 @@ export interface components {
         IsolineLevel: {
             /**
              * Level
-             * @description The distance, mesh units
+             * @description The distance in mesh units
              */
             level: number;
             /**
              * Lines
-             * @description Closed, or open where they end at the boundary, or at an edge of three faces or more; none where nothing is at that distance
+             * @description Closed lines, and open lines that end at the boundary or at an edge of three faces or more; empty if no point is at that distance
              */
             lines: components["schemas"]["IsolineDocument"][];
         };
@@ -1027,11 +1027,11 @@ export interface components {
             method: "exact" | "approximate" | "fast";
             /** Exact */
             exact: boolean;
-            /** @description Of the distance that each line is at */
+            /** @description Error bound of the distance of each line */
             error_bound: components["schemas"]["ErrorBound"];
             /**
              * Chord Error
-             * @description Largest distance of chords from exact lines, mesh units
+             * @description Largest distance of chords from the exact lines, in mesh units
              */
             chord_error: number;
             /** Sources */
@@ -1074,7 +1074,7 @@ export interface components {
         IsolinesRequest: {
             /**
              * Barriers
-             * @description Indices of faces that are blocked: holes, at whose corners paths may bend. Default: `[]`
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
              * @example [
              *       7,
              *       8
@@ -1083,18 +1083,18 @@ export interface components {
             barriers?: number[];
             /**
              * Method
-             * @description Not `fast`: lines need windows, which it does not have. Default: `exact`
+             * @description `fast` is not available: lines need windows, which it does not have. Default: `exact`
              * @enum {string}
              */
             method?: "exact" | "approximate";
             /**
              * Relative Error
-             * @description For `approximate`: share of the exact distance by which one may fall short; 0.001 where neither error is given
+             * @description For `approximate`: the allowed error, as a share of the exact distance; 0.001 if neither error is given
              */
             relative_error?: number | null;
             /**
              * Absolute Error
-             * @description For `approximate`: the same in mesh units; where both errors are given, both hold
+             * @description For `approximate`: the allowed error in mesh units; if both errors are given, both hold
              */
             absolute_error?: number | null;
             /** Sources */
@@ -1116,7 +1116,7 @@ export interface components {
             max_distance?: number | null;
             /**
              * Chord Error
-             * @description Largest distance of lines from exact ones inside faces, in mesh units: the exact ones are arcs, the answer has chords. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
+             * @description Largest distance of the returned chords from the exact lines, which are arcs inside faces, in mesh units. At least a billionth of the bounding box's diagonal; a thousandth of the mean edge length if not given
              */
             chord_error?: number | null;
         };
@@ -1129,7 +1129,7 @@ export interface components {
             id: string;
             /**
              * Kind
-             * @description Of query, such as `distances`
+             * @description Kind of the query, such as `distances`
              */
             kind: string;
             /** Mesh Id */
@@ -1146,17 +1146,17 @@ export interface components {
             progress: number;
             /**
              * Created
-             * @description RFC 3339, as all times
+             * @description When the job was created, RFC 3339 as all times
              */
             created: string;
             /**
              * Started
-             * @description When a worker began
+             * @description When a worker began the job
              */
             started?: string | null;
             /** Finished */
             finished?: string | null;
-            /** @description Of one that failed */
+            /** @description The problem of a failed job */
             problem?: components["schemas"]["ProblemDocument"] | null;
             /**
              * Links
@@ -1230,12 +1230,12 @@ export interface components {
         LocatedPoint: {
             /**
              * Vertex
-             * @description Where the point is a vertex
+             * @description The vertex, if the point is one
              */
             vertex?: number | null;
             /**
              * Face
-             * @description Where it is no vertex: the lowest face that contains it
+             * @description If the point is not a vertex: the lowest face that contains it
              */
             face?: number | null;
             /**
@@ -1255,7 +1255,7 @@ export interface components {
             ];
             /**
              * Distance
-             * @description Distance from the position, mesh units
+             * @description Distance from the position in mesh units
              */
             distance: number;
         };
@@ -1304,7 +1304,7 @@ export interface components {
             targets: components["schemas"]["MatrixEnd"][];
             /**
              * Shape
-             * @description Of a sparse matrix
+             * @description The shape of a sparse matrix
              */
             shape?: [
                 number,
@@ -1322,7 +1322,7 @@ export interface components {
             columns?: number[] | null;
             /**
              * Distances
-             * @description Dense: a row for each source. Pairs: one for each. Both `null` where unreachable. Sparse: the finite ones, zeros too
+             * @description Dense: a row for each source. Pairs: one distance for each pair. In both, `null` where unreachable. Sparse: the finite distances, zeros included
              */
             distances: ((number | null)[] | number | null)[];
             unreachable: components["schemas"]["Unreachable"];
@@ -1336,12 +1336,12 @@ export interface components {
         MatrixEnd: {
             /**
              * Vertex
-             * @description Where the point is a vertex
+             * @description The vertex, if the point is one
              */
             vertex?: number | null;
             /**
              * Face
-             * @description Where it is no vertex: the lowest face that contains it
+             * @description If the point is not a vertex: the lowest face that contains it
              */
             face?: number | null;
             /**
@@ -1361,7 +1361,7 @@ export interface components {
             ];
             /**
              * Component
-             * @description The connected component of the mesh that contains it: no path joins different components; other missing distances are beyond `max_distance`
+             * @description The connected component of the mesh that contains the point. No path joins different components; other missing distances are beyond `max_distance`
              */
             component: number;
         };
@@ -1395,7 +1395,7 @@ export interface components {
         MatrixRequest: {
             /**
              * Barriers
-             * @description Indices of faces that are blocked: holes, at whose corners paths may bend. Default: `[]`
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
              * @example [
              *       7,
              *       8
@@ -1409,7 +1409,7 @@ export interface components {
             sources: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[] | "all";
             /**
              * Targets
-             * @description The same; where they are the sources, each pair is asked once
+             * @description Points, or `all` for every vertex; if they are the sources, each pair is computed once
              */
             targets: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[] | "all";
             /**
@@ -1440,17 +1440,17 @@ export interface components {
             vertices: number;
             /**
              * Faces
-             * @description All of them, those that repeat a vertex as well
+             * @description Number of all faces, including those that repeat a vertex
              */
             faces: number;
             /**
              * Warnings
-             * @description A sentence or two each, with the remedy
+             * @description Warnings of one or two sentences each, with the remedy
              */
             warnings: string[];
             /**
              * Created
-             * @description When it was stored, RFC 3339
+             * @description When the mesh was stored, RFC 3339
              */
             created: string;
             /**
@@ -1479,21 +1479,21 @@ export interface components {
             saddle_vertices: number;
             /** Boundary Vertices */
             boundary_vertices: number;
-            /** @description Where several fans of faces meet */
+            /** @description Vertices where several fans of faces meet */
             bow_tie_vertices: components["schemas"]["Sample"];
-            /** @description Of no face of the surface */
+            /** @description Vertices that belong to no face of the surface */
             isolated_vertices: components["schemas"]["Sample"];
-            /** @description At the position of an earlier one; `merge=exact` joins them */
+            /** @description Vertices at the position of an earlier vertex; `merge=exact` joins them */
             duplicate_vertices: components["schemas"]["Sample"];
-            /** @description Made of fewer than three different vertices: no part of the surface */
+            /** @description Faces with fewer than three different vertices; they are not part of the surface */
             repeated_vertex_faces: components["schemas"]["Sample"];
-            /** @description Between different vertices at one position: their ends are one point */
+            /** @description Edges between different vertices at the same position: their ends are one point */
             zero_length_edges: components["schemas"]["Sample"];
-            /** @description With such an edge: they shrink to an edge of other faces, or to a vertex */
+            /** @description Faces with an edge of zero length: they shrink to an edge of other faces, or to a vertex */
             collapsed_faces: components["schemas"]["Sample"];
-            /** @description Of the same three vertices as an earlier one */
+            /** @description Faces with the same three vertices as an earlier face */
             duplicate_faces: components["schemas"]["Sample"];
-            /** @description Of the surface, but without area */
+            /** @description Faces of the surface without area */
             degenerate_faces: components["schemas"]["Sample"];
             non_manifold_edges: components["schemas"]["Sample"];
             /** Inconsistent Orientation */
@@ -1548,10 +1548,10 @@ export interface components {
             source: components["schemas"]["ResolvedPoint"];
             /**
              * Nearest
-             * @description Fewer than `k` where fewer are reachable
+             * @description Fewer than `k` if fewer are reachable
              */
             nearest: components["schemas"]["NearestPoint"][];
-            /** @description The reasons for those that are missing, where there are fewer */
+            /** @description Number of missing candidates, by reason, if there are fewer than `k` */
             unreachable?: components["schemas"]["Unreachable"] | null;
             /** Warnings */
             warnings: string[];
@@ -1563,12 +1563,12 @@ export interface components {
         NearestPoint: {
             /**
              * Vertex
-             * @description Where the point is a vertex
+             * @description The vertex, if the point is one
              */
             vertex?: number | null;
             /**
              * Face
-             * @description Where it is no vertex: the lowest face that contains it
+             * @description If the point is not a vertex: the lowest face that contains it
              */
             face?: number | null;
             /**
@@ -1596,7 +1596,7 @@ export interface components {
         };
         /**
          * NearestRequest
-         * @description The ``k`` of some ``candidates`` that are geodesically nearest to ``source``.
+         * @description The ``k`` candidates that are geodesically nearest to ``source``.
          * @example {
          *       "candidates": [
          *         {
@@ -1615,7 +1615,7 @@ export interface components {
         NearestRequest: {
             /**
              * Barriers
-             * @description Indices of faces that are blocked: holes, at whose corners paths may bend. Default: `[]`
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
              * @example [
              *       7,
              *       8
@@ -1719,7 +1719,7 @@ export interface components {
         PathRequest: {
             /**
              * Barriers
-             * @description Indices of faces that are blocked: holes, at whose corners paths may bend. Default: `[]`
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
              * @example [
              *       7,
              *       8
@@ -1728,23 +1728,23 @@ export interface components {
             barriers?: number[];
             /**
              * Method
-             * @description `approximate`: within an error; `fast`: in one quick pass, with an estimate of the error. Default: `exact`
+             * @description `approximate`: within an allowed error; `fast`: in one quick pass, with an estimate of the error. Default: `exact`
              * @enum {string}
              */
             method?: "exact" | "approximate" | "fast";
             /**
              * Relative Error
-             * @description For `approximate`: share of the exact distance by which one may fall short; 0.001 where neither error is given
+             * @description For `approximate`: the allowed error, as a share of the exact distance; 0.001 if neither error is given
              */
             relative_error?: number | null;
             /**
              * Absolute Error
-             * @description For `approximate`: the same in mesh units; where both errors are given, both hold
+             * @description For `approximate`: the allowed error in mesh units; if both errors are given, both hold
              */
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: more effort takes more time, and errs less; 2 by default
+             * @description For `fast`: more effort takes more time and lowers the error; 2 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Source */
@@ -1763,7 +1763,7 @@ export interface components {
             max_distance?: number | null;
             /**
              * Explain
-             * @description Add `steps`, an account of each step of the search; for `exact` and JSON only. Such an answer is not cached, since it states seconds. Default: `false`
+             * @description Add `steps`, an account of each step of the search; for `exact` and JSON only. Such an answer is not cached, since it contains timings. Default: `false`
              */
             explain?: boolean;
         };
@@ -1847,7 +1847,7 @@ export interface components {
         PathsRequest: {
             /**
              * Barriers
-             * @description Indices of faces that are blocked: holes, at whose corners paths may bend. Default: `[]`
+             * @description Indices of blocked faces. They act as holes, and paths may bend at their corners. Default: `[]`
              * @example [
              *       7,
              *       8
@@ -1856,23 +1856,23 @@ export interface components {
             barriers?: number[];
             /**
              * Method
-             * @description `approximate`: within an error; `fast`: in one quick pass, with an estimate of the error. Default: `exact`
+             * @description `approximate`: within an allowed error; `fast`: in one quick pass, with an estimate of the error. Default: `exact`
              * @enum {string}
              */
             method?: "exact" | "approximate" | "fast";
             /**
              * Relative Error
-             * @description For `approximate`: share of the exact distance by which one may fall short; 0.001 where neither error is given
+             * @description For `approximate`: the allowed error, as a share of the exact distance; 0.001 if neither error is given
              */
             relative_error?: number | null;
             /**
              * Absolute Error
-             * @description For `approximate`: the same in mesh units; where both errors are given, both hold
+             * @description For `approximate`: the allowed error in mesh units; if both errors are given, both hold
              */
             absolute_error?: number | null;
             /**
              * Effort
-             * @description For `fast`: more effort takes more time, and errs less; 2 by default
+             * @description For `fast`: more effort takes more time and lowers the error; 2 by default
              */
             effort?: (1 | 2 | 4 | 8) | null;
             /** Source */
@@ -1961,7 +1961,7 @@ export interface components {
         };
         /**
          * ProblemDocument
-         * @description An error, as RFC 9457 has it.
+         * @description An error, as defined by RFC 9457.
          */
         ProblemDocument: {
             /** Type */
@@ -2009,17 +2009,17 @@ export interface components {
         };
         /**
          * ResolvedPoint
-         * @description A resolved point, in one spelling for all that mean the same.
+         * @description A resolved point, in its canonical spelling.
          */
         ResolvedPoint: {
             /**
              * Vertex
-             * @description Where the point is a vertex
+             * @description The vertex, if the point is one
              */
             vertex?: number | null;
             /**
              * Face
-             * @description Where it is no vertex: the lowest face that contains it
+             * @description If the point is not a vertex: the lowest face that contains it
              */
             face?: number | null;
             /**
@@ -2045,12 +2045,12 @@ export interface components {
         ResolvedSource: {
             /**
              * Vertex
-             * @description Where the point is a vertex
+             * @description The vertex, if the point is one
              */
             vertex?: number | null;
             /**
              * Face
-             * @description Where it is no vertex: the lowest face that contains it
+             * @description If the point is not a vertex: the lowest face that contains it
              */
             face?: number | null;
             /**
@@ -2091,7 +2091,7 @@ export interface components {
         SearchStep: {
             /**
              * Leg
-             * @description From 0
+             * @description Number of the leg, from 0
              */
             leg: number;
             /**
@@ -2103,17 +2103,17 @@ export interface components {
             seconds: number;
             /**
              * Bound
-             * @description The least upper bound of the leg's length that is known after the step; after `exact`, the length
+             * @description The smallest upper bound of the leg's length that is known after the step; after `exact`, the length
              */
             bound: number;
             /**
              * Windows
-             * @description Windows created
+             * @description Number of windows created
              */
             windows: number;
             /**
              * Faces
-             * @description The region that was visited
+             * @description The faces that were visited
              */
             faces: number[];
         };
@@ -2158,7 +2158,7 @@ export interface components {
         };
         /**
          * Feature
-         * @description A line or a point with what is known of it.
+         * @description A line or a point with its properties.
          */
         Feature: {
             /**
@@ -2178,7 +2178,7 @@ export interface components {
         };
         /**
          * FeatureCollection
-         * @description Lines or points, in the order of the answer in JSON, whose other members it has too.
+         * @description Lines or points, in the order of the JSON answer, and the other members of that answer.
          */
         FeatureCollection: {
             /**
@@ -2239,15 +2239,15 @@ export interface components {
         "Accept-Ranges": string;
         /** @description Caching of the answer: where, and for how long */
         "Cache-Control": string;
-        /** @description Names the content of the answer, in its format and coding */
+        /** @description Identifies the content of the answer, in its format and coding */
         ETag: string;
         /** @description When the file of the answer was written */
         "Last-Modified": string;
         /** @description Range of these bytes, and the total */
         "Content-Range": string;
-        /** @description Of the numbers in `npy`, `npz` and `octets`: `<f8` or `<f4` */
+        /** @description Type of the numbers in `npy`, `npz` and `octets`: `<f8` or `<f4` */
         "Geodesic-Dtype": string;
-        /** @description Of the array in these formats, `rows,columns` of a matrix */
+        /** @description Shape of the array in these formats; `rows,columns` for a matrix */
         "Geodesic-Shape": string;
         /** @description Where the mesh or the job is */
         Location: string;
@@ -2255,13 +2255,13 @@ export interface components {
         "Preference-Applied": string;
         /** @description Seconds to wait before the next attempt */
         "Retry-After": number;
-        /** @description Milliseconds of each phase, as `queue;dur=0.1, load;dur=0.0, compute;dur=3.2, encode;dur=0.3`; `kept` where the store had the answer */
+        /** @description Milliseconds of each phase, as `queue;dur=0.1, load;dur=0.0, compute;dur=3.2, encode;dur=0.3`; `kept` if the store had the answer */
         "Server-Timing": string;
         /** @description Headers of the request that the answer depends on */
         Vary: string;
         /** @description `Bearer`, with the error if a key was sent */
         "WWW-Authenticate": string;
-        /** @description The id of the request, its own or a new one; the log has it */
+        /** @description The id of the request, from the client or newly made; the log has it */
         "X-Request-ID": string;
     };
     pathItems: never;
@@ -2273,17 +2273,17 @@ export interface operations {
             query?: {
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
-                /** @description Of the numbers in `npy`, `npz` and `octets` */
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
                 /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
                 estimate?: boolean;
             };
             header?: {
-                /** @description Milliseconds that the client waits at most */
+                /** @description The longest time that the client waits, in milliseconds */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen name of a job: a request sent again with it gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -2299,7 +2299,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The distances; as PLY the mesh with them at its vertices, for all vertices only. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The distances; as PLY, the mesh with the distances at its vertices, for all vertices only. In formats other than JSON the rest comes as `Geodesic-…` headers */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -2523,17 +2523,17 @@ export interface operations {
     getPath: {
         parameters: {
             query: {
-                /** @description `approximate`: within an error; `fast`: in one quick pass, with an estimate of the error */
+                /** @description `approximate`: within an allowed error; `fast`: in one quick pass, with an estimate of the error */
                 method?: "exact" | "approximate" | "fast";
-                /** @description For `approximate`: share of the exact distance by which one may fall short; 0.001 where neither error is given */
+                /** @description For `approximate`: the allowed error, as a share of the exact distance; 0.001 if neither error is given */
                 relative_error?: number;
-                /** @description For `approximate`: the same in mesh units; where both errors are given, both hold */
+                /** @description For `approximate`: the allowed error in mesh units; if both errors are given, both hold */
                 absolute_error?: number;
-                /** @description For `fast`: more effort takes more time, and errs less; 2 by default */
+                /** @description For `fast`: more effort takes more time and lowers the error; 2 by default */
                 effort?: 1 | 2 | 4 | 8;
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
-                /** @description Of the numbers in `npy`, `npz` and `octets` */
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
                 /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
                 estimate?: boolean;
@@ -2549,11 +2549,11 @@ export interface operations {
                 max_distance?: number;
             };
             header?: {
-                /** @description Milliseconds that the client waits at most */
+                /** @description The longest time that the client waits, in milliseconds */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen name of a job: a request sent again with it gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -2627,7 +2627,7 @@ export interface operations {
                     "application/geo+json": string;
                 };
             };
-            /** @description The answer is the one that is known */
+            /** @description The answer has not changed */
             304: {
                 headers: {
                     ETag: components["headers"]["ETag"];
@@ -2788,7 +2788,7 @@ export interface operations {
             query?: {
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
-                /** @description Of the numbers in `npy`, `npz` and `octets` */
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
                 /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
                 estimate?: boolean;
@@ -2796,11 +2796,11 @@ export interface operations {
                 explain?: boolean;
             };
             header?: {
-                /** @description Milliseconds that the client waits at most */
+                /** @description The longest time that the client waits, in milliseconds */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen name of a job: a request sent again with it gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -3046,17 +3046,17 @@ export interface operations {
             query?: {
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
-                /** @description Of the numbers in `npy`, `npz` and `octets` */
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
                 /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
                 estimate?: boolean;
             };
             header?: {
-                /** @description Milliseconds that the client waits at most */
+                /** @description The longest time that the client waits, in milliseconds */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen name of a job: a request sent again with it gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -3296,17 +3296,17 @@ export interface operations {
             query?: {
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
-                /** @description Of the numbers in `npy`, `npz` and `octets` */
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
                 /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
                 estimate?: boolean;
             };
             header?: {
-                /** @description Milliseconds that the client waits at most */
+                /** @description The longest time that the client waits, in milliseconds */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen name of a job: a request sent again with it gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -3546,17 +3546,17 @@ export interface operations {
             query?: {
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
-                /** @description Of the numbers in `npy`, `npz` and `octets` */
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
                 /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
                 estimate?: boolean;
             };
             header?: {
-                /** @description Milliseconds that the client waits at most */
+                /** @description The longest time that the client waits, in milliseconds */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen name of a job: a request sent again with it gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -3796,17 +3796,17 @@ export interface operations {
             query?: {
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
-                /** @description Of the numbers in `npy`, `npz` and `octets` */
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
                 /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
                 estimate?: boolean;
             };
             header?: {
-                /** @description Milliseconds that the client waits at most */
+                /** @description The longest time that the client waits, in milliseconds */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen name of a job: a request sent again with it gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -3822,7 +3822,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The distances; a sparse matrix in binary as `scipy.sparse.load_npz` reads it. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The distances; in binary, a sparse matrix has the format that `scipy.sparse.load_npz` reads. In formats other than JSON the rest comes as `Geodesic-…` headers */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -4048,17 +4048,17 @@ export interface operations {
             query?: {
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
-                /** @description Of the numbers in `npy`, `npz` and `octets` */
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
                 /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
                 estimate?: boolean;
             };
             header?: {
-                /** @description Milliseconds that the client waits at most */
+                /** @description The longest time that the client waits, in milliseconds */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen name of a job: a request sent again with it gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -4294,17 +4294,17 @@ export interface operations {
             query?: {
                 /** @description Overrides `Accept` */
                 format?: "json" | "npy" | "npz" | "octets" | "obj" | "ply" | "csv" | "svg" | "geojson";
-                /** @description Of the numbers in `npy`, `npz` and `octets` */
+                /** @description Type of the numbers in `npy`, `npz` and `octets` */
                 dtype?: "float64" | "float32";
                 /** @description Do not compute; answer with an `Estimate` of the cost, in JSON */
                 estimate?: boolean;
             };
             header?: {
-                /** @description Milliseconds that the client waits at most */
+                /** @description The longest time that the client waits, in milliseconds */
                 "x-timeout-ms"?: number;
-                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not there after two seconds */
+                /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
-                /** @description Freely chosen name of a job: a request sent again with it gets the same job */
+                /** @description Freely chosen key of a job: a request that is sent again with the same key gets the same job */
                 "idempotency-key"?: string;
                 /** @description Bytes of the answer to send, RFC 9110; they come without a content coding */
                 Range?: string;
@@ -4656,7 +4656,7 @@ export interface operations {
     createMesh: {
         parameters: {
             query?: {
-                /** @description What people call it; if not given, the file's name in a form, or the sample's */
+                /** @description Name for people; if not given, the file name in a form, or the name of the sample */
                 name?: string;
                 /** @description Overrides `Content-Type` */
                 format?: "obj" | "off" | "ply" | "stl" | "glb";
@@ -4664,11 +4664,11 @@ export interface operations {
                 merge?: "none" | "exact";
                 /** @description The sample to make, instead of reading a mesh */
                 sample?: "knot" | "sphere" | "terrain" | "obstacles" | "plane";
-                /** @description Number of faces of the sample, about; 20000 if not given */
+                /** @description Approximate number of faces of the sample; 20000 if not given */
                 faces?: number;
             };
             header?: {
-                /** @description Milliseconds that the client waits at most */
+                /** @description The longest time that the client waits, in milliseconds */
                 "x-timeout-ms"?: number;
             };
             path?: never;
@@ -5847,7 +5847,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Events, the data of each of which is a `JobDocument` */
+            /** @description Events; the data of each event is a `JobDocument` */
             200: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
@@ -5971,7 +5971,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description Addresses; for browsers the page */
+            /** @description The links; for browsers, the page */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];

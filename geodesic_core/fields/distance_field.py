@@ -53,10 +53,10 @@ from geodesic_core.tolerances import LEVEL
 
 @dataclass(frozen=True)
 class DistanceField:
-    """Geodesic distances from the sources to all vertices, and what can be found from them.
+    """Geodesic distances from the sources to all vertices, and queries on them.
 
-    The solvers make it. Paths, points inside faces, gradients and isolines come from retained data,
-    or from a second sweep where those were not retained.
+    The solvers return it. Paths, points inside faces, gradients and isolines come from retained
+    data, or from a second sweep if those data were not retained.
 
     Examples
     --------
@@ -147,7 +147,7 @@ class DistanceField:
         Returns
         -------
         dict of str to numpy.ndarray
-            All but the mesh, and but what later calls have found.
+            Everything except the mesh and the results of later calls.
 
         Examples
         --------
@@ -188,7 +188,7 @@ class DistanceField:
         Raises
         ------
         InvalidArgument
-            It does not, or cannot be written.
+            The path does not end in ``.npz``, or the file cannot be written.
 
         Examples
         --------
@@ -234,7 +234,7 @@ class DistanceField:
     def plot(self, screenshot: str | Path | None = None) -> None:
         """Draw the surface, coloured by distance: in a window, in a notebook, or into a file.
 
-        Sources are marked. What is unreachable is grey.
+        Sources are marked. Unreachable parts are grey.
 
         Parameters
         ----------
@@ -246,7 +246,7 @@ class DistanceField:
         MissingExtra
             PyVista is not installed; the extra ``plot`` brings it.
         InvalidArgument
-            The file is no picture by its suffix, or cannot be written.
+            The suffix is not that of a picture, or the file cannot be written.
 
         Examples
         --------
@@ -343,10 +343,11 @@ class DistanceField:
         """Return the distance of any point of the surface.
 
         At a vertex or a target of the sweep it is the sweep's value, O(1). Elsewhere it is exact,
-        also where the field is approximate: from the windows of an exact field that retains them,
-        O(windows of the face); else by an exact sweep from the point to the nearest source, in a
-        thin strip that the field's own values leave. Where a source is a curve, or the field a fast
-        one, the first such point runs the sweep again, exactly, and retains its windows.
+        also for an approximate field. An exact field that retains its windows finds it there,
+        O(windows of the face). Any other field runs an exact sweep from the point to the nearest
+        source, in a thin strip that the field's own values bound. If a source is a curve or the
+        field is a fast one, the first such point runs the whole sweep again, exactly, and retains
+        its windows.
 
         Parameters
         ----------
@@ -365,7 +366,7 @@ class DistanceField:
         InvalidPoint
             It is not a point of the mesh.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in `Control`; the field is as good as before.
+            As in `Control`; the field can still be used.
 
         Examples
         --------
@@ -414,7 +415,7 @@ class DistanceField:
         InvalidPoint
             It is not a point of the mesh.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in `Control`; the field is as good as before.
+            As in `Control`; the field can still be used.
 
         Examples
         --------
@@ -443,10 +444,11 @@ class DistanceField:
     ) -> GeodesicPath:
         """Return a path from the nearest source to any point of the surface (sections 3.5 and 4.3).
 
-        Of an exact field its length is the point's distance less the start distance of its source;
-        of an approximate one at most the promised error more; of a fast one no more. O(faces
-        crossed) to a vertex or a target of the sweep; a field that does not retain paths runs the
-        sweep again for the first of those. To other points as `distance_at` finds their distances.
+        In an exact field, the length of the path is the point's distance less the start distance of
+        its source. In an approximate field it may be longer by the error bound; in a fast field it
+        is not longer. A path to a vertex or a target of the sweep takes O(faces crossed). A field
+        that does not retain paths runs the sweep again for the first of these. Paths to other
+        points are found as `distance_at` finds their distances.
 
         Parameters
         ----------
@@ -467,7 +469,7 @@ class DistanceField:
         NoPath
             It is not connected to a source, or lies beyond ``max_distance``.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in `Control`; the field is as good as before.
+            As in `Control`; the field can still be used.
 
         Examples
         --------
@@ -501,10 +503,10 @@ class DistanceField:
     def gradient(self) -> Floats:
         """Unit vectors (V, 3), float64: where distance grows fastest, tangent to the surface.
 
-        At each vertex the direction opposite to the first step of the shortest path to its nearest
-        source; of one of them where several are as short. NaN at sources, and where `distances` is
-        infinite. O(V). A field that does not retain paths first runs the sweep again, without
-        control, unless `path_to` has found a path before.
+        At each vertex, the direction opposite to the first segment of the shortest path to its
+        nearest source. If several paths are equally short, it is that of one of them. NaN at
+        sources, and where `distances` is infinite. O(V). A field that does not retain paths first
+        runs the sweep again, without control, unless `path_to` has found a path before.
 
         Examples
         --------
@@ -532,7 +534,7 @@ class DistanceField:
         Raises
         ------
         InvalidArgument
-            The count is not an integer, 1 or more; or no vertex but the sources is reached.
+            The count is not an integer of 1 or more, or no vertex but the sources is reached.
 
         Examples
         --------
@@ -560,9 +562,9 @@ class DistanceField:
         the boundary or at an edge of more than two faces. In each face they consist of circular
         arcs, and of straight lines beside curves; their ends and crossings of edges are exact, and
         between them arcs become chords. A vertex at the level itself counts as within. Levels
-        beyond all distances, or beyond ``max_distance``, have no lines. Of an approximate field
-        they are those of its own distances, which the same error bounds; of a fast field they are
-        exact, from an exact sweep whose windows it retains.
+        beyond all distances, or beyond ``max_distance``, have no lines. In an approximate field the
+        lines follow its own distances, and the same error bound holds. In a fast field the lines
+        are exact: they come from an exact sweep, whose windows it retains.
 
         Parameters
         ----------
@@ -584,14 +586,14 @@ class DistanceField:
         InvalidArgument
             A level or the chord error is out of its domain.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in `Control`; the field is as good as before.
+            As in `Control`; the field can still be used.
 
         Notes
         -----
-        Where windows are not retained, each call runs the sweep again: of an exact field for the
-        windows of those faces only that the levels may pass. That takes far less memory than
-        retaining all, and mostly less time. O(windows), and for each level O(n² log n) for n
-        windows in each face that it passes.
+        If windows are not retained, each call runs the sweep again. An exact field then retains
+        only the windows of faces that the levels may pass. That takes far less memory than
+        retaining all windows, and usually less time. O(windows), and for each level O(n² log n) for
+        n windows in each face that it passes.
 
         Examples
         --------
@@ -687,14 +689,14 @@ class DistanceField:
     ) -> list[Border]:
         """Return the borders of the sources' territories: their geodesic Voronoi diagram.
 
-        The territory of a source is what is nearer to it than to any other; start distances count.
-        Each line separates two territories. It is closed, or ends where three of them or more meet,
-        at the boundary, at an edge of more than two faces, or at ``max_distance``. In each face it
-        consists of pieces of hyperbolas, of parabolas beside curves, and of straight lines. Its
-        ends and crossings of edges are exact, and between them pieces become chords. Where a part
-        of the surface is equally near to two sources, it belongs to the lower one. Every edge of
-        the mesh whose ends have different nearest sources is crossed. The borders of an approximate
-        or fast field are exact as well, from an exact sweep.
+        The territory of a source is the part of the surface that is nearer to it than to any other
+        source; start distances count. Each line separates two territories. It is closed, or ends
+        where three of them or more meet, at the boundary, at an edge of more than two faces, or at
+        ``max_distance``. In each face it consists of pieces of hyperbolas, of parabolas beside
+        curves, and of straight lines. Its ends and crossings of edges are exact, and between them
+        pieces become chords. Where a part of the surface is equally near to two sources, it belongs
+        to the lower one. Every edge of the mesh whose ends have different nearest sources is
+        crossed. The borders of an approximate or fast field are exact as well, from an exact sweep.
 
         Parameters
         ----------
@@ -713,12 +715,12 @@ class DistanceField:
         InvalidArgument
             The chord error is out of its domain.
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in `Control`; the field is as good as before.
+            As in `Control`; the field can still be used.
 
         Notes
         -----
-        Where windows are not retained, each call runs an exact sweep again, for the windows of
-        those faces only that borders may pass. O(windows), and O(n³) in each face that a border
+        If windows are not retained, each call runs an exact sweep again, and retains only the
+        windows of faces that borders may pass. O(windows), and O(n³) in each face that a border
         passes, for n windows that are nearest somewhere in it.
 
         Examples

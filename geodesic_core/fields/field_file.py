@@ -64,18 +64,19 @@ def read_field_file(
     members = _members_of(path)
     if str(members["mesh"]) != _digest_of(mesh):
         raise InvalidArgument(
-            f"{path} holds a field of another mesh: give the one that it was found on, with the "
-            f"same vertices and faces in the same order"
+            f"{path} holds a field of another mesh: give the mesh that it was computed on, with "
+            "the same vertices and faces in the same order"
         )
     if str(members["kernels"]) != sources_digest():
         raise InvalidArgument(
-            f"{path} was written by another version of this library: find the field again. Its "
-            f"distances are still there, as numpy.load(path)['distances']"
+            f"{path} was written by another version of this library: compute the field again. Its "
+            "distances can still be read with numpy.load(path)['distances']"
         )
     blocked = mesh.with_barriers(members["barriers"])
     if not np.array_equal(blocked.barriers, members["barriers"]):
         raise InvalidArgument(
-            f"{path} holds a field with other barriers than the mesh: give the mesh without any"
+            f"{path} holds a field with other barriers than the mesh: give the mesh without "
+            "barriers"
         )
     sweep = {
         name.removeprefix(_SWEEP): array
@@ -93,10 +94,10 @@ def _members_of(path: str | Path) -> dict[str, NDArray[Any]]:
         raise InvalidArgument(f"cannot read {path}: {error.strerror}") from error
     except (BadZipFile, EOFError, TypeError, ValueError) as error:
         raise InvalidArgument(
-            f"{path} is damaged, or no field that DistanceField.save wrote"
+            f"{path} is damaged, or was not written by DistanceField.save"
         ) from error
     if not members.keys() >= {"mesh", "kernels", "barriers"}:
-        raise InvalidArgument(f"{path} is no field that DistanceField.save wrote")
+        raise InvalidArgument(f"{path} was not written by DistanceField.save")
     return members
 
 

@@ -94,7 +94,9 @@ def spaced_levels(distances: Floats, count: int) -> Floats:
         raise InvalidArgument(f"the count of levels is {count!r}; it must be an integer, 1 or more")
     largest = distances.max(where=np.isfinite(distances), initial=0.0)
     if largest == 0.0:
-        raise InvalidArgument("only sources are reached: there is nothing to space levels in")
+        raise InvalidArgument(
+            "no vertex but the sources is reached: there is no distance to divide into levels"
+        )
     spaced: Floats = np.arange(1, count + 1) * (largest / (count + 1))
     return spaced
 

@@ -30,8 +30,9 @@ class ErrorBound:
     """Bound of the difference between an answer and the exact one.
 
     ``value`` is a share of the exact answer where ``type`` is ``"relative"``, else mesh units.
-    ``kind`` tells whether the bound is proved or estimated. What is proved of approximate distances
-    is that they are too short by no more; that they are never too long is argued and measured.
+    ``kind`` tells whether the bound is proved or estimated. For approximate distances it is proved
+    that they are too short by no more than the bound. That they are never too long is argued and
+    measured, but not proved.
 
     Examples
     --------
@@ -102,8 +103,8 @@ class GeodesicPath:
     """
 
     mesh: TriangleMesh | None
-    """The surface, with the barriers of the call; None of a copy or a pickle, which leaves it
-    behind."""
+    """The surface, with the barriers of the call; None in a copy or a pickle, which leaves it
+    out."""
     points: Floats
     """(K, 3) positions, mesh units."""
     faces: Ints
@@ -112,7 +113,7 @@ class GeodesicPath:
     """Sum of the distances between neighbouring points before those were rounded, mesh units."""
     error_bound: ErrorBound
     steps: tuple[SearchStep, ...] | None
-    """Steps of the search between two points, leg by leg; None unless they were to be explained."""
+    """Steps of the search between two points, leg by leg; None without ``explain``."""
     _location_faces: Ints
     _location_weights: Floats
     _location_vertices: Longs
@@ -198,7 +199,7 @@ class GeodesicPath:
         MissingExtra
             PyVista is not installed; the extra ``plot`` brings it.
         InvalidArgument
-            The file is no picture by its suffix, or cannot be written.
+            The suffix is not that of a picture, or the file cannot be written.
 
         Examples
         --------

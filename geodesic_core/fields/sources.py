@@ -34,7 +34,7 @@ class Source:
     point
         A vertex index, a `SurfacePoint` or a `Curve`.
     start_distance
-        Mesh units, finite, 0 or more: what every distance from this source begins with.
+        Mesh units, finite, 0 or more; added to every distance from this source.
 
     Examples
     --------

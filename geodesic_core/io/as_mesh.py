@@ -57,10 +57,10 @@ MeshLike = (
 
 
 def as_mesh(mesh: MeshLike) -> TriangleMesh:
-    """Return the mesh that an object holds; all functions take what this takes.
+    """Return an object as a `TriangleMesh`; all functions take the same objects.
 
-    Vertices keep their numbers. Polygons become triangles, as in `load_mesh`. To ask several
-    questions, convert once: each call that is given something else prepares the mesh anew.
+    Vertices keep their numbers. Polygons become triangles, as in `load_mesh`. For several calls,
+    convert once: each call with another object prepares the mesh again.
 
     Parameters
     ----------
@@ -77,8 +77,8 @@ def as_mesh(mesh: MeshLike) -> TriangleMesh:
     Raises
     ------
     InvalidMesh
-        It is none of these, holds something else than polygons, or a mesh that `TriangleMesh`
-        refuses.
+        The object is none of these, holds something other than polygons, or holds a mesh that
+        `TriangleMesh` refuses.
 
     Notes
     -----
@@ -102,8 +102,8 @@ def as_mesh(mesh: MeshLike) -> TriangleMesh:
         if all(hasattr(mesh, name) for name in attributes):
             return read(mesh)
     raise InvalidMesh(
-        f"a mesh cannot be made of this {type(mesh).__name__}: give a TriangleMesh, (vertices, "
-        f"faces), the path of a file, or a mesh of trimesh, meshio, PyVista or Open3D"
+        f"a mesh cannot be made from this {type(mesh).__name__}: give a TriangleMesh, (vertices, "
+        "faces), the path of a file, or a mesh of trimesh, meshio, PyVista or Open3D"
     )
 
 
@@ -132,7 +132,7 @@ def _split_rows(rows: Any) -> tuple[Any, list[int]]:
 
 def _from_grid(data: Any) -> TriangleMesh:
     raise InvalidMesh(
-        f"a {type(data).__name__} of PyVista is no surface: give data.extract_surface()"
+        f"a {type(data).__name__} of PyVista is not a surface: give data.extract_surface()"
     )
 
 
@@ -155,8 +155,8 @@ def _from_meshio(mesh: Any) -> TriangleMesh:
             sizes += map(len, block.data)
         else:
             raise InvalidMesh(
-                f"cells of type {block.type!r} are no polygons: a mesh of meshio may have cells of "
-                f"the types {', '.join(_POLYGONS)}"
+                f"cells of type {block.type!r} are not polygons: a mesh of meshio may have cells "
+                f"of the types {', '.join(_POLYGONS)}"
             )
     notes = [_left_out(beside, "vertices and lines")] if beside else []
     flat = np.concatenate(corners) if corners else np.empty(0, np.int64)

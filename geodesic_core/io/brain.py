@@ -35,7 +35,7 @@ def read_gifti(data: bytes, max_faces: int | None) -> FileContents:
     arrays = {name: image.get_arrays_from_intent(name) for name in (_POINTS, _TRIANGLES)}
     missing = [name for name, found in arrays.items() if not found]
     if missing:
-        raise InvalidMesh(f"the GIFTI file holds no {missing[0]} array: it is no surface")
+        raise InvalidMesh(f"the GIFTI file holds no {missing[0]} array: it is not a surface")
     return _contents(arrays[_POINTS][0].data, arrays[_TRIANGLES][0].data, max_faces)
 
 
@@ -50,7 +50,9 @@ def read_freesurfer(data: bytes, max_faces: int | None) -> FileContents:
         There are more faces than ``max_faces``.
     """
     if not data.startswith(FREESURFER_MAGIC):
-        raise InvalidMesh("the file is no triangle surface of FreeSurfer: its first bytes differ")
+        raise InvalidMesh(
+            "the file is not a FreeSurfer triangle surface: it begins with other bytes"
+        )
     # Two lines of text, two counts, then positions and faces, all big-endian.
     stream = BytesIO(data)
     stream.seek(len(FREESURFER_MAGIC))

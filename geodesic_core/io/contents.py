@@ -27,4 +27,6 @@ def note_on_ignored(kind: str, ignored: Mapping[str, int]) -> tuple[str, ...]:
     if not ignored:
         return ()
     what = ", ".join(f"{count} {name}" for name, count in ignored.items())
-    return (f"The {kind} file also holds {what}, which are no part of the surface: left out.",)
+    return (
+        f"The {kind} file also holds {what}, which are not part of the surface and were left out.",
+    )

@@ -53,8 +53,8 @@ def read_glb(data: bytes, max_faces: int | None) -> FileContents:
     }
     if len(primitives) > _MOST_PARTS:
         raise InvalidMesh(
-            f"the GLB file has {len(primitives)} parts, where at most {_MOST_PARTS} can be read; "
-            f"join them"
+            f"the GLB file has {len(primitives)} parts; at most {_MOST_PARTS} can be read: join "
+            "them"
         )
     shown = _shown_parts(tree)
     _check_vertex_count(tree, [primitives[part] for part, _ in shown], max_faces)
@@ -167,11 +167,11 @@ def _read_document(data: bytes) -> dict[str, Any]:
         )
     if json_length > _LARGEST_DOCUMENT:
         raise InvalidMesh(
-            f"the GLB file's glTF document has {json_length} bytes, where at most "
-            f"{_LARGEST_DOCUMENT} can be read; put its data into the binary chunk"
+            f"the GLB file's glTF document has {json_length} bytes; at most {_LARGEST_DOCUMENT} "
+            "can be read: put its data into the binary chunk"
         )
     if data[4:8] != b"\2\0\0\0" or data[16:20] != b"JSON":
-        raise InvalidMesh("the GLB file's header is not that of glTF 2 and its first chunk, JSON")
+        raise InvalidMesh("the GLB file is not glTF 2, or its first chunk is not JSON")
     try:
         tree: dict[str, Any] = json.loads(data[start : start + json_length])
     except (ValueError, RecursionError) as error:  # a number of too many digits is no JSON error
@@ -200,7 +200,7 @@ def _check_buffers(tree: Mapping[str, Any], chunks: bytes) -> None:
             try:
                 held = len(base64.b64decode(uri.partition(";base64,")[2], validate=True))
             except (binascii.Error, ValueError) as error:
-                raise InvalidMesh(f"buffer {number} of the GLB file is no base64") from error
+                raise InvalidMesh(f"buffer {number} of the GLB file is not valid base64") from error
         else:
             raise InvalidMesh(
                 f"buffer {number} of the GLB file lies in another file, {uri[:60]!r}; embed it"
@@ -230,7 +230,7 @@ def _check_vertex_count(
     ]
     if max_faces is not None and sum(counts) > 3 * max_faces:
         raise InvalidMesh(
-            f"the GLB file's scene shows {sum(counts)} vertices, where {max_faces} faces have at "
+            f"the GLB file's scene shows {sum(counts)} vertices, but {max_faces} faces have at "
             f"most {3 * max_faces}"
         )
 
@@ -255,7 +255,8 @@ def _check_accessors(tree: dict[str, Any], file_bytes: int) -> None:
             corners = tree["accessors"][last]["count"]
             if mode == _TRIANGLES and corners % 3:
                 raise InvalidMesh(
-                    f"accessor {last} of the GLB file has {corners} corners, which are no triangles"
+                    f"accessor {last} of the GLB file has {corners} corners, which do not form "
+                    "triangles"
                 )
 
 
@@ -274,7 +275,7 @@ def _check_accessor(tree: Mapping[str, Any], number: int, *, is_position: bool) 
         or "EXT_meshopt_compression" in view.get("extensions", ())
     ):
         raise InvalidMesh(
-            f"accessor {number} of the GLB file is sparse or compressed; save it plain"
+            f"accessor {number} of the GLB file is sparse or compressed; save it uncompressed"
         )
     width = _WIDTHS[kind] * (3 if is_position else 1)
     stride = view.get("byteStride", width)
@@ -282,7 +283,7 @@ def _check_accessor(tree: Mapping[str, Any], number: int, *, is_position: bool) 
     if stride < width or end > view["byteLength"]:
         raise InvalidMesh(
             f"accessor {number} of the GLB file has {accessor['count']} elements of {width} bytes, "
-            f"{stride} apart, which its bufferView {accessor['bufferView']} does not hold"
+            f"{stride} apart, which do not fit into its bufferView {accessor['bufferView']}"
         )
 
 

@@ -41,11 +41,11 @@ def placements(tree: Mapping[str, Any]) -> list[tuple[int, NDArray[np.float64]]]
     children += roots
     if max(len(nodes), len(children)) > _MOST_NODES:
         raise InvalidMesh(
-            f"the GLB file has {max(len(nodes), len(children))} nodes, where at most {_MOST_NODES} "
-            f"can be read; join its parts"
+            f"the GLB file has {max(len(nodes), len(children))} nodes; at most {_MOST_NODES} can "
+            "be read: join its parts"
         )
     if len(set(children)) < len(children):
-        raise InvalidMesh("the GLB file's nodes form no tree: one has two parents")
+        raise InvalidMesh("the GLB file's nodes do not form a tree: a node has two parents")
     return list(_walk(nodes, roots))[::-1]
 
 

@@ -102,8 +102,8 @@ class _Checker:
         self._values += 1
         if self._values > _MOST_VALUES:
             raise InvalidMesh(
-                f"the GLB file's glTF document has too many values, where at most {_MOST_VALUES} "
-                f"can be read; put its data into the binary chunk"
+                f"the GLB file's glTF document has too many values; at most {_MOST_VALUES} can be "
+                "read: put its data into the binary chunk"
             )
         match expected:
             case {}:
@@ -125,7 +125,7 @@ class _Checker:
                     self.check(each, item, f"{place}[{number}]")
             case _:
                 if not isinstance(value, expected):
-                    _refuse(value, place, "a text")
+                    _refuse(value, place, "a string")
 
     def _check_members(self, value: Any, expected: Mapping[str, Any], place: str) -> None:
         if not isinstance(value, dict):

@@ -23,7 +23,8 @@ def load_label(source: str | Path, mesh: TriangleMesh, label: str | float | None
     mesh
         The surface.
     label
-        Of a GIFTI file the name or the number of a label, or a value; those that are not 0 if None.
+        For a GIFTI file: the name or the number of a label, or a value. None for all values other
+        than 0.
 
     Returns
     -------
@@ -33,7 +34,8 @@ def load_label(source: str | Path, mesh: TriangleMesh, label: str | float | None
     Raises
     ------
     InvalidArgument
-        The file cannot be read or is no such file, has no such label, or is of another surface.
+        The file cannot be read, is not a label file, has no such label, or belongs to another
+        surface.
     MissingExtra
         GIFTI needs nibabel, the extra ``brain``.
 
@@ -53,7 +55,7 @@ def load_label(source: str | Path, mesh: TriangleMesh, label: str | float | None
     """
     path = Path(source)
     if path.suffix not in _READERS:
-        raise InvalidArgument(f"{path} is no label: it must end in .label or .gii")
+        raise InvalidArgument(f"{path} is not a label file: its name must end in .label or .gii")
     count = len(mesh.vertices if mesh.vertex_map is None else mesh.vertex_map)
     try:
         data = path.read_bytes()
@@ -62,7 +64,7 @@ def load_label(source: str | Path, mesh: TriangleMesh, label: str | float | None
     try:
         inside = _READERS[path.suffix](data, count, label)
     except InvalidArgument as error:
-        raise InvalidArgument(f"{path} is no label of this surface: {error}") from None
+        raise InvalidArgument(f"{path} is not a label of this surface: {error}") from None
     except GeodesicError:
         raise
     except Exception as error:  # any failure of a parser
@@ -78,7 +80,7 @@ def load_label(source: str | Path, mesh: TriangleMesh, label: str | float | None
 def _freesurfer(data: bytes, count: int, label: str | float | None) -> NDArray[np.bool_]:
     """Return which vertices a label lists: a comment, their number, and a line for each."""
     if label is not None:
-        raise InvalidArgument("a .label file has one label, without a name")
+        raise InvalidArgument("a .label file has one label without a name; leave the label out")
     _, declared, *lines = data.decode("utf-8").splitlines()
     vertices = np.array([int(line.split()[0]) for line in lines if line.strip()], np.int64)
     if len(vertices) != int(declared):
@@ -109,7 +111,7 @@ def _gifti(data: bytes, count: int, label: str | float | None) -> NDArray[np.boo
         wanted = names[label] if label in names else float(label)
     except ValueError:
         known = ", ".join(map(repr, names)) or "none"
-        raise InvalidArgument(f"it has no label {label!r}; it has {known}") from None
+        raise InvalidArgument(f"it has no label {label!r}; its labels are {known}") from None
     return np.asarray(values == wanted)
 
 

@@ -66,8 +66,8 @@ def load_mesh(
     merge
         ``"exact"`` merges vertices at equal positions, as `TriangleMesh` does.
     max_faces
-        Largest number of triangles. More are refused by the count in the header, else by counting,
-        and in any case before they are parsed.
+        Largest number of triangles. A file with more is refused before its faces are parsed, by the
+        count in its header or by counting.
 
     Returns
     -------
@@ -79,8 +79,8 @@ def load_mesh(
     TooManyFaces
         There are more than ``max_faces``; an `InvalidMesh` as well.
     InvalidMesh
-        The file cannot be read, is no such file, is damaged, declares more than it holds, or holds
-        a mesh that `TriangleMesh` refuses.
+        The file cannot be read, is not of this type, is damaged, declares more than it holds, or
+        holds a mesh that `TriangleMesh` refuses.
     MissingExtra
         GIFTI needs nibabel, the extra ``brain``; VTK's files need meshio, the extra ``vtk``.
 
@@ -128,9 +128,9 @@ def load_mesh(
 def _known_kind(file_type: str) -> str:
     kind, known = file_type.lower().removeprefix("."), ", ".join(_READERS)
     if not kind:
-        raise InvalidMesh(f"the file type is missing; say which of {known} it is")
+        raise InvalidMesh(f"the file type is missing; it must be one of {known}")
     if kind not in _READERS:
-        raise InvalidMesh(f"unknown mesh file type {kind!r}; known are {known}")
+        raise InvalidMesh(f"unknown mesh file type {kind!r}; it must be one of {known}")
     return kind
 
 

@@ -104,7 +104,8 @@ def _read_header(header: bytes) -> tuple[str, list[_Element]]:
     declared = sum(line.lstrip()[:7] in (b"element", b"propert") for line in lines)
     if declared > _MOST_HEADER_LINES:
         raise InvalidMesh(
-            f"the PLY header has {declared} elements and properties; {_MOST_HEADER_LINES} are read"
+            f"the PLY header has {declared} elements and properties; at most {_MOST_HEADER_LINES} "
+            "can be read"
         )
     for line in lines:
         match line.split():

@@ -24,11 +24,11 @@ _NO_VERTEX = -1
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """A polyline on the surface; as a source, all of its points are one.
+    """A polyline on the surface; as a source, distances start at all of its points.
 
     Each segment is straight, and lies in a face that both of its ends belong to. The `locations` of
-    a `GeodesicPath` make a curve, so that `shortest_path` through waypoints joins points that are
-    farther apart. A closed curve ends where it begins.
+    a `GeodesicPath` make a curve. So to join points that are farther apart, find the
+    `shortest_path` with these points as waypoints. A closed curve ends where it begins.
 
     Parameters
     ----------
@@ -70,7 +70,9 @@ def polyline_of(mesh: TriangleMesh, curve: Curve, name: str, control: Control) -
         As the control says.
     """
     if isinstance(curve.points, str | bytes) or not isinstance(curve.points, Iterable):
-        raise InvalidArgument(f"the points of {name} are {curve.points!r}; give a sequence of them")
+        raise InvalidArgument(
+            f"the points of {name} are {curve.points!r}; give a sequence of points"
+        )
     points = tuple(
         mesh.point(point, f"point {i} of {name}")
         for i, point in enumerate(control.watched(curve.points))
@@ -81,7 +83,7 @@ def polyline_of(mesh: TriangleMesh, curve: Curve, name: str, control: Control) -
         if not share_a_face(mesh, start, end):
             raise InvalidPoint(
                 f"the points {i} and {i + 1} of {name}, {start} and {end}, have no face in common; "
-                f"add those at which the curve crosses edges: a shortest path has them"
+                "add the points where the curve crosses edges: a shortest path has them"
             )
     return points
 

@@ -72,7 +72,7 @@ class MeshReport:
 
     vertices: int
     faces: int
-    """All of them, those that are no part of the surface as well."""
+    """All faces, including those that are not part of the surface."""
     edges: int
     """Of the surface, to which faces that repeat a vertex or are blocked do not belong."""
     triangulated_polygons: int
@@ -83,9 +83,10 @@ class MeshReport:
     """The lowest vertex of each component."""
     boundary_loops: int
     euler_characteristic: int
-    """V - E + F of the surface: isolated vertices and faces beside it do not count.
+    """V - E + F of the surface; isolated vertices, and faces that are not part of it, do not count.
 
-    Here and below, vertices that edges of no length join count as one, and go by the lowest.
+    Here and below, vertices that are joined by edges of zero length count as one; the lowest stands
+    for them.
     """
     saddle_vertices: int
     boundary_vertices: int
@@ -106,10 +107,10 @@ class MeshReport:
     degenerate_faces: Sample
     """Faces of the surface whose area is zero."""
     non_manifold_edges: Sample
-    """Edges of three faces or more, each by its vertices: paths go on into any of the faces."""
+    """Edges of three faces or more, each by its vertices; paths continue into any of the faces."""
     inconsistent_orientation: bool
     misoriented_edges: Sample
-    """Edges that their two faces run in the same direction, each by its vertices."""
+    """Edges that both of their faces traverse in the same direction, each by its vertices."""
     bounds: tuple[tuple[float, ...], tuple[float, ...]]
     """Lowest and highest corner of the bounding box, mesh units."""
     mean_edge_length: float
@@ -121,7 +122,7 @@ class MeshReport:
         Returns
         -------
         dict
-            What JSON can hold.
+            Values that JSON can hold.
 
         Examples
         --------
@@ -198,35 +199,35 @@ def warnings_of(report: MeshReport) -> Iterator[str]:
     """Yield sentences on the defects of a mesh and their remedies, for its user."""
     if report.components > 1:
         yield (
-            f"The mesh has {report.components} connected components, which begin at the vertices "
-            f"{_list(report.component_vertices)}: vertices of other components than the source's "
-            f"are unreachable."
+            f"The mesh has {report.components} connected components; their lowest vertices are "
+            f"{_list(report.component_vertices)}. Vertices in other components than the source are "
+            "unreachable."
         )
     sample = report.duplicate_vertices
     if sample.count:
         yield (
-            f"{_vertices(sample.count)} at the position of an earlier one but kept apart, so that "
-            f"no path leads from one to the other there; the first is vertex {sample.ids[0]}. "
-            f"merge='exact' joins them."
+            f"{_vertices(sample.count)} at the position of an earlier vertex but not joined to it: "
+            f"no path connects the two there; the first is vertex {sample.ids[0]}. merge='exact' "
+            "joins them."
         )
     sample = report.isolated_vertices
     if sample.count:
         yield (
-            f"{_vertices(sample.count)} of no face and unreachable; the first is vertex "
+            f"{_vertices(sample.count)} in no face and unreachable; the first is vertex "
             f"{sample.ids[0]}."
         )
     sample = report.repeated_vertex_faces
     if sample.count:
         yield (
-            f"{_faces(sample.count)} made of fewer than three different vertices and no part of "
+            f"{_faces(sample.count)} made of fewer than three different vertices and not part of "
             f"the surface; the first is face {sample.ids[0]}."
         )
     sample = report.zero_length_edges
     if sample.count:
         yield (
-            f"{_edges(sample.count)} of no length, both ends one place; the first joins the "
-            f"vertices {sample.ids[0]}. {_faces(report.collapsed_faces.count)} thereby no more "
-            f"than an edge or a point; the first is face {report.collapsed_faces.ids[0]}."
+            f"{_edges(sample.count)} of zero length, with both ends at one point; the first joins "
+            f"the vertices {sample.ids[0]}. {_faces(report.collapsed_faces.count)} therefore "
+            f"reduced to an edge or a point; the first is face {report.collapsed_faces.ids[0]}."
         )
     sample = report.duplicate_faces
     if sample.count:
@@ -241,14 +242,14 @@ def warnings_of(report: MeshReport) -> Iterator[str]:
     if sample.count:
         yield (
             f"{_edges(sample.count)} shared by three faces or more; the first joins the vertices "
-            f"{sample.ids[0]}. Paths may go on into any of the faces."
+            f"{sample.ids[0]}. Paths may continue into any of these faces."
         )
     sample = report.misoriented_edges
     if sample.count:
         yield (
-            f"{_edges(sample.count)} run in the same direction by both faces, whose winding is "
-            f"inconsistent; the first joins the vertices {sample.ids[0]}. Distances do not depend "
-            f"on it."
+            f"{_edges(sample.count)} traversed in the same direction by both adjacent faces, whose "
+            f"orientation is inconsistent; the first joins the vertices {sample.ids[0]}. Distances "
+            "do not depend on the orientation."
         )
     sample = report.bow_tie_vertices
     if sample.count:

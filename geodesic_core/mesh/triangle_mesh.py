@@ -70,13 +70,13 @@ class TriangleMesh:
 
     Notes
     -----
-    The arrays are copied once, and read-only. Vertices and faces keep the caller's order: the
-    topology's own, nearer in memory, shows nowhere. A face that repeats a vertex keeps its number,
-    but is no part of the surface: it joins nothing, and no point lies in it. To block other faces
-    as well, see `with_barriers`. An edge of no length, of a face of three different vertices, makes
-    its ends one point of the surface: their distance is 0. What is left of the face is an edge,
-    whose points are those of its other faces, or a point. Preparing costs O(V + F) time, and memory
-    of about 365 bytes a face.
+    The arrays are copied once, and read-only. Vertices and faces keep the caller's order; the
+    topology has an internal order, which is never visible. A face that repeats a vertex keeps its
+    number, but is not part of the surface: it joins nothing, and no point lies in it. To block
+    other faces as well, see `with_barriers`. An edge of zero length, in a face of three different
+    vertices, makes its ends one point of the surface: the distance between them is 0. Its face
+    shrinks to an edge, whose points belong to the other faces of that edge, or to a point.
+    Preparing costs O(V + F) time, and memory of about 365 bytes a face.
 
     Examples
     --------
@@ -239,12 +239,12 @@ class TriangleMesh:
         return arrays | self.topology._asdict()
 
     def with_barriers(self, barriers: Iterable[int]) -> "TriangleMesh":
-        """Return this mesh with some faces blocked: holes, at whose corners paths may bend.
+        """Return this mesh with some faces blocked, as holes; paths may bend at their corners.
 
-        It answers every question, and all vertices and faces keep their numbers. Paths run along a
-        blocked face where a free one is beside, and past it through a corner that free faces share.
-        No point lies in blocked faces alone. A vertex of these alone is as isolated as one of no
-        face: it reaches itself, and nothing else.
+        All methods and solvers accept it, and all vertices and faces keep their numbers. Paths may
+        run along an edge between a blocked and a free face, and pass through a corner that free
+        faces share. A point cannot lie in blocked faces alone. A vertex whose faces are all blocked
+        is isolated: it reaches only itself.
 
         Parameters
         ----------
@@ -264,8 +264,8 @@ class TriangleMesh:
 
         Notes
         -----
-        O(V + F): the time of `TriangleMesh` without its checks. Nothing is cached here: to ask
-        again among the same barriers, hold on to the mesh.
+        O(V + F): the time of `TriangleMesh` without its checks. The result is not cached: keep it
+        for further calls with the same barriers.
 
         Examples
         --------
@@ -359,8 +359,8 @@ class TriangleMesh:
         Raises
         ------
         InvalidPoint
-            The position is not three numbers of a size that vertices may have, or the surface is
-            farther away.
+            The position is not three finite numbers in the range that vertices may have, or the
+            surface is farther away than ``max_distance``.
         InvalidArgument
             The distance is not a number, 0 or more.
         MissingExtra
@@ -440,18 +440,18 @@ class TriangleMesh:
     def _point_in_face(self, face: int, weights: Sequence[float], name: str) -> SurfacePoint:
         if not of_three_vertices(self.faces[[face]])[0]:
             raise InvalidPoint(
-                f"the {name} is in face {face}, which repeats a vertex and is no part of the "
-                f"surface"
+                f"the {name} is in face {face}, which repeats a vertex and is not part of the "
+                "surface"
             )
         point = canonical.in_face(self.topology, self.faces, self.inner_face, face, weights)
         if point is None and face in self.barriers:
             raise InvalidPoint(
-                f"the {name} lies in face {face}, which is blocked, and in no face that is free"
+                f"the {name} lies in face {face}, which is blocked, and in no free face"
             )
         if point is None:
             raise InvalidPoint(
-                f"the {name} is in face {face}, which has an edge of no length and is no part of "
-                f"the surface: the edge that is left of it belongs to no other face"
+                f"the {name} is in face {face}, which has an edge of zero length and is not part "
+                "of the surface: its other two edges coincide and belong to no other face"
             )
         return point
 
@@ -473,7 +473,8 @@ class TriangleMesh:
         Raises
         ------
         InvalidPoint
-            The two are no vertices, no edge of the surface joins them, or ``t`` is not from 0 to 1.
+            One of the two is not a vertex, no edge of the surface joins them, or ``t`` is not from
+            0 to 1.
 
         Examples
         --------
@@ -662,7 +663,7 @@ def _built(vertices: Floats, faces: Ints, free: Longs) -> tuple[Topology, int, i
     surface = free[of_three_vertices(faces.take(free, axis=0))]  # take: four times as fast as []
     if len(surface) == 0:
         raise InvalidMesh(
-            "each face repeats a vertex or has an edge of no length: there is no surface",
+            "each face repeats a vertex or has an edge of zero length: there is no surface",
             kind="face",
             elements=free[:NAMED].tolist(),
         )

@@ -29,7 +29,8 @@ class CallLock:
         """
         if self._holder == threading.get_ident():
             raise InvalidArgument(
-                "a callback cannot call the solver that calls it; use another Solver of the mesh"
+                "a callback cannot use the Solver that is calling it; use another Solver of the "
+                "mesh"
             )
         while not self._lock.acquire(timeout=SLICE_SECONDS):
             control.checkpoint(0.0)

@@ -56,7 +56,7 @@ def distance_matrix(
     mesh
         The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     sources, targets
-        N and M vertex indices or `SurfacePoint`; of one alone no list is needed.
+        N and M vertex indices or `SurfacePoint`; a single one needs no list.
     max_distance
         Limit of the sweeps, mesh units; None for no limit. Points beyond it count as unreachable.
     layout
@@ -83,11 +83,11 @@ def distance_matrix(
 
     Notes
     -----
-    A sweep from each point of the smaller side, no farther than its farthest target; where both
-    sides are the same points, half of that, and the matrix is symmetric to the bit. Pairs are swept
-    from points that are in many of them, and searched for as `shortest_path` does else, in one
-    thread. Each thread needs a third of the mesh's own arrays, the searches two thirds. Results do
-    not depend on the number of threads.
+    One sweep starts from each point of the smaller side and ends at its farthest target. If both
+    sides are the same points, half of the work suffices, and the matrix is symmetric to the bit.
+    For pairs, a sweep starts from each point that is in many pairs; the other pairs are searched
+    for as in `shortest_path`, in one thread. The memory of each thread is a third of the mesh's own
+    arrays; that of the searches is two thirds. Results do not depend on the number of threads.
 
     Examples
     --------
@@ -152,8 +152,8 @@ def _find_pairs(
     """Return the distances of pairs: from points that are in many by sweeps, else by searches."""
     if len(sources) != len(targets):
         raise InvalidArgument(
-            f"there are {len(sources)} sources and {len(targets)} targets; pairs need as many of "
-            f"both"
+            f"there are {len(sources)} sources and {len(targets)} targets; pairs need the same "
+            "number of both"
         )
     table = _Pairs(mesh, sources, targets, control)
     few, parts = len(table.searched), len(table.searched) + len(table.groups)

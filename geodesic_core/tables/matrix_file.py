@@ -79,9 +79,9 @@ def write_matrix(
 ) -> MatrixFile:
     """Write the distances from each source to each target to a file, however many there are.
 
-    A call that was interrupted goes on where it stopped: rows that are finished lie in blocks, in a
-    hidden folder beside the file, until the file is whole. The file is the same to the bit however
-    often that happened, and however many threads there are.
+    If a call was interrupted, the same call continues where it stopped: finished rows are kept in
+    blocks, in a hidden folder beside the file, until the file is complete. Interruptions and the
+    number of threads do not change a bit of the file.
 
     Parameters
     ----------
@@ -92,19 +92,19 @@ def write_matrix(
         chunks of rows; ``.npz``: a sparse one for `scipy.sparse.load_npz`, of the finite distances;
         ``.parquet``: these as a table of source, target and distance.
     sources, targets
-        N and M vertex indices or `SurfacePoint`, or ``"all"`` vertices. Without targets they are
-        the sources, and each pair is asked once.
+        N and M vertex indices or `SurfacePoint`, or ``"all"`` vertices. Without targets, the
+        targets are the sources, and each pair is computed once.
     method
         ``"exact"``, ``"approximate"`` within a ``relative_error``, or ``"fast"`` with an
         ``effort``; see the solvers of these names.
     relative_error, effort
-        Of the method that has it.
+        For the method that takes it.
     max_distance
         Limit of the sweeps, mesh units; None for no limit. Points beyond it count as unreachable.
     barriers
         Ids of faces that paths may not cross, see `TriangleMesh.with_barriers`.
     dtype
-        Of the distances in the file.
+        Type of the distances in the file.
     threads
         Largest number of threads; None for one per core that the process may use.
     progress, cancel, deadline_s, memory_limit
@@ -113,7 +113,7 @@ def write_matrix(
     Returns
     -------
     MatrixFile
-        The file, its shape and its error. The same, with what was asked, lies in ``out`` +
+        The file, its shape and its error. The same facts and the arguments are in ``out`` +
         ``".json"``.
 
     Raises
@@ -126,12 +126,12 @@ def write_matrix(
     MissingExtra
         The format needs a package that is not installed.
     OSError
-        The file cannot be written; what was finished stays.
+        The file cannot be written; finished rows are kept.
 
     Notes
     -----
-    Memory is a block of rows and the state of a sweep for each thread, whatever N and M. On disk
-    it takes twice the file's size until it is whole.
+    Memory is a block of rows and the state of a sweep for each thread, whatever N and M. On disk it
+    takes twice the file's size until the file is complete.
 
     Examples
     --------

@@ -48,7 +48,7 @@ def test_every_setting_is_an_environment_variable(monkeypatch: pytest.MonkeyPatc
 def test_an_engine_of_several_machines_needs_an_address(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GEODESIC_ENGINE", "ray")
 
-    with pytest.raises(ValidationError, match="GEODESIC_ADDRESS names no head"):
+    with pytest.raises(ValidationError, match="set GEODESIC_ADDRESS to the address of the head"):
         Settings()
 
 
@@ -88,7 +88,7 @@ def test_a_store_that_is_no_folder_here_stops_the_start(
 ) -> None:
     monkeypatch.setenv("GEODESIC_STORE", url)
 
-    with pytest.raises(ValidationError, match="names no folder of this machine"):
+    with pytest.raises(ValidationError, match="is not a folder of this machine"):
         Settings()
 
 
@@ -175,7 +175,9 @@ def test_memory_is_that_of_the_machine_at_most() -> None:
 def test_unknown_variable_stops_the_start(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.setenv(f"GEODESIC_{name}", "2")
 
-    with pytest.raises(ValidationError, match=rf"unknown setting GEODESIC_{name}; there are"):
+    with pytest.raises(
+        ValidationError, match=rf"unknown setting GEODESIC_{name}; the settings are"
+    ):
         Settings()
 
 
@@ -241,15 +243,15 @@ def test_senseless_value_stops_the_start(
         ),
         (
             {"max_query_bytes": "2000", "max_upload_bytes": "1000"},
-            "GEODESIC_MAX_QUERY_BYTES is 2000, which is more than GEODESIC_MAX_UPLOAD_BYTES, 1000",
+            "GEODESIC_MAX_QUERY_BYTES is 2000; it must be at most GEODESIC_MAX_UPLOAD_BYTES, 1000",
         ),
         (
             {"query_memory_bytes": "2000000000", "worker_memory_bytes": "1000000000"},
-            "GEODESIC_QUERY_MEMORY_BYTES is 2000000000, which is more than GEODESIC_WORKER_MEMORY",
+            "GEODESIC_QUERY_MEMORY_BYTES is 2000000000; it must be at most GEODESIC_WORKER_MEMORY",
         ),
         (
             {"max_caller_connections": "11", "max_connections": "10"},
-            "GEODESIC_MAX_CALLER_CONNECTIONS is 11, which is more than GEODESIC_MAX_CONNECTIONS",
+            "GEODESIC_MAX_CALLER_CONNECTIONS is 11; it must be at most GEODESIC_MAX_CONNECTIONS",
         ),
     ],
 )

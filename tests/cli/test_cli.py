@@ -605,19 +605,19 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
                 ("--via", "--source 1 --target 2"),
             )
             for text, message in (
-                ("-1", "vertex -1 is not one of 0 to 120"),
-                ("v121", "vertex 121 is not one of 0 to 120"),
+                ("-1", "vertex -1 does not exist; the indices are 0 to 120"),
+                ("v121", "vertex 121 does not exist; the indices are 0 to 120"),
                 ("e0-120:0.5", "no edge joins the vertices 0 and 120"),
-                ("e0-121:0.5", "vertex 121 is not one of 0 to 120"),
+                ("e0-121:0.5", "vertex 121 does not exist; the indices are 0 to 120"),
                 ("e0-1:1.5", "t is 1.5"),
-                ("f200:1,0,0", "face 200 is not one of 0 to 199"),
+                ("f200:1,0,0", "face 200 does not exist; the indices are 0 to 199"),
                 ("f0:1,1,0", "the point has the weights (1.0, 1.0, 0.0) in face 0"),
                 ("p0,0,1e99", "the position is"),
             )
         ),
         (
             "paths plane.ply --source 0 --target 1 --target 121 --out p.obj",
-            "--target 121: vertex 121 is not one of",
+            "--target 121: vertex 121 does not exist; the indices are",
         ),
         (
             "paths plane.ply --source 0 --target 1 --max-distance -1 --out p.json",
@@ -625,7 +625,7 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
         ),
         (
             "matrix plane.ply --source 0 --target v-1 --out m.npy",
-            "--target v-1: vertex -1 is not one of",
+            "--target v-1: vertex -1 does not exist; the indices are",
         ),
         (
             "matrix plane.ply --source e0-120:0.5 --target 1 --out m.npy",
@@ -637,7 +637,7 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
         ),
         (
             "nearest plane.ply --source 0 --candidate f200:1,0,0",
-            "--candidate f200:1,0,0: face 200 is not one of",
+            "--candidate f200:1,0,0: face 200 does not exist; the indices are",
         ),
         ("nearest plane.ply --source 0 --candidate 1 --max-distance -1", "--max-distance is -1.0"),
         (
@@ -650,7 +650,7 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
         ),
         (
             "paths plane.ply --source 0/999 --target 1 --out p.obj",
-            "--source 999: vertex 999 is not one of",
+            "--source 999: vertex 999 does not exist; the indices are",
         ),
         ("locate plane.ply --at 0,0,-1e99", "--at 0,0,-1e99: the position is"),
         ("locate nowhere.ply --at 0,0,0", "cannot read nowhere.ply"),
@@ -759,7 +759,7 @@ def test_what_fails_says_why_in_one_line(
         ("matrix plane.ply --source 0 --target 1 --out m.npy --layout rows", "rows"),
         (
             "matrix plane.ply --source 0 --target 1 --target 2 --out m.npy --layout pairs",
-            "there are 1 sources and 2 targets; pairs need as many",
+            "there are 1 sources and 2 targets; pairs need the same number of both",
         ),
         ("isolines plane.ply --source 0 --out l.obj", "give --count, or --level"),
         ("isolines plane.ply --source 0 --out l.obj --count 2 --level 1", "not both"),

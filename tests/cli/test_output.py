@@ -90,7 +90,9 @@ def test_what_fails_prints_nothing_on_standard_output(run: Run, plane: Path) -> 
     for way in (["--json"], ["--out", "-"], []):
         ran = run("path", plane, "--source", 0, "--target", 999, *way)
         assert ran.code == 1
-        assert "--target 999: vertex 999 is not one of 0 to 120" in error_line(ran)
+        assert "--target 999: vertex 999 does not exist; the indices are 0 to 120" in error_line(
+            ran
+        )
 
 
 def test_info_as_json(run: Run) -> None:

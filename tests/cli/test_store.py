@@ -155,7 +155,7 @@ def test_check_names_what_is_damaged(run: Run, left: Left) -> None:
     for part in (
         f"mesh {left.ids[0]} is damaged: its array faces is not what was written",
         f"mesh {left.ids[0]} is damaged: its array component is not what was written",
-        f"mesh {left.ids[1]} is damaged: its manifest is not what was written",
+        f"mesh {left.ids[1]} is damaged: its manifest has changed since it was written",
         f"result {left.ids[0]}/{left.results(0)[1].stem} is damaged",
         f"result {left.ids[0]}/{left.results(0)[2].stem} is damaged",
         f"field {left.ids[0]}/2 is damaged",
@@ -285,7 +285,7 @@ def test_what_is_no_store_is_refused(run: Run, tmp_path: Path, command: str) -> 
     (tmp_path / "photos" / "VERSION").write_text("8\n")
     ran = run("store", command, tmp_path / "photos")
     assert ran.code == 1
-    assert "has layout 8, and this release reads 7" in error_line(ran)
+    assert "has layout 8, but this release reads 7" in error_line(ran)
 
 
 @pytest.mark.parametrize("command", ["ls", "check", "prune"])
@@ -293,7 +293,7 @@ def test_an_older_store_is_for_the_service_to_convert(run: Run, left: Left, comm
     (left.root / "VERSION").write_text("5\n")
     ran = run("store", command, left.root)
     assert ran.code == 1
-    assert "has layout 5, and this release reads 7: start the service on it" in error_line(ran)
+    assert "has layout 5, but this release reads 7: start the service on it" in error_line(ran)
 
 
 def test_serve_refuses_a_store_that_it_cannot_have(
@@ -322,4 +322,4 @@ def test_a_store_by_its_url(run: Run, tmp_path: Path) -> None:
     assert run("store", "ls", f"file://{tmp_path}/store").figure("meshes") == "0, 0 bytes"
     refused = run("store", "ls", "s3://bucket/store")
     assert refused.code == 2
-    assert "names no folder of this machine" in " ".join(refused.err.split())
+    assert "is not a folder of this machine" in " ".join(refused.err.split())

@@ -69,7 +69,7 @@ def test_a_label_of_a_brain_is_a_barrier(run: Run, sphere: Path) -> None:
     written(label, "#!ascii label", "1", f"{len(mesh.vertices)} 0 0 0 0")
     ran = run(*path, "--out", "q.json")
     assert ran.code == 1
-    assert f"{label} is no label of this surface" in error_line(ran)
+    assert f"{label} is not a label of this surface" in error_line(ran)
     ran = run("matrix", sphere, "--points", some, "--barriers", "@a.gii=wall", "--out", "n.npy")
     assert "cannot read a.gii" in error_line(ran)
 
@@ -100,7 +100,7 @@ def test_all_vertices_by_each_method(run: Run, sphere: Path) -> None:
         ("--points a --layout sparse --out m.npz", "do not go with --points"),
         ("--points a --out m.csv", "m.csv must end in .npy, .zarr, .npz or .parquet"),
         ("--points a --effort 2 --out m.npy", "--effort goes with --method fast only"),
-        ("--source 0 --target 1 --method fast --out m.npy", "go with points from files"),
+        ("--source 0 --target 1 --method fast --out m.npy", "apply only to points from files"),
         ("--source 0 --target 1 --out m.zarr", ".zarr does not go with --layout dense"),
         ("--points a --barriers @missing --out m.npy", "cannot read missing"),
         ("--points a --dtype int8 --out m.npy", "int8"),

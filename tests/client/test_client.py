@@ -156,11 +156,11 @@ def test_a_mesh_is_stored_read_listed_and_removed(service: Client, tmp_path: Pat
 @pytest.mark.parametrize(
     ("mesh", "message"),
     [
-        (b"OFF", "say the format"),
+        (b"OFF", "give the format"),
         (([[0, 0]], [[0, 0, 0]]), "vertices have the shape"),
         (([[0, 0, 0]], [[0, 0]]), "faces have the shape"),
-        (([[0, 0, 0]], [[0.0, 0, 0]]), "integers are needed"),
-        (([[0, 0, 0]], [[0, 0, 1]]), "outside of 0 to 0"),
+        (([[0, 0, 0]], [[0.0, 0, 0]]), "they must be integers"),
+        (([[0, 0, 0]], [[0, 0, 1]]), "outside 0 to 0"),
     ],
 )
 def test_meshes_that_are_none(service: Client, mesh: object, message: str) -> None:
@@ -169,7 +169,9 @@ def test_meshes_that_are_none(service: Client, mesh: object, message: str) -> No
 
 
 def test_a_refusal_names_the_element(service: Client, apart: Mesh) -> None:
-    with pytest.raises(ProblemError, match="vertex 9 is not one of 0 to 5") as caught:
+    with pytest.raises(
+        ProblemError, match="vertex 9 does not exist; the indices are 0 to 5"
+    ) as caught:
         service.distances(apart, [0, 9])
     error = caught.value
     assert (error.status, error.code) == (422, "invalid_point")

@@ -85,7 +85,7 @@ def test_without_a_file_a_plotter_shows_what_was_drawn(monkeypatch: pytest.Monke
     [
         ("picture.gif", "must end in .png, .jpg, .jpeg, .tif, .tiff or .bmp"),
         ("no/picture.png", "its folder does not exist"),
-        (7, "it must be a text or a Path"),
+        (7, "it must be a string or a Path"),
     ],
 )
 def test_a_place_where_no_picture_can_be_written_is_refused(screenshot: Any, message: str) -> None:

@@ -444,7 +444,7 @@ def test_exact_and_approximate_side_by_side(view: View, knot: str) -> None:
     view.page.click("#shades >> text=Difference")
     view.wait()
 
-    assert "promised: 0.2" in view.text("#legend-title")
+    assert "guaranteed: 0.2" in view.text("#legend-title")
     assert view.text("#tick-2") == view.text("#measured-approximate").split()[0]
 
 
@@ -555,7 +555,7 @@ def test_a_picture_is_refused_in_a_sentence(view: View) -> None:
     view.page.set_input_files("#file", picture)
     view.wait("error")
     assert view.text("#error-title") == "Not a mesh"
-    assert view.text("#error-detail") == "cat.png is a picture."
+    assert view.text("#error-detail") == "cat.png is an image."
 
 
 def test_the_search_step_by_step(view: View, knot: str) -> None:
@@ -570,7 +570,7 @@ def test_the_search_step_by_step(view: View, knot: str) -> None:
     view.wait()
 
     assert words[0].startswith("1 of ")
-    assert "Along edges" in words[0]
+    assert "along edges" in words[0]
     assert "window" in words[2]
     assert (np.abs(view.pixels() - orange).max(axis=2) > 40).sum() > 500
     view.page.click("#explain-stop")

@@ -307,8 +307,8 @@ def test_work_of_a_killed_replica_ends(spread: Place, cluster: ProcessCluster) -
     [
         ({"GEODESIC_CLUSTER_TOKEN": "another-token-of-tests"}, "has another token"),
         ({"GEODESIC_ADDRESS": f"{HOST}:1"}, f"no head answers at {HOST}:1"),
-        ({"GEODESIC_ADDRESS": "nonsense"}, "'nonsense' is no address of a head"),
-        ({"GEODESIC_ADDRESS": "127.0.0.1:6379"}, "Ray takes 127.0.0.1 for any address"),
+        ({"GEODESIC_ADDRESS": "nonsense"}, "'nonsense' is not the address of a head"),
+        ({"GEODESIC_ADDRESS": "127.0.0.1:6379"}, "Ray takes 127.0.0.1 to mean any address"),
         ({"GEODESIC_STORE": "/nowhere"}, "there is no store at /nowhere"),
     ],
 )

@@ -93,7 +93,7 @@ def test_a_damaged_manifest_is_not_served_and_an_upload_heals_it(client: Any, fa
     paths = [f"/v1/meshes/{mesh_id}", f"/v1/meshes/{mesh_id}/arrays/faces"]
     for response in (*map(client.get, paths), distances(client, mesh_id)):
         problem = check_problem(response, 500, "mesh_damaged")
-        assert "its manifest is not what was written" in problem["detail"]
+        assert "its manifest has changed since it was written" in problem["detail"]
     assert upload(client) == mesh_id
 
     healed = client.get(f"/v1/meshes/{mesh_id}").json()
@@ -175,7 +175,7 @@ def test_the_scrub_finds_what_is_damaged(tmp_path: Path, lines: Sequence[Any]) -
 
         assert bodies[1].exists()
         name = f"{whole}/{bodies[0].stem}"
-        assert f"result {name} is damaged: it is not what was written" in details(lines)
+        assert f"result {name} is damaged: it has changed since it was written" in details(lines)
         # Of what, depends on the file that the scrub was at when the bytes were flipped.
         assert any(detail.startswith(f"mesh {damaged} is damaged: ") for detail in details(lines))
         assert not any(detail.startswith(f"mesh {whole}") for detail in details(lines))

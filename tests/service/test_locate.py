@@ -141,7 +141,7 @@ def test_it_does_not_come_as_an_array(client: TestClient, apart: str) -> None:
     ):
         problem = check_problem(response, 406, "not_acceptable")
         assert problem["detail"] == (
-            "this answer comes as application/json, text/csv, application/geo+json"
+            "this answer is available as application/json, text/csv, application/geo+json"
         )
     for headers in ({"Accept": "*/*"}, {"Accept": "application/x-npy, application/json;q=0.1"}):
         assert locate(client, apart, headers, **body).status_code == 200

@@ -383,14 +383,14 @@ BAD_POINTS = [
     ({"position": {"x": 1}}, "invalid_request", "/position", "tuple"),
     ({"position": [1, 2, 3], "max_distance": -1}, "invalid_request", "/max_distance", "0"),
     # What cannot be on a mesh of this size
-    ({"vertex": -1}, "invalid_point", "/vertex", "vertex -1 is not one of 0 to 5"),
-    ({"edge": [0, 6], "t": 0.5}, "invalid_point", "/edge/1", "vertex 6 is not one of 0 to 5"),
+    ({"vertex": -1}, "invalid_point", "/vertex", "vertex -1 does not exist"),
+    ({"edge": [0, 6], "t": 0.5}, "invalid_point", "/edge/1", "indices are 0 to 5"),
     ({"edge": [-1, 0], "t": 0.5}, "invalid_point", "/edge/0", "vertex -1"),
     ({"edge": [0, 1], "t": 1.5}, "invalid_point", "/t", "t is 1.5"),
     ({"edge": [0, 1], "t": -1e-8}, "invalid_point", "/t", "t is -1e-08"),
-    ({"face": 2, "barycentric": [1, 0, 0]}, "invalid_point", "/face", "face 2 is not one of"),
+    ({"face": 2, "barycentric": [1, 0, 0]}, "invalid_point", "/face", "face 2 does not exist"),
     ({"face": -1, "barycentric": [1, 0, 0]}, "invalid_point", "/face", "face -1"),
-    ({"face": 10**30, "barycentric": [1, 0, 0]}, "invalid_point", "/face", "not one of"),
+    ({"face": 10**30, "barycentric": [1, 0, 0]}, "invalid_point", "/face", "does not exist"),
     # What this mesh does not have
     ({"edge": [0, 3], "t": 0.5}, "invalid_point", "/edge", "no edge joins the vertices 0 and 3"),
     ({"edge": [1, 1], "t": 0.5}, "invalid_point", "/edge", "no edge joins"),

@@ -29,7 +29,7 @@ def test_a_head_on_another_machine_knows_the_hosts(
     cluster: ProcessCluster, redis_server: Redis
 ) -> None:
     place = f"{redis_server.host}:{redis_server.port}"
-    listening = f"the head listens at {HOST}:{cluster.port}; its records outlive it in the Redis"
+    listening = f"the head listens at {HOST}:{cluster.port}; its records stay in the Redis"
     assert f"{listening} at {place}\n" in cluster.head.said
     node = cluster.add_node()
     wait_until(lambda: hosts(cluster) == 1 and len(node.workers()) == 2)
@@ -50,7 +50,7 @@ def test_a_head_whose_redis_dies_ends(cluster: ProcessCluster, redis_server: Red
     redis_server.close()
 
     assert cluster.head.process.wait() == 1
-    assert "error: Ray has ended on this machine" in cluster.head.said
+    assert "error: Ray has stopped on this machine" in cluster.head.said
 
 
 def test_a_head_that_has_no_redis_says_so(tmp_path: Path) -> None:

@@ -79,16 +79,16 @@ def _name(host: str) -> str:
 
 
 def _host_not_allowed(name: str) -> ProblemError:
-    detail = f"the service does not answer under the name {name[:100]!r}"
-    hint = f"an operator can allow it by {variable_of('allowed_hosts')}"
+    detail = f"the service does not accept requests for the host name {name[:100]!r}"
+    hint = f"an operator can allow it with {variable_of('allowed_hosts')}"
     return problem("host_not_allowed", detail, hint=hint, setting=variable_of("allowed_hosts"))
 
 
 def _origin_not_allowed(origin: str) -> ProblemError:
-    detail = f"a page of {origin[:100]!r} may not change anything here"
+    detail = f"a page from {origin[:100]!r} may not make changes here"
     setting = variable_of("cors_origins")
     hint = (
-        f"an operator can allow it by {setting}; a proxy must pass on `Host` as it came, or "
-        f"{variable_of('allowed_hosts')} must have its name"
+        f"an operator can allow it with {setting}; a proxy must pass on `Host` unchanged, or its "
+        f"name must be in {variable_of('allowed_hosts')}"
     )
     return problem("origin_not_allowed", detail, hint=hint, setting=setting)

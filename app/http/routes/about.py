@@ -47,18 +47,18 @@ _LIMITS = (
 @router.get(
     "/",
     operation_id="getIndex",
-    summary="Links to begin with",
+    summary="Links to the parts of the service",
     response_model=Index,
     responses={
         200: {
             "content": {"text/html": {}},
-            "description": "Addresses; for browsers the page",
+            "description": "The links; for browsers, the page",
             "headers": documented("Vary"),
         }
     },
 )
 async def get_index(request: Request, response: Response) -> Response | Index:
-    """Return links to begin with; to a browser, the page."""
+    """Return links to the parts of the service; to a browser, the page."""
     if page.is_built() and page.wants_page(request.headers):
         return page.page_response(request.scope)
     response.headers["Vary"] = "Accept"
@@ -68,7 +68,7 @@ async def get_index(request: Request, response: Response) -> Response | Index:
         "openapi": "/openapi.json",
         "docs": "/docs",
     }
-    shown = "for browsers" if page.is_built() else "left out when this package was built"
+    shown = "for browsers" if page.is_built() else "not part of this package"
     return Index(service="geodesic", version=__version__, page=shown, links=links)
 
 
@@ -76,7 +76,7 @@ async def get_index(request: Request, response: Response) -> Response | Index:
 async def get_reference(request: Request) -> Response:
     """Return the page that shows the interface document."""
     if not page.is_built():
-        detail = "the reference was left out when this package was built; /openapi.json has it all"
+        detail = "this package has no reference page; /openapi.json has the same document"
         raise problem("not_found", detail)
     return page.page_response(request.scope, "docs.html")
 
@@ -161,6 +161,6 @@ async def get_metrics(request: Request) -> Response:
 async def get_problem(code: str, response: Response) -> ProblemCode:
     """Return the row of the error table; the `type` of a problem leads here."""
     if code not in CODES:
-        raise problem("not_found", f"there is no code {code!r}; there are {', '.join(CODES)}")
+        raise problem("not_found", f"there is no code {code!r}; the codes are {', '.join(CODES)}")
     response.headers["Cache-Control"] = "public, max-age=86400"
     return ProblemCode(code=code, **vars(CODES[code]))

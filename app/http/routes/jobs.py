@@ -142,7 +142,7 @@ async def get_job_results(
     summary="Watch a job",
     response_class=EventSourceResponse,
     responses={
-        200: {"description": "Events, the data of each of which is a `JobDocument`"},
+        200: {"description": "Events; the data of each event is a `JobDocument`"},
         **problems("job_not_found", "invalid_request", "state_unavailable"),
     },
 )
@@ -172,6 +172,6 @@ def _number(cursor: str | None) -> int | None:
     if not cursor:
         return None
     if not _NUMBER.fullmatch(cursor):
-        detail = f"{cursor[:20]!r} is no next_cursor of a list of jobs"
+        detail = f"{cursor[:20]!r} is not a next_cursor of a list of jobs"
         raise problem("invalid_request", detail)
     return int(cursor)

@@ -112,7 +112,7 @@ async def create_mesh(
     """Read, check and store a mesh; the id is a hash of its content.
 
     The body is the file itself (with its format in `Content-Type` or `?format=`), a form with one
-    file, or JSON. It may be compressed (`Content-Encoding: gzip`), but for a form. Vertices and
+    file, or JSON. Except in a form, it may be compressed (`Content-Encoding: gzip`). Vertices and
     triangles keep the order they have in the file; polygons become triangles in their place, and
     `face_map` leads back to them.
     """

@@ -115,7 +115,8 @@ Parameters = Annotated[AnswerParameters, Query()]
         "Distances from sources to all vertices, exact or within a chosen error",
         _answers(
             DistancesAnswer,
-            "The distances; as PLY the mesh with them at its vertices, for all vertices only",
+            "The distances; as PLY, the mesh with the distances at its vertices, for all vertices "
+            "only",
             NPY,
             OCTETS,
             CSV,
@@ -158,7 +159,7 @@ async def compute_path(
     responses={
         **_answers(PathAnswer, _PATH, NPY, OCTETS, *_LINES),
         304: {
-            "description": "The answer is the one that is known",
+            "description": "The answer has not changed",
             "headers": documented("ETag", "Cache-Control", "Vary"),
         },
         **problems(*_CODES),
@@ -213,7 +214,7 @@ async def compute_isolines(
 async def compute_borders(
     body: BordersRequest, parameters: Parameters, query_request: QueryRequestDep
 ) -> Response:
-    """Return the polylines of points that are equally near to two sources, and to no other nearer.
+    """Return polylines of points that are equally near to two sources, and no nearer to a third.
 
     They are exact where they cross edges and where they meet.
     """
@@ -227,7 +228,8 @@ async def compute_borders(
         "Exact distances from many points to many others",
         _answers(
             MatrixAnswer,
-            "The distances; a sparse matrix in binary as `scipy.sparse.load_npz` reads it",
+            "The distances; in binary, a sparse matrix has the format that `scipy.sparse.load_npz` "
+            "reads",
             NPY,
             NPZ,
             OCTETS,
@@ -257,7 +259,7 @@ async def compute_matrix(
 async def find_nearest(
     body: NearestRequest, parameters: Parameters, query_request: QueryRequestDep
 ) -> Response:
-    """Return the `k` nearest candidates, or as many as can be reached."""
+    """Return the `k` nearest candidates, or fewer if fewer can be reached."""
     return await query_request.answer(NearestQuery, body, parameters)
 
 
@@ -274,6 +276,6 @@ async def locate_points(
 ) -> Response:
     """Return the nearest point for each position, `null` where it is farther than `max_distance`.
 
-    A point that is nearer to a vertex or an edge than 1e-12 of the bounding box is on it.
+    A point counts as on a vertex or an edge if it is within 1e-12 of the bounding box from it.
     """
     return await query_request.answer(LocateQuery, body, parameters)

@@ -156,7 +156,7 @@ class QueryHeaders(TimeoutHeader):
         default=None,
         description=(
             "`respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only "
-            "if the answer is not there after two seconds"
+            "if the answer is not ready after two seconds"
         ),
     )
     idempotency_key: str | None = Field(
@@ -164,7 +164,8 @@ class QueryHeaders(TimeoutHeader):
         alias="idempotency-key",
         min_length=1,
         max_length=255,
-        description="Freely chosen name of a job: a request sent again with it gets the same job",
+        description="Freely chosen key of a job: a request that is sent again with the same key "
+        "gets the same job",
     )
 
 

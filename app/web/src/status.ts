@@ -79,9 +79,9 @@ export class Status {
     const problem = error instanceof ProblemError ? error.problem : null;
     const isOffline = error instanceof TypeError && /fetch/i.test(error.message);
     byId("error-title").textContent =
-      problem?.title ?? (isOffline ? "The service does not answer" : "This did not work");
+      problem?.title ?? (isOffline ? "The service does not answer" : "Something went wrong");
     byId("error-detail").textContent = isOffline
-      ? "It may have been stopped, or the network be down."
+      ? "It may have stopped, or the network may be down."
       : error instanceof Error
         ? error.message
         : String(error);

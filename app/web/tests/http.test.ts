@@ -103,7 +103,7 @@ describe("errors", () => {
 
     expect(error).toBeInstanceOf(ProblemError);
     expect((error as ProblemError).problem).toEqual({
-      detail: "The service answered 502 without saying why.",
+      detail: "The service answered with status 502 and gave no reason.",
       code: "unknown",
       status: 502,
       request_id: "r2",

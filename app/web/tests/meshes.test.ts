@@ -6,8 +6,8 @@ test.each(["a.obj", "b.OFF", "c.d.ply", "e.stl", "f.glb", "g.json"])("%s may be 
 });
 
 test.each([
-  ["cat.png", "image/png", "cat.png is a picture."],
-  ["notes.txt", "text/plain", "notes.txt is a text."],
+  ["cat.png", "image/png", "cat.png is an image."],
+  ["notes.txt", "text/plain", "notes.txt is a text file."],
   ["archive.zip", "application/zip", "archive.zip is not a mesh that can be read here."],
   ["obj", "", null],
 ])("%s is refused in a sentence", (name, type, detail) => {

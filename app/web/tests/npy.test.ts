@@ -87,7 +87,7 @@ describe("bad input", () => {
     ["objects", npyOf(three, "|O", [3])],
     ["Fortran's order", npyOf(three, "<f8", [3], { order: "True" })],
   ])("%s cannot be read, and the header is named", (_, buffer) => {
-    expect(() => parseNpy(buffer)).toThrow(/cannot read: \{'descr'/);
+    expect(() => parseNpy(buffer)).toThrow(/cannot be read: \{'descr'/);
   });
 
   test("text cannot be read", () => {

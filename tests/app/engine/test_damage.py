@@ -91,7 +91,7 @@ def test_damage_of_a_manifest_is_noticed_and_healed_by_writing_the_mesh_again(
 
     fault(file_of(tmp_path, mesh_id, "manifest.json"))
     (damage,) = store.inspect(mesh_id)
-    assert "its manifest is not what was written" in str(damage)
+    assert "its manifest has changed since it was written" in str(damage)
     assert code_of(new_worker(tmp_path), distances_query(mesh_id)) == "mesh_damaged"
     store_mesh(tmp_path, plane())
 

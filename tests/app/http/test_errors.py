@@ -105,7 +105,7 @@ def test_invalid_mesh_names_its_elements() -> None:
     edge = problem_of(core.InvalidMesh("bad", kind="edge", elements=[(3, 5)]))
 
     assert [fault.pointer for fault in faces.errors] == ["/faces/3", "/faces/5"]
-    assert [fault.message for fault in edge.errors] == ["edge 3-5 is at fault"]
+    assert [fault.message for fault in edge.errors] == ["edge 3-5 is faulty"]
 
 
 @pytest.mark.parametrize(

@@ -69,7 +69,7 @@ def test_without_a_page_everyone_gets_the_index(
 
     index = client.get("/", headers=BROWSER).json()
 
-    assert index["page"] == "left out when this package was built"
+    assert index["page"] == "not part of this package"
 
 
 def test_what_is_no_asset_is_a_problem(client: TestClient) -> None:

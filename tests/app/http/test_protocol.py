@@ -372,7 +372,7 @@ def test_the_log_says_once_that_connections_are_refused(
         assert read_answer(first).text == "answer"
         assert [listener.send(WHOLE).status_code for _ in range(3)] == [503] * 3
     (line,) = [line for line in lines if line["event"] == "connections refused"]
-    assert "where at most 1 are allowed" in line["reason"]
+    assert "at most 1 are allowed" in line["reason"]
     assert line["caller"] == "127.0.0.1"
 
 

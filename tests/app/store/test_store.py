@@ -112,7 +112,7 @@ def test_a_new_store_has_the_number_of_its_layout(tmp_path: Path) -> None:
 def test_another_layout_is_refused(tmp_path: Path, written: str) -> None:
     (tmp_path / "VERSION").write_text(written)
 
-    with pytest.raises(StoreError, match=rf"has layout '?{written}'?, and this release reads 7:"):
+    with pytest.raises(StoreError, match=rf"has layout '?{written}'?, but this release reads 7:"):
         owned(tmp_path).__enter__()
     assert (tmp_path / "VERSION").read_text() == written
 

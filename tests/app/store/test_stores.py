@@ -128,12 +128,12 @@ def test_a_mesh_under_the_name_of_another_is_noticed(meshes: MeshStore, tmp_path
     first, second = (tmp_path / "meshes" / mesh_id for mesh_id in ids)
     for path in second.iterdir():
         shutil.copy(path, first)
-    assert "its manifest is that of another mesh" in damage_of(meshes, ids[0])[0]
+    assert "its manifest belongs to another mesh" in damage_of(meshes, ids[0])[0]
     renamed = {**read_manifest(str(first / "manifest.json")), "id": ids[0]}
     (first / "manifest.json").write_bytes(encode_manifest(renamed))
 
     (found,) = damage_of(meshes, ids[0])
-    assert "its name is not that of its content" in found
+    assert "its id does not match its content" in found
 
 
 @pytest.mark.parametrize("mesh_id", ["", "..", "0" * 32, "../meshes", "G" * 32])

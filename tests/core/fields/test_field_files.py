@@ -116,13 +116,13 @@ def test_what_is_no_field_is_refused(file: Path, tmp_path: Path) -> None:
     np.savez(tmp_path / "object.npz", mesh=np.array([None], object))
     cases = {
         "nowhere.npz": (None, "cannot read .*nowhere.npz: No such file"),
-        "short.npz": (whole[: len(whole) // 2], "is damaged, or no field"),
-        "damaged.npz": (bytes(damaged), "is damaged, or no field"),
-        "empty.npz": (b"", "is damaged, or no field"),
-        "text.npz": (b"distances", "is damaged, or no field"),
-        "other.npz": (None, "is no field that DistanceField.save wrote"),
-        "array.npy": (None, "is damaged, or no field"),
-        "object.npz": (None, "is damaged, or no field"),
+        "short.npz": (whole[: len(whole) // 2], "is damaged, or was not written"),
+        "damaged.npz": (bytes(damaged), "is damaged, or was not written"),
+        "empty.npz": (b"", "is damaged, or was not written"),
+        "text.npz": (b"distances", "is damaged, or was not written"),
+        "other.npz": (None, "was not written by DistanceField.save"),
+        "array.npy": (None, "is damaged, or was not written"),
+        "object.npz": (None, "is damaged, or was not written"),
     }
     for name, (content, message) in cases.items():
         if content is not None:
@@ -131,7 +131,7 @@ def test_what_is_no_field_is_refused(file: Path, tmp_path: Path) -> None:
             gc.load_field(tmp_path / name, MESH)
     with pytest.raises(InvalidArgument, match="cannot read"):
         gc.load_field(tmp_path, MESH)
-    with pytest.raises(InvalidMesh, match="cannot be made of this NoneType"):
+    with pytest.raises(InvalidMesh, match="cannot be made from this NoneType"):
         gc.load_field(file, None)  # type: ignore[arg-type]
 
 
@@ -141,7 +141,7 @@ def test_what_is_no_field_is_refused(file: Path, tmp_path: Path) -> None:
         ("field.npy", "path is 'field.npy'; it must end in .npz"),
         ("field", "must end in .npz"),
         ("no/folder/field.npz", "cannot write no/folder/field.npz: its folder does not exist"),
-        (3, "path is 3; it must be a text or a Path"),
+        (3, "path is 3; it must be a string or a Path"),
     ],
 )
 @pytest.mark.jit

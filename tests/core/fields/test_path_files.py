@@ -67,7 +67,7 @@ def test_a_reader_of_another_library_reads_the_polyline(tmp_path: Path) -> None:
         ("path.txt", r"must end in .obj, .ply, .csv, .json, .geojson or .npy"),
         ("path", r"path is 'path'; it must end in"),
         ("no/path.obj", "its folder does not exist"),
-        (None, "path is None; it must be a text or a Path"),
+        (None, "path is None; it must be a string or a Path"),
     ],
 )
 def test_a_place_where_no_path_can_be_written_is_refused(path: str, message: str) -> None:

@@ -92,7 +92,7 @@ def test_anything_else_is_refused_with_what_is_taken(thing: Any) -> None:
     with pytest.raises(InvalidMesh) as raised:
         gc.exact_distance(thing, 0)
     assert str(raised.value) == (
-        f"a mesh cannot be made of this {type(thing).__name__}: give a TriangleMesh, (vertices, "
+        f"a mesh cannot be made from this {type(thing).__name__}: give a TriangleMesh, (vertices, "
         "faces), the path of a file, or a mesh of trimesh, meshio, PyVista or Open3D"
     )
 
@@ -134,7 +134,7 @@ def test_points_of_meshio_may_lie_in_the_plane() -> None:
         (meshio.Mesh(SQUARES, [("line", [[0, 1]])]), "no faces"),
         (meshio.Mesh(SQUARES, [("triangle", [[0, 1, 9]])]), "numbered 0 to 5"),
         (Sphere().cast_to_unstructured_grid(), "UnstructuredGrid .* give data.extract_surface"),
-        (ImageData(dimensions=(3, 3, 3)), "ImageData of PyVista is no surface"),
+        (ImageData(dimensions=(3, 3, 3)), "ImageData of PyVista is not a surface"),
         (PolyData(SQUARES), "no faces"),
         (Sphere().strip(), "give data.triangulate()"),
         (trimesh.Trimesh(SQUARES, [[0, 1, 9]], process=False), "numbered 0 to 5"),

@@ -209,6 +209,6 @@ def test_glb_vertices_that_parts_share_are_counted_before_they_are_copied(
     copied: list[int] = []
     monkeypatch.setattr("trimesh.load_scene", lambda *_, **__: copied.append(1))
     often = glb_with(nodes=[{"mesh": 0}] * 100, scenes=[{"nodes": list(range(100))}])
-    with pytest.raises(InvalidMesh, match="4000 vertices, where 200 faces have at most 600"):
+    with pytest.raises(InvalidMesh, match="4000 vertices, but 200 faces have at most 600"):
         load_mesh(often, "glb", max_faces=200)
     assert not copied

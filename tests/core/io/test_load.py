@@ -883,7 +883,7 @@ def test_glb_places_beyond_all_numbers_are_refused_without_a_warning() -> None:
         (("bufferViews", 1, "byteLength"), 10**9, "bufferView 1 of the GLB file ends"),
         (("bufferViews", 1, "byteStride"), 2, "accessor 1 of the GLB file has 9"),
         (("buffers", 0, "byteLength"), 10**9, "buffer 0 of the GLB file declares"),
-        (("buffers", 0, "uri"), "data:;base64,x", "buffer 0 of the GLB file is no base64"),
+        (("buffers", 0, "uri"), "data:;base64,x", "buffer 0 of the GLB file is not valid base64"),
     ],
 )
 def test_a_glb_document_names_the_member_at_fault(

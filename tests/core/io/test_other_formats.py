@@ -115,5 +115,5 @@ def test_an_unknown_file_is_not_taken_for_freesurfer_s(tmp_path: Path) -> None:
     path.write_bytes(b"no surface")
     with pytest.raises(gc.errors.InvalidMesh, match="unknown mesh file type 'pial'"):
         gc.load_mesh(path)
-    with pytest.raises(gc.errors.InvalidMesh, match="no triangle surface of FreeSurfer"):
+    with pytest.raises(gc.errors.InvalidMesh, match="not a FreeSurfer triangle surface"):
         gc.load_mesh(path, "freesurfer")

@@ -53,7 +53,7 @@ export function uploadMesh(
     request.onerror = () =>
       reject(
         new ProblemError({
-          detail: "The upload broke off.",
+          detail: "The upload was interrupted.",
           code: "unknown",
           status: 0,
           request_id: "",

@@ -23,7 +23,7 @@ export function parseNpy(buffer: ArrayBuffer): NpyArray {
   const kind = /'descr':\s*'([^']+)'/.exec(header)?.[1];
   const shape = /'shape':\s*\(([^)]*)\)/.exec(header)?.[1];
   if (kind === undefined || shape === undefined || !(kind in KINDS) || header.includes("True")) {
-    throw new Error(`an array that this page cannot read: ${header.trim()}`);
+    throw new Error(`This array cannot be read: ${header.trim()}`);
   }
   const data = new KINDS[kind as keyof typeof KINDS](buffer, start + length);
   return {

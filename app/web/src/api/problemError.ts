@@ -21,7 +21,7 @@ export function parseProblem(status: number, text: string, requestId: string): P
   try {
     return new ProblemError(JSON.parse(text) as Problem);
   } catch {
-    const detail = `The service answered ${status} without saying why.`;
+    const detail = `The service answered with status ${status} and gave no reason.`;
     return new ProblemError({ detail, code: "unknown", status, request_id: requestId });
   }
 }

@@ -135,7 +135,7 @@ export async function locate(mesh: string, position: [number, number, number]): 
 export function pointOf({ vertex, face, barycentric }: Partial<ResolvedPoint>): Point {
   if (vertex != null) return { vertex };
   if (face != null && barycentric) return { face, barycentric };
-  throw new Error("The service named a point that is neither at a vertex nor in a face.");
+  throw new Error("The service returned a point that is neither at a vertex nor in a face.");
 }
 
 export function getAbout(): Promise<About> {

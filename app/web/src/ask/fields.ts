@@ -121,8 +121,8 @@ export class Fields {
       const errors = errorsOf(exact, rough);
       const largest = largestOf(errors);
       surface.setValues(errors, largest);
-      const kind = rough.bound.kind === "guaranteed" ? "promised" : "estimated";
-      showScale(`Error, % (${kind}: ${written(100 * rough.bound.value, 3)})`, largest);
+      const bound = `${rough.bound.kind}: ${written(100 * rough.bound.value, 3)}`;
+      showScale(`Error, % (${bound})`, largest);
       return;
     }
     const largest = state.range ?? field.largest;

@@ -11,12 +11,12 @@ import type { SceneView } from "../view/sceneView";
 type RouteRequest = RouteQuestion & { mesh: string };
 
 const WORDS: Record<Step["name"], string> = {
-  dijkstra: "Along edges: a first bound",
-  shorten: "The same, shortened across faces",
+  dijkstra: "A path along edges: a first bound",
+  shorten: "The same path, shortened across faces",
   approximate: "An approximate sweep within that bound",
-  backtrace: "Traced back: a tighter bound",
+  backtrace: "The path of that sweep: a tighter bound",
   exact: "The exact sweep, within all bounds",
-  path: "The path, traced back",
+  path: "The shortest path, traced back",
 };
 
 export class Routes {
@@ -33,7 +33,7 @@ export class Routes {
   ) {
     this.latestOnly = new LatestOnly<RouteRequest>(
       ({ mesh, ...question }, stop) =>
-        status.during("busy", "Searching the path…", stop, async () =>
+        status.during("busy", "Searching for the path…", stop, async () =>
           this.show(await askRoute(mesh, question, stop.signal), question),
         ),
       (error) => {
@@ -129,7 +129,7 @@ export class Routes {
     const leg = legs > 1 ? ` of leg ${step.leg + 1}` : "";
     byId("step-words").textContent =
       `${number + 1} of ${this.steps.length}${leg}. ${WORDS[step.name]}. ` +
-      `No longer than ${written(step.bound, 6)}; ${count(step.faces.length, "face")}, ` +
+      `Length at most ${written(step.bound, 6)}; ${count(step.faces.length, "face")}, ` +
       `${count(step.windows, "window")}, ${duration(step.seconds)}.`;
   }
 
@@ -144,5 +144,5 @@ export class Routes {
 function reason({ reason: code }: Outline): string {
   return code === "disconnected"
     ? "source and target are not connected"
-    : "the target is beyond the largest distance";
+    : "the target is farther than the distance limit";
 }

@@ -60,7 +60,7 @@ export class ExportPanel {
       );
     }
     if (lacking.size > 0) {
-      note(`This service does not write ${[...lacking].join(", ").toUpperCase()}.`);
+      note(`This service does not offer ${[...lacking].join(", ").toUpperCase()}.`);
     }
     this.show(this.store.state);
   }

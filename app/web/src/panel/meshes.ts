@@ -153,9 +153,9 @@ export function refusalOf({ name, type }: Pick<File, "name" | "type">): ProblemE
   const [kind] = type.split("/");
   const what =
     kind === "image"
-      ? "a picture"
+      ? "an image"
       : kind === "text"
-        ? "a text"
+        ? "a text file"
         : "not a mesh that can be read here";
   return new ProblemError({
     title: "Not a mesh",

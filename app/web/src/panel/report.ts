@@ -57,7 +57,12 @@ function faultsOf(mesh: MeshDocument): [Faults, string, string, Kind][] {
       "edges of three or more faces",
       "edge",
     ],
-    [mesh.misoriented_edges, "edge where winding flips", "edges where winding flips", "edge"],
+    [
+      mesh.misoriented_edges,
+      "edge with faces of opposite orientation",
+      "edges with faces of opposite orientation",
+      "edge",
+    ],
     [mesh.degenerate_faces, "face without area", "faces without area", "face"],
     [
       mesh.repeated_vertex_faces,
@@ -70,8 +75,8 @@ function faultsOf(mesh: MeshDocument): [Faults, string, string, Kind][] {
     [mesh.zero_length_edges, "edge of zero length", "edges of zero length", "edge"],
     [
       mesh.bow_tie_vertices,
-      "vertex joining several fans",
-      "vertices joining several fans",
+      "vertex where several fans of faces meet",
+      "vertices where several fans of faces meet",
       "vertex",
     ],
     [mesh.isolated_vertices, "vertex without a face", "vertices without a face", "vertex"],

@@ -20,7 +20,7 @@ export function parsePoint(text: string): WrittenPoint {
   const position = POSITION.exec(text);
   if (position) return { position: triple(position, 1) };
   throw new Error(
-    `“${text}” is not a point. A point is v12, e12-13:0.3, f7:0.2,0.3,0.5 or p1,2,3.`,
+    `“${text}” is not a point. Write it as v12, e12-13:0.3, f7:0.2,0.3,0.5 or p1,2,3.`,
   );
 }
 
