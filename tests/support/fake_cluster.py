@@ -81,7 +81,9 @@ class FakeCluster:
 
     def __init__(self, *names: str) -> None:
         self.engines = {name: SleepingEngine() for name in names}
-        self.machines = {name: Host(engine, SETTINGS, STORE_ID) for name, engine in self.engines.items()}
+        self.machines = {
+            name: Host(engine, SETTINGS, STORE_ID) for name, engine in self.engines.items()
+        }
         self.dead: set[str] = set()
         self.cut_off: set[str] = set()
         self.unanswered_stops = 0

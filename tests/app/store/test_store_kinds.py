@@ -319,7 +319,10 @@ def test_all_machines_see_one_identity_of_a_store(machines: Machines) -> None:
 def test_two_stores_of_one_service_have_two_identities(tmp_path: Path) -> None:
     stores: list[Store] = [
         *(FolderStore(tmp_path / name) for name in ("one", "two")),
-        *(ObjectStore(Objects(MemoryStore()), tmp_path / "copies", 10**9, name) for name in ("three", "four")),
+        *(
+            ObjectStore(Objects(MemoryStore()), tmp_path / "copies", 10**9, name)
+            for name in ("three", "four")
+        ),
     ]
     for store in stores:
         with store.owned(is_shared=True):
