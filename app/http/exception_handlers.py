@@ -10,7 +10,8 @@ from starlette.requests import ClientDisconnect
 from starlette.responses import Response
 from starlette.routing import compile_path
 
-from app.errors import Fault, Problem, ProblemError, pointer, problem_of_status
+from app.errors import EXCEPTIONS, Fault, Problem, ProblemError, pointer, problem_of_status
+from app.http.failures import note_failure
 from app.http.middleware.request_id import body_too_large
 from app.http.responses import problem_response
 from app.schemas.points import TAGS
@@ -22,6 +23,9 @@ def install(app: FastAPI, settings: Settings) -> None:
 
     async def on_problem(request: Request, error: ProblemError) -> Response:
         return _respond(request, error.problem)
+
+    async def on_failure(request: Request, error: Exception) -> Response:
+        return _respond(request, note_failure(error))
 
     async def on_validation(request: Request, error: RequestValidationError) -> Response:
         return _respond(request, validation_problem(error.errors()))
@@ -39,6 +43,7 @@ def install(app: FastAPI, settings: Settings) -> None:
         return Response(status_code=499)  # for the access log: no client reads it
 
     handlers: dict[Any, Any] = {
+        **dict.fromkeys((kind for kind, _ in EXCEPTIONS if kind is not BaseException), on_failure),
         ProblemError: on_problem,
         RequestValidationError: on_validation,
         HTTPException: on_framework,

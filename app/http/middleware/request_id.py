@@ -4,25 +4,16 @@ import asyncio
 import re
 from uuid import uuid4
 
-import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.middleware.body_limit import MAX_BODY_SIZE_SCOPE_KEY
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from structlog.contextvars import bound_contextvars
 
-from app.errors import (
-    PROBLEM_JSON,
-    Problem,
-    ProblemError,
-    draining,
-    problem_of,
-    problem_of_status,
-)
+from app.errors import PROBLEM_JSON, Problem, draining, problem_of_status
+from app.http.failures import note_failure
 from app.http.responses import common_headers, problem_response
 from app.settings import Settings, variable_of
 from app.tracing import trace_fields
-
-logger = structlog.get_logger(module=__name__)
 
 _SANE_ID = re.compile(r"[\w.:-]{1,128}")
 
@@ -71,11 +62,10 @@ class RequestIdMiddleware:
                 # The server cancelled this request: the service stops, and has waited long enough.
                 await answer(draining().problem)
             except Exception as error:
-                if not isinstance(error, ProblemError):
-                    logger.exception("request failed")
+                problem = note_failure(error)
                 if has_started:
                     raise  # too late for a problem: the server cuts the connection
-                await answer(problem_of(error))
+                await answer(problem)
 
     def _framework_problem(self, status: int, headers: Headers, scope: Scope) -> Problem:
         """Return the problem for a plain-text error of Starlette: a body or range too large."""

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
+from app.errors import StoreUnavailableError
 from tests.support.logs import Log
 from tests.support.service import ServiceClient
 
@@ -70,5 +71,23 @@ def test_a_failure_has_its_traceback_and_its_line(
     answer = client.get("/")
 
     failure, line = log
-    assert (failure["event"], failure["exc_info"]) == ("request failed", True)
+    assert (failure["event"], failure["log_level"]) == ("request failed", "error")
+    assert isinstance(failure["exc_info"], TypeError)
     assert (line["status"], line["request_id"]) == (500, answer.json()["request_id"])
+
+
+def test_an_outage_has_no_traceback_and_its_own_status(
+    client: TestClient, log: Log, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_arguments: object, **_named: object) -> None:
+        raise StoreUnavailableError("no route to host")
+
+    monkeypatch.setattr("app.http.routes.about.Index", fail)
+    answer = client.get("/")
+
+    assert answer.status_code == 503
+    failure, line = log
+    assert (failure["event"], failure["log_level"]) == ("request failed", "warning")
+    assert (failure["code"], failure["error"]) == ("store_unavailable", "no route to host")
+    assert "exc_info" not in failure
+    assert (line["event"], line["status"]) == ("request", 503)
