@@ -9,7 +9,6 @@ from app.store.folder_meshes import FolderMeshes
 from app.store.layout import (
     RESULTS,
     StoreError,
-    identity_of,
     make_identity,
     note_state,
     noted_state,
@@ -47,17 +46,15 @@ class FolderStore:
                 f"one the same {variable_of('state')}, or a store of its own"
             )
         note_state(self.folder, service)
-        make_identity(self.folder)
 
     def identity(self) -> str:
         """Return the id in the folder, which machines may have mounted at different paths."""
-        identity = identity_of(self.folder)
-        if identity is None:
+        if not self.folder.is_dir():
             raise StoreError(
                 f"there is no store at {self.folder}: start geodesic serve on it first, and give "
                 "the same shared folder on all machines as --store"
             )
-        return identity
+        return make_identity(self.folder)
 
     @asynccontextmanager
     async def lent(self, file: Path) -> AsyncIterator[None]:  # noqa: ARG002 - it is there

@@ -15,6 +15,7 @@
         tmp/            meshes that are being written
 """
 
+from contextlib import suppress
 from pathlib import Path
 from uuid import uuid4
 
@@ -73,8 +74,17 @@ def note_state(root: Path, service: str | None) -> None:
 
     Raises ``StoreError`` where the store cannot be written.
     """
-    if service != noted_state(root):
-        _write(root, STATE, service)
+    if service == noted_state(root):
+        return
+    aside = root / f"{STATE}.new"
+    try:
+        if service is None:
+            (root / STATE).unlink()
+        else:
+            aside.write_text(service)
+            aside.replace(root / STATE)
+    except OSError as error:
+        raise _unwritable(root, error) from error
 
 
 def noted_state(root: Path) -> str | None:
@@ -85,18 +95,22 @@ def noted_state(root: Path) -> str | None:
 def make_identity(root: Path) -> str:
     """Return the id of the store in ``root``, which gets one if it has none.
 
-    Raises ``StoreError`` where the store cannot be written.
+    Of machines that come at the same time one gives it. Raises ``StoreError`` where the store
+    cannot be written.
     """
-    identity = identity_of(root)
-    if identity is None:
-        identity = uuid4().hex
-        _write(root, IDENTITY, identity)
-    return identity
-
-
-def identity_of(root: Path) -> str | None:
-    """Return the id of the store in ``root``; None if no service has given it one."""
-    return _read(root, IDENTITY)
+    known = _read(root, IDENTITY)
+    if known is not None:
+        return known
+    identity = uuid4().hex
+    aside = root / f"{IDENTITY}.{identity}"
+    try:
+        aside.write_text(identity)
+        with suppress(FileExistsError):
+            (root / IDENTITY).hardlink_to(aside)
+        aside.unlink()
+        return (root / IDENTITY).read_text()
+    except OSError as error:
+        raise _unwritable(root, error) from error
 
 
 def _read(root: Path, name: str) -> str | None:
@@ -106,17 +120,8 @@ def _read(root: Path, name: str) -> str | None:
         return None
 
 
-def _write(root: Path, name: str, text: str | None) -> None:
-    """Replace a file by one with this text; remove it for None."""
-    aside = root / f"{name}.new"
-    try:
-        if text is None:
-            (root / name).unlink()
-        else:
-            aside.write_text(text)
-            aside.replace(root / name)
-    except OSError as error:
-        raise StoreError(f"the store {root} cannot be written: {error.strerror}") from error
+def _unwritable(root: Path, error: OSError) -> StoreError:
+    return StoreError(f"the store {root} cannot be written: {error.strerror}")
 
 
 def is_store(root: Path) -> bool:
