@@ -22,7 +22,8 @@ pytest_plugins = [
     "tests.support.postgres",
     "tests.support.redis",
     "tests.support.s3",
-    "tests.support.against",  # after those that it imports
+    "tests.support.gcs",  # after what it imports, as the next
+    "tests.support.against",
     "tests.support.service",
 ]
 

@@ -10,6 +10,7 @@ from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 from app.access import caller_at
 from app.errors import Problem
 from app.http.connections import Connections
+from app.http.joined_writes import JoinedWrites
 from app.http.responses import common_headers, problem_response
 
 MOST_HEAD_BYTES = 32 * 1024
@@ -123,7 +124,12 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         self._is_in_head = False
         self._unparsed_bytes = 0
         self._stop_head_timer()
+        before = self.cycle
         super().on_headers_complete()
+        if self.cycle is not before:  # else the connection is upgraded
+            self.cycle.transport = JoinedWrites(  # type: ignore[assignment]
+                self.transport, self.loop
+            )
 
     def on_body(self, body: bytes) -> None:
         """Take a part of the body; small ones are joined, as uvicorn copies all before each."""

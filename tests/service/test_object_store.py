@@ -16,6 +16,7 @@ from structlog.testing import capture_logs
 import geodesic_core as gc
 from tests.service.test_replicas import refused_start
 from tests.support.azure import Azure
+from tests.support.gcs import GCS
 from tests.support.postgres import Server as Postgres
 from tests.support.processes import Server, stopped
 from tests.support.s3 import S3
@@ -32,11 +33,19 @@ from tests.support.waiting import LONG_S, wait_until
 
 IDENTITY = {"Accept-Encoding": "identity"}
 LONG = {**NPY, **IDENTITY}
+both_providers = pytest.mark.parametrize("provider", ["s3", "gcs"], indirect=True)
 
 
 @pytest.fixture
-def url(s3: S3) -> str:
-    return s3.new_url()
+def provider(request: pytest.FixtureRequest) -> S3:
+    """The S3 server, or another one that a test names."""
+    server: S3 = request.getfixturevalue(getattr(request, "param", "s3"))
+    return server
+
+
+@pytest.fixture
+def url(provider: S3) -> str:
+    return provider.new_url()
 
 
 @pytest.fixture
@@ -57,13 +66,14 @@ def drop_copies(service: ServiceClient) -> None:
         anyio.run(meshes.distrust, mesh_id)
 
 
+@both_providers
 def test_a_mesh_and_its_answers_are_objects_and_all_goes(
-    service: ServiceClient, s3: S3, url: str, tmp_path: Path
+    service: ServiceClient, provider: S3, url: str, tmp_path: Path
 ) -> None:
     mesh_id = upload_sample(service, "plane", 30_000)
     answer = distances(service, mesh_id, LONG)
     assert answer.status_code == 200
-    kept = s3.names(url)
+    kept = provider.names(url)
     assert f"meshes/{mesh_id}/manifest.json" in kept
     assert sum(name.startswith(f"results/{mesh_id}/") for name in kept) == 2
     assert not list((tmp_path / "copies" / "results").glob("*/*"))
@@ -72,11 +82,12 @@ def test_a_mesh_and_its_answers_are_objects_and_all_goes(
     again = distances(service, mesh_id, LONG)
     assert (again.content, again.headers["server-timing"]) == (answer.content, "kept")
     assert service.delete(f"/v1/meshes/{mesh_id}").status_code == 204
-    wait_until(lambda: s3.names(url) == {"owner.json"})
+    wait_until(lambda: provider.names(url) == {"owner.json"})
     assert copies_of(service) == set()
     check_problem(service.get(f"/v1/meshes/{mesh_id}"), 404, "mesh_not_found")
 
 
+@both_providers
 def test_ranges_of_an_answer_are_streamed(service: ServiceClient) -> None:
     mesh_id = upload_sample(service, "plane", 30_000)
     job = distances(service, mesh_id, {**LONG, "Prefer": "respond-async"})
@@ -266,10 +277,12 @@ def test_a_mesh_that_is_deleted_while_it_is_pulled_is_gone(service: ServiceClien
         ("s3://no-such-bucket/x", {}, "does not exist: create its bucket"),
         ("s3://", {}, "is not the URL of a store"),
         ("s3://bucket/x", {"AWS_ENDPOINT_URL": "http://127.0.0.1:9"}, "cannot be used"),
+        ("gs://no-such-bucket/x", {}, "does not exist: make its bucket"),
+        ("gs://bucket/x", {"GOOGLE_SERVICE_ACCOUNT": "/nowhere"}, "Unable to open service account"),
         ("az://container/x", {}, "Account must be specified"),
     ],
 )
-@pytest.mark.usefixtures("s3")
+@pytest.mark.usefixtures("s3", "gcs")
 def test_starts_that_are_refused(
     tmp_path: Path, store: str, environment: dict[str, str], said: str
 ) -> None:
@@ -282,6 +295,13 @@ def test_wrong_credentials_are_refused(s3: S3, url: str, tmp_path: Path) -> None
         said = refused_start(url, GEODESIC_COPIES=str(tmp_path))  # type: ignore[arg-type]
     assert "cannot be used" in said
     assert "AWS_ENDPOINT_URL and AWS_ACCESS_KEY_ID" in said
+
+
+def test_wrong_credentials_are_refused_by_google(gcs: GCS, tmp_path: Path) -> None:
+    wrong = {"GOOGLE_BEARER_TOKEN": "another"}
+    said = refused_start(gcs.new_url(), GEODESIC_COPIES=str(tmp_path), **wrong)  # type: ignore[arg-type]
+    assert "cannot be used" in said
+    assert "GOOGLE_APPLICATION_CREDENTIALS" in said
 
 
 def test_wrong_credentials_are_refused_by_azure(azure: Azure, tmp_path: Path) -> None:

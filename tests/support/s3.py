@@ -10,10 +10,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
+from urllib.parse import unquote
 
 import httpx2
 import pytest
 
+from tests.support.paths import ROOT
 from tests.support.processes import stopped
 from tests.support.waiting import wait_until
 
@@ -27,6 +29,10 @@ class S3:
     ``inside`` goes before a command that is to run on that machine.
     """
 
+    scheme = "s3"
+    module = "moto.server"
+    """What Python runs as the server"""
+
     def __init__(self, host: str = "127.0.0.1", inside: Sequence[str] = ()) -> None:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
@@ -34,7 +40,8 @@ class S3:
         self.url = f"http://{host}:{self.port}"
         self._log = tempfile.NamedTemporaryFile(prefix="geodesic-s3-")  # noqa: SIM115 - see close
         self.process = subprocess.Popen(  # noqa: S603 - this Python
-            [*inside, sys.executable, "-m", "moto.server", "-H", host, "-p", str(self.port)],
+            [*inside, sys.executable, "-m", self.module, "-H", host, "-p", str(self.port)],
+            cwd=ROOT,
             stdout=subprocess.DEVNULL,
             stderr=self._log,
         )
@@ -58,11 +65,11 @@ class S3:
 
     def new_url(self) -> str:
         """Return the URL of a store that nobody has."""
-        return f"s3://bucket/store-{next(_numbers)}"
+        return f"{self.scheme}://bucket/store-{next(_numbers)}"
 
     def sizes(self, url: str) -> dict[str, int]:
         """Return the bytes of the objects of a store, by name."""
-        prefix = url.removeprefix("s3://bucket/") + "/"
+        prefix = self._prefix(url)
         found = self.client.list_objects_v2(Bucket="bucket", Prefix=prefix).get("Contents", [])
         return {each["Key"].removeprefix(prefix): each["Size"] for each in found}
 
@@ -72,16 +79,20 @@ class S3:
 
     def reads(self, url: str) -> Counter[str]:
         """Return how often each object of a store was read so far, whole or in part."""
-        place = url.removeprefix("s3:/")
+        place = f"/bucket/{self._prefix(url)}"
         log = re.sub(r"\x1b\[\d+m", "", Path(self._log.name).read_text())  # it has colours
-        return Counter(re.findall(rf'"GET {place}/(\S+) HTTP', log))
+        log = unquote(log)  # Google's client escapes slashes
+        return Counter(re.findall(rf'"GET {place}(\S+) HTTP', log))
 
     def damage(self, url: str, name: str) -> None:
         """Change the last byte of an object."""
-        key = f"{url.removeprefix('s3://bucket/')}/{name}"
+        key = self._prefix(url) + name
         content = bytearray(self.client.get_object(Bucket="bucket", Key=key)["Body"].read())
         content[-1] ^= 1
         self.client.put_object(Bucket="bucket", Key=key, Body=bytes(content))
+
+    def _prefix(self, url: str) -> str:
+        return url.removeprefix(f"{self.scheme}://bucket/") + "/"
 
     @contextmanager
     def asking_for_credentials(self) -> Iterator[None]:

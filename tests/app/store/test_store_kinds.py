@@ -85,6 +85,7 @@ Machines = tuple[Machine, Machine]
         "folder",
         "memory",
         pytest.param("s3", marks=pytest.mark.service),
+        pytest.param("gcs", marks=pytest.mark.service),
         pytest.param("azure", marks=pytest.mark.service),
     ]
 )
