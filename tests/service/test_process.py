@@ -8,8 +8,10 @@ from contextlib import closing
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from select import select
 from typing import Any
 
+import httpx2
 import pytest
 
 import geodesic_core as gc
@@ -17,6 +19,7 @@ from app.settings import MIB
 from app.store.layout import StoreError
 from app.store.meshes import MeshStore
 from app.store.ownership import owned
+from tests.support.listening import read_answer
 from tests.support.meshes import named_mesh, real_mesh
 from tests.support.processes import (
     Server,
@@ -92,18 +95,26 @@ def test_a_client_that_hangs_up_while_it_uploads(server: Server) -> None:
 
 
 def test_a_worker_is_killed_while_it_writes_a_mesh(server: Server) -> None:
-    unfinished, meshes = server.store / "tmp", server.client.get("/v1/meshes").json()
-    workers = server.both_workers()
+    meshes = server.client.get("/v1/meshes").json()
 
+    while (answer := _answer_of_killed_workers(server)).status_code == 201:
+        # The mesh was complete before they were killed.
+        server.client.delete(f"/v1/meshes/{answer.json()['id']}")
+
+    assert (answer.status_code, answer.json()["code"]) == (500, "worker_died")
+    wait_until(lambda: not any((server.store / "tmp").iterdir()))
+    assert server.client.get("/v1/meshes").json() == meshes
+
+
+def _answer_of_killed_workers(server: Server) -> httpx2.Response:
+    """Have a mesh made, kill the workers once its files are being written; return the answer."""
+    workers = server.both_workers()
     with server.connect("/v1/meshes?sample=sphere&faces=400000", b"") as connection:
-        wait_until(lambda: any(unfinished.glob("*/mesh/*")))
+        files = (server.store / "tmp").glob
+        wait_until(lambda: any(files("*/mesh/*")) or select([connection], [], [], 0)[0])
         for pid in workers:
             os.kill(pid, signal.SIGKILL)
-        answer = connection.recv(20)
-
-    assert answer.startswith(b"HTTP/1.1 500")
-    wait_until(lambda: not any(unfinished.iterdir()))
-    assert server.client.get("/v1/meshes").json() == meshes
+        return read_answer(connection)
 
 
 @pytest.mark.parametrize("name", ["rough_scan", "horse97k.ply"])
