@@ -79,7 +79,8 @@ class BordersQuery(Query[BordersRequest]):
         lines = math.sqrt(len(request.sources) - 1)  # as the length of all borders grows
         crossed = min(1.0, lines * FACES_ON_LEVEL / math.sqrt(size.faces)) * share
         sweep = sweep_cost(size.faces, EXACT, share, crossed=crossed)
-        return sweep.seconds + _seconds_per_face(size.faces, share) * crossed * size.faces
+        each = _seconds_per_face(share * size.faces, len(request.sources))
+        return sweep.seconds + each * crossed * size.faces
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
         """Sweep, then draw the borders, if they fit into the answer."""
@@ -106,7 +107,7 @@ class BordersQuery(Query[BordersRequest]):
         found = [{"sources": (0, 1), **straight_line(mesh, faces, 1.0)}] if len(faces) else []
         sweep = sweep_cost(len(mesh.faces), EXACT, share, crossed=len(faces) / len(mesh.faces))
         seconds = sweep.seconds + PER_POINT * len(points)
-        seconds += _seconds_per_face(len(mesh.faces), share) * len(faces)
+        seconds += _seconds_per_face(share * len(mesh.faces), len(starts)) * len(faces)
         answer = self._answer(opened, starts, chord_error, found, expected_stats(mesh, share))
         return Forecast(Cost(seconds, sweep.memory_bytes), answer, SEGMENTS_IN_FACE)
 
@@ -138,8 +139,12 @@ def describe_border(border: gc.Border) -> dict[str, Any]:
     return {"sources": border.sources, **describe_line(border)}
 
 
-def _seconds_per_face(faces: int, share: float) -> float:
-    return PER_FACE_DIVIDED + PER_WINDOW_DIVIDED * math.sqrt(share * faces)
+def _seconds_per_face(faces: float, sources: int) -> float:
+    """Return the seconds for a face that borders cross, of all the ``faces`` that are reached.
+
+    The windows over an edge grow with the distance to its source.
+    """
+    return PER_FACE_DIVIDED + PER_WINDOW_DIVIDED * math.sqrt(faces / sources)
 
 
 def _divided_faces(

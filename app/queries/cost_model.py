@@ -39,8 +39,8 @@ PER_WINDOW_RETAINED = 50e-9
 """To retain the windows of an exact sweep, for the n√n of n faces: memory takes most of it."""
 PER_FACE_CROSSED, PER_WINDOW_CROSSED = 8e-6, 0.2e-6
 """For each face that an isoline crosses; for √n more, by the windows of an exact sweep."""
-PER_FACE_DIVIDED, PER_WINDOW_DIVIDED = 100e-6, 1.5e-6
-"""For each face that a border crosses; for √n more, by the windows of an exact sweep."""
+PER_FACE_DIVIDED, PER_WINDOW_DIVIDED = 40e-6, 2.5e-6
+"""For each face that a border crosses; for √(n / k) more of k sources, by their windows."""
 PER_FACE_BLOCKED = 0.4e-6
 """To make a mesh with barriers: for each of its faces."""
 PER_PATH = 0.3e-3
