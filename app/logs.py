@@ -52,6 +52,7 @@ def install(log_format: LogFormat | None, stream: TextIO | None = None) -> None:
     )
     logging.basicConfig(handlers=[_Forward()], level=_LEVEL, force=True)
     logging.captureWarnings(capture=True)
+    logging.getLogger("alembic.runtime.plugins").setLevel(logging.WARNING)  # a line each
 
 
 class _Lines(structlog.BytesLogger):
