@@ -109,8 +109,8 @@ class JobManager:
     An owner has at most ``quota`` jobs, finished ones included; None stands for no quota.
 
     Where services share the repository, they are ``replicas``, and each job is run by one of them.
-    The others show its record, which is at most a second old, and dismiss it there. Jobs of a
-    replica that is dead are run again by another one.
+    All of them show its record, which is at most a second old, and the others dismiss it there.
+    Jobs of a replica that is dead are run again by another one.
     """
 
     def __init__(
@@ -198,7 +198,7 @@ class JobManager:
     async def find(self, owner: str | None, job_id: str) -> Job:
         """Return the present state of a job; raises ``ProblemError`` where the owner has none."""
         live = self._live.get(job_id)
-        if live is not None and live.job.spec.owner == owner:
+        if live is not None and live.job.spec.owner == owner and self._is_shown_here(live):
             return await live.shown()
         job = await self._repository.find(owner, job_id)
         if job is None:
@@ -210,8 +210,19 @@ class JobManager:
     ) -> tuple[list[Job], int | None]:
         """Return ``limit`` jobs of an owner, the newest first, and the number to go on before."""
         jobs, after = await self._repository.page(owner, limit, before)
-        live = [self._live.get(job.id) for job in jobs]
-        return [await at.shown() if at else job for job, at in zip(jobs, live, strict=True)], after
+        shown = []
+        for job in jobs:
+            live = self._live.get(job.id)
+            shown.append(await live.shown() if live and self._is_shown_here(live) else job)
+        return shown, after
+
+    def _is_shown_here(self, live: _LiveJob) -> bool:
+        """Tell whether clients see the state in this process, and not its record.
+
+        All replicas show the record of a job that runs. Else its progress would fall for a client
+        that asks one replica after the other.
+        """
+        return self._replicas is None or live.job.is_finished
 
     async def count(self) -> Counter[str]:
         """Return the number of jobs of all owners by status."""

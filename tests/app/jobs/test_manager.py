@@ -1,6 +1,7 @@
 """The life of jobs: what clients are told, and when."""
 
 import asyncio
+from collections.abc import Callable
 from typing import Any, NoReturn, cast
 
 from app.errors import problem
@@ -8,6 +9,7 @@ from app.jobs.job import Job
 from app.jobs.manager import JobManager
 from app.jobs.repository import JobRepository
 from app.state import Database
+from app.store.results import Result
 from tests.support.databases import opened
 from tests.support.jobs import SPEC
 
@@ -58,5 +60,53 @@ def test_an_end_is_told_once_it_is_recorded(database: Database) -> None:
                 found = [await task for task in asked] + (await page)[0]
                 assert [each.status for each in found] == ["failed"] * 3
                 assert await others.find(None, job.id) == found[0]
+
+    asyncio.run(main())
+
+
+class OneReplica:
+    """The only one of all replicas."""
+
+    id = "one"
+
+    async def beat(self) -> set[str]:
+        return {self.id}
+
+    async def leave(self) -> None:
+        pass
+
+
+def test_all_replicas_tell_the_same_progress(database: Database) -> None:
+    async def main() -> None:
+        told: list[Callable[[float], None]] = []
+
+        async def solve(on_progress: Callable[[float], None]) -> Result:
+            told.append(on_progress)
+            on_progress(0.25)
+            await asyncio.sleep(3600)
+            raise AssertionError
+
+        async with opened(database):
+            repository, others = JobRepository(database), JobRepository(database)
+            replicas = cast(Any, OneReplica())
+            jobs = JobManager(repository, cast(Any, "not used"), 60.0, None, replicas)
+
+            async def shares() -> set[float]:
+                """Return what this replica says, twice, and another one, which reads the record."""
+                (listed,), _ = await jobs.page(None, 1, None)
+                record = await others.find(None, job.id)
+                assert record is not None
+                found = await jobs.find(None, job.id)
+                return {listed.progress, record.progress, found.progress}
+
+            async with jobs.running(fail):
+                job = await jobs.submit(SPEC, QUERY, solve)
+                while await shares() != {0.25}:
+                    await asyncio.sleep(0.01)
+                told[0](0.5)
+                assert await shares() == {0.25}
+                while await shares() == {0.25}:
+                    await asyncio.sleep(0.01)
+                assert await shares() == {0.5}
 
     asyncio.run(main())
