@@ -468,7 +468,7 @@ def _known() -> Iterable[Case]:
         yield Case(name, vertices, faces, lambda s, p=polar, t=total: closed_forms.cone(p, s, t))
     for name, size in (("cube_grid", (5, 5, 5)), ("brick_grid", (2, 4, 9))):
         vertices, faces = box_grid(size)
-        yield Case(name, vertices, faces, lambda s, v=vertices, z=size: _box(z, v, s))
+        yield Case(name, vertices, faces, lambda s, z=size, v=vertices: _on_box(z, v, s))
 
 
 def _planar(name, vertices, faces, chart=None) -> Case:
@@ -476,8 +476,8 @@ def _planar(name, vertices, faces, chart=None) -> Case:
     return Case(name, vertices, faces, lambda s: closed_forms.plane(chart, s))
 
 
-def _box(size, vertices, source):
-    return np.array([closed_forms.box(size, vertices[source], end) for end in vertices])
+def _on_box(size, vertices, source):
+    return closed_forms.box(size, vertices[source], vertices)
 
 
 def _crowded():
