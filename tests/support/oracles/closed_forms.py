@@ -67,10 +67,7 @@ def box(size, start, end) -> np.ndarray:
 
 
 class _Rolls(NamedTuple):
-    """Where the box stands after each order of rolling: on the face (axis, high).
-
-    A point of that face is laid out at anchor + (point - origin) @ frame.
-    """
+    """Where the box stands after each order of rolling: the columns of its floors (N, ...)."""
 
     axis: np.ndarray
     high: np.ndarray
@@ -84,35 +81,52 @@ class _Rolls(NamedTuple):
 @cache
 def _rolls(size, axis, high) -> _Rolls:
     """Every order of rolling a box that stands on a face; the first one is not to roll at all."""
-    first, second = (k for k in range(3) if k != axis)
-    frame = np.zeros((3, 2))
-    frame[first, 0] = frame[second, 1] = 1.0
     found = []
 
-    def stand(axis, high, origin, anchor, frame, edges, visited):
-        padded = np.full((5, 2, 2), math.nan)
-        padded[: len(edges)] = np.array(edges).reshape(-1, 2, 2)
-        found.append((axis, high, origin, anchor, frame, padded))
-        for way, far in itertools.product(range(3), (False, True)):
-            if way != axis and (way, far) not in visited:
-                # The neighbouring face begins at the edge between them.
-                corner = np.zeros(3)
-                corner[axis], corner[way] = size[axis] * high, size[way] * far
-                along = 3 - axis - way
-                other_end = corner.copy()
-                other_end[along] = size[along]
-                edge = [anchor + (point - origin) @ frame for point in (corner, other_end)]
-                rolled = np.zeros((3, 2))
-                rolled[along] = frame[along]
-                # What pointed out of the old face within the plane is where the new face now
-                # extends: away from the old face along the new one.
-                outward = frame[way] * (1 if far else -1)
-                rolled[axis] = outward * (-1 if high else 1)
-                seen = visited | {(way, far)}
-                stand(way, far, corner, edge[0], rolled, [*edges, edge], seen)
+    def roll(floor, visited, edges):
+        missing = np.full((5 - len(edges), 2, 2), math.nan)
+        columns = floor.axis, floor.high, floor.origin, floor.anchor, floor.frame
+        found.append((*columns, [*edges, *missing]))
+        for axis, high in itertools.product(range(3), (False, True)):
+            if axis != floor.axis and (axis, high) not in visited:
+                rolled, edge = floor.roll_over(axis, high)
+                roll(rolled, visited | {(axis, high)}, [*edges, edge])
 
-    stand(axis, high, np.zeros(3), np.zeros(2), frame, [], {(axis, high)})
+    roll(_Floor(np.array(size), axis, high), {(axis, high)}, [])
     return _Rolls(*map(np.array, zip(*found, strict=True)))
+
+
+class _Floor:
+    """A box that stands on one of its faces: maps points of that face to the plane."""
+
+    def __init__(self, size, axis, high, origin=None, anchor=None, frame=None):
+        self.size, self.axis, self.high = size, axis, high
+        self.origin = np.zeros(3) if origin is None else origin
+        self.anchor = np.zeros(2) if anchor is None else anchor
+        first, second = (k for k in range(3) if k != axis)
+        self.frame = np.zeros((3, 2)) if frame is None else frame
+        if frame is None:
+            self.frame[first, 0] = self.frame[second, 1] = 1.0
+
+    def lay(self, point):
+        return self.anchor + (point - self.origin) @ self.frame
+
+    def roll_over(self, axis, high):
+        """Stand on the neighbouring face; also the laid-out ends of the edge between them."""
+        edge_point = np.zeros(3)
+        edge_point[self.axis] = self.size[self.axis] * self.high
+        edge_point[axis] = self.size[axis] * high
+        along = 3 - axis - self.axis
+        frame = np.zeros((3, 2))
+        frame[along] = self.frame[along]
+        # What pointed out of the old face within the plane is where the new face now extends: away
+        # from the old face along the new one.
+        outward = self.frame[axis] * (1 if high else -1)
+        frame[self.axis] = outward * (-1 if self.high else 1)
+        floor = _Floor(self.size, axis, high, edge_point, self.lay(edge_point), frame)
+        far_end = edge_point.copy()
+        far_end[along] = self.size[along]
+        return floor, (self.lay(edge_point), self.lay(far_end))
 
 
 def _meet(p, q, a, b) -> np.ndarray:
