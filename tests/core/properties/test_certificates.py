@@ -1,4 +1,4 @@
-"""What the check of paths refuses: one thing of a right path is changed at a time."""
+"""Refusals of wrong paths by their check: one thing of a right path is changed at a time."""
 
 from dataclasses import replace
 
