@@ -10,6 +10,9 @@ import geodesic_core as gc
 LENGTH = 1e-10
 """Relative difference allowed between a path's length and the distance it stands for."""
 
+NONE = -1
+"""In place of a vertex or a face."""
+
 
 def check_path(mesh: gc.TriangleMesh, path: gc.GeodesicPath, source, target, distance):
     """A path from source to target, over the surface, of the given length."""
@@ -22,27 +25,48 @@ def check_path(mesh: gc.TriangleMesh, path: gc.GeodesicPath, source, target, dis
     assert path.length == pytest.approx(distance, rel=LENGTH, abs=0)
     pieces = np.linalg.norm(np.diff(points, axis=0), axis=1)
     assert pieces.sum() == pytest.approx(path.length, rel=LENGTH, abs=0)
-    carriers = [_check_location(mesh, *pair) for pair in zip(points, locations, strict=True)]
     assert not set(faces.tolist()) & set(mesh.barriers.tolist()), "no piece crosses a blocked face"
-    for face, start, end in zip(faces, carriers, carriers[1:], strict=False):
-        # Both ends lie on the closed face: the piece between them does, a face is convex.
-        assert start | end <= set(mesh.faces[face].tolist())
+    carriers = _check_locations(mesh, points, locations)
+    # Both ends lie on the closed face: the piece between them does, a face is convex.
+    corners = np.hstack([mesh.faces[faces], np.full((len(faces), 1), NONE)])
+    for end in (carriers[:-1], carriers[1:]):
+        is_corner = (end[:, :, None] == corners[:, None]).any(axis=2)
+        wrong = np.flatnonzero(~is_corner.all(axis=1)).tolist()
+        assert not wrong, f"pieces {wrong} leave their faces"
 
 
-def _check_location(mesh, point, location) -> set[int]:
-    """Check one surface point; return the vertices of the vertex, edge or face that carries it."""
-    weights = np.array(location.barycentric)
-    assert (weights >= 0).all()
-    assert weights.sum() == pytest.approx(1, abs=1e-15)
-    corners = mesh.faces[location.face_index]
-    scale = np.abs(mesh.vertices[corners]).max()
-    np.testing.assert_allclose(weights @ mesh.vertices[corners], point, rtol=0, atol=1e-14 * scale)
-    carrier = corners[weights > 0].tolist()
-    holders = {location.face_index}
-    if len(carrier) < 3:  # two faces may have the same corners, but no point inside in common
-        holders = set.intersection(*(_faces_at(mesh)[vertex] for vertex in carrier))
-    assert location.face_index == min(holders), "the lowest face that holds the point"
-    return set(carrier)
+def _check_locations(mesh, points, locations) -> np.ndarray:
+    """Check surface points; return the vertices (K, 3) of what carries each: vertex, edge or face.
+
+    Those of a vertex or an edge are filled up with `NONE`.
+    """
+    faces = np.array([location.face_index for location in locations])
+    weights = np.array([location.barycentric for location in locations])
+    corners = mesh.faces[faces]
+    places = mesh.vertices[corners]
+    scale = np.abs(places).max(axis=(1, 2))
+    away = np.abs(np.einsum("kc,kcd->kd", weights, places) - points).max(axis=1)
+    carriers = np.where(weights > 0, corners, NONE)
+
+    def claim(what, holds):
+        wrong = [locations[k] for k in np.flatnonzero(~holds)]
+        assert not wrong, f"{what}: not so of {wrong}"
+
+    claim("weights are not negative", (weights >= 0).all(axis=1))
+    claim("the sum of weights is 1", np.abs(weights.sum(axis=1) - 1) <= 1e-15)
+    claim("weights give the point", away <= 1e-14 * scale)
+    pairs = zip(faces.tolist(), carriers.tolist(), strict=True)
+    lowest = np.array([_lowest_face(mesh, *pair) for pair in pairs])
+    claim("the face is the lowest that holds the point", faces == lowest)
+    return carriers
+
+
+def _lowest_face(mesh, face, carrier) -> int:
+    """Of the faces that hold a point on the given one."""
+    vertices = [vertex for vertex in carrier if vertex != NONE]
+    if len(vertices) == 3:  # two faces may have the same corners, but no point inside in common
+        return face
+    return min(set.intersection(*(_faces_at(mesh)[vertex] for vertex in vertices)), default=NONE)
 
 
 @lru_cache(maxsize=1)

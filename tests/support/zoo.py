@@ -107,22 +107,17 @@ def icosahedron():
 
 
 def subdivide(vertices, faces):
-    """Split each face into four at the middles of its edges."""
-    vertices, middle = [tuple(v) for v in np.asarray(vertices).tolist()], {}
-
-    def between(a, b):
-        key = (min(a, b), max(a, b))
-        if key not in middle:
-            middle[key] = len(vertices)
-            p, q = vertices[key[0]], vertices[key[1]]
-            vertices.append(tuple((x + y) / 2 for x, y in zip(p, q, strict=True)))
-        return middle[key]
-
-    split = []
-    for a, b, c in np.asarray(faces).tolist():
-        ab, bc, ca = between(a, b), between(b, c), between(c, a)
-        split += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return np.array(vertices), np.array(split)
+    """Split each face into four at the middles of its edges, numbered as the faces meet them."""
+    vertices, faces = np.asarray(vertices), np.asarray(faces)
+    low, high = np.sort([faces, np.roll(faces, -1, axis=1)], axis=0).reshape(2, -1)
+    edges, met, edge = np.unique(low * len(vertices) + high, return_index=True, return_inverse=True)
+    order = np.argsort(met)
+    number = np.empty(len(edges), dtype=int)
+    number[order] = len(vertices) + np.arange(len(edges))
+    middles = (vertices[low[met]] + vertices[high[met]])[order] / 2
+    (a, b, c), (ab, bc, ca) = faces.T, number[edge].reshape(-1, 3).T
+    split = np.stack([a, ab, ca, ab, b, bc, ca, bc, c, ab, bc, ca], axis=1).reshape(-1, 3)
+    return np.vstack([vertices, middles]), split
 
 
 def split_at_centroids(vertices, faces):
@@ -468,7 +463,7 @@ def _known() -> Iterable[Case]:
         yield Case(name, vertices, faces, lambda s, p=polar, t=total: closed_forms.cone(p, s, t))
     for name, size in (("cube_grid", (5, 5, 5)), ("brick_grid", (2, 4, 9))):
         vertices, faces = box_grid(size)
-        yield Case(name, vertices, faces, lambda s, v=vertices, z=size: _box(z, v, s))
+        yield Case(name, vertices, faces, lambda s, z=size, v=vertices: _on_box(z, v, s))
 
 
 def _planar(name, vertices, faces, chart=None) -> Case:
@@ -476,8 +471,8 @@ def _planar(name, vertices, faces, chart=None) -> Case:
     return Case(name, vertices, faces, lambda s: closed_forms.plane(chart, s))
 
 
-def _box(size, vertices, source):
-    return np.array([closed_forms.box(size, vertices[source], end) for end in vertices])
+def _on_box(size, vertices, source):
+    return closed_forms.box(size, vertices[source], vertices)
 
 
 def _crowded():

@@ -31,14 +31,15 @@ def total_length(lines):
 
 
 def check_all(mesh, sources, field, levels, *, crossings=True):
-    for level, lines in zip(levels, field.isolines(levels), strict=True):
+    lines_of_each = field.isolines(levels)
+    for level, lines in zip(levels, lines_of_each, strict=True):
         for line in lines:
             check_pieces(mesh, line)
             check_ends(mesh, line)
         if lines:
             check_points(mesh, sources, level, lines)
-        if crossings:
-            check_crossings(mesh, sources, level, lines)
+    if crossings:
+        check_crossings(mesh, sources, levels, lines_of_each)
 
 
 @pytest.mark.slow

@@ -100,7 +100,7 @@ def test_boxes(size):
     places = np.array([mesh.position(point) for point in points])
     whole = np.rint(places)
     places = np.where(np.abs(places - whole) < 1e-12, whole, places)  # on a side, to the bit
-    table = [[closed_forms.box(size, start, end) for end in places] for start in places]
+    table = [closed_forms.box(size, place, places) for place in places]
     check_table(mesh, points, table)
 
 

@@ -55,7 +55,7 @@ def spider_and_fly():
 
 def main() -> None:
     vertices, faces = spider_and_fly()
-    row = [closed_forms.box((30, 12, 12), vertices[8], end) for end in vertices]
+    row = closed_forms.box((30, 12, 12), vertices[8], vertices)
     assert math.isclose(row[9], 40)
     write(
         "spider_and_fly",

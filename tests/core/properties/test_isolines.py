@@ -23,4 +23,4 @@ def test_lines_are_at_their_level_and_complete(case, seed, share):
         check_ends(mesh, line)
     if lines:
         check_points(mesh, source, level, lines, most=20)
-    check_crossings(mesh, source, level, lines, samples=16)
+    check_crossings(mesh, source, [level], [lines], samples=16)

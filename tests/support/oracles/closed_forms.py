@@ -1,6 +1,9 @@
 """Geodesic distances that geometry knows by heart, or by a ruler on the unfolded surface."""
 
+import itertools
 import math
+from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,21 +40,60 @@ def cone(polar, source, total_angle: float) -> np.ndarray:
     return np.where(turn >= math.pi, radius + radius[source], chord)
 
 
-def box(size, start, end) -> float:
-    """Distance over the surface of the box [0, size] between two points of that surface.
+def box(size, start, end) -> np.ndarray:
+    """Distances over the surface of the box [0, size] from one of its points to others (..., 3).
 
-    Rolls the box over its edges in every order that visits no face twice, and draws a straight line
-    on the floor. It counts only if it crosses every edge that was rolled over: then it is a path.
+    Rolls the box over its edges in every order that visits no face twice, and draws straight lines
+    on the floor. One counts only if it crosses every edge that was rolled over: then it is a path.
     A shortest path on a convex body visits no face twice, so the least of them is the distance.
     """
     size, start, end = (np.asarray(x, dtype=float) for x in (size, start, end))
-    best = math.inf
-    for axis in range(3):
-        for high in (False, True):
-            if start[axis] == (size[axis] if high else 0.0):
-                floor = _Floor(size, axis, high)
-                best = min(best, _roll(floor, start, end, {(axis, high)}, [], floor.lay(start)))
-    return best
+    ends = end.reshape(-1, 3)
+    best = np.full(len(ends), math.inf)
+    for axis, high in itertools.product(range(3), (False, True)):
+        if start[axis] == size[axis] * high:
+            rolls = _rolls(tuple(size.tolist()), axis, high)
+            here = (start - rolls.origin[0]) @ rolls.frame[0]
+            stands_on = size[rolls.axis] * rolls.high
+            of_end, roll = np.nonzero(ends[:, rolls.axis] == stands_on)
+            offset = ends[of_end] - rolls.origin[roll]
+            there = rolls.anchor[roll] + np.einsum("nk,nkd->nd", offset, rolls.frame[roll])
+            edges = np.moveaxis(rolls.edges[roll], 2, 0)
+            crosses = _meet(here, there[:, None], *edges) | np.isnan(edges[0, ..., 0])
+            is_path = crosses.all(axis=1)
+            length = np.linalg.norm(there[is_path] - here, axis=1)
+            np.minimum.at(best, of_end[is_path], length)
+    return best.reshape(end.shape[:-1])[()]
+
+
+class _Rolls(NamedTuple):
+    """Where the box stands after each order of rolling: the columns of its floors (N, ...)."""
+
+    axis: np.ndarray
+    high: np.ndarray
+    origin: np.ndarray
+    anchor: np.ndarray
+    frame: np.ndarray
+    edges: np.ndarray
+    """(N, 5, 2, 2): the laid-out ends of those that were rolled over; NaN beyond the last"""
+
+
+@cache
+def _rolls(size, axis, high) -> _Rolls:
+    """Every order of rolling a box that stands on a face; the first one is not to roll at all."""
+    found = []
+
+    def roll(floor, visited, edges):
+        missing = np.full((5 - len(edges), 2, 2), math.nan)
+        columns = floor.axis, floor.high, floor.origin, floor.anchor, floor.frame
+        found.append((*columns, [*edges, *missing]))
+        for axis, high in itertools.product(range(3), (False, True)):
+            if axis != floor.axis and (axis, high) not in visited:
+                rolled, edge = floor.roll_over(axis, high)
+                roll(rolled, visited | {(axis, high)}, [*edges, edge])
+
+    roll(_Floor(np.array(size), axis, high), {(axis, high)}, [])
+    return _Rolls(*map(np.array, zip(*found, strict=True)))
 
 
 class _Floor:
@@ -87,26 +129,12 @@ class _Floor:
         return floor, (self.lay(edge_point), self.lay(far_end))
 
 
-def _roll(floor, start, end, visited, edges, here) -> float:
-    best = math.inf
-    if end[floor.axis] == (floor.size[floor.axis] if floor.high else 0.0):
-        there = floor.lay(end)
-        if all(_meets(here, there, *edge) for edge in edges):
-            best = float(np.linalg.norm(there - here))
-    for axis in range(3):
-        for high in (False, True):
-            if axis != floor.axis and (axis, high) not in visited:
-                rolled, edge = floor.roll_over(axis, high)
-                seen, crossed = visited | {(axis, high)}, [*edges, edge]
-                best = min(best, _roll(rolled, start, end, seen, crossed, here))
-    return best
-
-
-def _meets(p, q, a, b) -> bool:
-    """Whether the segment pq meets the segment ab; ends count, up to rounding."""
+def _meet(p, q, a, b) -> np.ndarray:
+    """Whether the segments pq meet the segments ab; ends count, up to rounding."""
 
     def side(u, v, w):
-        return (v[0] - u[0]) * (w[1] - u[1]) - (v[1] - u[1]) * (w[0] - u[0])
+        (ux, uy), (vx, vy), (wx, wy) = (np.moveaxis(end, -1, 0) for end in (u, v, w))
+        return (vx - ux) * (wy - uy) - (vy - uy) * (wx - ux)
 
-    slack = 1e-12 * (1.0 + float(np.linalg.norm(q - p))) ** 2
-    return side(p, q, a) * side(p, q, b) <= slack and side(a, b, p) * side(a, b, q) <= slack
+    slack = 1e-12 * (1.0 + np.linalg.norm(q - p, axis=-1)) ** 2
+    return (side(p, q, a) * side(p, q, b) <= slack) & (side(a, b, p) * side(a, b, q) <= slack)
