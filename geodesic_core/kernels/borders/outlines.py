@@ -419,7 +419,7 @@ def trace_borders(
     have numbers from ``next_node`` on; the next free one comes last. Ends nearer than ``near``,
     mesh units, are one. O(n³) for n bisectors in a face.
     """
-    territories, labelled = borrowed(territories), borrowed(labelled)
+    topology, territories, labelled = borrowed(topology), borrowed(territories), borrowed(labelled)
     points, count = np.empty((4 * ROWS, 3)), 0
     points_of, pieces = np.empty((ROWS, 1), np.int64), 0
     nodes, sources = np.empty((ROWS, 2), np.int32), np.empty((ROWS, 2), np.int32)
@@ -510,7 +510,7 @@ def put_node(
     topology: Any, labelled: Any, face: int, nodes: FaceNodes, node: int, points: Floats, count: int
 ) -> Any:
     """Append the point of a node of a face to ``points``; return them and their number."""
-    crossing = crossing_of(nodes, node)
+    nodes, crossing = borrowed(nodes), crossing_of(nodes, node)
     if crossing >= 0:
         return put_crossing(topology, labelled.crossings, crossing, points, count)
     points = with_room(points, count + 1)
