@@ -18,11 +18,11 @@ All is planar, in the frame of the face's first half-edge.
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Floats
+from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.isolines.arcs import (
     INTERVALS,
     ROWS,
@@ -67,6 +67,19 @@ PARALLEL = 1e-6
 
 FARTHER, NEARER, BEYOND = -1, 1, 0
 """Another region is farther than one everywhere, nearer everywhere, or nearer beyond a bisector."""
+
+
+class Regions(NamedTuple):
+    """The regions of a face that are to be compared, and how."""
+
+    rows: Floats
+    """(n, REGION)"""
+    labels: Ints
+    """(n, 1): the source of each"""
+    level: float
+    """The distance up to which they reach; mesh units"""
+    slack: float
+    """Differences of distances up to this count as rounding"""
 
 
 @kernel
@@ -334,42 +347,37 @@ def is_one_sided(geometry: Floats, face: int, region: Floats, other: Floats, sla
 
 
 @kernel
-def bisectors_within(
-    topology: Any, face: int, regions: Floats, labels: Any, level: float, slack: float,
-    shortest: float,
-) -> Floats:  # fmt: skip
+def bisectors_within(topology: Any, face: int, regions: Regions, shortest: float) -> Floats:
     """Return the pieces of bisectors that are borders in a face: nothing else is nearer there.
 
-    ``labels`` (n, 1) are the sources of the regions. Of regions that are equally near within
-    ``slack`` everywhere, the first takes precedence. Pieces not longer than ``shortest`` are left
-    out. O(n³) for n regions.
+    Of regions that are equally near within the slack everywhere, the first takes precedence. Pieces
+    not longer than ``shortest`` are left out. O(n³) for n regions.
     """
     geometry, regions = topology.geometry, borrowed(regions)
+    rows, labels, level, slack = regions.rows, regions.labels, regions.level, regions.slack
     pieces, count = np.empty((ROWS, BISECTOR)), 0
     curve, intervals = np.zeros(BISECTOR), np.empty((INTERVALS, 2))
     hidden, one = np.empty((ROWS, 2)), np.empty((INTERVALS, 2))
     ax, ay, ux, uy = half_edge_in_face(geometry, 3 * face + 2)
     middle = (geometry[3 * face, 0] + ax) / 3.0, ay / 3.0
-    for i in range(len(regions)):
-        for j in range(len(regions)):
-            if labels[i, 0] == labels[j, 0] or is_line(regions[i]) > is_line(regions[j]):
+    for i in range(len(rows)):
+        for j in range(len(rows)):
+            if labels[i, 0] == labels[j, 0] or is_line(rows[i]) > is_line(rows[j]):
                 continue
-            if i > j and is_line(regions[i]) == is_line(regions[j]):
+            if i > j and is_line(rows[i]) == is_line(rows[j]):
                 continue
-            if is_one_sided(geometry, face, regions[i], regions[j], slack):
+            if is_one_sided(geometry, face, rows[i], rows[j], slack):
                 continue
-            left = put_bisector(curve, intervals, regions[i], regions[j], level, slack, middle)
+            left = put_bisector(curve, intervals, rows[i], rows[j], level, slack, middle)
             for h in range(3 * face, 3 * face + 3):
                 ox, oy, ux, uy = half_edge_in_face(geometry, h)
                 depth = ux * (curve[CY] - oy) - uy * (curve[CX] - ox)
                 left = clip_to_half_plane(intervals, left, curve, depth, -uy, ux)
-            left = clip_to_sides(intervals, left, curve, regions[i])
-            left = clip_to_sides(intervals, left, curve, regions[j])
+            left = clip_to_sides(intervals, left, curve, rows[i])
+            left = clip_to_sides(intervals, left, curve, rows[j])
             for k in range(left):
                 start, end = intervals[k, 0], intervals[k, 1]
-                hidden, hides = hidden_intervals(
-                    curve, start, end, i, j, regions, labels, level, slack, one, hidden
-                )
+                hidden, hides = hidden_intervals(curve, start, end, regions, i, j, one, hidden)
                 pieces = with_room(pieces, count + max(hides, 0) + 1)
                 for n in range(hides + 1):
                     stop = hidden[n, 0] if n < hides else end
@@ -411,26 +419,25 @@ def is_apart(chord: Any, region: Floats) -> bool:
 
 @kernel
 def hidden_intervals(
-    curve: Floats, start: float, end: float, i: int, j: int, regions: Floats, labels: Any,
-    level: float, slack: float, one: Floats, hidden: Floats,
+    curve: Floats, start: float, end: float, regions: Regions, i: int, j: int, one: Floats,
+    hidden: Floats,
 ) -> tuple[Floats, int]:  # fmt: skip
     """Return the intervals of a bisector of regions i and j that others hold, and their number.
 
     They are sorted, and written to ``hidden``, or to a larger array. Their number is -1 where one
     region holds all of the piece from ``start`` to ``end``. ``one`` is scratch memory.
     """
-    curve, regions = borrowed(curve), borrowed(regions)
+    curve, rows, labels = borrowed(curve), borrowed(regions.rows), borrowed(regions.labels)
     count, chord = 0, chord_of(curve, start, end)
-    for c in range(len(regions)):
-        if c in (i, j) or is_apart(chord, regions[c]):
+    for c in range(len(rows)):
+        if c in (i, j) or is_apart(chord, rows[c]):
             continue
         own = i if labels[c, 0] == labels[i, 0] else j
         precedes = labels[c, 0] == labels[own, 0] and c < own
+        favour = regions.slack if precedes else -regions.slack
         one[0, 0], one[0, 1] = start, end
-        left = clip_to_nearer(
-            one, 1, curve, regions[i], regions[c], level, slack if precedes else -slack
-        )
-        left = clip_to_sides(one, left, curve, regions[c])
+        left = clip_to_nearer(one, 1, curve, rows[i], rows[c], regions.level, favour)
+        left = clip_to_sides(one, left, curve, rows[c])
         if left == 1 and one[0, 0] <= start and one[0, 1] >= end:
             return hidden, -1
         hidden = with_room(hidden, count + left)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats
-from geodesic_core.kernels.borders.bisectors import distance_to, linear
+from geodesic_core.kernels.borders.bisectors import Regions, distance_to, linear
 from geodesic_core.kernels.isolines.arcs import ROWS, with_room
 from geodesic_core.kernels.isolines.regions import (
     CX,
@@ -89,34 +89,31 @@ def crossings_of(region: Floats, other: Floats, level: float, edge: Any) -> tupl
 
 
 @kernel
-def envelope_along(
-    regions: Floats, labels: Any, level: float, edge: Any, length: float, slack: float
-) -> Floats:
+def envelope_along(regions: Regions, edge: Any, length: float) -> Floats:
     """Return the envelope of the regions of a face along one of its edges, by its stretches.
 
-    A region of another source must be nearer by ``slack`` to replace what is there.
+    A region of another source must be nearer by the slack to replace what is there.
     """
-    regions, labels = borrowed(regions), borrowed(labels)
+    regions = borrowed(regions)
     stretches, count = np.empty((ROWS, STRETCH)), 1
     stretches[0, START], stretches[0, REGION] = 0.0, -1
     other = np.empty((ROWS, STRETCH))
-    for c in range(len(regions)):
-        lo, hi = span_of(regions[c], edge, length)
+    for c in range(len(regions.rows)):
+        lo, hi = span_of(regions.rows[c], edge, length)
         if not lo < hi:
             continue
         other = with_room(other, 4 * count + 8)
-        size = insert_region(stretches[:count], regions, labels, c, (lo, hi), level, edge, length,
-                             slack, other)  # fmt: skip
+        size = insert_region(stretches[:count], regions, c, (lo, hi), edge, length, other)
         stretches, other, count = other, stretches, size
     return stretches[:count]
 
 
 @kernel
 def insert_region(
-    stretches: Floats, regions: Floats, labels: Any, c: int, span: Any, level: float, edge: Any,
-    length: float, slack: float, out: Floats,
-) -> int:  # fmt: skip
+    stretches: Floats, regions: Regions, c: int, span: Any, edge: Any, length: float, out: Floats
+) -> int:
     """Write the envelope with region c, within ``span``, to ``out``; return its stretches."""
+    rows, labels, level = regions.rows, regions.labels, regions.level
     ox, oy, ux, uy = edge
     lo, hi = span
     cuts, size = np.empty(6), 0
@@ -131,7 +128,7 @@ def insert_region(
             size = append_stretch(out, size, start, i)
         cuts[0], number = a, 1
         if i >= 0:
-            first, second = crossings_of(regions[c], regions[i], level, edge)
+            first, second = crossings_of(rows[c], rows[i], level, edge)
             if a < first < b:
                 cuts[number] = first
                 number += 1
@@ -144,11 +141,9 @@ def insert_region(
             winner = c
             if i >= 0:
                 x, y = ox + t * ux, oy + t * uy
-                margin = slack if labels[i, 0] != labels[c, 0] else 0.0
-                if not (
-                    distance_to(regions[c], level, x, y)
-                    < distance_to(regions[i], level, x, y) - margin
-                ):
+                margin = regions.slack if labels[i, 0] != labels[c, 0] else 0.0
+                most = distance_to(rows[i], level, x, y) - margin
+                if not distance_to(rows[c], level, x, y) < most:
                     winner = i
             size = append_stretch(out, size, cuts[n], winner)
         if b < end:

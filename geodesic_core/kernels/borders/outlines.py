@@ -64,6 +64,19 @@ class Pieces(NamedTuple):
     """(p, 2): of the territories on both sides, the lower first"""
 
 
+class FaceNodes(NamedTuple):
+    """The nodes of a face: both ends of each bisector, then crossings, then hubs."""
+
+    inner: int
+    """Number of ends, and the first crossing among the nodes"""
+    crossings: Ints
+    """(n, 3): as `crossings_of_face` returns them"""
+    parent: Ints
+    """By node, the one that it is united with, or itself; see `root_of`"""
+    places: Floats
+    """(N, 2): in the frame of the face's first half-edge"""
+
+
 @kernel
 def cross_edges(topology: Any, territories: Any, row_of: Ints) -> LabelledCrossings:
     """Find the crossings of borders with the edges of the faces that they may pass, each edge once.
@@ -137,13 +150,14 @@ def source_on_edge(territories: Any, labelled: Any, k: int, i: int, length: floa
 
 @kernel
 def bisectors_inside(
-    topology: Any, territories: Any, labelled: Any, face: int, k: int, lo: int, hi: int, near: float
+    topology: Any, territories: Any, labelled: Any, face: int, k: int, near: float
 ) -> Floats:
     """Return the bisectors in the k-th face, but for those along edges that are in the other face.
 
     A border along an edge, within ``near``, would be in either face by rounding. It is in that face
     whose side is not that of the edge itself.
     """
+    lo, hi = territories.first_bisector[k, 0], territories.first_bisector[k + 1, 0]
     curves, count = np.empty((hi - lo, BISECTOR)), 0
     for b in range(lo, hi):
         curve = territories.bisectors[b]
@@ -245,62 +259,117 @@ def close_gaps(gaps: Ints, at: Floats, crossings: int, near: float) -> tuple[Int
     nodes and the sources on the left and right; and the places of all nodes. The last ``crossings``
     of the nodes at ``at`` are crossings, which stay apart. Ends nearer than ``near`` are one.
     """
-    total, inner = len(at), len(at) - crossings
-    parent = np.arange(total + len(gaps)).astype(np.int32)
-    places = np.zeros((total + len(gaps), 2))
-    copy_rows(at, places, 0)
+    inner = len(at) - crossings
+    parent = np.arange(len(at) + len(gaps)).astype(np.int32)
+    straight = np.empty((2 * len(gaps), 4), np.int32)
+    gaps = unite_ends(gaps, at, inner, near, parent)
+    gaps, count = close_opposite(gaps, straight)
+    places, count = draw_together(gaps, at, inner, parent, straight, count)
+    return parent, straight[:count], places
+
+
+@kernel
+def unite_ends(gaps: Ints, at: Floats, inner: int, near: float, parent: Ints) -> Ints:
+    """Unite the ends of bisectors, the nodes below ``inner``, at gaps no wider than ``near``.
+
+    Returns the gaps that are left, between the nodes that stand for theirs. Modifies ``parent``.
+    """
     for i in range(len(gaps)):
         u, v = gaps[i, 0], gaps[i, 1]
         if max(u, v) < inner and math.hypot(at[u, 0] - at[v, 0], at[u, 1] - at[v, 1]) <= near:
             parent[root_of(parent, u)] = root_of(parent, v)
-    straight, count = np.empty((2 * len(gaps), 4), np.int32), 0
-    closed = np.zeros(len(gaps), np.uint8)
+    left, count = np.empty(gaps.shape, np.int32), 0
     for i in range(len(gaps)):
         u, v = root_of(parent, gaps[i, 0]), root_of(parent, gaps[i, 1])
-        if u == v:
-            closed[i] = 1
+        if u != v:
+            left[count, 0], left[count, 1], left[count, 2] = u, v, gaps[i, 2]
+            count += 1
+    return left[:count]
+
+
+@kernel
+def close_opposite(gaps: Ints, straight: Ints) -> tuple[Ints, int]:
+    """Close each two gaps between the same nodes in opposite directions; return the others.
+
+    Writes a piece to ``straight`` where they are of two sources. The number of pieces comes last.
+    """
+    closed, count = np.zeros(len(gaps), np.uint8), 0
+    for i in range(len(gaps)):
         for j in range(i):
             if closed[i] or closed[j]:
                 continue
-            if root_of(parent, gaps[j, 0]) == v and root_of(parent, gaps[j, 1]) == u:
+            if gaps[j, 0] == gaps[i, 1] and gaps[j, 1] == gaps[i, 0]:
                 closed[i], closed[j] = 1, 1
                 if gaps[i, 2] != gaps[j, 2]:
-                    count = put_straight(straight, count, u, v, gaps[i, 2], gaps[j, 2])
-    # The rest: each connected group of gaps is drawn together.
-    group = np.arange(total + len(gaps)).astype(np.int32)
+                    count = put_straight(
+                        straight, count, gaps[i, 0], gaps[i, 1], gaps[i, 2], gaps[j, 2]
+                    )
+    left, size = np.empty(gaps.shape, np.int32), 0
     for i in range(len(gaps)):
         if not closed[i]:
-            u, v = root_of(parent, gaps[i, 0]), root_of(parent, gaps[i, 1])
-            group[root_of(group, u)] = root_of(group, v)
-    hubs = total
-    for first in range(total):
-        if root_of(group, first) != first:
+            left[size, 0], left[size, 1], left[size, 2] = gaps[i, 0], gaps[i, 1], gaps[i, 2]
+            size += 1
+    return left[:size], count
+
+
+@kernel
+def draw_together(
+    gaps: Ints, at: Floats, inner: int, parent: Ints, straight: Ints, count: int
+) -> tuple[Floats, int]:
+    """Draw each connected group of gaps together to a hub: a new node at the most central of its.
+
+    Ends of bisectors, the nodes below ``inner``, become the hub, and crossings are joined to it by
+    pieces, appended to the first ``count`` of ``straight``. Returns the places of all nodes, and
+    the number of pieces. Modifies ``parent`` and ``straight``.
+    """
+    places, hub = np.empty((len(at) + len(gaps), 2)), len(at)
+    copy_rows(at, places, 0)
+    group = groups_of(gaps, len(at))
+    for first in range(len(at)):
+        central = most_central(gaps, at, group, first)
+        if central < 0:
             continue
-        best = math.inf
+        places[hub, 0], places[hub, 1] = at[central, 0], at[central, 1]
         for i in range(len(gaps)):
-            u, ways = root_of(parent, gaps[i, 0]), 0.0
-            if closed[i] or root_of(group, u) != first:
-                continue
-            for j in range(len(gaps)):
-                v = root_of(parent, gaps[j, 0])
-                if not closed[j] and root_of(group, v) == first:
-                    ways += math.hypot(places[u, 0] - places[v, 0], places[u, 1] - places[v, 1])
-            if ways < best:
-                best, places[hubs, 0], places[hubs, 1] = ways, places[u, 0], places[u, 1]
-        if best == math.inf:
-            continue
-        for i in range(len(gaps)):
-            u = root_of(parent, gaps[i, 0])
-            if closed[i] or u == hubs or root_of(group, u) != first:
+            u = gaps[i, 0]
+            if group[u] != first:
                 continue
             if u < inner:
-                parent[u] = hubs
+                parent[u] = hub
                 continue
             for j in range(len(gaps)):  # the gap that ends at this crossing
-                if not closed[j] and gaps[j, 1] == u:
-                    count = put_straight(straight, count, u, hubs, gaps[i, 2], gaps[j, 2])
-        hubs += 1
-    return parent, straight[:count], places[:hubs]
+                if gaps[j, 1] == u:
+                    count = put_straight(straight, count, u, hub, gaps[i, 2], gaps[j, 2])
+        hub += 1
+    return places[:hub], count
+
+
+@kernel
+def groups_of(gaps: Ints, nodes: int) -> Ints:
+    """Return the node that stands for the connected group of gaps of each node."""
+    group = np.arange(nodes).astype(np.int32)
+    for i in range(len(gaps)):
+        group[root_of(group, gaps[i, 0])] = root_of(group, gaps[i, 1])
+    for node in range(nodes):
+        group[node] = root_of(group, node)
+    return group
+
+
+@kernel
+def most_central(gaps: Ints, at: Floats, group: Ints, first: int) -> int:
+    """Return the node of a group that is nearest to all others in sum; -1 if it has no gaps."""
+    least, central = math.inf, -1
+    for i in range(len(gaps)):
+        u, ways = gaps[i, 0], 0.0
+        if group[u] != first:
+            continue
+        for j in range(len(gaps)):
+            v = gaps[j, 0]
+            if group[v] == first:
+                ways += math.hypot(at[u, 0] - at[v, 0], at[u, 1] - at[v, 1])
+        if ways < least:
+            least, central = ways, u
+    return central
 
 
 @kernel
@@ -348,53 +417,37 @@ def trace_borders(
 
     Returns the pieces, as `Pieces` has them, but with the number of points of each. Nodes in faces
     have numbers from ``next_node`` on; the next free one comes last. Ends nearer than ``near``,
-    mesh units, are one. O(n³) for n bisectors in
-    a face.
+    mesh units, are one. O(n³) for n bisectors in a face.
     """
-    territories, labelled = borrowed(territories), borrowed(labelled)
+    topology, territories, labelled = borrowed(topology), borrowed(territories), borrowed(labelled)
     points, count = np.empty((4 * ROWS, 3)), 0
     points_of, pieces = np.empty((ROWS, 1), np.int64), 0
     nodes, sources = np.empty((ROWS, 2), np.int32), np.empty((ROWS, 2), np.int32)
     faces = np.empty((ROWS, 1), np.int32)
     for k in range(first, last):
         face = territories.faces[k, 0]
-        lo, hi = territories.first_bisector[k, 0], territories.first_bisector[k + 1, 0]
-        curves = bisectors_inside(topology, territories, labelled, face, k, lo, hi, near)
-        places, ids = crossings_of_face(topology, labelled, face, k)
-        inner = 2 * len(curves)
-        at = np.empty((inner + len(ids), 2))
-        for b in range(len(curves)):
-            at[2 * b, 0], at[2 * b, 1] = point_on(curves[b], curves[b, START])
-            at[2 * b + 1, 0], at[2 * b + 1, 1] = point_on(curves[b], curves[b, END])
-        copy_rows(places, at, inner)
-        gaps = gaps_between(curves, places, ids)
-        parent, straight, where = close_gaps(gaps, at, len(ids), near)
+        curves = bisectors_inside(topology, territories, labelled, face, k, near)
+        own, straight = nodes_of_face(topology, labelled, face, k, curves, near)
         room = pieces + len(curves) + len(straight)
         points_of, nodes = with_room(points_of, room), with_room(nodes, room)
         sources, faces = with_room(sources, room), with_room(faces, room)
         for i in range(len(curves) + len(straight)):
-            s = i - len(curves)
-            if s < 0:
-                left, right = int(curves[i, LEFT]), int(curves[i, RIGHT])
-                u, v = root_of(parent, 2 * i), root_of(parent, 2 * i + 1)
-            else:
-                left, right = straight[s, 2], straight[s, 3]
-                u, v = root_of(parent, straight[s, 0]), root_of(parent, straight[s, 1])
+            u, v, left, right = ends_of_piece(curves, straight, own.parent, i)
             if min(left, right) < 0:
                 continue
             begin = count
-            points, count = put_node(topology, labelled, face, ids, inner, u, where, points, count)
-            if s < 0:
+            points, count = put_node(topology, labelled, face, own, u, points, count)
+            if i < len(curves):
                 points, count = trace_bisector(
                     topology, face, curves[i], chord_error, points, count
                 )
-            points, count = put_node(topology, labelled, face, ids, inner, v, where, points, count)
+            points, count = put_node(topology, labelled, face, own, v, points, count)
             points_of[pieces, 0], faces[pieces, 0] = count - begin, face
-            nodes[pieces, 0] = global_node(ids, inner, u, next_node)
-            nodes[pieces, 1] = global_node(ids, inner, v, next_node)
+            nodes[pieces, 0] = global_node(own, u, next_node)
+            nodes[pieces, 1] = global_node(own, v, next_node)
             sources[pieces, 0], sources[pieces, 1] = min(left, right), max(left, right)
             pieces += 1
-        next_node += len(where)
+        next_node += len(own.places)
     return (
         points[:count],
         points_of[:pieces],
@@ -406,21 +459,60 @@ def trace_borders(
 
 
 @kernel
-def global_node(ids: Ints, inner: int, node: int, next_node: int) -> int:
+def nodes_of_face(
+    topology: Any, labelled: Any, face: int, k: int, curves: Floats, near: float
+) -> tuple[FaceNodes, Ints]:
+    """Return the nodes of the k-th face, which has these bisectors, and its straight pieces.
+
+    The pieces, and ``near``, are as in `close_gaps`.
+    """
+    places, ids = crossings_of_face(topology, labelled, face, k)
+    inner = 2 * len(curves)
+    at = np.empty((inner + len(ids), 2))
+    for b in range(len(curves)):
+        at[2 * b, 0], at[2 * b, 1] = point_on(curves[b], curves[b, START])
+        at[2 * b + 1, 0], at[2 * b + 1, 1] = point_on(curves[b], curves[b, END])
+    copy_rows(places, at, inner)
+    gaps = gaps_between(curves, places, ids)
+    parent, straight, places = close_gaps(gaps, at, len(ids), near)
+    return FaceNodes(inner, ids, parent, places), straight
+
+
+@kernel
+def ends_of_piece(
+    curves: Floats, straight: Ints, parent: Ints, i: int
+) -> tuple[int, int, int, int]:
+    """Return the nodes of piece i, and the sources on its left and right; bisectors come first."""
+    s = i - len(curves)
+    if s >= 0:
+        u, v = root_of(parent, straight[s, 0]), root_of(parent, straight[s, 1])
+        return u, v, straight[s, 2], straight[s, 3]
+    u, v = root_of(parent, 2 * i), root_of(parent, 2 * i + 1)
+    return u, v, int(curves[i, LEFT]), int(curves[i, RIGHT])
+
+
+@kernel
+def crossing_of(nodes: FaceNodes, node: int) -> int:
+    """Return the number of the crossing that a node of a face is, -1 if it is none."""
+    place = node - nodes.inner
+    return nodes.crossings[place, 0] if 0 <= place < len(nodes.crossings) else -1
+
+
+@kernel
+def global_node(nodes: FaceNodes, node: int, next_node: int) -> int:
     """Return the number of a node of a face among those of all faces."""
-    if inner <= node < inner + len(ids):
-        return ids[node - inner, 0]
-    return next_node + node
+    crossing = crossing_of(nodes, node)
+    return crossing if crossing >= 0 else next_node + node
 
 
 @kernel
 def put_node(
-    topology: Any, labelled: Any, face: int, ids: Ints, inner: int, node: int, where: Floats,
-    points: Floats, count: int,
-) -> Any:  # fmt: skip
+    topology: Any, labelled: Any, face: int, nodes: FaceNodes, node: int, points: Floats, count: int
+) -> Any:
     """Append the point of a node of a face to ``points``; return them and their number."""
-    if inner <= node < inner + len(ids):
-        return put_crossing(topology, labelled.crossings, ids[node - inner, 0], points, count)
+    nodes, crossing = borrowed(nodes), crossing_of(nodes, node)
+    if crossing >= 0:
+        return put_crossing(topology, labelled.crossings, crossing, points, count)
     points = with_room(points, count + 1)
-    put_in_face(topology, face, where[node, 0], where[node, 1], points[count])
+    put_in_face(topology, face, nodes.places[node, 0], nodes.places[node, 1], points[count])
     return points, count + 1

@@ -13,7 +13,7 @@ import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.borders import envelopes
-from geodesic_core.kernels.borders.bisectors import BISECTOR, bisectors_within
+from geodesic_core.kernels.borders.bisectors import BISECTOR, Regions, bisectors_within
 from geodesic_core.kernels.isolines.arcs import ROWS, copy_rows, with_room
 from geodesic_core.kernels.isolines.regions import (
     CX,
@@ -101,25 +101,24 @@ def level_of_face(topology: Any, field: Any, face: int, limit: float) -> float:
 
 
 @kernel
-def labelled_regions(
-    topology: Any, field: Any, nearest: Ints, face: int, level: float, limit: float
-) -> tuple[Floats, Ints]:
-    """Return the regions of a face and the source of each, (n, 1).
+def labelled_regions(topology: Any, field: Any, nearest: Ints, face: int, limit: float) -> Regions:
+    """Return the regions of a face with their sources.
 
     The last one stands for no source, -1, where the face is not all within ``limit``: it is
     everywhere at that distance.
     """
-    regions = regions_of_face(topology, field, face, level)
+    level = level_of_face(topology, field, face, limit)
+    regions, slack = regions_of_face(topology, field, face, level), LEVEL * level
     count = len(regions)
     labels = np.full((count + 1, 1), -1, np.int32)
     for i in range(count):
         labels[i, 0] = nearest[int(regions[i, ORIGIN])]
     if level < limit:
-        return regions, labels[:count]
+        return Regions(regions, labels[:count], level, slack)
     beyond = np.zeros((count + 1, REGION))
     copy_rows(regions, beyond, 0)
     beyond[count, RADIUS], beyond[count, OVER] = np.inf, -1
-    return beyond, labels
+    return Regions(beyond, labels, level, slack)
 
 
 @kernel
@@ -141,60 +140,108 @@ def divide_faces(
     curves_of = np.empty((len(faces), 1), np.int32)
     found, count = np.empty((ROWS, 1), np.int32), 0
     for k in range(len(faces)):
-        f = faces[k, 0]
-        level = level_of_face(topology, field, f, limit)
-        regions, labels = labelled_regions(topology, field, nearest, f, level, limit)
-        slack = LEVEL * level
-        seen = np.empty((len(regions), 2))  # the stretch of its edge on which each is nearest
-        for i in range(len(regions)):
-            seen[i, 0], seen[i, 1] = np.inf, -np.inf
-        first_run, is_divided = run_count, False
-        for h in range(3 * f, 3 * f + 3):
+        face, first_run = faces[k, 0], run_count
+        regions = labelled_regions(topology, field, nearest, face, limit)
+        seen = nothing_seen(len(regions.rows))
+        for i in range(3):
+            h = 3 * face + i
             edge, length = half_edge_in_face(geometry, h), geometry[h, LENGTH]
-            stretches = envelopes.envelope_along(regions, labels, level, edge, length, slack)
-            for i in range(len(stretches)):
-                region = int(stretches[i, envelopes.REGION])
-                if region >= 0 and regions[region, OVER] == h % 3:
-                    end = stretches[i + 1, envelopes.START] if i + 1 < len(stretches) else length
-                    seen[region, 0] = min(seen[region, 0], stretches[i, envelopes.START])
-                    seen[region, 1] = max(seen[region, 1], end)
+            stretches = envelopes.envelope_along(regions, edge, length)
+            see_over(regions.rows, i, stretches, length, seen)
             ends = (
                 label_at(field, nearest, links[h, TAIL], limit),
                 label_at(field, nearest, links[h, HEAD], limit),
             )
-            own = envelopes.label_runs(stretches, labels, ends, length, CROSSING * length)
+            own = envelopes.label_runs(stretches, regions.labels, ends, length, CROSSING * length)
             runs = with_room(runs, run_count + len(own))
-            for i in range(len(own)):
-                runs[run_count, 0], runs[run_count, 1] = own[i, 0], own[i, 1]
-                is_divided = is_divided or own[i, 1] != runs[first_run, 1]
-                run_count += 1
-            runs_of[3 * (k - f) + h, 0] = len(own)
-            g = next_around(links, h) if leads_on(own) else -1
-            while g >= 0 and g != h:
-                if row_of[g // 3] < 0:
-                    found = with_room(found, count + 1)
-                    found[count, 0], row_of[g // 3] = g // 3, known + count
-                    count += 1
-                g = next_around(links, g)
-        chosen, chosen_labels, size = np.empty(regions.shape), np.empty(labels.shape, np.int32), 0
-        for i in range(len(regions)):
-            if seen[i, 0] < seen[i, 1] or regions[i, OVER] < 0:
-                if regions[i, OVER] >= 0:
-                    narrow(geometry, 3 * f + int(regions[i, OVER]), regions[i], seen[i])
-                copy_rows(regions[i : i + 1], chosen, size)
-                chosen_labels[size, 0] = labels[i, 0]
-                is_divided = is_divided or labels[i, 0] != runs[first_run, 1]
-                size += 1
+            copy_rows(own, runs, run_count)
+            run_count += len(own)
+            runs_of[3 * k + i, 0] = len(own)
+            if leads_on(own):
+                found, count = number_across(links, h, known, row_of, found, count)
+        regions = regions_seen(geometry, face, regions, seen)
         curves_of[k, 0] = 0
-        if is_divided:
-            own_curves = bisectors_within(
-                topology, f, chosen[:size], chosen_labels[:size], level, slack, PIECE * level
-            )
+        if is_divided(runs[first_run:run_count], regions.labels):
+            own_curves = bisectors_within(topology, face, regions, PIECE * regions.level)
             curves = with_room(curves, curve_count + len(own_curves))
             copy_rows(own_curves, curves, curve_count)
             curve_count += len(own_curves)
             curves_of[k, 0] = len(own_curves)
     return runs[:run_count], runs_of, curves[:curve_count], curves_of, found[:count]
+
+
+@kernel
+def nothing_seen(count: int) -> Floats:
+    """Return empty stretches, (n, 2), for `see_over` to widen."""
+    seen = np.empty((count, 2))
+    for i in range(count):
+        seen[i, 0], seen[i, 1] = np.inf, -np.inf
+    return seen
+
+
+@kernel
+def see_over(regions: Floats, i: int, stretches: Floats, length: float, seen: Floats) -> None:
+    """Widen the stretches in ``seen`` to where regions of windows over the i-th edge are nearest.
+
+    Of each region there is one, which may hold others; ``stretches`` are those of the envelope.
+    """
+    for k in range(len(stretches)):
+        region = int(stretches[k, envelopes.REGION])
+        if region >= 0 and regions[region, OVER] == i:
+            end = stretches[k + 1, envelopes.START] if k + 1 < len(stretches) else length
+            seen[region, 0] = min(seen[region, 0], stretches[k, envelopes.START])
+            seen[region, 1] = max(seen[region, 1], end)
+
+
+@kernel
+def number_across(
+    links: Ints, h: int, known: int, row_of: Ints, found: Ints, count: int
+) -> tuple[Ints, int]:
+    """Append the faces across the edge of h that have no row to ``found``; return both.
+
+    Their rows, from ``known`` on, are written to ``row_of``.
+    """
+    g = next_around(links, h)
+    while g >= 0 and g != h:
+        if row_of[g // 3] < 0:
+            found = with_room(found, count + 1)
+            found[count, 0], row_of[g // 3] = g // 3, known + count
+            count += 1
+        g = next_around(links, g)
+    return found, count
+
+
+@kernel
+def regions_seen(geometry: Floats, face: int, regions: Regions, seen: Floats) -> Regions:
+    """Return the regions that may be nearest in a face, without windows of which nothing is seen.
+
+    Windows are narrowed to what is ``seen`` of each, a stretch of its edge. Modifies ``regions``.
+    """
+    rows, labels = borrowed(regions.rows), borrowed(regions.labels)
+    chosen, chosen_labels, count = np.empty(rows.shape), np.empty(labels.shape, np.int32), 0
+    for i in range(len(rows)):
+        over = int(rows[i, OVER])
+        if over >= 0 and not seen[i, 0] < seen[i, 1]:
+            continue
+        if over >= 0:
+            narrow(geometry, 3 * face + over, rows[i], seen[i])
+        copy_rows(rows[i : i + 1], chosen, count)
+        chosen_labels[count, 0] = labels[i, 0]
+        count += 1
+    return Regions(chosen[:count], chosen_labels[:count], regions.level, regions.slack)
+
+
+@kernel
+def is_divided(runs: Floats, labels: Ints) -> bool:
+    """Whether several sources are nearest in a face, by the runs around it and its regions."""
+    source = runs[0, 1]
+    for i in range(1, len(runs)):
+        if runs[i, 1] != source:
+            return True
+    for i in range(len(labels)):  # noqa: SIM110 - numba has no generators in any()
+        if labels[i, 0] != source:
+            return True
+    return False
 
 
 @kernel

@@ -7,7 +7,7 @@ paths that exist: the best of them wins a place, or several, and the rest is dro
 """
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from geodesic_core.kernels.fast.places import (
     AT_LARGE,
@@ -49,6 +49,16 @@ OFFERS = 4
 """Windows offered to an edge, at most"""
 VERTICES = 3
 """Times that the apex may be reached, at most"""
+
+
+class Corners(NamedTuple):
+    """The vertices of a face that a window crosses, as seen from one of the two other sides."""
+
+    near: int
+    """Where the side begins, an end of the half-edge"""
+    apex: int
+    far: int
+    """The other end of the half-edge"""
 
 
 @inlined
@@ -96,9 +106,9 @@ def cross(wave: Any, h: int, slot: int) -> None:
     relax(wave, apex, front.distance[head] + right.length, h, far_end, 0.0, head, far_end)
     if wave.sizes.first_site > 0:
         reach_sites(wave, h, window)
-    send_over(wave, window, left, previous(h), x, far_end, tail, apex, head)
-    mirrored = reversed_window(window, far_end)
-    send_over(wave, mirrored, right, following(h), far_end - x, far_end, head, apex, tail)
+    send_over(wave, window, left, previous(h), x, far_end, Corners(tail, apex, head))
+    mirrored, corners = reversed_window(window, far_end), Corners(head, apex, tail)
+    send_over(wave, mirrored, right, following(h), far_end - x, far_end, corners)
 
 
 @inlined
@@ -142,14 +152,12 @@ def send_over(
     g: int,
     x: float,
     length: float,
-    near: int,
-    apex: int,
-    far: int,
+    corners: Corners,
 ) -> None:
     """Offer all windows that leave a face over one of its sides to the half-edge across.
 
     The window is in the frame of the half-edge that it crosses, of this ``length``, as seen from
-    the ``near`` end, at which the side g begins; its ray to the apex crosses at ``x``.
+    its near end, at which the side g begins; its ray to the apex crosses at ``x``.
     """
     if side.out < 0 and side.out != IRREGULAR:
         return
@@ -163,6 +171,7 @@ def send_over(
         sigma, root = window.sigma, window.root
         lit = Window(u0, u1, along, depth, sigma, window.weight, root, 0.0, window.reference)
         offer_side(wave, side, g, lit)
+    near, apex, far = corners
     if side.out >= 0:
         offer_end(wave, side.out, g, side.length, near, not side.is_right)
         offer_end(wave, side.out, g, side.length, apex, side.is_right)
