@@ -104,11 +104,22 @@ def joined(folder: Path, settings: Settings) -> Iterator["Processes"]:
             _temp_dir=str(folder.resolve()),
         )
         signal.signal(signal.SIGTERM, on_end)  # Ray has set one of its own
+        _end_listener()
         try:
             _check_code(address)
             yield processes
         finally:
             ray.shutdown()
+
+
+def _end_listener() -> None:
+    """Have Ray's thread that prints errors of the cluster end once the head is away.
+
+    It would ask again and again then, without a pause, and burn a core.
+    """
+    from ray._private.worker import global_worker
+
+    global_worker.threads_stopped.set()
 
 
 def host_and_port(address: str | None) -> tuple[str, int]:

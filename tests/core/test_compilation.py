@@ -60,7 +60,7 @@ def test_a_process_that_fails_is_an_error(monkeypatch):
 
     monkeypatch.setattr(compilation, "_start", fail)
     monkeypatch.setattr(cache, "is_complete", lambda _: False)
-    with pytest.raises(InternalError, match="failed with 3"):
+    with pytest.raises(InternalError, match="failed with exit code 3"):
         gc.compile_kernels(["exact"])
 
 

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
@@ -281,6 +282,11 @@ def test_a_head_that_is_killed_stops_nothing_and_comes_back(spread: Place) -> No
     cluster.head.kill()
     mesh_id = upload_sample(spread.client, "terrain", 3000)
     assert spread.client.get(f"/v1/meshes/{mesh_id}/path?from=v0&to=v99").status_code == 200
+    replica = spread.server.process.pid
+    since, before = time.monotonic_ns(), total_time([replica])
+    time.sleep(3)
+    taken, passed = total_time([replica]) - before, time.monotonic_ns() - since
+    assert taken < passed / 5, "waiting for the head keeps no core busy"
 
     cluster.head = cluster.start_head()
     if len(cluster.living()) == 2:

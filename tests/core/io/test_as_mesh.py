@@ -130,7 +130,7 @@ def test_points_of_meshio_may_lie_in_the_plane() -> None:
 @pytest.mark.parametrize(
     ("thing", "message"),
     [
-        (meshio.Mesh(SQUARES, [("tetra", [[0, 1, 2, 3]])]), "cells of type 'tetra' are no polyg"),
+        (meshio.Mesh(SQUARES, [("tetra", [[0, 1, 2, 3]])]), "cells of type 'tetra' are not polyg"),
         (meshio.Mesh(SQUARES, [("line", [[0, 1]])]), "no faces"),
         (meshio.Mesh(SQUARES, [("triangle", [[0, 1, 9]])]), "numbered 0 to 5"),
         (Sphere().cast_to_unstructured_grid(), "UnstructuredGrid .* give data.extract_surface"),

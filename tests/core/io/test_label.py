@@ -100,7 +100,7 @@ def test_what_is_no_label_of_the_surface_is_refused(tmp_path: Path) -> None:
         with pytest.raises(gc.errors.InvalidArgument, match=message):
             gc.load_label(path, BALL, label)
     path = gifti(tmp_path, parcels(), "NIFTI_INTENT_LABEL", {7: "wall"})
-    with pytest.raises(gc.errors.InvalidArgument, match="no label 'Wall'; it has 'wall'"):
+    with pytest.raises(gc.errors.InvalidArgument, match="no label 'Wall'; its labels are 'wall'"):
         gc.load_label(path, BALL, "Wall")
 
 
