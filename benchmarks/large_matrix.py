@@ -11,10 +11,10 @@ from benchmarks.inputs import Inputs
 from benchmarks.tables import Section, rated
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
+from geodesic_core.search.plan import Plan
+from geodesic_core.search.rows import ExactRows, FieldRows, Rows
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import available_cores, share_out
-from geodesic_core.tables.plan import Plan
-from geodesic_core.tables.rows import ExactRows, FieldRows, Rows
 
 VERTICES = 32_492
 """As many as surfaces of a brain hemisphere often have"""

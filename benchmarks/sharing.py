@@ -13,9 +13,9 @@ from benchmarks.inputs import Inputs
 from benchmarks.large_matrix import VERTICES, cortex
 from benchmarks.tables import Section
 from geodesic_core.control import Control
+from geodesic_core.search.plan import Plan
+from geodesic_core.search.rows import ExactRows
 from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.tables.plan import Plan
-from geodesic_core.tables.rows import ExactRows
 
 SWEEPS = {2.0: 400, 20.0: 60, math.inf: 8}
 """How many, by the radius in millimetres"""

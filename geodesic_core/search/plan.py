@@ -10,7 +10,7 @@ from geodesic_core.control import Control
 from geodesic_core.fields.sources import Ends, ends_of
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tables.order import sweep_order
+from geodesic_core.search.order import sweep_order
 
 _BLOCK_BYTES = 1 << 25
 """Bytes of a block, at most: a process that is killed loses one or two"""
