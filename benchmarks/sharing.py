@@ -25,7 +25,7 @@ def run(_inputs: Inputs, runs: int) -> Section:
     """Sweep from neighbours and from points anywhere, in memory that is reused and in new one."""
     mesh = cortex()
     points = [mesh.point(i) for i in range(len(mesh.vertices))]
-    plan = Plan.of(mesh, points, list(points), Control(), in_order=True)
+    plan = Plan.of(mesh, points, None, Control(), in_order=True)
     every = np.arange(len(points), dtype=np.int32)
     rng = np.random.default_rng(1)
     field = gc.exact_distance(mesh, int(rng.integers(len(points))))

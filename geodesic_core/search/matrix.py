@@ -63,13 +63,11 @@ def find_matrix(
     table: _Dense | _Sparse | _Pairs
     if layout == "pairs":
         table = _Pairs(mesh, starts, stops, SWEEP_FROM if solve is None else 1, control)
+    elif layout == "dense":
+        control.check_memory(8 * len(starts) * len(stops))
+        table = _Dense(Plan.of(mesh, starts, stops, control, in_order=False))
     else:
-        others = None if starts == stops else stops
-        if layout == "dense":
-            control.check_memory(8 * len(starts) * len(stops))
-            table = _Dense(Plan.of(mesh, starts, others, control, in_order=False))
-        else:
-            table = _Sparse(Plan.of(mesh, starts, others, control, in_order=True))
+        table = _Sparse(Plan.of(mesh, starts, stops, control, in_order=True))
     rest = control
     if isinstance(table, _Pairs) and len(table.searched):
         few, parts = len(table.searched), len(table.searched) + table.sweeps

@@ -49,10 +49,12 @@ class Plan:
         *,
         in_order: bool,
     ) -> "Plan":
-        """Return the plan of a table, symmetric where there are no targets.
+        """Return the plan of a table, symmetric where there are no targets but the sources.
 
         Sweeps are ``in_order`` where their rows are to be, else in the one that sweeps least.
         """
+        if targets == sources:
+            targets = None
         is_flipped = targets is not None and len(targets) < len(sources)
         order = np.arange(min(len(sources), len(sources if targets is None else targets)))
         if targets is None:

@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -93,7 +93,7 @@ def write_matrix(
         ``.parquet``: these as a table of source, target and distance.
     sources, targets
         N and M vertex indices or `SurfacePoint`, or ``"all"`` vertices. Without targets, the
-        targets are the sources, and each pair is computed once.
+        targets are the sources. Where both are the same, each pair is computed once.
     method
         ``"exact"``; ``"approximate"``, within ``relative_error`` and ``absolute_error``; or
         ``"fast"``, with an ``effort``. See the solvers of these names.
@@ -166,12 +166,17 @@ def write_matrix(
     starts = _points(mesh, sources, "source", control)
     stops = None if targets is None else _points(mesh, targets, "target", control)
     plan = Plan.of(mesh, starts, stops, control, in_order=suffix in SPARSE)
+    chosen: Mapping[str, Mapping[str, Any]] = {
+        "approximate": {"relative_error": relative_error, "absolute_error": absolute_error},
+        "fast": {"effort": effort},
+    }
     facts = {
         "mesh": _digest(mesh.vertices, mesh.faces, mesh.barriers),
         "sources": _written(starts),
         "targets": None if stops is None else _written(stops),
         "shape": plan.shape,
         "method": method,
+        **chosen.get(method, {}),
         "error_bound": asdict(bound),
         "max_distance": None if math.isinf(limit) else limit,
         "dtype": dtype,

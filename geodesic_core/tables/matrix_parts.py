@@ -79,13 +79,7 @@ class MatrixParts:
         starts = as_points(self._mesh, sources, "source", control)
         stops = as_points(self._mesh, targets, "target", control)
         self._is_sparse = layout == "sparse"
-        self._plan = Plan.of(
-            self._mesh,
-            starts,
-            None if starts == stops else stops,
-            control,
-            in_order=self._is_sparse,
-        )
+        self._plan = Plan.of(self._mesh, starts, stops, control, in_order=self._is_sparse)
 
     @staticmethod
     def areas(sources: int, targets: int | None) -> list[int]:
