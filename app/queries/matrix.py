@@ -44,8 +44,8 @@ if TYPE_CHECKING:
 _CELLS = "cells of the matrix"
 _IN_PARTS: Mapping[Layout, str] = {"dense": NPY, "sparse": NPZ}
 """Media types in which jobs compute a matrix of any size, by layout"""
-_BYTES_OF_END = 8
-"""Of the column of a distance in a sparse file, and of the end of a row"""
+_INDEX_BYTES = 8
+"""Bytes of an index in a sparse file: of the column of a distance, or of the end of a row"""
 _SAMPLED = 2**22
 """Straight distances that are computed for an estimate, at most, about"""
 
@@ -127,7 +127,7 @@ class MatrixQuery(Query[MatrixRequest]):
         Of a sparse matrix these are only the ends of rows: `bytes_of_part` tells the rest.
         """
         if self.request.layout == "sparse":
-            return _BYTES_OF_END * self._count(size)[0]
+            return _INDEX_BYTES * self._count(size)[0]
         cells = sum(self.areas_of_parts(size)) + math.prod(self._count(size))
         return cells * np.dtype(representation.dtype).itemsize
 
@@ -135,7 +135,7 @@ class MatrixQuery(Query[MatrixRequest]):
         """Return what a part of ``nbytes`` adds to `bytes_in_parts`, once it is computed."""
         if self.request.layout == "dense":
             return 0
-        return nbytes + reached * (_BYTES_OF_END + np.dtype(representation.dtype).itemsize)
+        return nbytes + reached * (_INDEX_BYTES + np.dtype(representation.dtype).itemsize)
 
     def parts(self, opened: OpenMesh, dtype: Any, cancel: Callable[[], bool]) -> gc.MatrixParts:
         """Return the parts of the matrix, which are still to be computed."""

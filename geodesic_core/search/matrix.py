@@ -78,8 +78,7 @@ def find_matrix(
         rest = control.for_part(few, parts, table.sweeps).holding(finder.nbytes)
     if table.sweeps:
         make = partial(rows_of, table.ends, limit, solve)
-        rest_of_rows = (make(partial(TargetSweep, mesh)) for _ in repeat(None))
-        rows = chain([make(target_sweep)], rest_of_rows)
+        rows = map(make, chain([target_sweep], repeat(partial(TargetSweep, mesh))))
         _sweep_all(rows, table, threads or available_cores(), rest)
     if control.progress is not None:
         control.progress(1.0)
@@ -113,8 +112,9 @@ def _sweep_all(
         count = max(1, min(count, room // (_GROWTH * first.nbytes)))
 
     def sweep(rows: Rows, source: int, control: Control) -> None:
-        # The states of other threads are about as large as that of the first.
-        control = control.holding(table.nbytes + (count - 1) * first.nbytes)
+        if control.memory_limit is not None:
+            # The states of other threads are about as large as that of the first.
+            control = control.holding(table.nbytes + (count - 1) * first.nbytes)
         targets = table.wanted(source)
         table.put(source, targets, rows.distances(source, targets, control))
 
