@@ -3,6 +3,7 @@
 import math
 import time
 from functools import partial
+from typing import get_args
 
 import numpy as np
 
@@ -11,10 +12,11 @@ from benchmarks.inputs import Inputs
 from benchmarks.tables import Section, rated
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
+from geodesic_core.search.plan import Plan
+from geodesic_core.search.rows import Method, Rows, rows_of
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import available_cores, share_out
-from geodesic_core.tables.plan import Plan
-from geodesic_core.tables.rows import ExactRows, FieldRows, Rows
+from geodesic_core.solvers import row_solver
 
 VERTICES = 32_492
 """As many as surfaces of a brain hemisphere often have"""
@@ -47,23 +49,10 @@ def run(_inputs: Inputs, _runs: int) -> Section:
     plan = Plan.of(mesh, points, None, Control(), in_order=False)
     sweeps = np.arange(0, plan.sweeps, EVERY)
 
-    def exact() -> Rows:
-        return ExactRows(plan.ends, math.inf, TargetSweep(mesh))
-
-    def approximate() -> Rows:
-        def solve(source: gc.SurfacePoint, _targets: object, _control: Control) -> gc.DistanceField:
-            return gc.approximate_distance(mesh, source, retain="distances")
-
-        return FieldRows(plan.ends, solve)
-
-    def fast() -> Rows:
-        def solve(source: gc.SurfacePoint, _targets: object, _control: Control) -> gc.DistanceField:
-            return gc.fast_distance(mesh, source, retain="distances")
-
-        return FieldRows(plan.ends, solve)
-
     rows = []
-    for name, make in (("exact", exact), ("approximate", approximate), ("fast", fast)):
+    for name in get_args(Method):
+        solve = row_solver(mesh, name, relative_error=1e-3, absolute_error=None, effort=2)
+        make = partial(rows_of, plan.ends, math.inf, solve, partial(TargetSweep, mesh))
         one_s, all_s = (_seconds(plan, sweeps, make, n) for n in (1, cores))
         whole = plan.sweeps / len(sweeps) * one_s
         limit = AT_MOST_S if name == "exact" else None

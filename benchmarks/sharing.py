@@ -13,9 +13,9 @@ from benchmarks.inputs import Inputs
 from benchmarks.large_matrix import VERTICES, cortex
 from benchmarks.tables import Section
 from geodesic_core.control import Control
+from geodesic_core.search.plan import Plan
+from geodesic_core.search.rows import ExactRows
 from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.tables.plan import Plan
-from geodesic_core.tables.rows import ExactRows
 
 SWEEPS = {2.0: 400, 20.0: 60, math.inf: 8}
 """How many, by the radius in millimetres"""
@@ -25,7 +25,7 @@ def run(_inputs: Inputs, runs: int) -> Section:
     """Sweep from neighbours and from points anywhere, in memory that is reused and in new one."""
     mesh = cortex()
     points = [mesh.point(i) for i in range(len(mesh.vertices))]
-    plan = Plan.of(mesh, points, list(points), Control(), in_order=True)
+    plan = Plan.of(mesh, points, None, Control(), in_order=True)
     every = np.arange(len(points), dtype=np.int32)
     rng = np.random.default_rng(1)
     field = gc.exact_distance(mesh, int(rng.integers(len(points))))

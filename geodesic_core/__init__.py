@@ -31,12 +31,13 @@ from geodesic_core.mesh.curve import Curve, share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.search.matrix import distance_matrix
 from geodesic_core.search.nearest import Nearest, nearest
 from geodesic_core.solvers import (
     Retain,
     Solver,
     approximate_distance,
+    distance_matrix,
+    error_bound,
     exact_distance,
     fast_distance,
     kernel_digest,
@@ -72,6 +73,7 @@ __all__ = [
     "as_mesh",
     "compile_kernels",
     "distance_matrix",
+    "error_bound",
     "errors",
     "exact_distance",
     "fast_distance",

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Literal, get_args
 
@@ -13,7 +14,7 @@ from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.fields.distance_field import DistanceField, field_of
-from geodesic_core.fields.fast_sweep import FastSweep
+from geodesic_core.fields.fast_sweep import FastSweep, estimated_error
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep, stats_of
 from geodesic_core.fields.sources import (
@@ -34,6 +35,7 @@ from geodesic_core.search.call_lock import CallLock
 from geodesic_core.search.matrix import Layout, find_matrix
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
+from geodesic_core.search.rows import Method, Solve
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
 from geodesic_core.validation import as_barriers, as_limit, check_choice, is_number
@@ -189,18 +191,10 @@ def approximate_distance(
     True
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    relative, absolute = _as_errors(relative_error, absolute_error)
+    errors = _as_errors(relative_error, absolute_error)
     limit = as_limit(max_distance)
-    kept = min(relative, WIDEST_ERROR)
-    bounds = merging_bounds(limit, kept, absolute)
     mesh, control = _with_barriers(as_mesh(mesh), barriers, control)
-    if mesh.is_rough:
-        bounds, promise = exact_bounds(limit), EXACT
-    elif math.isfinite(relative):
-        promise = ErrorBound("relative", kept, "guaranteed")
-    else:
-        promise = ErrorBound("absolute", absolute, "guaranteed")
-    return _solve(mesh, sources, targets, bounds, promise, retain, control)
+    return _solve_within(mesh, sources, targets, limit, retain, control, errors=errors)
 
 
 def fast_distance(
@@ -263,17 +257,60 @@ def fast_distance(
     True
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    if not is_number(effort) or effort not in get_args(Effort):
-        raise InvalidArgument(f"effort is {effort!r}; it must be 1, 2, 4 or 8")
+    places = _as_effort(effort)
     check_choice("retain", retain, ("distances", "paths"))
-    bounds = exact_bounds(as_limit(max_distance))
+    limit = as_limit(max_distance)
     mesh, control = _with_barriers(as_mesh(mesh), barriers, control)
-    starts, polylines, ends, exact = _as_question(mesh, sources, targets, bounds, control)
-    sweep = FastSweep(exact, int(effort))
-    front = sweep.run(control)
-    result = sweep.result_of(front, paths=retain == "paths")
-    stats = sweep.stats_of(front, time.perf_counter() - control.began)
-    return field_of(starts, polylines, ends, exact, sweep, sweep.error_bound, result, stats)
+    return _solve_fast(mesh, sources, targets, limit, retain, control, effort=places)
+
+
+def error_bound(
+    mesh: MeshLike,
+    method: Method,
+    *,
+    relative_error: float | None = 1e-3,
+    absolute_error: float | None = None,
+    effort: Effort = 2,
+) -> ErrorBound:
+    """Return the error bound of the distances that a method finds on a mesh, without solving.
+
+    `DistanceField.error_bound` is the same. A matrix is an array, which does not have it.
+
+    Parameters
+    ----------
+    mesh
+        The surface, with its barriers: a `TriangleMesh`, or anything else that `as_mesh` takes.
+    method
+        ``"exact"``, ``"approximate"`` or ``"fast"``, see the solvers of these names.
+    relative_error, absolute_error
+        Allowed errors of approximate distances, as in `approximate_distance`.
+    effort
+        Effort of fast distances, as in `fast_distance`.
+
+    Returns
+    -------
+    ErrorBound
+        A share of the exact distance, or mesh units.
+
+    Raises
+    ------
+    InvalidArgument
+        An argument that the method takes is out of its domain.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)
+    >>> gc.error_bound(mesh, "approximate", relative_error=0.01)
+    ErrorBound(type='relative', value=0.002, kind='guaranteed')
+    >>> gc.error_bound(mesh, "fast", effort=8)
+    ErrorBound(type='relative', value=0.002, kind='estimated')
+    """
+    check_choice("method", method, get_args(Method))
+    if method == "exact":
+        return EXACT
+    if method == "fast":
+        return estimated_error(_as_effort(effort))
+    return _bound_within(as_mesh(mesh), *_as_errors(relative_error, absolute_error))
 
 
 def shortest_path(
@@ -342,6 +379,93 @@ def shortest_path(
     surface = as_mesh(mesh)
     stops = _as_stops(surface, source, target, waypoints, control)
     return _shortest_through(PathSearch(surface), stops, limit, control, explain=explain)
+
+
+def distance_matrix(
+    mesh: MeshLike,
+    sources: Points,
+    targets: Points,
+    max_distance: float | None = None,
+    layout: Layout = "dense",
+    *,
+    method: Method = "exact",
+    relative_error: float | None = 1e-3,
+    absolute_error: float | None = None,
+    effort: Effort = 2,
+    threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> "Floats | csr_array":
+    """Return the geodesic distances from each source to each target, exact by default.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
+    sources, targets
+        N and M vertex indices or `SurfacePoint`; a single one needs no list.
+    max_distance
+        Limit of the sweeps, mesh units; None for no limit. Points beyond it count as unreachable.
+    layout
+        ``"dense"`` for an (N, M) array, infinite where unreachable; ``"sparse"`` for a
+        `scipy.sparse.csr_array` of the same shape that holds the finite distances, zeros too;
+        ``"pairs"`` for an (N,) array of the distances from each source to the target of the same
+        index, with as many targets as sources.
+    method
+        ``"exact"``; ``"approximate"``, within ``relative_error`` and ``absolute_error``; or
+        ``"fast"``, with an ``effort``. See the solvers of these names; `error_bound` returns the
+        error bound.
+    relative_error, absolute_error, effort
+        For the method that takes them.
+    threads
+        Largest number of threads; None for one per core that the process may use.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`; the result counts as memory. Callbacks are called in the caller's thread.
+
+    Returns
+    -------
+    numpy.ndarray or scipy.sparse.csr_array
+        Distances, float64, mesh units, in the shape of the layout.
+
+    Raises
+    ------
+    InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+    MissingExtra
+        The layout is sparse, and SciPy is not installed; the extra ``sparse`` brings it.
+
+    Notes
+    -----
+    One sweep starts from each point of the smaller side and ends at its farthest target. If both
+    sides are the same points, half of the work suffices, and the matrix is symmetric to the bit.
+    For pairs, a sweep starts from each point that is in many pairs; the other pairs are searched
+    for as in `shortest_path`, in one thread. Approximate and fast sweeps do not end at their
+    farthest target, and are not replaced by searches. The memory of each thread is a third of the
+    mesh's own arrays, or up to two thirds for fast sweeps; that of the searches is two thirds.
+    Results do not depend on the number of threads.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
+
+    >>> gc.distance_matrix(mesh, [0, 1], [2, 3]).round(3).tolist()
+    [[1.0, 1.414], [1.414, 1.0]]
+    >>> gc.distance_matrix(mesh, [0, 1], [2, 3], layout="pairs").round(3).tolist()
+    [1.0, 1.0]
+    >>> gc.distance_matrix(mesh, [0, 1], [1, 2, 3], max_distance=1.0, layout="sparse").nnz
+    4
+    >>> gc.distance_matrix(mesh, 0, [1, 2, 3], method="fast").round(3).tolist()
+    [[1.0, 1.0, 1.414]]
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    surface = as_mesh(mesh)
+    solve = row_solver(surface, method, relative_error, absolute_error, effort)
+    make = partial(TargetSweep, surface), partial(PathSearch, surface)
+    return find_matrix(
+        surface, solve, *make, sources, targets, max_distance, layout, threads, control
+    )
 
 
 class Solver:
@@ -599,19 +723,25 @@ class Solver:
         max_distance: float | None = None,
         layout: Layout = "dense",
         *,
+        method: Method = "exact",
+        relative_error: float | None = 1e-3,
+        absolute_error: float | None = None,
+        effort: Effort = 2,
         threads: int | None = None,
         progress: Callable[[float], None] | None = None,
         cancel: Callable[[], bool] | None = None,
         deadline_s: float | None = None,
         memory_limit: int | None = None,
     ) -> "Floats | csr_array":
-        """Return the exact distances from each source to each target, as `distance_matrix` does.
+        """Return the distances from each source to each target, as `distance_matrix` does.
 
         The memory of one of the threads is reused by the next call.
 
         Parameters
         ----------
-        sources, targets, max_distance, layout, threads
+        sources, targets, max_distance, layout, method, relative_error, absolute_error, effort
+            As in the function `distance_matrix`.
+        threads
             As in the function `distance_matrix`.
         progress, cancel, deadline_s, memory_limit
             See `Control`.
@@ -634,10 +764,11 @@ class Solver:
         [[1.0, 1.414], [1.414, 1.0]]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
+        solve = row_solver(self.mesh, method, relative_error, absolute_error, effort)
         shared = self._shared_sweep, self._shared_search
         with self._lock.held(control):
             return find_matrix(
-                self.mesh, *shared, sources, targets, max_distance, layout, threads, control
+                self.mesh, solve, *shared, sources, targets, max_distance, layout, threads, control
             )
 
     def nearest(
@@ -758,6 +889,87 @@ def _with_barriers(
     return mesh.with_barriers(faces), control
 
 
+def row_solver(
+    mesh: TriangleMesh,
+    method: Method,
+    relative_error: float | None,
+    absolute_error: float | None,
+    effort: Effort,
+) -> Solve | None:
+    """Return the function that solves a row of a matrix; None where rows are exact.
+
+    Raises
+    ------
+    InvalidArgument
+        An argument that the method takes is out of its domain.
+    """
+    check_choice("method", method, get_args(Method))
+    solve: Callable[..., DistanceField]
+    if method == "fast":
+        solve = partial(_solve_fast, mesh, effort=_as_effort(effort))
+    elif method == "approximate":
+        errors = _as_errors(relative_error, absolute_error)
+        if mesh.is_rough:
+            return None
+        solve = partial(_solve_within, mesh, errors=errors)
+    else:
+        return None
+    return lambda source, targets, limit, control: solve(
+        source, targets, limit, "distances", control
+    )
+
+
+def _solve_within(
+    mesh: TriangleMesh,
+    sources: Sources,
+    targets: Points,
+    limit: float,
+    retain: Retain,
+    control: Control,
+    *,
+    errors: tuple[float, float],
+) -> DistanceField:
+    """Return the field within a relative and an absolute error."""
+    relative, absolute = errors
+    bounds = (
+        exact_bounds(limit)
+        if mesh.is_rough
+        else merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
+    )
+    promise = _bound_within(mesh, relative, absolute)
+    return _solve(mesh, sources, targets, bounds, promise, retain, control)
+
+
+def _bound_within(mesh: TriangleMesh, relative: float, absolute: float) -> ErrorBound:
+    """Return what a sweep within both errors promises."""
+    if mesh.is_rough:
+        return EXACT
+    if math.isfinite(relative):
+        return ErrorBound("relative", min(relative, WIDEST_ERROR), "guaranteed")
+    return ErrorBound("absolute", absolute, "guaranteed")
+
+
+def _solve_fast(
+    mesh: TriangleMesh,
+    sources: Sources,
+    targets: Points,
+    limit: float,
+    retain: Retain,
+    control: Control,
+    *,
+    effort: int,
+) -> DistanceField:
+    """Return the field of a fast sweep."""
+    bounds = exact_bounds(limit)
+    starts, polylines, ends, exact = _as_question(mesh, sources, targets, bounds, control)
+    sweep = FastSweep(exact, effort)
+    front = sweep.run(control)
+    result = sweep.result_of(front, paths=retain == "paths")
+    stats = sweep.stats_of(front, time.perf_counter() - control.began)
+    promise = estimated_error(effort)
+    return field_of(starts, polylines, ends, exact, sweep, promise, result, stats)
+
+
 def _solve(
     mesh: TriangleMesh,
     sources: Sources,
@@ -831,3 +1043,9 @@ def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, f
         math.inf if relative is None else float(relative),
         math.inf if absolute is None else float(absolute),
     )
+
+
+def _as_effort(effort: Effort) -> int:
+    if not is_number(effort) or effort not in get_args(Effort):
+        raise InvalidArgument(f"effort is {effort!r}; it must be 1, 2, 4 or 8")
+    return int(effort)

@@ -112,7 +112,7 @@ def distance(
     print_size(output, answered.mesh)
     output.say(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
     output.say(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
-    output.say(f"error bound {_bound_in_words(found['error_bound'])}")
+    output.say(f"error bound {bound_in_words(found['error_bound'])}")
     print_end(output, answered)
 
 
@@ -172,7 +172,7 @@ def path(
     print_size(output, answered.mesh)
     output.say(f"length      {found['length']!r}")
     output.say(f"points      {len(found['points'])}")
-    output.say(f"error bound {_bound_in_words(found['error_bound'])}")
+    output.say(f"error bound {bound_in_words(found['error_bound'])}")
     _print_seconds(output, answered)
     for step in found.get("steps", ()):
         output.say(
@@ -213,7 +213,7 @@ def paths(
     print_size(output, answered.mesh)
     for written, path in zip(target, answered.answer.members["paths"], strict=True):
         if path["status"] == "ok":
-            bound = _bound_in_words(path["error_bound"])
+            bound = bound_in_words(path["error_bound"])
             output.say(f"path        to {written.text}: {path['length']!r}, error bound {bound}")
         else:
             output.say(f"no path     to {written.text}: {path['reason']}")
@@ -262,7 +262,7 @@ def isolines(
             f"level       {each['level']!r}: {closed} closed, {len(lines) - closed} open, "
             f"{float(length)!r} long"
         )
-    output.say(f"error bound {_bound_in_words(answered.answer.members['error_bound'])}")
+    output.say(f"error bound {bound_in_words(answered.answer.members['error_bound'])}")
     print_end(output, answered)
 
 
@@ -375,7 +375,8 @@ def print_end(output: Output, answered: Answered) -> None:
     output.say_written()
 
 
-def _bound_in_words(bound: "Mapping[str, Any]") -> str:
+def bound_in_words(bound: "Mapping[str, Any]") -> str:
+    """Return an error bound, as the lines of commands state it."""
     return f"{bound['value']!r} ({bound['type']}, {bound['kind']})"
 
 

@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from hashlib import file_digest
 from pathlib import Path
@@ -25,6 +25,7 @@ def write_matrix(
     sources: "Points",
     targets: "Points",
     *,
+    accuracy: Mapping[str, Any],
     max_distance: float | None,
     barriers: Sequence[int],
     dtype: Literal["float64", "float32"],
@@ -50,6 +51,8 @@ def write_matrix(
                     stored,
                     _written(sources),
                     _written(targets),
+                    **accuracy,
+                    layout="sparse" if out.suffix.lower() == ".npz" else "dense",
                     max_distance=max_distance,
                     barriers=barriers,
                     dtype=dtype,
@@ -66,7 +69,7 @@ def write_matrix(
         "service": service,
         "mesh": stored.id,
         "shape": matrix.shape,
-        "method": "exact",
+        **accuracy,
         "error_bound": asdict(matrix.error_bound),
         "max_distance": max_distance,
         "dtype": dtype,

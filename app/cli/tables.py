@@ -9,6 +9,7 @@ import typer
 
 from app.cli import remote_matrix
 from app.cli.arguments import (
+    AbsoluteError,
     Barriers,
     BlockedFaces,
     EffortOption,
@@ -29,7 +30,7 @@ from app.cli.arguments import (
 )
 from app.cli.ask import WrittenMembers, ask
 from app.cli.output import AsJson, Output, print_json
-from app.cli.queries import print_end, print_size
+from app.cli.queries import bound_in_words, print_end, print_size
 from app.cli.steps import Failure, read, showing
 
 if TYPE_CHECKING:
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     Everywhere = Literal["all"]
 
 _OF_ANY_SIZE = (".npy", ".zarr", ".npz", ".parquet")
+_BY_SERVICES = (".npy", ".npz")
 _FILE = "POINTS"
 
 
@@ -88,6 +90,7 @@ def matrix(
     ] = Layout.DENSE,
     method: MethodOption = Method.EXACT,
     relative_error: RelativeError = None,
+    absolute_error: AbsoluteError = None,
     effort: EffortOption = None,
     dtype: Annotated[
         Number, typer.Option(help="Type of the distances, for points from files.")
@@ -100,8 +103,8 @@ def matrix(
         str | None,
         typer.Option(
             metavar="URL",
-            help="Let this service compute the matrix, on all its machines: exact distances for "
-            "points from files, to a .npy file. GEODESIC_SERVICE_KEY holds the API key.",
+            help="Let this service compute the matrix, on all its machines: for points from "
+            "files, to a .npy or .npz file. GEODESIC_SERVICE_KEY holds the API key.",
         ),
     ] = None,
     max_distance: MaxDistance = None,
@@ -110,17 +113,22 @@ def matrix(
     as_json: AsJson = False,
 ) -> None:
     """Compute distances from several points to several others, or between all points of a file."""
+    options = accuracy(method, relative_error, absolute_error, effort)
     by_files = {"--points": points, "--sources": sources, "--targets": targets}
     given = [name for name, value in by_files.items() if value is not None]
     if not given:
         if not source or not target:
             raise typer.BadParameter("give --source and --target, or --points with a file")
-        if method is not Method.EXACT or dtype is not Number.FLOAT64 or threads or service:
+        if dtype is not Number.FLOAT64 or threads or service:
             raise typer.BadParameter(
-                "--method, --dtype, --threads and --service apply only to points from files"
+                "--dtype, --threads and --service apply only to points from files"
             )
-        output = Output(out, as_json)
-        _ask_matrix(mesh_file, output, source, target, layout, max_distance, barriers, merge)
+        members = options | {
+            "layout": layout.value,
+            "max_distance": max_distance,
+            "barriers": barriers or BlockedFaces(),
+        }
+        _ask_matrix(mesh_file, Output(out, as_json), source, target, layout, members, merge)
         return
     if given not in (["--points"], ["--sources", "--targets"]):
         raise typer.BadParameter("give --points, or both --sources and --targets")
@@ -130,10 +138,10 @@ def matrix(
         raise typer.BadParameter(f"{given[0]} needs --out, a file for the matrix")
     if out.suffix.lower() not in _OF_ANY_SIZE:
         raise typer.BadParameter(f"{out} must end in .npy, .zarr, .npz or .parquet")
-    options = accuracy(method, relative_error, None, effort) | {"dtype": dtype.value}
-    is_simple = method is Method.EXACT and threads is None and out.suffix.lower() == ".npy"
-    if service is not None and not is_simple:
-        raise typer.BadParameter("--service computes exact distances, to a .npy file")
+    if service is not None and out.suffix.lower() not in _BY_SERVICES:
+        raise typer.BadParameter("--service writes .npy and .npz files only")
+    if service is not None and threads is not None:
+        raise typer.BadParameter("--threads does not go with --service, which has its own")
     opened, read_seconds = read(mesh_file, merge)
     import geodesic_core as gc
 
@@ -150,6 +158,7 @@ def matrix(
                 out,
                 starts,
                 starts if stops is None else stops,
+                accuracy=options,
                 max_distance=max_distance,
                 barriers=() if barriers is None else barriers.of(mesh),
                 dtype=dtype.value,
@@ -157,6 +166,8 @@ def matrix(
             out,
         )
         return
+    if absolute_error is not None:
+        options.setdefault("relative_error", None)
     with showing("Computing the matrix") as step:
         written = gc.write_matrix(
             mesh,
@@ -164,6 +175,7 @@ def matrix(
             starts,
             stops,
             **options,
+            dtype=dtype.value,
             max_distance=max_distance,
             barriers=() if barriers is None else barriers.of(mesh),
             threads=threads,
@@ -231,8 +243,7 @@ def _ask_matrix(
     source: list[Point],
     target: list[Point],
     layout: Layout,
-    max_distance: float | None,
-    barriers: BlockedFaces | None,
+    members: Mapping[str, Any],
     merge: Merge,
 ) -> None:
     """Ask for a matrix as the service would be asked."""
@@ -245,11 +256,6 @@ def _ask_matrix(
             f"there are {len(source)} sources and {len(target)} targets; pairs need the same "
             "number of both"
         )
-    members: Mapping[str, Any] = {
-        "layout": layout.value,
-        "max_distance": max_distance,
-        "barriers": barriers or BlockedFaces(),
-    }
     points: WrittenMembers = {"sources": source, "targets": target}
     answered = ask("matrix", mesh_file, merge, "Computing the matrix", points, members)
     import numpy as np
@@ -259,4 +265,5 @@ def _ask_matrix(
     cells = len(source) if layout is Layout.PAIRS else len(source) * len(target)
     print_size(output, answered.mesh)
     output.say(f"reached     {reached} of {cells} distances")
+    output.say(f"error bound {bound_in_words(answered.answer.members['error_bound'])}")
     print_end(output, answered)

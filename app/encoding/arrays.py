@@ -32,14 +32,22 @@ def to_octets(answer: Answer, dtype: str) -> Encoded:
 
 
 def to_npz(answer: Answer, dtype: str) -> Encoded:
-    """Encode a sparse matrix as `scipy.sparse.load_npz` reads it."""
-    from scipy.sparse import coo_array, save_npz
+    """Encode a sparse matrix as `scipy.sparse.load_npz` reads it, and `write_matrix` writes it."""
+    from scipy.sparse import coo_array
 
     _, rows, columns = (answer.members[name] for name in answer.arrays)
     distances = _body(answer, dtype)
     table = coo_array((distances, (rows, columns)), shape=answer.members["shape"]).tocsr()
     file = BytesIO()
-    save_npz(file, table, compressed=False)
+    np.savez(
+        file,
+        format=np.array(b"csr"),
+        shape=np.array(table.shape),
+        indices=table.indices.astype(np.int64),
+        indptr=table.indptr.astype(np.int64),
+        data=table.data,
+        _is_array=np.array(True),
+    )
     return Encoded([file.getbuffer()], array_headers(answer, distances.dtype, table.shape))
 
 
@@ -60,7 +68,7 @@ def too_large_for(dtype: str) -> ProblemError:
 
 
 def _raw(array: NDArray[Any]) -> memoryview | bytes:
-    return array.data.cast("B") if array.size else b""
+    return array.reshape(-1).view(np.uint8).data if array.size else b""
 
 
 def array_headers(answer: Answer, dtype: np.dtype[Any], shape: tuple[int, ...]) -> dict[str, str]:

@@ -41,6 +41,12 @@ def _options_of(request: StrictModel) -> dict[str, Any]:
     return request.model_dump(include=set().union(*_OPTIONS.values()), exclude_none=True)
 
 
+def options_of(request: Accuracy) -> dict[str, Any]:
+    """Return the method, and what goes with it, as arguments of the library."""
+    errors = {"relative_error": None} if request.method == "approximate" else {}
+    return {"method": request.method, **errors, **_options_of(request)}
+
+
 def as_swept(request: A, mesh: gc.TriangleMesh) -> A:
     """Return the request by the sweep that answers it: an exact one on rough meshes."""
     if request.method != "approximate" or not mesh.is_rough:
@@ -117,10 +123,9 @@ def bound_of(bound: gc.ErrorBound) -> Mapping[str, Any]:
     return {"type": bound.type, "value": bound.value, "kind": bound.kind}
 
 
-def expected_bound(request: Accuracy) -> Mapping[str, Any]:
-    """Return about the same as `bound_of`, for a field that is not solved."""
-    kind = "estimated" if request.method == "fast" else "guaranteed"
-    return {"type": "relative", "value": request.relative_error or 0.0, "kind": kind}
+def bound_on(mesh: gc.TriangleMesh, request: Accuracy) -> Mapping[str, Any]:
+    """Return the members of the error bound that distances on a mesh will have."""
+    return bound_of(gc.error_bound(mesh, **options_of(request)))
 
 
 def stats_of(stats: gc.SweepStats) -> Mapping[str, Any]:

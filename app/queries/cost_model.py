@@ -62,7 +62,7 @@ FAST_BYTES, FAST_BYTES_PER_FACE, BYTES_PER_PLACE = 270_000, 28, 24
 SEARCH_BYTES, SEARCH_BYTES_PER_FACE = 230_000, 275
 
 SWEPT_FROM = 6
-"""Pairs of one point from which on a matrix of pairs sweeps; it searches for fewer, one by one."""
+"""Pairs of one point from which on an exact matrix of pairs sweeps; it searches for fewer."""
 
 FACES_ON_LEVEL = 4.0
 """Faces that an isoline crosses, for the √n of n faces: about those of a great circle."""
@@ -114,11 +114,12 @@ def sweep_cost(
     return Cost(seconds + PER_FACE_UNSWEPT * faces, memory)
 
 
-def sweeps_cost(faces: int, shares: Sequence[float], threads: int) -> Cost:
-    """Return the cost of exact sweeps over shares of some faces, in some threads."""
-    seconds = sum(_sweep_seconds(share * faces) for share in shares)
-    memory = SWEEP_BYTES + SWEEP_BYTES_PER_FACE * faces
-    return Cost(PER_FACE_UNSWEPT * faces * threads + seconds / threads, memory * threads)
+def sweeps_cost(faces: int, request: Accuracy, shares: Sequence[float], threads: int) -> Cost:
+    """Return the cost of sweeps over shares of some faces, in some threads."""
+    seconds = sum(sweep_cost(faces, request, share).seconds for share in shares)
+    if request.method == "exact":  # the sweeps of a thread share their state
+        seconds -= PER_FACE_UNSWEPT * faces * (len(shares) - threads)
+    return Cost(seconds / threads, sweep_cost(faces, request).memory_bytes * threads)
 
 
 def search_cost(faces: int, count: int) -> Cost:

@@ -14,7 +14,7 @@ from app.queries.accuracy import (
     affinity_keys_of,
     as_swept,
     bound_of,
-    expected_bound,
+    bound_on,
     expected_stats,
     method_of,
     solve_field,
@@ -143,7 +143,7 @@ class DistancesQuery(Query[DistancesRequest]):
         sweep = sweep_cost(len(mesh.faces), swept, share, paths="gradient" in self._included)
         straight, nearest = straight_to_nearest(mesh, sources, targets, request.max_distance)
         cost = Cost(sweep.seconds + PER_POINT * len(points), sweep.memory_bytes)
-        bound = expected_bound(swept)
+        bound = bound_on(mesh, request)
         included: dict[str, NDArray[Any]] = {}
         if "nearest_source" in self._included:
             included["nearest_source"] = nearest

@@ -13,7 +13,7 @@ from app.queries.accuracy import (
     affinity_keys_of,
     as_swept,
     bound_of,
-    expected_bound,
+    bound_on,
     expected_stats,
     method_of,
     solve_field,
@@ -150,7 +150,7 @@ class IsolinesQuery(Query[IsolinesRequest]):
         seconds = sweep.seconds + PER_POINT * len(points) + per_face * float(counts.sum())
         segments = _segments_in_face(mesh, np.array(levels), chord_error)
         times = float(counts @ segments) / counts.sum() if counts.any() else 1.0
-        bound, stats = expected_bound(swept), expected_stats(mesh, share)
+        bound, stats = bound_on(mesh, request), expected_stats(mesh, share)
         answer = self._answer(opened, starts, chord_error, found, bound, stats)
         return Forecast(Cost(seconds, sweep.memory_bytes), answer, times)
 

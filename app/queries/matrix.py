@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 import geodesic_core as gc
 from app.encoding import CSV, JSON, NPY, NPZ, OCTETS, Answer, Representation
 from app.errors import over_limit
-from app.queries.accuracy import CERTAIN
+from app.queries.accuracy import (
+    as_swept,
+    bound_on,
+    method_of,
+    options_of,
+    with_default_accuracy,
+)
 from app.queries.base import VALUES_OF_POINT, ExecutionContext, Forecast, Query
 from app.queries.cost_model import (
     PER_POINT,
@@ -22,12 +28,13 @@ from app.queries.cost_model import (
     share_within,
     straight_along,
     straight_between,
+    sweep_cost,
     sweeps_cost,
 )
 from app.queries.points import SurfacePoints, components_of, describe_point, numbered
 from app.queries.validation import MeshSize, WrittenPoints, check_count, invalid_fields
 from app.queries.views import table_of_matrix, table_of_sparse
-from app.schemas.requests import MatrixRequest
+from app.schemas.requests import Layout, MatrixRequest
 from app.settings import Settings, available_cores
 from app.store.meshes import OpenMesh
 
@@ -35,11 +42,12 @@ if TYPE_CHECKING:
     from scipy.sparse import coo_array
 
 _CELLS = "cells of the matrix"
-_AS_JOB = "ask for application/x-npy with `Prefer: respond-async`: such a job may have more cells"
-_AT_A_TIME = 2**20
-"""Straight distances that are computed at a time."""
+_IN_PARTS: Mapping[Layout, str] = {"dense": NPY, "sparse": NPZ}
+"""Media types in which jobs compute a matrix of any size, by layout"""
+_INDEX_BYTES = 8
+"""Bytes of an index in a sparse file: of the column of a distance, or of the end of a row"""
 _SAMPLED = 2**22
-"""Straight distances that are computed for the estimate of a dense matrix, at most, about"""
+"""Straight distances that are computed for an estimate, at most, about"""
 
 
 class MatrixQuery(Query[MatrixRequest]):
@@ -50,7 +58,7 @@ class MatrixQuery(Query[MatrixRequest]):
 
     @classmethod
     def normalized(cls, request: MatrixRequest) -> MatrixRequest:
-        """Refuse pairs without as many sources as targets."""
+        """Name error or effort; refuse pairs without as many sources as targets."""
         if request.layout == "pairs":
             for name in ("sources", "targets"):
                 if getattr(request, name) == "all":
@@ -63,7 +71,7 @@ class MatrixQuery(Query[MatrixRequest]):
                     "number of both"
                 )
                 raise invalid_fields(["/targets"], message)
-        return request
+        return with_default_accuracy(request)
 
     @property
     def offers(self) -> Sequence[str]:
@@ -77,11 +85,6 @@ class MatrixQuery(Query[MatrixRequest]):
             return "ask for application/x-npz, with `Accept` or with ?format=npz"
         return super().hint
 
-    def check_limits(self, size: MeshSize, settings: Settings) -> None:
-        """Refuse pairs and sparse matrices that are too large; `check_answer` does dense ones."""
-        if self.request.layout != "dense":
-            self._check_in_memory(size, settings)
-
     def check_answer(
         self,
         representation: Representation,
@@ -94,21 +97,20 @@ class MatrixQuery(Query[MatrixRequest]):
 
         The parts and the file are there at the same time.
         """
-        if self.request.layout == "dense":
-            if not (as_job and representation.media_type == NPY):
-                self._check_in_memory(size, settings)
-            elif self.is_in_parts(representation, size, settings):
-                needed = self.bytes_in_parts(representation, size)
-                if needed > settings.results_bytes:
-                    what, limit = "bytes of the matrix and its parts", settings.results_bytes
-                    raise over_limit("limit_exceeded", what, needed, limit, "results_bytes")
+        if self.is_in_parts(representation, size, settings, as_job=as_job):
+            needed = self.bytes_in_parts(representation, size)
+            if needed > settings.results_bytes:
+                what, limit = "bytes of the matrix and its parts", settings.results_bytes
+                raise over_limit("limit_exceeded", what, needed, limit, "results_bytes")
+        else:
+            self._check_in_memory(size, settings)
         super().check_answer(representation, size, settings, as_job=as_job)
 
     def is_in_parts(
-        self, representation: Representation, size: MeshSize, settings: Settings
+        self, representation: Representation, size: MeshSize, settings: Settings, *, as_job: bool
     ) -> bool:
-        """Tell whether the answer is computed in parts, since it is too large for memory."""
-        if self.request.layout != "dense" or representation.media_type != NPY:
+        """Tell whether the answer is computed in parts, since it may be too large for memory."""
+        if not as_job or representation.media_type != _IN_PARTS.get(self.request.layout):
             return False
         sources, targets = self._count(size)
         return sources > settings.max_sources or sources * targets > settings.max_matrix_cells
@@ -120,16 +122,35 @@ class MatrixQuery(Query[MatrixRequest]):
         return gc.MatrixParts.areas(sources, None if is_symmetric else targets)
 
     def bytes_in_parts(self, representation: Representation, size: MeshSize) -> int:
-        """Return the size of the parts and of the file that they become."""
+        """Return the size of the parts and of the file that they become.
+
+        Of a sparse matrix these are only the ends of rows: `bytes_of_part` tells the rest.
+        """
+        if self.request.layout == "sparse":
+            return _INDEX_BYTES * self._count(size)[0]
         cells = sum(self.areas_of_parts(size)) + math.prod(self._count(size))
         return cells * np.dtype(representation.dtype).itemsize
 
+    def bytes_of_part(self, representation: Representation, nbytes: int, reached: int) -> int:
+        """Return what a part of ``nbytes`` adds to `bytes_in_parts`, once it is computed."""
+        if self.request.layout == "dense":
+            return 0
+        return nbytes + reached * (_INDEX_BYTES + np.dtype(representation.dtype).itemsize)
+
     def parts(self, opened: OpenMesh, dtype: Any, cancel: Callable[[], bool]) -> gc.MatrixParts:
         """Return the parts of the matrix, which are still to be computed."""
-        mesh, limit = opened.mesh, self.request.max_distance
+        mesh, request = opened.mesh, self.request
         sources, targets = self._parted(mesh, self.resolved(mesh, cancel))
+        assert request.layout != "pairs", "pairs are in memory"  # noqa: S101
         return gc.MatrixParts(
-            mesh, sources, targets, max_distance=limit, dtype=dtype, cancel=cancel
+            mesh,
+            sources,
+            targets,
+            layout=request.layout,
+            **options_of(request),
+            max_distance=request.max_distance,
+            dtype=dtype,
+            cancel=cancel,
         )
 
     def answer_of_parts(self, opened: OpenMesh, reached: int, cancel: Callable[[], bool]) -> Answer:
@@ -141,7 +162,7 @@ class MatrixQuery(Query[MatrixRequest]):
         sources, targets = self._parted(mesh, self.resolved(mesh, cancel))
         ends = components_of(mesh, sources), components_of(mesh, targets)
         unreachable = self._unreachable(*ends, reached)
-        return Answer(self._about | {"unreachable": unreachable, "warnings": opened.warnings})
+        return Answer(self._about(mesh) | {"unreachable": unreachable, "warnings": opened.warnings})
 
     def value_count(self, size: MeshSize) -> int:
         """Return the number of cells, and of the values of each point."""
@@ -168,7 +189,7 @@ class MatrixQuery(Query[MatrixRequest]):
         """Return the cost of a sweep to the limit from each point of the smaller side."""
         count = self._count(size)
         share = rough_share(size, 1, self.request.max_distance)
-        one = sweeps_cost(size.faces, [share], 1).seconds
+        one = sweep_cost(size.faces, self.request, share).seconds
         return min(count) * one + PER_POINT * sum(count)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
@@ -176,18 +197,24 @@ class MatrixQuery(Query[MatrixRequest]):
         sources, targets = self._parted(opened.mesh, points)
         request = self.request
         found: Any = opened.solver.distance_matrix(
-            sources, targets, request.max_distance, request.layout, **context.options
+            sources,
+            targets,
+            request.max_distance,
+            request.layout,
+            **options_of(request),
+            **context.options,
         )
         if request.layout == "sparse" and found.nnz > context.max_cells:
+            setting, hint = "max_matrix_cells", self._as_job
             raise over_limit(
-                "limit_exceeded", _CELLS, found.nnz, context.max_cells, "max_matrix_cells"
+                "limit_exceeded", _CELLS, found.nnz, context.max_cells, setting, hint=hint
             )
         return self._answer(opened, sources, targets, found)
 
     def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
-        """Return the cost of sweeps, each to its farthest target along a straight line.
+        """Return the cost of sweeps, exact ones to the farthest target along a straight line.
 
-        Of a large dense matrix some sources stand for all.
+        Of a large matrix some sources stand for all.
         """
         mesh, limit = opened.mesh, self.request.max_distance
         sources, targets = self._parted(mesh, points)
@@ -195,27 +222,64 @@ class MatrixQuery(Query[MatrixRequest]):
         found: Any
         if self.request.layout == "pairs":
             found = straight_along(mesh, sources, targets, limit)
-            cost = _cost_of_pairs(mesh, sources, targets, found)
-        elif self.request.layout == "dense":
+            cost = self._cost_of_pairs(mesh, sources, targets, found)
+            table = found.nbytes
+        else:
             count = len(sources)
             sources = sources[:: 1 + (count * len(targets) - 1) // _SAMPLED]
             times = count / len(sources)
             found = straight_between(mesh, sources, targets, limit)
             radii = _farthest(found if count <= len(targets) else found.T)
-            cost = _cost_of_sweeps(mesh, np.resize(radii, min(count, len(targets))))
-        else:
-            found = _straight_sparse(mesh, sources, targets, limit)
-            from_sources = len(sources) <= len(targets)
-            radii = np.zeros(min(found.shape))
-            np.maximum.at(radii, found.row if from_sources else found.col, found.data)
-            cost = _cost_of_sweeps(mesh, radii)
-        table = found.nnz * 12 if self.request.layout == "sparse" else found.nbytes
+            cost = self._cost_of_sweeps(mesh, np.resize(radii, min(count, len(targets))))
+            table = found.nbytes
+            if self.request.layout == "sparse":
+                found = _sparse(found)
+                table = found.nnz * 12
         answer = self._answer(opened, sources, targets, found)
         return Forecast(Cost(cost.seconds + seconds, cost.memory_bytes + table), answer, times)
 
+    def _cost_of_sweeps(self, mesh: gc.TriangleMesh, radii: NDArray[np.float64]) -> Cost:
+        """Return the cost of sweeps to these farthest targets, where only exact ones end."""
+        request = as_swept(self.request, mesh)
+        if request.method != "exact":
+            limit = request.max_distance
+            radii = np.full(len(radii), math.inf if limit is None else limit)
+        threads = min(available_cores(), len(radii))
+        shares = share_within(mesh, radii).tolist()
+        return sweeps_cost(len(mesh.faces), request, shares, threads)
+
+    def _cost_of_pairs(
+        self,
+        mesh: gc.TriangleMesh,
+        sources: SurfacePoints,
+        targets: SurfacePoints,
+        distances: NDArray[np.float64],
+    ) -> Cost:
+        """Return the cost of searches and of sweeps, these from the side with fewer points."""
+        swept_from = SWEPT_FROM if as_swept(self.request, mesh).method == "exact" else 1
+        ends = min(sources, targets, key=lambda side: len(set(side)))
+        pairs = Counter(ends)
+        searches = sum(count for count in pairs.values() if count < swept_from)
+        radii = {end: 0.0 for end, count in pairs.items() if count >= swept_from}
+        for end, distance in zip(ends, distances.tolist(), strict=True):
+            if end in radii and distance < math.inf:
+                radii[end] = max(radii[end], distance)
+        costs = [search_cost(len(mesh.faces), searches)] if searches else []
+        if radii:
+            costs.append(self._cost_of_sweeps(mesh, np.array(list(radii.values()))))
+        return Cost(sum(cost.seconds for cost in costs), sum(cost.memory_bytes for cost in costs))
+
+    @property
+    def _as_job(self) -> str | None:
+        """The remedy for a matrix that is too large for memory."""
+        media_type = _IN_PARTS.get(self.request.layout)
+        return media_type and (
+            f"ask for {media_type} with `Prefer: respond-async`: such a job may have more cells"
+        )
+
     def _check_in_memory(self, size: MeshSize, settings: Settings) -> None:
         """Refuse too many sources, or cells where their number is known before solving."""
-        hint = _AS_JOB if self.request.layout == "dense" else None
+        hint = self._as_job
         check_count("sources", self._count(size)[0], settings, "max_sources", hint=hint)
         if self.request.layout != "sparse" or self.request.max_distance is None:
             check_count(_CELLS, self._cells(size), settings, "max_matrix_cells", hint=hint)
@@ -245,7 +309,7 @@ class MatrixQuery(Query[MatrixRequest]):
         mesh, layout = opened.mesh, self.request.layout
         starts, ends = components_of(mesh, sources), components_of(mesh, targets)
         members: dict[str, Any] = {
-            **self._about,
+            **self._about(mesh),
             "sources": _describe_ends(mesh, sources, starts),
             "targets": _describe_ends(mesh, targets, ends),
         }
@@ -267,14 +331,12 @@ class MatrixQuery(Query[MatrixRequest]):
         values = VALUES_OF_POINT * points + sum(members[name].size for name in arrays)
         return Answer(members, arrays, arrays, values, table)
 
-    @property
-    def _about(self) -> dict[str, Any]:
+    def _about(self, mesh: gc.TriangleMesh) -> dict[str, Any]:
         return {
             "kind": self.kind,
             "mesh_id": self.mesh_id,
-            "method": "exact",
-            "exact": True,
-            "error_bound": CERTAIN,
+            **method_of(self.request),
+            "error_bound": bound_on(mesh, self.request),
             "layout": self.request.layout,
         }
 
@@ -300,50 +362,15 @@ def _describe_ends(
     ]
 
 
-def _straight_sparse(
-    mesh: gc.TriangleMesh, sources: SurfacePoints, targets: SurfacePoints, limit: float | None
-) -> "coo_array":
-    """Return the finite straight distances, computed for some sources at a time."""
+def _sparse(table: NDArray[np.float64]) -> "coo_array":
+    """Return the finite distances of a matrix."""
     from scipy.sparse import coo_array
 
-    size = max(1, _AT_A_TIME // len(targets))
-    rows, columns, values = [], [], []
-    for first in range(0, len(sources), size):
-        table = straight_between(mesh, sources[first : first + size], targets, limit)
-        row, column = np.nonzero(np.isfinite(table))
-        rows.append(first + row)
-        columns.append(column)
-        values.append(table[row, column])
-    cells = np.concatenate(rows), np.concatenate(columns)
-    return coo_array((np.concatenate(values), cells), shape=(len(sources), len(targets)))
+    cells = np.nonzero(np.isfinite(table))
+    return coo_array((table[cells], cells), shape=table.shape)
 
 
 def _farthest(distances: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the largest finite distance of each row, or 0."""
     farthest: NDArray[np.float64] = np.where(np.isfinite(distances), distances, 0.0).max(axis=1)
     return farthest
-
-
-def _cost_of_sweeps(mesh: gc.TriangleMesh, radii: NDArray[np.float64]) -> Cost:
-    threads = min(available_cores(), len(radii))
-    return sweeps_cost(len(mesh.faces), share_within(mesh, radii).tolist(), threads)
-
-
-def _cost_of_pairs(
-    mesh: gc.TriangleMesh,
-    sources: SurfacePoints,
-    targets: SurfacePoints,
-    distances: NDArray[np.float64],
-) -> Cost:
-    """Return the cost of searches and of sweeps, these from the side with fewer points."""
-    ends = min(sources, targets, key=lambda side: len(set(side)))
-    pairs = Counter(ends)
-    searches = sum(count for count in pairs.values() if count < SWEPT_FROM)
-    radii = {end: 0.0 for end, count in pairs.items() if count >= SWEPT_FROM}
-    for end, distance in zip(ends, distances.tolist(), strict=True):
-        if end in radii and distance < math.inf:
-            radii[end] = max(radii[end], distance)
-    costs = [search_cost(len(mesh.faces), searches)] if searches else []
-    if radii:
-        costs.append(_cost_of_sweeps(mesh, np.array(list(radii.values()))))
-    return Cost(sum(cost.seconds for cost in costs), sum(cost.memory_bytes for cost in costs))

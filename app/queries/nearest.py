@@ -16,7 +16,7 @@ from app.queries.cost_model import (
     rough_share,
     share_within,
     straight_between,
-    sweeps_cost,
+    sweep_cost,
 )
 from app.queries.points import (
     SurfacePoints,
@@ -27,7 +27,7 @@ from app.queries.points import (
 )
 from app.queries.validation import MeshSize, WrittenPoints, invalid_fields
 from app.queries.views import point_features, table_of_points
-from app.schemas.requests import NearestRequest
+from app.schemas.requests import Accuracy, NearestRequest
 from app.store.meshes import OpenMesh
 
 
@@ -60,7 +60,7 @@ class NearestQuery(Query[NearestRequest]):
     def rough_seconds(self, size: MeshSize) -> float:
         """Return the cost of a sweep to the limit."""
         share = rough_share(size, 1, self.request.max_distance)
-        sweep = sweeps_cost(size.faces, [share], 1)
+        sweep = sweep_cost(size.faces, Accuracy(), share)
         return sweep.seconds + PER_POINT * len(self.request.candidates)
 
     def solve(self, opened: OpenMesh, points: SurfacePoints, context: ExecutionContext) -> Answer:
@@ -85,7 +85,7 @@ class NearestQuery(Query[NearestRequest]):
             share = float(share_within(mesh, self.request.max_distance))
         else:
             share = 1.0
-        sweep = sweeps_cost(len(mesh.faces), [share], 1)
+        sweep = sweep_cost(len(mesh.faces), Accuracy(), share)
         cost = Cost(sweep.seconds + PER_POINT * len(points), sweep.memory_bytes)
         return Forecast(cost, self._answer(opened, points, order, straight[order]))
 

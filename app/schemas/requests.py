@@ -231,8 +231,8 @@ class PathsRequest(AccuracyOrEffort, AmongBarriers):
     )
 
 
-class MatrixRequest(AmongBarriers):
-    """Exact distances from each of ``sources`` to each of ``targets``."""
+class MatrixRequest(AccuracyOrEffort, AmongBarriers):
+    """Distances from each of ``sources`` to each of ``targets``."""
 
     model_config = ConfigDict(
         json_schema_extra={

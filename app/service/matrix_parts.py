@@ -54,10 +54,10 @@ class MatrixInParts:
             on_progress(done / whole)
 
         needed = query.bytes_in_parts(self.representation, self.size)
-        with self.results.reserving(needed), self._using_parts():
-            await self._compute(len(areas), note)
+        with self.results.reserving(needed) as reserve, self._using_parts():
+            await self._compute(len(areas), note, reserve)
             found = [self._found[part] for part in range(len(areas))]
-            reached = sum(int(part.manifest.headers[REACHED]) for part in found)
+            reached = sum(map(_reached, found))
             names = [part.name for part in found]
             work = JoinParts(query, dtype, names, reached, self.result_name)
             done = await self.engine.run(self._task(work), lambda _share: None)
@@ -75,9 +75,9 @@ class MatrixInParts:
             for part in self._found.values():
                 self.results.release(part)
 
-    async def _compute(self, count: int, note: NotePart) -> None:
+    async def _compute(self, count: int, note: NotePart, reserve: Callable[[int], None]) -> None:
         todo = iter(range(count))
-        running: set[asyncio.Task[None]] = set()
+        running: set[asyncio.Task[Result]] = set()
         try:
             while True:
                 while len(running) < self._at_once and (part := next(todo, None)) is not None:
@@ -86,7 +86,9 @@ class MatrixInParts:
                     return
                 done, running = await asyncio.wait(running, return_when=asyncio.FIRST_COMPLETED)
                 for each in done:
-                    each.result()
+                    found = each.result()
+                    size, reached = found.manifest.size, _reached(found)
+                    reserve(self.query.bytes_of_part(self.representation, size, reached))
         finally:
             for each in running:
                 each.cancel()
@@ -98,7 +100,7 @@ class MatrixInParts:
         load = self.engine.load
         return max(1, load.idle + load.busy + load.missing)
 
-    async def _find_or_compute(self, part: int, note: NotePart) -> None:
+    async def _find_or_compute(self, part: int, note: NotePart) -> Result:
         name = f"{self.result_name}-{part}"
         await self.results.index(name)  # another service may have computed it
         result = await self.results.find(name)
@@ -110,6 +112,12 @@ class MatrixInParts:
             result = await self.results.with_files(self.results.add(done.result))
         self._found[part] = result
         note(part, 1.0)
+        return result
 
     def _task(self, work: ComputePart | JoinParts) -> Task:
         return Task(work, self.client, self.query.affinity_keys, is_promised=True)
+
+
+def _reached(part: Result) -> int:
+    """Return the number of finite distances of the matrix that come from a part."""
+    return int(part.manifest.headers[REACHED])

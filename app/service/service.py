@@ -510,7 +510,12 @@ class Service:
     ) -> tuple[Result, PhaseSeconds]:
         with self.mesh_catalog.pinned(query.mesh_id):
             query.check_answer(representation, size, self.settings, as_job=is_promised)
-            name = result_name(query.mesh_id, result_key(query, representation))
+            in_parts = isinstance(query, MatrixQuery) and query.is_in_parts(
+                representation, size, self.settings, as_job=is_promised
+            )
+            key = result_key(query, representation)
+            # In parts a sparse matrix has no limit of cells: it is another answer than in memory.
+            name = result_name(query.mesh_id, f"{key}.parts" if in_parts else key)
             # Small work costs less than to look for what another service has computed.
             if self.database.is_shared and not query.is_small(size):
                 await self.results.index(name)
@@ -518,13 +523,10 @@ class Service:
             self.lookups["miss" if stored is None else "hit"] += 1
             if stored is not None:
                 return stored, {}
-            if isinstance(query, MatrixQuery) and query.is_in_parts(
-                representation, size, self.settings
-            ):
-                in_parts = MatrixInParts(
+            if isinstance(query, MatrixQuery) and in_parts:
+                run = MatrixInParts(
                     query, size, representation, name, client, self.engine, self.results
-                )
-                run = in_parts.run
+                ).run
             else:
                 work = RunQuery(query, representation, name)
                 is_small = query.is_small(size)

@@ -360,17 +360,25 @@ class ResultStore:
         return filed
 
     @contextmanager
-    def reserving(self, nbytes: int) -> Iterator[None]:
+    def reserving(self, nbytes: int) -> Iterator[Callable[[int], None]]:
         """Reserve room for results that are made, in several steps, inside the block.
 
-        Raises ``ProblemError`` where the results of jobs, and other reservations, leave too little.
+        Yields a function that reserves more. Raises ``ProblemError`` where the results of jobs,
+        and other reservations, leave too little.
         """
-        self.refuse_without_room(nbytes)
-        self._reserved += nbytes
+        reserved = 0
+
+        def reserve(nbytes: int) -> None:
+            nonlocal reserved
+            self.refuse_without_room(nbytes)
+            self._reserved += nbytes
+            reserved += nbytes
+
+        reserve(nbytes)
         try:
-            yield
+            yield reserve
         finally:
-            self._reserved -= nbytes
+            self._reserved -= reserved
 
     def refuse_without_room(self, nbytes: int) -> None:
         """Raise ``ProblemError`` where the results of jobs leave no room for so many bytes."""

@@ -132,23 +132,29 @@ class Matrix:
 
 @dataclass(frozen=True)
 class StoredMatrix:
-    """A matrix in a file of the service: the answer of a job, whose rows are read in parts.
+    """A matrix that the service keeps in a file: the answer of a job.
 
-    `matrix_rows` reads some rows, `save_matrix` all. The service keeps the file until the job is
-    dismissed or expires.
+    `matrix_rows` reads some rows of a dense one, `save_matrix` saves either to a file. The service
+    keeps it until the job is dismissed or expires.
     """
 
     job_id: str
+    layout: str
+    """``dense`` in numpy's format, or ``sparse`` as `scipy.sparse.load_npz` reads it"""
     shape: tuple[int, int]
     """The numbers of sources and of targets"""
     dtype: np.dtype[Any]
+    method: str
     error_bound: ErrorBound
     size: int
-    """Bytes of the file, which has numpy's format"""
-    rows_at: int
-    """Bytes before the first row"""
+    """Bytes of the file"""
     etag: str
-    """Identifies the content"""
+    """Names the content"""
+
+    @property
+    def rows_at(self) -> int:
+        """Bytes before the first row of a dense matrix."""
+        return self.size - self.shape[0] * self.shape[1] * self.dtype.itemsize
 
 
 @dataclass(frozen=True)
@@ -297,15 +303,19 @@ def to_matrix(response: httpx2.Response) -> Matrix:
 
 
 def to_stored_matrix(job_id: str, response: httpx2.Response) -> StoredMatrix:
-    """Return a matrix in a file, from the first bytes of that."""
-    begin = BytesIO(response.content)
-    np.lib.format.read_magic(begin)
-    shape, _, dtype = np.lib.format.read_array_header_1_0(begin)
-    bound = ErrorBound(**_members_of_headers(response)["error_bound"])
-    rows, columns = shape
-    size = int(response.headers["content-range"].rpartition("/")[2])
-    etag = response.headers["etag"].strip('"')
-    return StoredMatrix(job_id, (rows, columns), dtype, bound, size, begin.tell(), etag)
+    """Return a matrix in a file, from the response with some part of it."""
+    members = _members_of_headers(response)
+    rows, columns = map(int, members["shape"].split(","))
+    return StoredMatrix(
+        job_id=job_id,
+        layout=members["layout"],
+        shape=(rows, columns),
+        dtype=np.dtype(members["dtype"]),
+        method=members["method"],
+        error_bound=ErrorBound(**members["error_bound"]),
+        size=int(response.headers["content-range"].rpartition("/")[2]),
+        etag=response.headers["etag"].strip('"'),
+    )
 
 
 def to_neighbours(response: httpx2.Response) -> list[Neighbour]:

@@ -60,8 +60,6 @@ Accuracy = Literal["exact", "approximate", "fast"]
 Kind = Literal["distances", "path", "paths", "isolines", "borders", "matrix", "nearest", "locate"]
 ArrayName = Literal["vertices", "faces", "vertex_map", "face_map", "components"]
 
-_NPY_HEAD = 256
-"""Bytes that have the whole header of a matrix in numpy's format"""
 _PART_BYTES = 2**23
 """Bytes of a stored matrix that are read at a time"""
 _PAGE = 1000
@@ -270,15 +268,23 @@ def matrix(
     sources: Sequence[Point],
     targets: Sequence[Point],
     *,
+    method: Accuracy = "exact",
+    relative_error: float | None = None,
+    absolute_error: float | None = None,
+    effort: Literal[1, 2, 4, 8] | None = None,
     max_distance: float | None = None,
     layout: Literal["dense", "sparse", "pairs"] = "dense",
     barriers: Sequence[int] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[Matrix]:
-    """Return exact distances from each source to each target, or for pairs of them."""
+    """Return the distances from each source to each target, or for pairs of them."""
     body = _body(
         sources=sources,
         targets=targets,
+        method=method,
+        relative_error=relative_error,
+        absolute_error=absolute_error,
+        effort=effort,
         max_distance=max_distance,
         layout=layout,
         barriers=barriers,
@@ -292,27 +298,46 @@ def store_matrix(
     sources: Sequence[Point] | Literal["all"],
     targets: Sequence[Point] | Literal["all"],
     *,
+    method: Accuracy = "exact",
+    relative_error: float | None = None,
+    absolute_error: float | None = None,
+    effort: Literal[1, 2, 4, 8] | None = None,
     max_distance: float | None = None,
+    layout: Literal["dense", "sparse"] = "dense",
     barriers: Sequence[int] = (),
     dtype: Literal["float64", "float32"] = "float64",
     progress: Progress = ignore_progress,
 ) -> Flow[StoredMatrix]:
-    """Let the service compute any number of exact distances, and store them in a file.
+    """Let the service compute any number of distances, and store them in a file.
 
     All workers of the service share the work. If sources and targets are the same, each pair is
-    computed once. If a call was stopped, the next one continues where it stopped.
+    computed once. If a call was stopped, the next one continues where it stopped. A ``sparse``
+    matrix holds the finite distances only.
     """
-    body = _body(sources=sources, targets=targets, max_distance=max_distance, barriers=barriers)
-    request = _request(mesh, "matrix", body, NPY, {"dtype": dtype})
+    body = _body(
+        sources=sources,
+        targets=targets,
+        method=method,
+        relative_error=relative_error,
+        absolute_error=absolute_error,
+        effort=effort,
+        max_distance=max_distance,
+        layout=layout,
+        barriers=barriers,
+    )
+    media_type = NPZ if layout == "sparse" else NPY
+    request = _request(mesh, "matrix", body, media_type, {"dtype": dtype})
     headers = {**request.headers, "Prefer": "respond-async", "Idempotency-Key": uuid4().hex}
     job = to_job((yield from send(replace(request, headers=headers))).json())
     yield from end_of(job, progress)
     progress(1.0)
-    return to_stored_matrix(job.id, (yield from _part_of_result(job.id, 0, _NPY_HEAD)))
+    return to_stored_matrix(job.id, (yield from _part_of_result(job.id, 0, 1)))
 
 
 def matrix_rows(matrix: StoredMatrix, first: int, last: int) -> Flow[NDArray[Any]]:
-    """Return the rows of a stored matrix from ``first`` to before ``last``."""
+    """Return the rows of a stored dense matrix from ``first`` to before ``last``."""
+    if matrix.layout != "dense":
+        raise ValueError("a sparse matrix cannot be read by rows; save_matrix saves it to a file")
     if not 0 <= first < last <= matrix.shape[0]:
         raise ValueError(f"rows {first} to {last} do not exist; the matrix has {matrix.shape[0]}")
     row = matrix.shape[1] * matrix.dtype.itemsize
@@ -324,7 +349,9 @@ def matrix_rows(matrix: StoredMatrix, first: int, last: int) -> Flow[NDArray[Any
 def save_matrix(
     matrix: StoredMatrix, path: str | PathLike[str], *, progress: Progress = ignore_progress
 ) -> Flow[None]:
-    """Write a stored matrix to a file, which `numpy.load` can map into memory.
+    """Write a stored matrix to a file.
+
+    `numpy.load` can map a dense one into memory; `scipy.sparse.load_npz` reads a sparse one.
 
     If a call was stopped, the next one continues where it stopped: received data are kept in a
     hidden file beside.

@@ -1367,7 +1367,7 @@ export interface components {
         };
         /**
          * MatrixRequest
-         * @description Exact distances from each of ``sources`` to each of ``targets``.
+         * @description Distances from each of ``sources`` to each of ``targets``.
          * @example {
          *       "sources": [
          *         {
@@ -1402,6 +1402,27 @@ export interface components {
              *     ]
              */
             barriers?: number[];
+            /**
+             * Method
+             * @description `approximate`: within an allowed error; `fast`: in one quick pass, with an estimate of the error. Default: `exact`
+             * @enum {string}
+             */
+            method?: "exact" | "approximate" | "fast";
+            /**
+             * Relative Error
+             * @description For `approximate`: the allowed error, as a share of the exact distance; 0.001 if neither error is given
+             */
+            relative_error?: number | null;
+            /**
+             * Absolute Error
+             * @description For `approximate`: the allowed error in mesh units; if both errors are given, both hold
+             */
+            absolute_error?: number | null;
+            /**
+             * Effort
+             * @description For `fast`: more effort takes more time and lowers the error; 2 by default
+             */
+            effort?: (1 | 2 | 4 | 8) | null;
             /**
              * Sources
              * @description Points, or `all` for every vertex

@@ -36,11 +36,6 @@ class FastSweep:
     """The same question for an exact sweep"""
     effort: int
 
-    @property
-    def error_bound(self) -> ErrorBound:
-        """The estimated error of its distances."""
-        return ErrorBound("relative", ESTIMATES[self.effort], "estimated")
-
     def run(self, control: Control) -> Wavefront:
         """Return the state after the sweep.
 
@@ -105,6 +100,11 @@ class FastSweep:
             parallel=exact.parallel,
             first_segment=exact.first_segment,
         )
+
+
+def estimated_error(effort: int) -> ErrorBound:
+    """Return the estimated error of the distances of fast sweeps."""
+    return ErrorBound("relative", ESTIMATES[effort], "estimated")
 
 
 def winners_of(front: Wavefront) -> Winners:

@@ -4,7 +4,7 @@ import json
 import os
 import shutil
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ _QUESTION = "question.json"
 
 @dataclass(frozen=True)
 class Blocks:
-    """The folder of a table in the making; each block is a file, whole and checked, or missing."""
+    """The folder of a table in the making; each block is an array: checked, or missing."""
 
     folder: Path
 
@@ -57,26 +57,25 @@ class Blocks:
     def _out(self) -> str:
         return self.folder.name.removeprefix(".").removesuffix(".part")
 
-    def put(self, block: int, **arrays: NDArray[Any]) -> None:
-        """Write the arrays of a block."""
-        for name, array in arrays.items():
-            with (self.folder / f"{block}.{name}.npy").open("wb") as file:
-                np.save(file, array)
-                file.flush()
-                os.fsync(file.fileno())
+    def put(self, block: int, array: NDArray[Any]) -> None:
+        """Write a block."""
+        with (self.folder / f"{block}.npy").open("wb") as file:
+            np.save(file, array)
+            file.flush()
+            os.fsync(file.fileno())
         # Last: without it the block counts as missing.
-        _write(self.folder / f"{block}.crc32", _checksum(arrays.values()))
+        _write(self.folder / f"{block}.crc32", _checksum(array))
 
-    def get(self, block: int, name: str) -> NDArray[Any]:
-        """Return an array of a block, mapped."""
-        array: NDArray[Any] = np.load(self.folder / f"{block}.{name}.npy", mmap_mode="r")
+    def get(self, block: int) -> NDArray[Any]:
+        """Return a block, mapped."""
+        array: NDArray[Any] = np.load(self.folder / f"{block}.npy", mmap_mode="r")
         return array
 
-    def has(self, block: int, *names: str) -> bool:
+    def has(self, block: int) -> bool:
         """Read a block; tell whether it is there and as it was written."""
         try:
             checksum = (self.folder / f"{block}.crc32").read_bytes()
-            return checksum == _checksum(self.get(block, name) for name in names)
+            return checksum == _checksum(self.get(block))
         except (OSError, ValueError):
             return False
 
@@ -86,12 +85,8 @@ class Blocks:
         self.folder.with_suffix(".lock").unlink(missing_ok=True)
 
 
-def _checksum(arrays: Iterable[NDArray[Any]]) -> bytes:
-    checksum = 0
-    for array in arrays:
-        if array.size:
-            checksum = zlib.crc32(np.ascontiguousarray(array).data.cast("B"), checksum)
-    return str(checksum).encode()
+def _checksum(array: NDArray[Any]) -> bytes:
+    return str(zlib.crc32(array.tobytes())).encode()
 
 
 def _write(path: Path, content: bytes) -> None:

@@ -7,15 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.tables.plan import Plan
-
-ARRAYS = ("rows",)
+from geodesic_core.search.plan import Plan
 
 
 def block_of(
     plan: Plan, block: int, rows: Mapping[int, Floats], dtype: np.dtype[Any]
-) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a block: (rows, targets from its first row on), mirrored in itself."""
+) -> NDArray[Any]:
+    """Return a block: (rows, targets from its first row on), mirrored in itself."""
     sweeps = plan.rows_of(block)
     first = sweeps[0] if plan.is_symmetric else 0
     table = np.empty((len(sweeps), plan.width - first), dtype)
@@ -24,7 +22,7 @@ def block_of(
         table[place, plan.width - first - len(row) :] = row
         if plan.is_symmetric:
             table[place:, place] = row[: len(sweeps) - place]
-    return {"rows": table}
+    return table
 
 
 def file_rows(

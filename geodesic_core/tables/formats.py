@@ -3,17 +3,18 @@
 import hashlib
 import json
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import IO, Any
+from zipfile import ZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.extras import extra
+from geodesic_core.search.plan import Plan
 from geodesic_core.tables import dense, sparse
 from geodesic_core.tables.blocks import Blocks
-from geodesic_core.tables.plan import Plan
 
 DENSE, SPARSE = (".npy", ".zarr"), (".npz", ".parquet")
 SUFFIXES = (*DENSE, *SPARSE)
@@ -42,11 +43,12 @@ def write_table(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], facts: Facts, 
     if suffix in DENSE:
         whole = scratch.with_suffix(".npy")
         with whole.open("wb") as file:
-            write_npy(plan, lambda block: blocks.get(block, "rows"), dtype, file)
+            write_npy(plan, blocks.get, dtype, file)
         if suffix == ".zarr":
             _write_zarr(np.load(whole, mmap_mode="r"), facts, scratch)
     elif suffix == ".npz":
-        _write_npz(plan, blocks, dtype, blocks.folder, scratch)
+        with scratch.open("wb") as file:
+            write_npz(plan, blocks.get, dtype, file)
     else:
         _write_parquet(plan, blocks, dtype, facts, scratch)
     if out.is_dir():
@@ -55,17 +57,59 @@ def write_table(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], facts: Facts, 
 
 
 def write_npy(
-    plan: Plan, rows_of: Callable[[int], NDArray[Any]], dtype: np.dtype[Any], file: IO[bytes]
+    plan: Plan, block_of: Callable[[int], NDArray[Any]], dtype: np.dtype[Any], file: IO[bytes]
 ) -> None:
-    """Write a dense table in numpy's format, from the rows of its blocks."""
+    """Write a dense table in numpy's format, from its blocks."""
     # Written, not mapped: pages of a map would count as memory of the process.
     header = {"descr": dtype.str, "fortran_order": False, "shape": plan.shape}
     np.lib.format.write_array_header_1_0(file, header)
     begin, row_bytes = file.tell(), plan.shape[1] * dtype.itemsize
-    for numbers, rows in dense.file_rows(plan, rows_of):
+    for numbers, rows in dense.file_rows(plan, block_of):
         for number, row in zip(numbers.tolist(), np.ascontiguousarray(rows), strict=True):
             file.seek(begin + number * row_bytes)
             file.write(row.data.cast("B"))
+
+
+def write_npz(
+    plan: Plan, block_of: Callable[[int], NDArray[Any]], dtype: np.dtype[Any], file: IO[bytes]
+) -> None:
+    """Write a sparse table as `scipy.sparse.load_npz` reads it, from its blocks.
+
+    The bytes are those of `numpy.savez`, which would need all entries at once.
+    """
+    counts = np.zeros(plan.shape[0] + 1, np.int64)
+    for entries in sparse.file_rows(plan, block_of):
+        counts += np.bincount(entries.row + 1, minlength=len(counts))
+    ends = np.cumsum(counts)
+    shape = (int(ends[-1]),)
+    with ZipFile(file, "w") as archive:
+        _put(archive, "format", np.array(b"csr"))
+        _put(archive, "shape", np.array(plan.shape))
+        columns = (entries.column for entries in sparse.file_rows(plan, block_of))
+        _put_parts(archive, "indices", ends.dtype, shape, columns)
+        _put(archive, "indptr", ends)
+        distances = (entries.distance for entries in sparse.file_rows(plan, block_of))
+        _put_parts(archive, "data", dtype, shape, distances)
+        _put(archive, "_is_array", np.array(True))
+
+
+def _put(archive: ZipFile, name: str, array: NDArray[Any]) -> None:
+    _put_parts(archive, name, array.dtype, array.shape, [array])
+
+
+def _put_parts(
+    archive: ZipFile,
+    name: str,
+    dtype: np.dtype[Any],
+    shape: tuple[int, ...],
+    parts: Iterable[NDArray[Any]],
+) -> None:
+    """Write an array of an npz file, from its parts in order."""
+    header = {"descr": dtype.str, "fortran_order": False, "shape": shape}
+    with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+        np.lib.format.write_array_header_1_0(file, header)
+        for part in parts:
+            file.write(part.tobytes())
 
 
 def sha256_of(path: Path) -> str:
@@ -91,29 +135,6 @@ def _write_zarr(table: NDArray[Any], facts: Facts, folder: Path) -> None:
         array[first : first + rows] = table[first : first + rows]
 
 
-def _write_npz(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], scratch: Path, path: Path) -> None:
-    columns, data = scratch / "indices.raw", scratch / "data.raw"
-    counts = np.zeros(plan.shape[0] + 1, np.int64)
-    with columns.open("wb") as column_file, data.open("wb") as data_file:
-        for entries in sparse.file_rows(plan, blocks):
-            column_file.write(entries.column.astype(np.int64).data.cast("B"))
-            data_file.write(entries.distance.data.cast("B"))
-            counts += np.bincount(entries.row + 1, minlength=len(counts))
-    np.savez(
-        path,
-        format=np.array(b"csr"),
-        shape=np.array(plan.shape),
-        indices=_mapped(columns, np.int64),
-        indptr=np.cumsum(counts),
-        data=_mapped(data, dtype),
-        _is_array=np.array(True),
-    )
-
-
-def _mapped(path: Path, dtype: Any) -> NDArray[Any]:
-    return np.memmap(path, dtype, "r") if path.stat().st_size else np.empty(0, dtype)
-
-
 def _write_parquet(
     plan: Plan, blocks: Blocks, dtype: np.dtype[Any], facts: Facts, path: Path
 ) -> None:
@@ -129,5 +150,5 @@ def _write_parquet(
         metadata={"geodesic": json.dumps(dict(facts))},
     )
     with pq.ParquetWriter(path, schema) as writer:
-        for entries in sparse.file_rows(plan, blocks):
+        for entries in sparse.file_rows(plan, blocks.get):
             writer.write_table(pa.table(list(entries), schema=schema))

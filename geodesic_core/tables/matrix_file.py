@@ -4,12 +4,12 @@ import hashlib
 import json
 import math
 import threading
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,20 +17,19 @@ from numpy.typing import NDArray
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.fields.distance_field import DistanceField
-from geodesic_core.fields.path import EXACT, ErrorBound
+from geodesic_core.fields.path import ErrorBound
 from geodesic_core.fields.sources import as_points
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.search.plan import Plan
+from geodesic_core.search.rows import Method, Rows, Solve, rows_of
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import available_cores, share_out
-from geodesic_core.solvers import Effort, approximate_distance, fast_distance, kernel_digest
+from geodesic_core.solvers import Effort, error_bound, kernel_digest, row_solver
 from geodesic_core.tables import dense, sparse
 from geodesic_core.tables.blocks import Blocks
 from geodesic_core.tables.formats import DENSE, SPARSE, SUFFIXES, require, sha256_of, write_table
-from geodesic_core.tables.plan import Plan
-from geodesic_core.tables.rows import ExactRows, FieldRows, Method, Rows, Solve
 from geodesic_core.validation import as_limit, check_choice, is_index
 
 Everywhere = Literal["all"]
@@ -66,8 +65,9 @@ def write_matrix(
     targets: Sequence[Point] | Everywhere | None = None,
     *,
     method: Method = "exact",
-    relative_error: float = 1e-3,
-    effort: Literal[1, 2, 4, 8] = 2,
+    relative_error: float | None = 1e-3,
+    absolute_error: float | None = None,
+    effort: Effort = 2,
     max_distance: float | None = None,
     barriers: Iterable[int] = (),
     dtype: Literal["float64", "float32"] = "float64",
@@ -93,11 +93,11 @@ def write_matrix(
         ``.parquet``: these as a table of source, target and distance.
     sources, targets
         N and M vertex indices or `SurfacePoint`, or ``"all"`` vertices. Without targets, the
-        targets are the sources, and each pair is computed once.
+        targets are the sources. Where both are the same, each pair is computed once.
     method
-        ``"exact"``, ``"approximate"`` within a ``relative_error``, or ``"fast"`` with an
-        ``effort``; see the solvers of these names.
-    relative_error, effort
+        ``"exact"``; ``"approximate"``, within ``relative_error`` and ``absolute_error``; or
+        ``"fast"``, with an ``effort``. See the solvers of these names.
+    relative_error, absolute_error, effort
         For the method that takes it.
     max_distance
         Limit of the sweeps, mesh units; None for no limit. Points beyond it count as unreachable.
@@ -145,7 +145,6 @@ def write_matrix(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     limit = as_limit(max_distance)
-    check_choice("method", method, get_args(Method))
     check_choice("dtype", dtype, ("float64", "float32"))
     if threads is not None and not (is_index(threads) and threads >= 1):
         raise InvalidArgument(f"threads is {threads!r}; it must be an integer, 1 or more, or None")
@@ -156,16 +155,28 @@ def write_matrix(
         raise InvalidArgument(f"there is no folder {path.parent}")
     require(suffix)
     mesh = as_mesh(mesh).with_barriers(barriers)
-    solve, bound = _solver(mesh, method, relative_error, effort, limit)
+    solve = row_solver(mesh, method, relative_error, absolute_error, effort)
+    bound = error_bound(
+        mesh,
+        method,
+        relative_error=relative_error,
+        absolute_error=absolute_error,
+        effort=effort,
+    )
     starts = _points(mesh, sources, "source", control)
     stops = None if targets is None else _points(mesh, targets, "target", control)
     plan = Plan.of(mesh, starts, stops, control, in_order=suffix in SPARSE)
+    chosen: Mapping[str, Mapping[str, Any]] = {
+        "approximate": {"relative_error": relative_error, "absolute_error": absolute_error},
+        "fast": {"effort": effort},
+    }
     facts = {
         "mesh": _digest(mesh.vertices, mesh.faces, mesh.barriers),
         "sources": _written(starts),
         "targets": None if stops is None else _written(stops),
         "shape": plan.shape,
         "method": method,
+        **chosen.get(method, {}),
         "error_bound": asdict(bound),
         "max_distance": None if math.isinf(limit) else limit,
         "dtype": dtype,
@@ -205,35 +216,6 @@ def _digest(*arrays: NDArray[Any]) -> str:
     return digest.hexdigest()
 
 
-def _solver(
-    mesh: TriangleMesh, method: Method, relative_error: float, effort: Effort, limit: float
-) -> tuple[Solve | None, ErrorBound]:
-    """Return the function that solves a row, None for an exact sweep; and its error."""
-    if method == "exact":
-        return None, EXACT
-
-    def solve(
-        source: SurfacePoint, targets: Sequence[SurfacePoint], control: Control
-    ) -> DistanceField:
-        solver = (
-            partial(fast_distance, effort=effort)
-            if method == "fast"
-            else partial(approximate_distance, relative_error=relative_error)
-        )
-        return solver(
-            mesh,
-            source,
-            max_distance=limit,
-            targets=targets,
-            retain="distances",
-            progress=control.progress,
-            cancel=control.cancel,
-            memory_limit=control.memory_limit,
-        )
-
-    return solve, solve(mesh.point(0), (), Control()).error_bound
-
-
 @dataclass(frozen=True)
 class _Sweep:
     """The sweeps of a plan, in threads; each block is written once its rows are there."""
@@ -248,9 +230,7 @@ class _Sweep:
     def run(self, blocks: Blocks, threads: int, control: Control) -> int:
         """Write the blocks that are missing; return the number of their rows."""
         missing = [
-            block
-            for block in control.watched(range(self.plan.blocks))
-            if not blocks.has(block, *self.layout.ARRAYS)
+            block for block in control.watched(range(self.plan.blocks)) if not blocks.has(block)
         ]
         sweeps = [sweep for block in missing for sweep in self.plan.rows_of(block)]
         if not sweeps:
@@ -266,17 +246,15 @@ class _Sweep:
                 if len(rows) < len(self.plan.rows_of(block)):
                     return
                 del unfinished[block]
-            blocks.put(block, **self.layout.block_of(self.plan, block, rows, self.dtype))
+            blocks.put(block, self.layout.block_of(self.plan, block, rows, self.dtype))
 
         def work(rows: Rows, part: int, control: Control) -> None:
             sweep = sweeps[part]
             put(sweep, rows.distances(sweep, self.plan.targets_of(sweep), control))
 
-        workers = [partial(work, self._rows()) for _ in range(min(threads, len(sweeps)))]
+        make = partial(
+            rows_of, self.plan.ends, self.limit, self.solve, partial(TargetSweep, self.mesh)
+        )
+        workers = [partial(work, make()) for _ in range(min(threads, len(sweeps)))]
         share_out(len(sweeps), workers, control)
         return len(sweeps)
-
-    def _rows(self) -> Rows:
-        if self.solve is None:
-            return ExactRows(self.plan.ends, self.limit, TargetSweep(self.mesh))
-        return FieldRows(self.plan.ends, self.solve)

@@ -1,6 +1,7 @@
 """A matrix in parts, which may be computed on several machines and are then joined to one file."""
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import IO, Any, Literal
 
 import numpy as np
@@ -10,16 +11,17 @@ from geodesic_core.control import Control
 from geodesic_core.fields.sources import as_points
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.mesh.surface_point import Point
+from geodesic_core.search.plan import Plan, block_rows
+from geodesic_core.search.rows import Method, rows_of
 from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.tables import dense
-from geodesic_core.tables.formats import write_npy
-from geodesic_core.tables.plan import Plan, block_rows
-from geodesic_core.tables.rows import ExactRows
+from geodesic_core.solvers import Effort, row_solver
+from geodesic_core.tables import dense, sparse
+from geodesic_core.tables.formats import write_npy, write_npz
 from geodesic_core.validation import as_limit, check_choice
 
 
 class MatrixParts:
-    """A dense matrix of exact distances in parts, each with the rows of some sweeps.
+    """A matrix in parts, each with the distances of some sweeps.
 
     The parts may be computed in any order, by several processes or machines. Joined, they are the
     file that `write_matrix` writes, to the bit.
@@ -30,8 +32,10 @@ class MatrixParts:
         The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     sources, targets
         N and M vertex indices or `SurfacePoint`. Where both are the same, each pair is asked once.
-    max_distance
-        Limit of the sweeps, mesh units; None for no limit. Points beyond it count as unreachable.
+    layout
+        ``"dense"`` for all distances, ``"sparse"`` for the finite ones.
+    method, relative_error, absolute_error, effort, max_distance
+        As in `write_matrix`.
     dtype
         Of the distances.
     cancel
@@ -56,20 +60,26 @@ class MatrixParts:
         sources: Sequence[Point],
         targets: Sequence[Point],
         *,
+        layout: Literal["dense", "sparse"] = "dense",
+        method: Method = "exact",
+        relative_error: float | None = 1e-3,
+        absolute_error: float | None = None,
+        effort: Effort = 2,
         max_distance: float | None = None,
         dtype: Literal["float64", "float32"] = "float64",
         cancel: Callable[[], bool] | None = None,
     ) -> None:
+        check_choice("layout", layout, ("dense", "sparse"))
         check_choice("dtype", dtype, ("float64", "float32"))
         control = Control(cancel=cancel)
         self._mesh = as_mesh(mesh)
+        self._solve = row_solver(self._mesh, method, relative_error, absolute_error, effort)
         self._limit = as_limit(max_distance)
         self._dtype = np.dtype(dtype)
         starts = as_points(self._mesh, sources, "source", control)
         stops = as_points(self._mesh, targets, "target", control)
-        self._plan = Plan.of(
-            self._mesh, starts, None if starts == stops else stops, control, in_order=False
-        )
+        self._is_sparse = layout == "sparse"
+        self._plan = Plan.of(self._mesh, starts, stops, control, in_order=self._is_sparse)
 
     @staticmethod
     def areas(sources: int, targets: int | None) -> list[int]:
@@ -83,7 +93,7 @@ class MatrixParts:
         Returns
         -------
         list of int
-            One for each part. Work and memory are about proportional to it.
+            One for each part, whatever the layout. Work and memory are about proportional to it.
 
         Examples
         --------
@@ -129,7 +139,8 @@ class MatrixParts:
         Returns
         -------
         numpy.ndarray
-            float64 or float32, (sweeps, columns), mesh units, infinite where unreachable.
+            Of a dense matrix: (sweeps, columns), float64 or float32, mesh units, infinite where
+            unreachable. Of a sparse one: (K,) records of sweep and column, int32, and distance.
 
         Raises
         ------
@@ -144,7 +155,7 @@ class MatrixParts:
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
         plan, sweeps = self._plan, self._plan.rows_of(part)
-        rows = ExactRows(plan.ends, self._limit, TargetSweep(self._mesh))
+        rows = rows_of(plan.ends, self._limit, self._solve, partial(TargetSweep, self._mesh))
         control = control.holding(8 * len(sweeps) * plan.width)
         found = {
             sweep: rows.distances(
@@ -152,14 +163,15 @@ class MatrixParts:
             )
             for done, sweep in enumerate(sweeps)
         }
-        return dense.block_of(plan, part, found, self._dtype)["rows"]
+        block_of = sparse.block_of if self._is_sparse else dense.block_of
+        return block_of(plan, part, found, self._dtype)
 
-    def reached(self, rows: NDArray[Any]) -> int:
+    def reached(self, part: NDArray[Any]) -> int:
         """Return the number of finite distances of the matrix that come from a part.
 
         Parameters
         ----------
-        rows
+        part
             What `compute` has returned for it.
 
         Returns
@@ -173,14 +185,16 @@ class MatrixParts:
         >>> parts.reached(parts.compute(0))
         2
         """
-        finite = int(np.count_nonzero(np.isfinite(rows)))
+        finite = len(part) if self._is_sparse else int(np.count_nonzero(np.isfinite(part)))
         if not self._plan.is_symmetric:
             return finite
+        if self._is_sparse:
+            return 2 * finite - int(np.count_nonzero(part["row"] == part["column"]))
         # Of the sweeps among themselves both halves are there, of the others one.
-        return 2 * finite - int(np.count_nonzero(np.isfinite(rows[:, : len(rows)])))
+        return 2 * finite - int(np.count_nonzero(np.isfinite(part[:, : len(part)])))
 
     def write(self, file: IO[bytes], part: Callable[[int], NDArray[Any]]) -> None:
-        """Write the matrix in numpy's format, (N, M), from its parts.
+        """Write the matrix, (N, M), from its parts: as npy if dense, as npz if sparse.
 
         Parameters
         ----------
@@ -198,4 +212,5 @@ class MatrixParts:
         >>> np.load(BytesIO(file.getvalue())).shape
         (2, 2)
         """
-        write_npy(self._plan, part, self._dtype, file)
+        write = write_npz if self._is_sparse else write_npy
+        write(self._plan, part, self._dtype, file)

@@ -40,7 +40,16 @@ def jobs_of(client: TestClient) -> set[str]:
     return {job["id"] for job in client.get("/v1/jobs").json()["jobs"]}
 
 
-@pytest.mark.parametrize("service_key", [None, "secret"])
+@pytest.mark.parametrize(
+    ("service_key", "suffix", "method"),
+    [
+        (None, ".npy", []),
+        ("secret", ".npz", []),
+        (None, ".npy", ["--method", "fast", "--effort", 1]),
+        (None, ".npz", ["--method", "approximate", "--relative-error", 0.001]),
+        (None, ".npy", ["--method", "approximate", "--absolute-error", 0.01]),
+    ],
+)
 def test_the_file_is_the_one_of_this_machine(
     run: Run,
     plane: Path,
@@ -49,18 +58,20 @@ def test_the_file_is_the_one_of_this_machine(
     client: TestClient,
     monkeypatch: pytest.MonkeyPatch,
     service_key: str | None,
+    suffix: str,
+    method: list[Any],
 ) -> None:
     if service_key is not None:
         monkeypatch.setenv("GEODESIC_SERVICE_KEY", service_key)
     others = jobs_of(client)
     points = tmp_path / "points.txt"
     points.write_text("3\nf7:0.2,0.3,0.5\n100\n")
-    options = ["--max-distance", 0.8, "--barriers", "0-5", "--dtype", "float32"]
+    options = ["--max-distance", 0.8, "--barriers", "0-5", "--dtype", "float32", *method]
     for ends in (["--points", points], ["--sources", points, "--targets", "all"]):
-        assert run("matrix", plane, *ends, *options, "--out", "here.npy").code == 0
-        ran = run("matrix", plane, *ends, *options, "--out", "there.npy", *SERVICE)
+        here, there = (plane.parent / f"{name}{suffix}" for name in ("here", "there"))
+        assert run("matrix", plane, *ends, *options, "--out", here).code == 0
+        ran = run("matrix", plane, *ends, *options, "--out", there, *SERVICE)
         assert ran.code == 0, ran.err
-        here, there = (plane.parent / f"{name}.npy" for name in ("here", "there"))
         assert there.read_bytes() == here.read_bytes()
         facts = [json.loads(Path(f"{out}.json").read_text()) for out in (here, there)]
         for name in ("shape", "sha256", "error_bound", "max_distance", "dtype", "method"):
@@ -85,8 +96,8 @@ def test_a_refusal_is_told(
 @pytest.mark.parametrize(
     "options",
     [
-        ["--points", "all", "--out", "m.npy", "--method", "fast"],
         ["--points", "all", "--out", "m.npy", "--threads", 2],
+        ["--points", "all", "--out", "m.zarr"],
         ["--points", "all", "--out", "m.parquet"],
         ["--source", 0, "--target", 1, "--out", "m.npy"],
     ],

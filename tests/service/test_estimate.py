@@ -34,6 +34,7 @@ CORNER = {"face": 1040, "barycentric": [1, 0, 0]}
 ROUGH = {"method": "approximate", "relative_error": 0.01}
 FAST = {"method": "fast", "effort": 8}
 PAIRS = {"layout": "pairs"}
+FEW = {"sources": SOME[:9], "targets": SOME[9:18]}
 JSON_ONLY: tuple[str, ...] = ("json",)
 
 # The body, the formats, by which factor the response may be off
@@ -50,6 +51,9 @@ QUERIES: dict[str, tuple[str, dict[str, Any], tuple[str, ...], float]] = {
     "sparse": ("matrix", {"sources": SOME, "targets": MANY, "layout": "sparse"}, ("json",), 1.05),
     "npz": ("matrix", {"sources": SOME, "targets": MANY, "layout": "sparse"}, ("npz",), 1.05),
     "pairs": ("matrix", {"sources": MANY[:40], "targets": SOME, **PAIRS}, ("json",), 1.05),
+    "rough dense": ("matrix", {"sources": SOME, "targets": MANY, **ROUGH}, JSON_ONLY, 1.05),
+    "quick sparse": ("matrix", {**FEW, "layout": "sparse", **FAST}, ("npz",), 1.05),
+    "quick pairs": ("matrix", {**FEW, **PAIRS, **FAST}, JSON_ONLY, 1.05),
     "hub": ("matrix", {"sources": [INSIDE] * 40, "targets": SOME, **PAIRS}, ("npy",), 1.05),
     "nearest": ("nearest", {"source": INSIDE, "candidates": MANY, "k": 50}, ("json", "csv"), 1.05),
     "path": ("path", {"source": INSIDE, "target": {"vertex": 1900}}, ("json", "npy", "csv"), 3),
@@ -188,7 +192,7 @@ def test_memory_that_suffices(
     query.answer(opened, context(memory=3 * estimated.memory_bytes))
 
 
-@pytest.mark.parametrize("name", ["rough", "rough lines", "rough paths"])
+@pytest.mark.parametrize("name", ["rough", "rough lines", "rough paths", "rough dense"])
 def test_on_rough_meshes_an_approximate_answer_costs_what_an_exact_one_does(
     client: TestClient, ids: dict[str, str], name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -242,7 +246,7 @@ def test_seconds_of_all_kinds_are_off_by_one_factor(
     opened = OpenMesh(("", b""), gc.Solver(stored_mesh(client, ids["knot"])), [])
     factors = {}
     one_sweep = "all", "rough", "quick", "rough path", "quick path", "rough paths", "quick paths"
-    for name in (*one_sweep, "pairs", "nearest", "legs", "lines"):
+    for name in (*one_sweep, "pairs", "quick sparse", "quick pairs", "nearest", "legs", "lines"):
         query = query_of(name)
         estimated = estimate(query, Representation(JSON), opened, lambda: False).seconds
         factors[name] = min(processor_seconds(query, opened) for _ in range(3)) / estimated

@@ -1,13 +1,16 @@
 """Matrices over HTTP that are larger than memory: in parts, as jobs, read in ranges."""
 
 import json
+import math
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from geodesic_client import Client, Mesh, ProblemError
+from scipy.sparse import load_npz
 
 import geodesic_core as gc
 from tests.support.service import (
@@ -57,7 +60,8 @@ def same(service: ServiceClient, sphere: str) -> gc.TriangleMesh:
 
 def submit(service: ServiceClient, mesh_id: str, query: str = "", **body: Any) -> Any:
     """Submit a matrix as a job, and return the document at its end."""
-    link = f"/v1/meshes/{mesh_id}/matrix?format=npy{query}"
+    format_ = "npz" if body.get("layout") == "sparse" else "npy"
+    link = f"/v1/meshes/{mesh_id}/matrix?format={format_}{query}"
     response = service.post(link, json=ALL | body, headers=ASYNC)
     assert response.status_code == 202, response.text
     job = response.json()["links"]["self"]
@@ -66,17 +70,25 @@ def submit(service: ServiceClient, mesh_id: str, query: str = "", **body: Any) -
 
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
+APPROXIMATE = {"method": "approximate", "relative_error": 1e-3}
 
 
 @pytest.mark.parametrize(
     ("query", "body", "options"),
     [
-        ("&dtype=float32", {}, {"dtype": "float32"}),
+        ("&dtype=float32", {}, {}),
         ("", {"max_distance": 1.5, "barriers": [*range(200)]}, {}),
         ("", {"sources": [{"vertex": 3}, INSIDE]}, {}),
         ("", {"targets": [5, INSIDE, 3]}, {}),
+        ("", {"method": "approximate", "relative_error": 1e-4}, {}),
+        ("", {"method": "approximate", "absolute_error": 1e-3}, {"relative_error": None}),
+        ("&dtype=float32", {"method": "fast", "effort": 1, "max_distance": 1.5}, {}),
+        ("", {"layout": "sparse", "max_distance": 0.5}, {}),
+        ("", {"layout": "sparse", "sources": [{"vertex": 3}, INSIDE]}, {}),
+        ("&dtype=float32", {"layout": "sparse", "targets": [5, INSIDE, 3], "method": "fast"}, {}),
+        ("", {"layout": "sparse", "max_distance": 0.6, "barriers": [*range(9)], **APPROXIMATE}, {}),
     ],
-    ids=["symmetric", "limited", "rows", "columns"],
+    ids=str,
 )
 def test_the_file_is_the_library_s_to_the_bit(
     service: ServiceClient,
@@ -95,19 +107,27 @@ def test_the_file_is_the_library_s_to_the_bit(
     sides = {"sources": [3, inside], "targets": [5, inside, 3]}
     starts = sides["sources"] if "sources" in body else "all"
     stops = sides["targets"] if "targets" in body else "all"
-    limits = {name: body[name] for name in ("max_distance", "barriers") if name in body}
-    out = tmp_path / "table.npy"
-    stops = None if starts == stops == "all" else stops
-    gc.write_matrix(same, out, starts, stops, **limits, **options)
+    sides |= {"layout": []}
+    limits = {name: value for name, value in body.items() if name not in sides}
+    out = tmp_path / ("table.npz" if body.get("layout") == "sparse" else "table.npy")
+    if "dtype=float32" in query:
+        options = {**options, "dtype": "float32"}
+    written = gc.write_matrix(same, out, starts, stops, **limits, **options)
     assert answer.content == out.read_bytes()
     assert job["progress"] == 1.0
-    table = np.load(out)
-    missing = int(np.isinf(table).sum())
+    if out.suffix == ".npz":
+        table = load_npz(out)
+        missing = math.prod(table.shape) - table.nnz
+    else:
+        table = np.load(out)
+        missing = int(np.isinf(table).sum())
     assert (missing > 0) == ("max_distance" in body)
     headers = answer.headers
     assert headers["geodesic-shape"] == ",".join(map(str, table.shape))
     assert headers["geodesic-dtype"] == table.dtype.str
-    assert headers["geodesic-error-bound"] == '{"type":"relative","value":0.0,"kind":"guaranteed"}'
+    assert headers["geodesic-method"] == body.get("method", "exact")
+    assert headers["geodesic-exact"] == json.dumps("method" not in body)
+    assert json.loads(headers["geodesic-error-bound"]) == asdict(written.error_bound)
     assert sum(json.loads(headers["geodesic-unreachable"]).values()) == missing
     assert not [*store.glob("results/*/*-*")], "parts stay behind"
 
@@ -206,11 +226,49 @@ def test_bounds(service: ServiceClient, sphere: str) -> None:
         assert 1.5 < problem["actual"] / (8 * vertices**2) < 1.7
 
 
+def test_bounds_of_sparse_matrices(service: ServiceClient, sphere: str) -> None:
+    link = f"/v1/meshes/{sphere}/matrix?format=npz"
+    body = {"sources": [*range(10)], "targets": "all", "layout": "sparse"}
+    for query, limit, actual in (({}, 100, 6420), ({"max_distance": 9.0}, 100, 6420)):
+        problem = check_problem(service.post(link, json=body | query), 422, "limit_exceeded")
+        assert (problem["limit"], problem["actual"]) == (limit, actual)
+        assert problem["setting"] == "GEODESIC_MAX_MATRIX_CELLS"
+        assert "application/x-npz with `Prefer: respond-async`" in problem["hint"]
+    json_link = f"/v1/meshes/{sphere}/matrix"
+    problem = check_problem(
+        service.post(json_link, json=body, headers=ASYNC), 422, "limit_exceeded"
+    )
+    assert problem["setting"] == "GEODESIC_MAX_MATRIX_CELLS"
+    # The refusal of a request is not that of a job, though the question is the same.
+    job = submit(service, sphere, **body, max_distance=9.0)
+    assert job["status"] == "successful"
+    again = service.post(link, json=body | {"max_distance": 9.0})
+    check_problem(again, 422, "limit_exceeded")
+    # What a job finds counts against the store: here all distances, of which each takes 16 bytes
+    # in a part and 16 in the file.
+    larger = upload_sample(service, "sphere", 2600)
+    job = submit(service, larger, layout="sparse")
+    assert job["status"] == "failed"
+    problem = job["problem"]
+    assert (problem["code"], problem["limit"]) == ("storage_full", 20_000_000)
+    assert problem["setting"] == "GEODESIC_RESULTS_BYTES"
+    assert submit(service, larger, layout="sparse", max_distance=0.3)["status"] == "successful"
+
+
 def test_an_estimate_of_a_large_matrix(service: ServiceClient, sphere: str) -> None:
     link = f"/v1/meshes/{sphere}/matrix?estimate=true&format=npy"
     estimate = service.post(link, json=ALL).json()
     assert estimate["response_bytes"] == pytest.approx(8 * 642**2, rel=0.01)
     assert estimate["seconds"] > 0
+    sparse = link.replace("npy", "npz")
+    body = ALL | {"layout": "sparse", "max_distance": 0.5}
+    expected = len(
+        service.get(
+            submit(service, sphere, layout="sparse", max_distance=0.5)["links"]["results"]
+        ).content
+    )
+    estimate = service.post(sparse, json=body).json()
+    assert estimate["response_bytes"] == pytest.approx(expected, rel=0.2)
 
 
 def test_answers_of_jobs_leave_no_room(service: ServiceClient, sphere: str) -> None:
@@ -254,6 +312,7 @@ def test_the_clients_read_rows_and_save_files(
         sphere, "all", "all", max_distance=2.5, dtype="float32", progress=shares.append
     )
     assert (matrix.shape, matrix.dtype) == ((642, 642), np.dtype("float32"))
+    assert (matrix.layout, matrix.method) == ("dense", "exact")
     assert matrix.error_bound.value == 0.0
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
@@ -273,6 +332,22 @@ def test_the_clients_read_rows_and_save_files(
     assert not part.exists()
     client.dismiss_job(matrix.job_id)
     with pytest.raises(ProblemError, match="job_not_found"):
+        client.matrix_rows(matrix, 0, 1)
+
+
+def test_the_clients_save_sparse_files(
+    service: ServiceClient, sphere: str, same: gc.TriangleMesh, tmp_path: Path
+) -> None:
+    client = Client(http=service)
+    options: dict[str, Any] = {"method": "approximate", "absolute_error": 1e-3}
+    matrix = client.store_matrix(sphere, "all", "all", layout="sparse", max_distance=0.4, **options)
+    assert (matrix.layout, matrix.shape, matrix.method) == ("sparse", (642, 642), "approximate")
+    assert matrix.error_bound.type == "absolute"
+    out, expected = tmp_path / "out.npz", tmp_path / "expected.npz"
+    client.save_matrix(matrix, out)
+    gc.write_matrix(same, expected, "all", max_distance=0.4, relative_error=None, **options)
+    assert out.read_bytes() == expected.read_bytes()
+    with pytest.raises(ValueError, match="cannot be read by rows"):
         client.matrix_rows(matrix, 0, 1)
 
 

@@ -113,6 +113,72 @@ def test_pairs(client: TestClient, knot: str, table: np.ndarray) -> None:
     assert npy.headers["geodesic-shape"] == "3"
 
 
+APPROXIMATE = {"method": "approximate", "relative_error": 1e-3}
+WITHIN = {"method": "approximate", "absolute_error": 1e-3}
+FAST = {"method": "fast", "effort": 4}
+
+
+@pytest.mark.parametrize("layout", ["dense", "sparse", "pairs"])
+@pytest.mark.parametrize("method", [APPROXIMATE, WITHIN, FAST], ids=str)
+def test_other_methods_are_the_library_s_and_tell_their_error(
+    client: TestClient, knot: str, layout: Any, method: dict[str, Any]
+) -> None:
+    mesh = stored_mesh(client, knot)
+    inside = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5))
+    ends = [3, inside, 900], [7, 3, 500]
+    options = {"relative_error": None} | method if method == WITHIN else method
+    body = {"targets": TARGETS[:3], "layout": layout, "max_distance": 9.5, **method}
+    exact, expected = (
+        gc.distance_matrix(mesh, *ends, 9.5, layout, **each) for each in ({}, options)
+    )
+
+    answer = matrix(client, knot, **body).json()
+    binary = matrix(client, knot, "?format=npz" if layout == "sparse" else "?format=npy", **body)
+
+    found = np.array(answer["distances"], float)
+    found[np.isnan(found)] = np.inf
+    if layout == "sparse":
+        exact, expected = exact.tocoo().data, expected.tocoo().data
+        np.testing.assert_array_equal(load_npz(BytesIO(binary.content)).data, expected)
+    else:
+        np.testing.assert_array_equal(np.load(BytesIO(binary.content)), expected)
+    np.testing.assert_array_equal(found, expected)
+    bound = gc.error_bound(mesh, **options)
+    assert (answer["method"], answer["exact"]) == (method["method"], False)
+    assert answer["error_bound"] == {"type": bound.type, "value": bound.value, "kind": bound.kind}
+    assert bound.value > 0.0
+    assert json.loads(binary.headers["geodesic-error-bound"]) == answer["error_bound"]
+    assert binary.headers["geodesic-method"] == method["method"]
+    assert binary.headers["geodesic-exact"] == "false"
+    reached = np.isfinite(exact)
+    exact, found = exact[reached], found[reached]
+    if method == FAST:
+        assert (found >= exact * (1 - 1e-12)).all()
+    else:
+        assert (found <= exact * (1 + 1e-12)).all()
+        allowed = bound.value * (exact if bound.type == "relative" else 1.0)
+        assert (found >= exact - allowed - 1e-12).all()
+
+
+def test_the_default_error_is_that_of_single_queries(client: TestClient, knot: str) -> None:
+    for method in ("approximate", "fast"):
+        row = client.post(
+            f"/v1/meshes/{knot}/distances",
+            json={"sources": SOURCES[:1], "targets": TARGETS, "method": method},
+        ).json()
+        answer = matrix(client, knot, sources=SOURCES[:1], method=method).json()
+        assert answer["distances"] == [row["distances"]]
+        assert answer["error_bound"] == row["error_bound"]
+        for name in ("relative_error", "effort"):
+            given = {"relative_error": 1e-3, "effort": 2}[name]
+            if (name == "effort") == (method == "fast"):
+                named = matrix(client, knot, sources=SOURCES[:1], method=method, **{name: given})
+                assert (
+                    named.headers["etag"]
+                    == matrix(client, knot, sources=SOURCES[:1], method=method).headers["etag"]
+                )
+
+
 @pytest.mark.parametrize("layout", ["dense", "sparse", "pairs"])
 def test_a_reason_for_each_that_is_missing(client: TestClient, apart: str, layout: str) -> None:
     ends = [{"vertex": i} for i in range(6)]
@@ -189,7 +255,14 @@ def test_get_is_not_allowed(client: TestClient, knot: str) -> None:
         ({"layout": "rows"}, "/layout"),
         ({"layout": None}, "/layout"),
         ({"layout": "pairs"}, "/targets"),
-        ({"method": "exact"}, "/method"),
+        ({"method": "quick"}, "/method"),
+        ({"method": "exact", "effort": 2}, "/effort"),
+        ({"relative_error": 0.01}, "/relative_error"),
+        ({"method": "fast", "absolute_error": 0.01}, "/absolute_error"),
+        ({"method": "approximate", "effort": 2}, "/effort"),
+        ({"method": "approximate", "relative_error": 1}, "/relative_error"),
+        ({"method": "approximate", "absolute_error": 0}, "/absolute_error"),
+        ({"method": "fast", "effort": 3}, "/effort"),
         ({"threads": 2}, "/threads"),
     ],
 )

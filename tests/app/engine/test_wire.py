@@ -40,7 +40,7 @@ REQUESTS: dict[str, dict[str, Any]] = {
     "paths": {"source": VERTEX, "targets": [{"edge": [0, 1], "t": 1 / 3}]},
     "isolines": {"sources": [{"polyline": [VERTEX, {"vertex": 4}]}], "levels": [1e-300, 0.1]},
     "borders": {"sources": [VERTEX, {"vertex": 4}], "chord_error": 0.01},
-    "matrix": {"sources": [VERTEX], "targets": [VERTEX], "max_distance": 0.7},
+    "matrix": {"sources": [VERTEX], "targets": [VERTEX], "method": "fast", "effort": 4},
     "nearest": {"source": VERTEX, "candidates": [VERTEX, {"vertex": 9}], "k": 1},
     "locate": {"points": [[0.1, 0.2, 0.3]], "max_distance": 5e-324},
 }

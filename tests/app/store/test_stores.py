@@ -403,6 +403,12 @@ def test_room_is_reserved_among_pinned_results(tmp_path: Path) -> None:
         problem = refused.value.problem
         assert (problem.code, problem.limit, problem.actual) == ("storage_full", 100, 101)
         assert problem.setting == "GEODESIC_RESULTS_BYTES"
+        with store.reserving(0) as reserve:
+            reserve(6)
+            reserve(4)
+            with pytest.raises(ProblemError) as refused:
+                reserve(1)
+            assert refused.value.problem.code == "storage_full"
         with store.reserving(10):
             pass
     assert store.can_pin("m/other")

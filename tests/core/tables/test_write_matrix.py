@@ -16,10 +16,10 @@ import zarr
 from scipy.sparse import load_npz
 
 import geodesic_core as gc
-from geodesic_core.tables import plan
+from geodesic_core.search import plan
+from geodesic_core.search.order import sweep_order
 from geodesic_core.tables.blocks import Blocks
 from geodesic_core.tables.formats import sha256_of
-from geodesic_core.tables.order import sweep_order
 from tests.core.fields.test_points import EXACT, random_points
 from tests.support import zoo
 from tests.support.faults import flip_bytes
@@ -132,7 +132,7 @@ def test_the_file_tells_what_was_asked(mesh, tmp_path):
 KILLED = """
 import sys
 import geodesic_core as gc
-from geodesic_core.tables import plan
+from geodesic_core.search import plan
 from geodesic_core.tables.blocks import Blocks
 from geodesic_core.tables.formats import sha256_of
 
@@ -178,16 +178,16 @@ def test_a_stop_loses_no_block_and_a_damaged_block_is_made_again(
     folder = tmp_path / f".{out.name}.part"
     put = Blocks.put
 
-    def put_until_the_disk_is_full(blocks: Blocks, block: int, **arrays: np.ndarray) -> None:
+    def put_until_the_disk_is_full(blocks: Blocks, block: int, array: np.ndarray) -> None:
         if block == 5:
             raise OSError(errno.ENOSPC, "No space left on device")
-        put(blocks, block, **arrays)
+        put(blocks, block, array)
 
     monkeypatch.setattr(Blocks, "put", put_until_the_disk_is_full)
     with pytest.raises(OSError, match="No space"):
         gc.write_matrix(mesh, out, points, threads=1)
     monkeypatch.setattr(Blocks, "put", put)
-    flip_bytes(next(folder.glob("0.*.npy")))
+    flip_bytes(folder / "0.npy")
     assert gc.write_matrix(mesh, out, points).swept == len(points) - 3 * 4
     assert sha256_of(out) == sha256_of(whole)
 

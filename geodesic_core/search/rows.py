@@ -16,12 +16,17 @@ from geodesic_core.search.target_sweep import TargetSweep
 
 Method = Literal["exact", "approximate", "fast"]
 
-Solve = Callable[[SurfacePoint, Sequence[SurfacePoint], Control], DistanceField]
-"""Function that returns the field of a source, whose sweep finds also some points in faces"""
+Solve = Callable[[SurfacePoint, Sequence[SurfacePoint], float, Control], DistanceField]
+"""Function that returns the field of a source up to a limit; its sweep also finds some points in
+faces"""
 
 
 class Rows(Protocol):
     """A solver of rows, for one thread."""
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the state of a sweep, bytes; it may grow."""
 
     def distances(self, source: int, targets: Ints, control: Control) -> Floats:
         """Return the distances from a source to targets; infinite where out of reach."""
@@ -34,6 +39,11 @@ class ExactRows:
     ends: Ends
     limit: float
     sweep: TargetSweep
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of the state of a sweep, bytes; it may grow."""
+        return self.sweep.nbytes
 
     def distances(self, source: int, targets: Ints, control: Control) -> Floats:
         """Return the distances from a source to targets; infinite where out of reach."""
@@ -52,7 +62,13 @@ class FieldRows:
     """Rows of an approximate or a fast solver, by a field for each."""
 
     ends: Ends
+    limit: float
     solve: Solve
+
+    @cached_property
+    def nbytes(self) -> int:
+        """Memory of the state of a sweep, bytes, as one that ends at once shows; it may grow."""
+        return self.solve(self.ends.sources[0], (), 0.0, Control()).stats.peak_bytes
 
     @cached_property
     def _vertices(self) -> Ints:
@@ -65,7 +81,16 @@ class FieldRows:
         vertices = self._vertices[targets]
         others = np.flatnonzero(vertices < 0)
         points = [self.ends.targets[target] for target in targets[others]]
-        field = self.solve(self.ends.sources[source], points, control)
+        field = self.solve(self.ends.sources[source], points, self.limit, control)
         row = field.distances[vertices]
         row[others] = [field.distance_at(point) for point in points]
         return row
+
+
+def rows_of(
+    ends: Ends, limit: float, solve: Solve | None, target_sweep: Callable[[], TargetSweep]
+) -> Rows:
+    """Return a solver of rows: by the fields of ``solve``, exactly where it is None."""
+    if solve is None:
+        return ExactRows(ends, limit, target_sweep())
+    return FieldRows(ends, limit, solve)

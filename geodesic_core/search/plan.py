@@ -10,7 +10,7 @@ from geodesic_core.control import Control
 from geodesic_core.fields.sources import Ends, ends_of
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tables.order import sweep_order
+from geodesic_core.search.order import sweep_order
 
 _BLOCK_BYTES = 1 << 25
 """Bytes of a block, at most: a process that is killed loses one or two"""
@@ -49,10 +49,12 @@ class Plan:
         *,
         in_order: bool,
     ) -> "Plan":
-        """Return the plan of a table, symmetric where there are no targets.
+        """Return the plan of a table, symmetric where there are no targets but the sources.
 
         Sweeps are ``in_order`` where their rows are to be, else in the one that sweeps least.
         """
+        if targets == sources:
+            targets = None
         is_flipped = targets is not None and len(targets) < len(sources)
         order = np.arange(min(len(sources), len(sources if targets is None else targets)))
         if targets is None:
