@@ -245,7 +245,9 @@ def test_an_edge_that_no_other_face_has_is_no_part_of_the_surface():
     assert gc.exact_distance(mesh, 1).distances.tolist() == [1, 0, np.sqrt(2), 1, np.inf]
     assert mesh.point(gc.SurfacePoint.face(1, (0.0, 0.0, 1.0))) == mesh.point(4)
     assert mesh.point(gc.SurfacePoint.face(1, (0.3, 0.7, 0.0))) == mesh.point(0)
-    with pytest.raises(gc.errors.InvalidPoint, match=r"source 0 is in face 1, .* an edge of zero length"):
+    with pytest.raises(
+        gc.errors.InvalidPoint, match=r"source 0 is in face 1, .* an edge of zero length"
+    ):
         gc.exact_distance(mesh, gc.SurfacePoint.face(1, (0.3, 0.3, 0.4)))
     with pytest.raises(gc.errors.InvalidPoint, match="no edge joins"):
         mesh.point_on_edge(3, 4, 0.5)
