@@ -36,6 +36,7 @@ LONGEST = (
     "test_process.py",
     "test_replicas.py",
     "test_object_store.py",
+    "test_tolerances.py",
 )
 NOT_QUICK = ("service", "page", "slow")
 FULL_ONLY = ("full",)

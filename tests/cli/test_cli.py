@@ -74,7 +74,7 @@ def test_info_tells_of_polygons_and_of_what_is_left_out(run: Run) -> None:
     assert ran.figure("triangulated polygons") == "1"
     assert ran.figure("repeated vertex faces") == "1 (2)"
     assert "left out" in ran.figure("warning:")
-    assert "no part of the surface" in ran.out
+    assert "not part of the surface" in ran.out
 
 
 def test_distance_writes_npy_csv_and_json(run: Run, plane: Path) -> None:

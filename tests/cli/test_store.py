@@ -153,8 +153,8 @@ def test_check_names_what_is_damaged(run: Run, left: Left) -> None:
     assert (ran.code, ran.err, ran.figure("damaged")) == (1, "", "7")
     rows = ran.out.splitlines()
     for part in (
-        f"mesh {left.ids[0]} is damaged: its array faces is not what was written",
-        f"mesh {left.ids[0]} is damaged: its array component is not what was written",
+        f"mesh {left.ids[0]} is damaged: its array faces has changed since it was written",
+        f"mesh {left.ids[0]} is damaged: its array component has changed since it was written",
         f"mesh {left.ids[1]} is damaged: its manifest has changed since it was written",
         f"result {left.ids[0]}/{left.results(0)[1].stem} is damaged",
         f"result {left.ids[0]}/{left.results(0)[2].stem} is damaged",

@@ -67,7 +67,7 @@ def test_a_damaged_array_is_not_served_and_an_upload_heals_it(client: Any, fault
     for headers in ({}, {"Range": "bytes=0-99"}):
         response = client.get(f"/v1/meshes/{mesh_id}/arrays/vertices", headers=headers)
         problem = check_problem(response, 500, "mesh_damaged")
-        assert "its array vertices is not what was written" in problem["detail"]
+        assert "its array vertices has changed since it was written" in problem["detail"]
         assert "upload it again" in problem["hint"]
         assert "etag" not in response.headers
     check_array(client, mesh_id, "faces", faces)

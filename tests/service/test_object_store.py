@@ -277,7 +277,7 @@ def test_a_mesh_that_is_deleted_while_it_is_pulled_is_gone(service: ServiceClien
         ("s3://no-such-bucket/x", {}, "does not exist: create its bucket"),
         ("s3://", {}, "is not the URL of a store"),
         ("s3://bucket/x", {"AWS_ENDPOINT_URL": "http://127.0.0.1:9"}, "cannot be used"),
-        ("gs://no-such-bucket/x", {}, "does not exist: make its bucket"),
+        ("gs://no-such-bucket/x", {}, "does not exist: create its bucket"),
         ("gs://bucket/x", {"GOOGLE_SERVICE_ACCOUNT": "/nowhere"}, "Unable to open service account"),
         ("az://container/x", {}, "Account must be specified"),
     ],

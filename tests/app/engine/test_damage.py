@@ -73,7 +73,7 @@ def test_damage_of_an_open_mesh_is_noticed_and_healed_by_writing_it_again(
             problem = outcome_of(each, distances_query(mesh_id, *barriers, vertex=7))
             assert isinstance(problem, Problem)
             assert problem.code == "mesh_damaged"
-            assert f"its array {name} is not what was written" in problem.detail
+            assert f"its array {name} has changed since it was written" in problem.detail
     assert store_mesh(tmp_path, plane()) == mesh_id
 
     assert not any(MeshStore(tmp_path).inspect(mesh_id))

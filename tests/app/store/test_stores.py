@@ -100,7 +100,7 @@ def test_a_changed_array_is_noticed(meshes: MeshStore, tmp_path: Path, file: str
 
     assert code_of(lambda: meshes.open(mesh_id)) == "mesh_damaged"
     (found,) = damage_of(meshes, mesh_id)
-    assert f"its array {file.removesuffix('.npy')} is not what was written" in found
+    assert f"its array {file.removesuffix('.npy')} has changed since it was written" in found
 
 
 @pytest.mark.parametrize("content", [b"", b"[]", b"{}", b'{"id": "of another"}'])
