@@ -191,17 +191,19 @@ def cluster(nodes: int) -> Iterator[Nodes]:
         Path(folder, "store").mkdir()
 
         def start(*command: str) -> None:
+            """Start a command, and wait until it says that it is ready: a replica would give up."""
             process = subprocess.Popen(
                 [sys.executable, "-c", SERVE, *command],
                 env=os.environ | settings,
-                stdout=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
             )
             stack.callback(process.wait)
             stack.callback(process.terminate)
+            if process.stdout is None or not process.stdout.readline():
+                raise RuntimeError(f"{command[0]} ended before it was ready")
 
         start("head", "--host", HOST, "--port", port, "--dir", f"{folder}/h")
-        time.sleep(20)  # until the head listens; a replica would give up
         for node in range(nodes):
             start("node", "--dir", f"{folder}/n{node}")
         served = stack.enter_context(serving_process(**settings, GEODESIC_ENGINE="ray"))
