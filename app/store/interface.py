@@ -41,7 +41,7 @@ class Store(Protocol):
     def identity(self) -> str:
         """Return an id that no other store has, and that all machines see.
 
-        Raises ``StoreError`` where no service has made the store.
+        Raises ``StoreError`` where there is no store yet.
         """
 
     def lent(self, file: Path) -> AbstractAsyncContextManager[None]:
