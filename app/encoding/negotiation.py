@@ -1,6 +1,7 @@
 """Content negotiation: from what a client accepts to one media type and one coding."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 from app.encoding.codings import CODINGS
 from app.encoding.representation import FORMATS
@@ -34,7 +35,8 @@ def negotiate_coding(accept_encoding: str | None) -> str | None:
     return best if is_accepted else None
 
 
-def _accepted(header: str) -> list[tuple[str, float]]:
+@lru_cache  # a client sends the same headers with each request
+def _accepted(header: str) -> tuple[tuple[str, float], ...]:
     ranges = []
     for item in header.split(","):
         media, *parameters = (part.strip().lower() for part in item.split(";"))
@@ -43,7 +45,7 @@ def _accepted(header: str) -> list[tuple[str, float]]:
             ranges.append((media, float(quality)))
         except ValueError:
             ranges.append((media, 1.0))
-    return ranges
+    return tuple(ranges)
 
 
 def _matches(media: str, offered: str) -> bool:

@@ -23,6 +23,9 @@ from app.service.service import PhaseSeconds, RequestContext, Service
 
 T = TypeVar("T")
 
+_PROMPT_S = 0.02
+"""Seconds of work before a disconnect is listened for: small requests end sooner."""
+
 
 def service_of(request: Request) -> Service:
     """Return the service of this application."""
@@ -126,15 +129,23 @@ def negotiated(
 async def while_connected(request: Request, work: Coroutine[Any, Any, T]) -> T:
     """Do ``work``, and cancel it if the client disconnects. The body must have been read."""
     working = asyncio.ensure_future(work)
+    try:
+        await asyncio.wait({working}, timeout=_PROMPT_S)
+        if not working.done():
+            await _wait_or_disconnect(request, working)
+        return working.result()
+    finally:
+        working.cancel()
+
+
+async def _wait_or_disconnect(request: Request, working: asyncio.Future[Any]) -> None:
     listening = asyncio.ensure_future(_until_disconnect(request))
     try:
         await asyncio.wait({working, listening}, return_when=asyncio.FIRST_COMPLETED)
-        if not working.done():
-            raise ClientDisconnect
-        return working.result()
     finally:
         listening.cancel()
-        working.cancel()
+    if not working.done():
+        raise ClientDisconnect
 
 
 async def _until_disconnect(request: Request) -> None:

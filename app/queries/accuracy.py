@@ -21,6 +21,7 @@ _OPTIONS: Mapping[Method, Mapping[str, float | None]] = {
     "fast": {"effort": 2},
 }
 """Members that go with one method only, and what they are where the request names none of them."""
+_OPTION_NAMES = tuple(name for options in _OPTIONS.values() for name in options)
 
 CERTAIN: Mapping[str, Any] = {"type": "relative", "value": 0.0, "kind": "guaranteed"}
 """The bound of answers without error."""
@@ -38,7 +39,8 @@ def with_default_accuracy(request: A) -> A:
 
 def _options_of(request: StrictModel) -> dict[str, Any]:
     """Return the members that are given of those that go with one method."""
-    return request.model_dump(include=set().union(*_OPTIONS.values()), exclude_none=True)
+    given = {name: getattr(request, name, None) for name in _OPTION_NAMES}
+    return {name: value for name, value in given.items() if value is not None}
 
 
 def options_of(request: Accuracy) -> dict[str, Any]:

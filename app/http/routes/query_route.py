@@ -88,6 +88,8 @@ def _headers(request: Request) -> dict[str, str]:
 
 def _parameters(request: Request, lists: frozenset[str]) -> dict[str, str | list[str]]:
     """Return the query parameters; of repeated ones the last, but all values of ``lists``."""
+    if not request.scope["query_string"]:
+        return {}
     query = request.query_params
     return {name: query.getlist(name) if name in lists else query[name] for name in query}
 

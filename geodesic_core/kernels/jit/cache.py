@@ -141,8 +141,8 @@ def _is_writable() -> bool:
             return True
     except OSError as error:
         message = (
-            f"kernels are compiled anew in each process, since they cannot be written ({error}); "
-            f"NUMBA_CACHE_DIR names another folder"
+            f"kernels are compiled again in each process, since they cannot be written to the "
+            f"cache ({error}); set NUMBA_CACHE_DIR to another folder"
         )
         warnings.warn(message, RuntimeWarning, stacklevel=2)
         return False
