@@ -27,12 +27,16 @@ def negotiate(
 
 def negotiate_coding(accept_encoding: str | None) -> str | None:
     """Return the content coding for ``Accept-Encoding``: the fastest of those liked best."""
-    qualities = dict(_accepted(accept_encoding or ""))
-    others = qualities.get("*", 0.0)
-    wanted = {coding: qualities.get(coding, others) for coding in CODINGS}
+    wanted = {coding: coding_quality(accept_encoding, coding) for coding in CODINGS}
     best = max(wanted, key=lambda coding: wanted[coding])
-    is_accepted = wanted[best] > 0 and wanted[best] >= qualities.get("identity", 0.0)
-    return best if is_accepted else None
+    plain = dict(_accepted(accept_encoding or "")).get("identity", 0.0)
+    return best if wanted[best] > 0 and wanted[best] >= plain else None
+
+
+def coding_quality(accept_encoding: str | None, coding: str) -> float:
+    """Return how much ``Accept-Encoding`` likes a coding, from 0, not at all, to 1."""
+    qualities = dict(_accepted(accept_encoding or ""))
+    return qualities.get(coding, qualities.get("*", 0.0))
 
 
 @lru_cache  # a client sends the same headers with each request
