@@ -48,16 +48,18 @@ LARGE = 2**16
 T = TypeVar("T")
 
 
-async def offload_if_large(request: Request, do: Callable[[], T]) -> T:
+async def offload_if_large(request: Request, deadline_s: float, do: Callable[[], T]) -> T:
     """Run work whose time grows with the body: in a thread, where the body is large.
 
     Only one thread runs at a time. Several would take the interpreter from each other, and from the
-    event loop.
+    event loop. A request waits for it no longer than its client, and no longer than ``deadline_s``.
     """
     if len(await request.body()) < LARGE:
         return do()
     limiter = request.app.state.large_bodies
-    return await to_thread.run_sync(partial(_at_half_pace, do), limiter=limiter)
+    working = to_thread.run_sync(partial(_at_half_pace, do), limiter=limiter)
+    async with service_of(request).time_limit(deadline_s):
+        return await while_connected(request, working)
 
 
 def _at_half_pace(do: Callable[[], T]) -> T:
@@ -113,7 +115,7 @@ class QueryRequest:
             query.written  # noqa: B018 - computes and caches it
             return query
 
-        query = await offload_if_large(request, make_query)
+        query = await offload_if_large(request, context.deadline_s, make_query)
         representation = negotiated(request, parameters, query.offers)
         media_type = representation.media_type
         if parameters.estimate:
