@@ -75,7 +75,7 @@ class AsyncClient(Operations):
         if isinstance(step, Pause):
             await anyio.sleep(step.seconds)
             return None
-        async for attempt in connection.attempts():
+        async for attempt in connection.attempts(step):
             with attempt:
                 return await self._send(step)
         return None

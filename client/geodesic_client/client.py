@@ -70,7 +70,7 @@ class Client(Operations):
         if isinstance(step, Pause):
             time.sleep(step.seconds)
             return None
-        for attempt in connection.attempts():
+        for attempt in connection.attempts(step):
             with attempt:
                 return self._send(step)
         return None

@@ -5,6 +5,7 @@ from typing import Any
 import stamina
 
 from geodesic_client.errors import pause_before_retry
+from geodesic_client.flow import Request
 
 ADDRESS = "http://127.0.0.1:8000"
 """Where ``geodesic serve`` listens"""
@@ -20,6 +21,7 @@ def settings(address: str, api_key: str | None) -> dict[str, Any]:
     return {"base_url": address, "headers": headers, "timeout": TIMEOUT_S}
 
 
-def attempts() -> Any:
+def attempts(request: Request) -> Any:
     """Return the attempts of a request, for ``for`` and for ``async for``."""
-    return stamina.retry_context(pause_before_retry, attempts=ATTEMPTS, timeout=PATIENCE_S)
+    most = 1 if request.is_optional else ATTEMPTS
+    return stamina.retry_context(pause_before_retry, attempts=most, timeout=PATIENCE_S)

@@ -179,14 +179,37 @@ def test_a_refusal_names_the_element(service: Client, apart: Mesh) -> None:
     assert error.request_id
 
 
-def test_jobs(
+def test_a_query_that_was_a_job_leaves_none(
     service: Client, mesh: Mesh, same: gc.TriangleMesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(flow, "JOB_AFTER_S", 0)
+    before = service.jobs()
     shares: list[float] = []
     found = service.distances(mesh, [11], progress=shares.append)
     np.testing.assert_array_equal(found.distances, gc.exact_distance(same, 11).distances)
     assert shares[-1] == 1.0
+    assert len(shares) > 1, "it was a job"
+    assert service.jobs() == before
+
+
+def test_a_query_that_is_stopped_leaves_no_job(
+    service: Client, mesh: Mesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(_share: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(flow, "JOB_AFTER_S", 0)
+    before = service.jobs()
+    with pytest.raises(KeyboardInterrupt):
+        service.distances(mesh, [12], progress=stop)
+    assert service.jobs() == before
+
+
+def test_jobs(service: Client, client: TestClient, mesh: Mesh) -> None:
+    headers = {"Prefer": "respond-async"}
+    link = f"/v1/meshes/{mesh.id}/distances"
+    submitted = client.post(link, json={"sources": [13]}, headers=headers)
+    client.get(f"{submitted.headers['location']}/events")  # until it has finished
     job = service.jobs()[0]
     assert service.job(job.id) == job
     assert (job.kind, job.status, job.is_finished) == ("distances", "successful", True)

@@ -83,7 +83,13 @@ def test_what_takes_little_is_one_request() -> None:
 def long_replies() -> list[httpx2.Response | Exception]:
     half = httpx2.Response(202, json=JOB)
     done = httpx2.Response(200, json=JOB | {"status": "successful", "progress": 1.0})
-    return [half, done, httpx2.Response(200, json=ANSWER)]
+    return [half, done, httpx2.Response(200, json=ANSWER), done]
+
+
+def stopped() -> list[httpx2.Response | Exception]:
+    """The replies to the two requests that stop a job and remove it."""
+    dismissed = httpx2.Response(200, json=JOB | {"status": "dismissed"})
+    return [dismissed, dismissed]
 
 
 def check_long(service: Service, progress: list[float], pauses: list[float]) -> None:
@@ -91,6 +97,7 @@ def check_long(service: Service, progress: list[float], pauses: list[float]) -> 
         "POST /v1/meshes/m/nearest",
         "GET /v1/jobs/7",
         "GET /v1/jobs/7/results",
+        "DELETE /v1/jobs/7",
     ]
     assert service.requests[0].headers["idempotency-key"]
     assert progress == [0.5, 1.0]
@@ -110,18 +117,49 @@ def test_coroutines_have_the_same_conversation(pauses: list[float]) -> None:
     check_long(service, progress, pauses)
 
 
-def test_a_callback_that_raises_stops_the_job() -> None:
+@pytest.mark.parametrize(
+    "reply",
+    [
+        problem(503, "draining", **{"Retry-After": "1"}),
+        problem(404, "job_not_found"),
+        httpx2.ConnectError("refused"),
+    ],
+)
+def test_an_answer_does_not_wait_for_the_removal_of_its_job(
+    reply: httpx2.Response | Exception, pauses: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tenacity.nap.time.sleep", pauses.append)
+    service = Service(*long_replies()[:3], reply)
+    assert service.client().nearest("m", 0, [1])[0].candidate == 1
+    assert service.sent.count("DELETE /v1/jobs/7") == 1
+    assert len(pauses) == 1, "before it looked at the job"
+
+
+def test_a_job_that_fails_is_removed() -> None:
+    failed = JOB | {"status": "failed"}
+    service = Service(
+        httpx2.Response(202, json=JOB),
+        httpx2.Response(200, json=failed),
+        problem(504, "deadline_exceeded"),
+        httpx2.Response(200, json=failed),
+    )
+    with pytest.raises(ProblemError, match="deadline_exceeded"):
+        service.client().store_matrix("m", [0], [1])
+    assert service.sent[2:] == ["GET /v1/jobs/7/results", "DELETE /v1/jobs/7"]
+
+
+def test_a_callback_that_raises_stops_and_removes_the_job() -> None:
     def stop(_share: float) -> None:
         raise KeyboardInterrupt
 
-    service = Service(*long_replies()[:1], httpx2.Response(200, json=JOB))
+    service = Service(*long_replies()[:1], *stopped())
     with pytest.raises(KeyboardInterrupt):
         service.client().nearest("m", 0, [1], progress=stop)
-    assert service.sent[-1] == "DELETE /v1/jobs/7"
+    assert service.sent[1:] == ["DELETE /v1/jobs/7"] * 2
 
 
-def test_a_cancelled_task_stops_its_job(monkeypatch: pytest.MonkeyPatch) -> None:
-    service = Service(*long_replies()[:1], httpx2.Response(200, json=JOB))
+def test_a_cancelled_task_stops_and_removes_its_job(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(*long_replies()[:1], *stopped())
 
     async def cancel_while_it_waits() -> None:
         waiting = asyncio.Event()
@@ -138,7 +176,7 @@ def test_a_cancelled_task_stops_its_job(monkeypatch: pytest.MonkeyPatch) -> None
             await task
 
     asyncio.run(cancel_while_it_waits())
-    assert service.sent[-1] == "DELETE /v1/jobs/7"
+    assert service.sent[1:] == ["DELETE /v1/jobs/7"] * 2
 
 
 @pytest.mark.parametrize(("status", "code"), [(429, "rate_limited"), (503, "queue_full")])
