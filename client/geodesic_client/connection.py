@@ -4,7 +4,7 @@ from typing import Any
 
 import stamina
 
-from geodesic_client.errors import pause_before_retry
+from geodesic_client.errors import ProblemError, UnreachableError
 from geodesic_client.flow import Request
 
 ADDRESS = "http://127.0.0.1:8000"
@@ -12,7 +12,7 @@ ADDRESS = "http://127.0.0.1:8000"
 TIMEOUT_S = 180.0
 """Seconds to wait for an answer: longer than the service computes one that is no job"""
 ATTEMPTS, PATIENCE_S = 8, 120.0
-"""Attempts of a request, and seconds after which there are no more"""
+"""Attempts of a request, and seconds after which there are no more; no pause is longer either"""
 
 
 def settings(address: str, api_key: str | None) -> dict[str, Any]:
@@ -25,3 +25,15 @@ def attempts(request: Request) -> Any:
     """Return the attempts of a request, for ``for`` and for ``async for``."""
     most = 1 if request.is_optional else ATTEMPTS
     return stamina.retry_context(pause_before_retry, attempts=most, timeout=PATIENCE_S)
+
+
+def pause_before_retry(error: Exception) -> bool | float:
+    """Tell whether to send a request again: True, or the seconds that the service asks to wait."""
+    match error:
+        case ProblemError(status=429 | 503, retry_after=None):
+            return True
+        case ProblemError(status=429 | 503, retry_after=float(seconds)) if seconds <= PATIENCE_S:
+            return seconds
+        case UnreachableError(may_retry=may_retry):
+            return may_retry
+    return False

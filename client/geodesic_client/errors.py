@@ -82,22 +82,17 @@ def check(response: httpx2.Response) -> httpx2.Response:
     raise ProblemError(response.status_code, document, retry_after)
 
 
+_UNSENT = httpx2.ConnectError, httpx2.ConnectTimeout
+_BROKEN = httpx2.NetworkError, httpx2.RemoteProtocolError
+
+
 def unreachable(error: httpx2.TransportError) -> UnreachableError:
-    """Return the error for a request that was not answered."""
-    broken = httpx2.NetworkError, httpx2.RemoteProtocolError, httpx2.ConnectTimeout
-    message = f"no answer from {error.request.url}: {error or type(error).__name__}"
-    return UnreachableError(message, may_retry=isinstance(error, broken))
+    """Return the error for a request that was not answered.
 
-
-def pause_before_retry(error: Exception) -> bool | float:
-    """Tell whether to send a request again: True, or the seconds that the service asks to wait.
-
-    Every request may be sent twice: meshes are named by their content, jobs by a key, and queries
-    change nothing.
+    If the connection broke, the service may have received the request. It may be sent again all the
+    same: meshes are named by their content, jobs by a key, and queries change nothing. But a second
+    ``DELETE`` would find nothing, or remove a job that the first one only stopped.
     """
-    match error:
-        case ProblemError(status=429 | 503, retry_after=seconds):
-            return True if seconds is None else seconds
-        case UnreachableError(may_retry=may_retry):
-            return may_retry
-    return False
+    repeatable = _UNSENT if error.request.method == "DELETE" else (*_UNSENT, *_BROKEN)
+    message = f"no answer from {error.request.url}: {error or type(error).__name__}"
+    return UnreachableError(message, may_retry=isinstance(error, repeatable))

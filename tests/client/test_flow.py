@@ -191,6 +191,38 @@ def test_a_busy_service_is_asked_again_when_it_says(
     assert waits == [7.0, 7.0]
 
 
+def test_a_call_does_not_wait_for_hours(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where the quota of jobs is reached: the first of them expires tomorrow."""
+    waits: list[float] = []
+    monkeypatch.setattr("tenacity.nap.time.sleep", waits.append)
+    full = problem(429, "quota_exceeded", **{"Retry-After": "86000"})
+    service = Service(full)
+    with pytest.raises(ProblemError, match="quota_exceeded") as caught:
+        service.client().nearest("m", 0, [1])
+    assert caught.value.retry_after == 86000.0
+    assert (len(service.requests), waits) == (1, [])
+
+
+@pytest.mark.parametrize(
+    "broken", [httpx2.ReadError("reset"), httpx2.RemoteProtocolError("disconnected")]
+)
+def test_what_a_service_may_have_removed_is_not_removed_again(
+    broken: httpx2.TransportError, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mesh would not be found, and a job that was only stopped would be removed."""
+    monkeypatch.setattr("tenacity.nap.time.sleep", lambda _: None)
+    done = httpx2.Response(200, json=JOB)
+    for name in ("delete_mesh", "dismiss_job"):
+        once = Service(broken, done)
+        with pytest.raises(UnreachableError, match="no answer"):
+            getattr(once.client(), name)("7")
+        unsent = Service(httpx2.ConnectError("refused"), problem(503, "draining"), done)
+        getattr(unsent.client(), name)("7")
+        assert (len(once.requests), len(unsent.requests)) == (1, 3)
+    query = Service(broken, httpx2.Response(200, json=ANSWER))
+    assert query.client().nearest("m", 0, [1])[0].candidate == 1
+
+
 def test_a_broken_connection_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tenacity.nap.time.sleep", lambda _: None)
     broken = httpx2.ConnectError("refused")
