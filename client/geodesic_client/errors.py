@@ -20,7 +20,7 @@ class GeodesicClientError(Exception):
 class UnreachableError(GeodesicClientError):
     """No service answered: there is none at the address, or the connection broke."""
 
-    def __init__(self, message: str, *, may_retry: bool) -> None:
+    def __init__(self, message: str, *, may_retry: bool = False) -> None:
         super().__init__(message)
         self.may_retry = may_retry
 
@@ -63,8 +63,11 @@ class ProblemError(GeodesicClientError):
         self.setting: str | None = document.get("setting")
         self.request_id: str | None = document.get("request_id")
         self.retry_after = retry_after
+        super().__init__(status, document, retry_after)  # pickle calls it with these
+
+    def __str__(self) -> str:
         hint = f" ({self.hint})" if self.hint else ""
-        super().__init__(f"{self.code}: {self.detail}{hint}")
+        return f"{self.code}: {self.detail}{hint}"
 
 
 def check(response: httpx2.Response) -> httpx2.Response:

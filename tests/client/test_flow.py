@@ -2,11 +2,18 @@
 
 import asyncio
 import json
+import pickle
 from collections.abc import Callable
 
 import httpx2
 import pytest
-from geodesic_client import AsyncClient, Client, ProblemError, UnreachableError
+from geodesic_client import (
+    AsyncClient,
+    Client,
+    GeodesicClientError,
+    ProblemError,
+    UnreachableError,
+)
 from geodesic_client.flow import JOB_AFTER_S
 
 JOB = {"id": "7", "kind": "nearest", "mesh_id": "m", "status": "running", "progress": 0.5}
@@ -244,6 +251,18 @@ def test_a_problem_is_an_error_with_all_that_it_says() -> None:
     with pytest.raises(ProblemError, match="status 502") as caught:
         Service(httpx2.Response(502, text="<html>")).client().about()
     assert caught.value.code == "unknown"
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        ProblemError(429, {"code": "rate_limited", "detail": "no", "hint": "wait"}, 7.0),
+        UnreachableError("no answer", may_retry=True),
+    ],
+)
+def test_errors_pass_between_processes(error: GeodesicClientError) -> None:
+    copy = pickle.loads(pickle.dumps(error))  # noqa: S301 - of this test
+    assert (type(copy), str(copy), vars(copy)) == (type(error), str(error), vars(error))
 
 
 def test_lists_are_read_to_their_end() -> None:
