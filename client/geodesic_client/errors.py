@@ -8,6 +8,7 @@
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import httpx2
@@ -72,17 +73,24 @@ class ProblemError(GeodesicClientError):
 
 def check(response: httpx2.Response) -> httpx2.Response:
     """Return a response that is an answer; raise `ProblemError` for any other."""
-    if response.status_code < 400:
+    if response.is_success:
         return response
-    try:
-        document = response.json()
-    except ValueError:  # a proxy on the way, for example
-        document = {
-            "detail": f"the answer has status {response.status_code}, but is not a problem document"
-        }
     seconds = response.headers.get("retry-after", "")
     retry_after = float(seconds) if seconds.isdecimal() else None
-    raise ProblemError(response.status_code, document, retry_after)
+    raise ProblemError(response.status_code, _document_of(response), retry_after)
+
+
+def _document_of(response: httpx2.Response) -> Mapping[str, Any]:
+    """Return the problem document of a response, or one about it if a proxy sent it, say."""
+    if response.has_redirect_location:
+        return {"detail": f"the service has another address: {response.headers['location']}"}
+    with suppress(ValueError):
+        document = response.json()
+        if isinstance(document, dict):
+            return document
+    return {
+        "detail": f"the answer has status {response.status_code}, but is not a problem document"
+    }
 
 
 _UNSENT = httpx2.ConnectError, httpx2.ConnectTimeout

@@ -248,9 +248,19 @@ def test_a_problem_is_an_error_with_all_that_it_says() -> None:
     error = caught.value
     assert (error.status, error.code) == (404, "mesh_not_found")
     assert (error.detail, error.hint) == ("no", "wait")
+
+
+@pytest.mark.parametrize("text", ["<html>", "", "null", '"bad gateway"'])
+def test_an_error_that_is_no_document_is_a_problem(text: str) -> None:
     with pytest.raises(ProblemError, match="status 502") as caught:
-        Service(httpx2.Response(502, text="<html>")).client().about()
+        Service(httpx2.Response(502, text=text)).client().about()
     assert caught.value.code == "unknown"
+
+
+def test_a_redirection_is_a_problem_that_names_the_address() -> None:
+    moved = httpx2.Response(301, headers={"Location": "https://service/v1"})
+    with pytest.raises(ProblemError, match="another address: https://service/v1"):
+        Service(moved).client().about()
 
 
 @pytest.mark.parametrize(
