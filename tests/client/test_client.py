@@ -80,6 +80,14 @@ def test_what_cannot_be_reached_is_infinite(service: Client, apart: Mesh) -> Non
     assert missing.points.shape == (0, 3)
 
 
+def test_a_vertex_may_be_a_number_of_numpy(service: Client, mesh: Mesh) -> None:
+    ids = np.arange(10)
+    found = service.distances(mesh, [starting_at(ids[7], 0.5)], targets=ids[7:9])
+    assert found.distances == pytest.approx(
+        0.5 + service.distances(mesh, [7], targets=[7, 8]).distances
+    )
+
+
 def test_all_kinds_of_sources(service: Client, mesh: Mesh) -> None:
     found = service.distances(mesh, SOURCES, targets=[9, position((3, 1, 0))], method="fast")
     assert found.distances.shape == (2,)
