@@ -1,7 +1,7 @@
 """The client for coroutines, on asyncio or trio."""
 
 from collections.abc import AsyncIterator, Iterator
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 import anyio
 import httpx2
@@ -84,7 +84,7 @@ class AsyncClient(Operations):
         content: bytes | AsyncIterator[bytes] = (
             request.content if isinstance(request.content, bytes) else _each(request.content())
         )
-        options: dict[str, Any] = {"params": request.params, "headers": request.headers}
+        options = connection.options(request)
         try:
             response = await self._http.request(
                 request.method, request.path, content=content, **options

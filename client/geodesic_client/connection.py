@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import httpx2
 import stamina
 
 from geodesic_client.errors import ProblemError, UnreachableError
@@ -11,6 +12,8 @@ ADDRESS = "http://127.0.0.1:8000"
 """Where ``geodesic serve`` listens"""
 TIMEOUT_S = 180.0
 """Seconds to wait for an answer: longer than the service computes one that is no job"""
+OPTIONAL_TIMEOUT_S = 5.0
+"""Seconds to wait where the answer does not matter"""
 ATTEMPTS, PATIENCE_S = 8, 120.0
 """Attempts of a request, and seconds after which there are no more; no pause is longer either"""
 
@@ -19,6 +22,14 @@ def settings(address: str, api_key: str | None) -> dict[str, Any]:
     """Return the arguments of a client of httpx2."""
     headers = {} if api_key is None else {"Authorization": f"Bearer {api_key}"}
     return {"base_url": address, "headers": headers, "timeout": TIMEOUT_S}
+
+
+def options(request: Request) -> dict[str, Any]:
+    """Return the arguments of a request of httpx2, except its content."""
+    found: dict[str, Any] = {"params": request.params, "headers": request.headers}
+    if request.is_optional:
+        found["extensions"] = {"timeout": httpx2.Timeout(OPTIONAL_TIMEOUT_S).as_dict()}
+    return found
 
 
 def attempts(request: Request) -> Any:

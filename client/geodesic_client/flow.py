@@ -37,7 +37,7 @@ class Request:
     content: bytes | Callable[[], Iterator[bytes]] = b""
     """The body, or what begins to read it: it is read again for each attempt"""
     is_optional: bool = False
-    """Whether it may fail without harm; it is then sent only once"""
+    """Whether it may fail without harm; it is then sent only once, and not waited for long"""
 
 
 @dataclass(frozen=True)

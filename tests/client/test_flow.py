@@ -3,7 +3,6 @@
 import asyncio
 import json
 import pickle
-from collections.abc import Callable
 
 import httpx2
 import pytest
@@ -13,12 +12,13 @@ from geodesic_client import (
     GeodesicClientError,
     ProblemError,
     UnreachableError,
+    connection,
 )
 from geodesic_client.flow import JOB_AFTER_S
 
 JOB = {"id": "7", "kind": "nearest", "mesh_id": "m", "status": "running", "progress": 0.5}
 ANSWER = {"nearest": [{"candidate": 1, "distance": 2.5}]}
-Reply = Callable[[httpx2.Request], httpx2.Response]
+SETTINGS = connection.settings("http://service", None)
 
 
 def problem(status: int, code: str, **headers: str) -> httpx2.Response:
@@ -54,13 +54,12 @@ class Service:
         return [f"{each.method} {each.url.path}" for each in self.requests]
 
     def client(self) -> Client:
-        http = httpx2.Client(transport=httpx2.MockTransport(self), base_url="http://service")
-        return Client(http=http)
+        transport = httpx2.MockTransport(self)
+        return Client(http=httpx2.Client(transport=transport, **SETTINGS))
 
     def async_client(self) -> AsyncClient:
         transport = httpx2.MockTransport(self.answer)
-        http = httpx2.AsyncClient(transport=transport, base_url="http://service")
-        return AsyncClient(http=http)
+        return AsyncClient(http=httpx2.AsyncClient(transport=transport, **SETTINGS))
 
 
 @pytest.fixture(autouse=True)
@@ -163,6 +162,20 @@ def test_a_callback_that_raises_stops_and_removes_the_job() -> None:
     with pytest.raises(KeyboardInterrupt):
         service.client().nearest("m", 0, [1], progress=stop)
     assert service.sent[1:] == ["DELETE /v1/jobs/7"] * 2
+
+
+@pytest.mark.parametrize("kind", ["client", "async_client"])
+def test_a_call_that_is_stopped_waits_for_seconds_only(kind: str) -> None:
+    """A service that hangs may be the reason why it is stopped."""
+
+    def stop(_share: float) -> None:
+        raise KeyboardInterrupt
+
+    service = Service(*long_replies()[:1], httpx2.ReadTimeout("late"))
+    with pytest.raises(KeyboardInterrupt):
+        asyncio.run(getattr(service, kind)().nearest("m", 0, [1], progress=stop))
+    query, removal = (max(each.extensions["timeout"].values()) for each in service.requests)
+    assert (query, removal) == (connection.TIMEOUT_S, connection.OPTIONAL_TIMEOUT_S)
 
 
 def test_a_cancelled_task_stops_and_removes_its_job(monkeypatch: pytest.MonkeyPatch) -> None:
