@@ -19,8 +19,8 @@ ATTEMPTS, PATIENCE_S = 8, 120.0
 
 
 def settings(address: str, api_key: str | None) -> dict[str, Any]:
-    """Return the arguments of a client of httpx2."""
-    headers = {} if api_key is None else {"Authorization": f"Bearer {api_key}"}
+    """Return the arguments of a client of httpx2; a key from a file may end with a newline."""
+    headers = {} if api_key is None else {"Authorization": f"Bearer {api_key.strip()}"}
     return {"base_url": address, "headers": headers, "timeout": TIMEOUT_S}
 
 

@@ -267,7 +267,7 @@ def test_both_clients_by_the_address_and_the_key_of_a_service(tmp_path: Path) ->
     key = "0123456789abcdef0123456789abcdef"
     server = Server(tmp_path, GEODESIC_API_KEYS=f"ann:{key}")
     try:
-        with Client(server.url, api_key=key) as client:
+        with Client(server.url, api_key=f"{key}\n") as client:
             mesh = client.sample("plane", 200)
             assert client.path(mesh, 0, 120).length == pytest.approx(2**0.5)
 
