@@ -343,7 +343,8 @@ def matrix_rows(matrix: StoredMatrix, first: int, last: int) -> Flow[NDArray[Any
     row = matrix.shape[1] * matrix.dtype.itemsize
     begin, end = (matrix.rows_at + row * number for number in (first, last))
     part = (yield from _part_of_result(matrix.job_id, begin, end)).content
-    return np.frombuffer(part, matrix.dtype).reshape(last - first, matrix.shape[1])
+    # A copy, because an array over bytes is read-only.
+    return np.frombuffer(part, matrix.dtype).reshape(last - first, matrix.shape[1]).copy()
 
 
 def save_matrix(

@@ -5,12 +5,15 @@ import json
 import pickle
 
 import httpx2
+import numpy as np
 import pytest
 from geodesic_client import (
     AsyncClient,
     Client,
+    ErrorBound,
     GeodesicClientError,
     ProblemError,
+    StoredMatrix,
     UnreachableError,
     connection,
 )
@@ -296,6 +299,18 @@ def test_lists_are_read_to_their_end() -> None:
     )
     assert [job.id for job in service.client().jobs()] == ["0", "1", "2"]
     assert service.requests[1].url.params["cursor"] == "2"
+
+
+def test_rows_of_a_matrix_can_be_changed() -> None:
+    table = np.arange(6, dtype=np.float32).reshape(3, 2)
+    bound = ErrorBound("relative", 0.0, "guaranteed")
+    size = 128 + table.nbytes
+    matrix = StoredMatrix("7", "dense", table.shape, table.dtype, "exact", bound, size, "e")
+    service = Service(httpx2.Response(206, content=table[1:].tobytes()))
+    rows = service.client().matrix_rows(matrix, 1, 3)
+    rows += 1
+    np.testing.assert_array_equal(rows, table[1:] + 1)
+    assert service.requests[0].headers["range"] == "bytes=136-151"
 
 
 @pytest.mark.parametrize("name", ["distances", "upload", "path"])
