@@ -29,5 +29,5 @@ def curve(points: Sequence[Point]) -> Point:
 
 def starting_at(source: Point, distance: float) -> Point:
     """Return a source at which distances begin with ``distance`` instead of 0."""
-    members = {"vertex": source} if isinstance(source, int) else source
+    members = source if isinstance(source, Mapping) else {"vertex": source}
     return {**members, "start_distance": distance}
