@@ -53,7 +53,7 @@ from geodesic_client.flow import (
     send,
 )
 from geodesic_client.method import Method
-from geodesic_client.points import Point
+from geodesic_client.points import Point, as_points
 
 T = TypeVar("T")
 Accuracy = Literal["exact", "approximate", "fast"]
@@ -134,7 +134,7 @@ def array(mesh: Mesh | str, name: ArrayName) -> Flow[NDArray[Any]]:
 
 def distances(
     mesh: Mesh | str,
-    sources: Sequence[Point],
+    sources: Point | Sequence[Point],
     *,
     targets: Sequence[Point] | None = None,
     method: Accuracy = "exact",
@@ -146,9 +146,12 @@ def distances(
     include: Sequence[Literal["nearest_source", "gradient"]] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[Distances]:
-    """Return the distance of each vertex, or of each target, from the nearest source."""
+    """Return the distance of each vertex, or of each target, from the nearest source.
+
+    ``sources`` is a point, or several.
+    """
     body = _body(
-        sources=sources,
+        sources=as_points(sources),
         targets=targets,
         method=method,
         relative_error=relative_error,
@@ -220,7 +223,7 @@ def paths(
 
 def isolines(
     mesh: Mesh | str,
-    sources: Sequence[Point],
+    sources: Point | Sequence[Point],
     *,
     levels: Sequence[float] | None = None,
     count: int | None = None,
@@ -232,9 +235,12 @@ def isolines(
     barriers: Sequence[int] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[Isolines]:
-    """Return the lines at some distances (``levels``), or at ``count`` evenly spaced ones."""
+    """Return the lines at some distances (``levels``), or at ``count`` evenly spaced ones.
+
+    ``sources`` is a point, or several.
+    """
     body = _body(
-        sources=sources,
+        sources=as_points(sources),
         levels=levels,
         count=count,
         method=method,

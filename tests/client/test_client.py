@@ -1,6 +1,7 @@
 """The client with a service that runs, against the library."""
 
 from pathlib import Path
+from typing import Any
 
 import anyio
 import httpx2
@@ -66,6 +67,15 @@ def test_distances_are_the_library_s_to_the_bit(
     np.testing.assert_array_equal(rich.distances, field.distances)
     np.testing.assert_array_equal(rich.nearest_source, field.nearest_source)
     np.testing.assert_allclose(rich.gradient, field.gradient, equal_nan=True)
+
+
+@pytest.mark.parametrize("source", [7, np.int64(7), {"vertex": 7}], ids=repr)
+def test_a_single_source_needs_no_list(service: Client, mesh: Mesh, source: Any) -> None:
+    distances, lines = service.distances(mesh, source), service.isolines(mesh, source, count=3)
+    np.testing.assert_array_equal(distances.distances, service.distances(mesh, [7]).distances)
+    assert [level.level for level in lines.levels] == [
+        level.level for level in service.isolines(mesh, [7], count=3).levels
+    ]
 
 
 def test_what_cannot_be_reached_is_infinite(service: Client, apart: Mesh) -> None:
