@@ -174,6 +174,7 @@ class DistributedEngine:
 
     async def _run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
         note = _rising(on_progress)
+        waits_for_host = task.is_promised
         refusal: Problem | None = None
         without: set[str] = set()
         """Hosts that were lost with this task, or that refused it"""
@@ -181,7 +182,7 @@ class DistributedEngine:
         while True:
             name = self._place(task, without)
             if name is None:
-                if not task.is_promised:
+                if not waits_for_host:
                     raise _no_host() if refusal is None else ProblemError(refusal)
                 await asyncio.sleep(_SEARCH_S)
                 without.clear()
@@ -197,6 +198,7 @@ class DistributedEngine:
                 task = _once_more(task)
                 continue
             if outcome is None:  # another host computes the same
+                task = replace(task, is_promised=True)
                 continue
             if isinstance(outcome, TaskResult):
                 return outcome
@@ -413,7 +415,11 @@ def _within(whole: Period, parts: Mapping[str, Period]) -> Mapping[str, Period]:
 
 
 def _once_more(task: Task) -> Task:
-    """Return a task to be done again; the host that was lost may still write where it did."""
+    """Return a task to be done again, which no host refuses because its queue is full.
+
+    The host that was lost may still write where it did.
+    """
+    task = replace(task, is_promised=True)
     if isinstance(task.work, StoreMesh):
         folder = task.work.folder
         return replace(task, work=replace(task.work, folder=folder.with_name(f"{folder.name}-2")))

@@ -124,6 +124,7 @@ class LocalEngine:
         deaths = 0
         while True:
             slot = await self._acquire(task)
+            task = replace(task, is_promised=True)  # accepted: a second wait is not refused
             queued = perf_counter() - start
             try:
                 outcome = await self._run_in(slot, task, on_progress)

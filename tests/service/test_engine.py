@@ -19,10 +19,13 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.engine.interface import ProgressCallback
+from app.engine.local import LocalEngine
 from app.engine.slot import Slot
 from app.engine.work import Task, TaskResult
 from app.main import create_app
 from app.queries import DistancesQuery
+from app.service.progress import ignore_progress
 from app.settings import Settings
 from tests.support.clocks import Clock
 from tests.support.dying import die
@@ -409,6 +412,36 @@ def test_what_proves_not_to_be_small_begins_anew(
     assert result.seconds["queue"] == 10.0, "the first try counts as waiting"
     assert result.result is not None
     assert sum((processor_time(pid) - before[pid])[10] for pid in before) > 0, "the second is long"
+
+
+def test_what_proves_not_to_be_small_waits_however_full_the_queue_is(
+    two: ServiceClient, small: str, clock: Clock
+) -> None:
+    reports: list[float] = []
+
+    async def begin(
+        task: Task, on_progress: ProgressCallback = ignore_progress, **load: int
+    ) -> "asyncio.Task[TaskResult]":
+        running = asyncio.create_task(two.engine.run(task, on_progress))
+        await until(lambda: all(getattr(two.load, name) == many for name, many in load.items()))
+        return running
+
+    async def run() -> list[TaskResult]:
+        with stopped(two.workers()):
+            running = [await begin(new_task(small), busy=busy) for busy in (1, 2)]
+            not_small = await begin(new_task(small, is_small=True), reports.append, busy=3)
+            running += [await begin(new_task(small), waiting=waiting) for waiting in (1, 2)]
+            clock.now += 10.0
+            before_now = len(reports)
+            await until(lambda: len(reports) > before_now)  # the engine has looked at its clock
+            os.kill(pid_for_small_work, signal.SIGCONT)
+            await until(lambda: two.load.waiting == 3 or not_small.done())
+        return await asyncio.gather(not_small, *running)
+
+    assert isinstance(two.engine, LocalEngine)
+    pid_for_small_work = two.engine._small.pid or 0
+
+    assert len(two.portal.call(run)) == 5, "and none was refused"
 
 
 def test_clients_take_turns(two: ServiceClient, small: str) -> None:

@@ -242,6 +242,22 @@ def test_a_dead_host_is_replaced_once() -> None:
     play(scene)
 
 
+def test_a_full_queue_does_not_refuse_what_a_lost_host_had_accepted() -> None:
+    async def scene(replica: Replica) -> None:
+        asking = replica.ask()
+        await asyncio.sleep(5)
+        lost = replica.where()
+        other = replica.cluster.engines[replica.other()]
+        other.is_full = True
+        replica.cluster.kill(lost)
+        await asking
+
+        assert await code_of(replica.ask()) == "queue_full"
+        assert [task.is_promised for task in other.begun] == [True]
+
+    play(scene)
+
+
 def test_a_second_loss_is_an_error() -> None:
     async def scene(replica: Replica) -> None:
         asking = replica.ask()
