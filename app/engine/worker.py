@@ -201,7 +201,7 @@ class Worker:
                 result = write_result(
                     self.config.results,
                     work.result_name,
-                    self._verified_parts(encoded.parts, opened),
+                    self._verified_parts(encoded.parts, opened, cancel),
                     encoded.headers,
                     code_version(),
                     is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
@@ -226,7 +226,7 @@ class Worker:
                 result = write_result(
                     self.config.results,
                     work.result_name,
-                    self._verified_parts(npy_parts(rows), opened),
+                    self._verified_parts(npy_parts(rows), opened, cancel),
                     {REACHED: str(parts.reached(rows))},
                     code_version(),
                     is_cheap=False,
@@ -241,8 +241,7 @@ class Worker:
             opened = self._open(work.query)
 
         def part(number: int) -> NDArray[Any]:
-            if cancel():
-                raise gc.errors.Cancelled("cancelled while parts were joined")
+            _stop_if(cancel)
             rows: NDArray[Any] = np.load(body_path(root, work.parts[number]), mmap_mode="r")
             return rows
 
@@ -251,8 +250,9 @@ class Worker:
             answer = work.query.answer_of_parts(opened, work.reached, cancel)
         with clock.phase("encode"):
             headers = array_headers(answer, np.dtype(work.dtype), parts.shape)
-            write = partial(parts.write, part=part)
-            result = write_result_file(root, work.result_name, write, headers, code_version())
+            write, check = partial(parts.write, part=part), partial(_stop_if, cancel)
+            name = work.result_name
+            result = write_result_file(root, name, write, headers, code_version(), check)
         return TaskResult(clock.seconds, clock.periods, result=result)
 
     def _parts_of(
@@ -288,9 +288,13 @@ class Worker:
             self._verify(opened)
             raise
 
-    def _verified_parts(self, parts: Iterable[Buffer], opened: OpenMesh) -> Iterator[Buffer]:
+    def _verified_parts(
+        self, parts: Iterable[Buffer], opened: OpenMesh, cancel: Callable[[], bool]
+    ) -> Iterator[Buffer]:
         """Yield the parts of a body, and raise at its end where the mesh was damaged meanwhile."""
-        yield from parts
+        for part in parts:
+            _stop_if(cancel)
+            yield part
         self._verify(opened)
 
     def _verify(self, opened: OpenMesh) -> None:
@@ -337,6 +341,11 @@ class Worker:
         """Empty all caches."""
         for name in list(self.meshes):
             self._close(name)
+
+
+def _stop_if(cancel: Callable[[], bool]) -> None:
+    if cancel():
+        raise gc.errors.Cancelled("cancelled while the answer was written")
 
 
 @contextmanager
