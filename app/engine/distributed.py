@@ -14,7 +14,7 @@ import structlog
 from structlog.contextvars import get_contextvars
 
 from app.engine.cluster import BEAT_S, LEASE_S, SILENCE_S, Cluster, HostLostError, HostReport
-from app.engine.interface import Load, ProgressCallback
+from app.engine.interface import Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.placement import Occupancy, choose
 from app.engine.wire import Message, Wire, WireError, decode
 from app.engine.work import MeshFromFile, Outcome, StoreMesh, Task, TaskResult, WritesResult
@@ -105,6 +105,7 @@ class DistributedEngine:
         self.is_draining = False
         self.on_wait: Callable[[float], None] = lambda _seconds: None
         self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
+        self.on_unclaimed: UnclaimedCallback = ignore_unclaimed
         self._background: set[asyncio.Task[None]] = set()
         self._stopping: set[asyncio.Task[None]] = set()
 
@@ -344,6 +345,8 @@ class DistributedEngine:
         is_new = host.report is None
         host.note(report)
         self._supersede_flights(name)
+        for result in report.unclaimed:
+            self._spawn(self.on_unclaimed(result), self._background)
         if is_new:
             logger.info("host joined", host=name, workers=report.workers)
 

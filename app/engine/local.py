@@ -15,7 +15,7 @@ import structlog
 
 import geodesic_core as gc
 from app.engine import worker
-from app.engine.interface import Load, ProgressCallback
+from app.engine.interface import Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.queue import FairQueue
 from app.engine.slot import Slot, WorkerLostError
 from app.engine.work import Outcome, Task, TaskResult
@@ -68,6 +68,7 @@ class LocalEngine:
         self._is_stopping = threading.Event()
         self.on_wait: Callable[[float], None] = lambda _seconds: None
         self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
+        self.on_unclaimed: UnclaimedCallback = ignore_unclaimed
         self._background: set[asyncio.Task[None]] = set()
 
     @property
@@ -185,10 +186,13 @@ class LocalEngine:
         """
         slot.ask_to_stop()
         await asyncio.wait({outcome}, timeout=self._settings.cancel_grace_s)
-        if outcome.done() and outcome.exception() is None:
-            self._release(slot)
-        else:
+        if not outcome.done() or outcome.exception() is not None:
             slot.retire()
+            return
+        self._release(slot)
+        late = outcome.result()
+        if isinstance(late, TaskResult) and late.result is not None and late.result.has_files:
+            await self.on_unclaimed(late.result.name)
 
     async def _compile_and_supervise(self) -> None:
         await self._compile(worker.FIRST_KERNELS)

@@ -46,7 +46,7 @@ from app.store.meshes import WrittenMesh
 from app.store.results import Result, ResultManifest
 from app.tracing import Period
 
-VERSION = 6
+VERSION = 7
 """To be raised with every change of the types below, and of what they mean"""
 
 _MAGIC = b"GEOD"

@@ -10,7 +10,7 @@ import errno
 import zlib
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -19,7 +19,7 @@ from typing import IO, Protocol
 from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from app.errors import problem
+from app.errors import StoreUnavailableError, problem
 from app.settings import variable_of
 from app.store.atomic import atomic_write, remove_partial
 from app.store.last_use import note_use, order_of_use
@@ -331,6 +331,15 @@ class ResultStore:
             size = await self._files.size(name)
             if size is not None:
                 self._count(name, size)
+
+    async def index_unclaimed(self, name: str) -> None:
+        """Index a result that was written although nobody waits for it.
+
+        Where the store does not answer, the next start finds it.
+        """
+        with suppress(StoreUnavailableError):
+            await self.index(name)
+            self.make_room()
 
     def add(self, result: Result, *, is_reusable: bool = True) -> Result:
         """Acquire a result that a worker has just written."""

@@ -26,6 +26,7 @@ from app.engine.work import Task, TaskResult
 from app.main import create_app
 from app.queries import DistancesQuery
 from app.service.progress import ignore_progress
+from app.service.service import Service
 from app.settings import Settings
 from tests.support.clocks import Clock
 from tests.support.dying import die
@@ -482,6 +483,27 @@ def test_many_at_once(two: ServiceClient, small: str) -> None:
         responses = list(pool.map(lambda _: ask(two, small), range(100)))
 
     assert {response.status_code for response in responses} == {200}
+
+
+def test_an_answer_that_comes_too_late_counts_and_is_found(
+    two: ServiceClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ask_all(**headers: str) -> Any:
+        body = {"sources": [{"vertex": 0, "start_distance": start}]}
+        return two.post(link, json=body, headers={"Accept": "application/x-npy", **headers})
+
+    service: Service = two.app.state.service  # type: ignore[attr-defined]
+    link = f"/v1/meshes/{upload_sample(two, 'plane', 50_000)}/distances"
+    start, before = next(start_distances), service.results.nbytes
+    monkeypatch.setattr(Slot, "ask_to_stop", lambda _: None)  # as if its work was over by then
+
+    with stopped(two.workers()):
+        check_problem(ask_all(**{"X-Timeout-Ms": "100"}), 504, "deadline_exceeded")
+    wait_until(lambda: service.results.nbytes > before)
+
+    hits = service.lookups["hit"]
+    assert len(ask_all().content) == service.results.nbytes - before
+    assert service.lookups["hit"] == hits + 1
 
 
 def test_the_server_s_own_deadline_names_its_setting(tmp_path: Path) -> None:

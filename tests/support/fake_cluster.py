@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from app.engine.cluster import HostLostError, HostReport
 from app.engine.host import Host
-from app.engine.interface import Load, ProgressCallback
+from app.engine.interface import Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.wire import decode, encode
 from app.engine.work import Task, TaskResult
 from app.errors import ProblemError, problem
@@ -41,6 +41,7 @@ class SleepingEngine:
         self.running = 0
         self.on_wait: Callable[[float], None] = lambda _seconds: None
         self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
+        self.on_unclaimed: UnclaimedCallback = ignore_unclaimed
 
     @property
     def load(self) -> Load:

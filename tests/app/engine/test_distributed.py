@@ -199,6 +199,22 @@ def test_cancelling_stops_the_work() -> None:
     play(scene, "a")
 
 
+def test_a_result_that_nobody_waits_for_is_reported_to_one_replica() -> None:
+    async def main() -> None:
+        cluster, reported = FakeCluster("a"), list[str]()
+
+        async def note(name: str) -> None:
+            reported.append(name)
+
+        async with replica_of(cluster) as one, replica_of(cluster) as other:
+            one.engine.on_unclaimed = other.engine.on_unclaimed = note
+            await cluster.engines["a"].on_unclaimed(f"{MESH}/late")
+            await asyncio.sleep(4 * BEAT_S)
+            assert reported == [f"{MESH}/late"]
+
+    virtual_time.run(main())
+
+
 def test_a_stop_is_sent_again_until_it_is_answered() -> None:
     async def scene(replica: Replica) -> None:
         replica.cluster.unanswered_stops = 2
