@@ -14,12 +14,12 @@ from typing import Any
 import structlog
 
 import geodesic_core as gc
-from app.engine import worker
 from app.engine.interface import Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.queue import FairQueue
 from app.engine.slot import Slot, WorkerLostError
 from app.engine.work import Outcome, Task, TaskResult
 from app.engine.worker import WorkerConfig
+from app.engine.worker_process import FIRST_KERNELS
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.settings import Settings
 from app.tracing import Period, record_span
@@ -195,7 +195,7 @@ class LocalEngine:
             await self.on_unclaimed(late.result.name)
 
     async def _compile_and_supervise(self) -> None:
-        await self._compile(worker.FIRST_KERNELS)
+        await self._compile(FIRST_KERNELS)
         for slot in reversed(self._slots):
             self._spawn(self._supervise(slot))
         await self._compile(None)

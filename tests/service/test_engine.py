@@ -540,7 +540,7 @@ def test_work_that_does_not_stop_is_killed(tmp_path: Path) -> None:
 
 
 def test_workers_that_cannot_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.engine.worker.run", die)
+    monkeypatch.setattr("app.engine.worker_process.run", die)
     sample = {"sample": "plane", "faces": 10}
     with TestClient(create_app(Settings(store=tmp_path, workers=1))) as client:
         # The first asks before it is known that none can start, the second after.
@@ -586,7 +586,7 @@ def test_an_interrupt_while_workers_start_is_no_failure(
         closed.set()
         await close(slot)
 
-    monkeypatch.setattr("app.engine.worker.run", die)
+    monkeypatch.setattr("app.engine.worker_process.run", die)
     monkeypatch.setattr(Slot, "close", close_and_tell)
     app = create_app(Settings(store=tmp_path, workers=1))
     app.state.service.engine.drain()

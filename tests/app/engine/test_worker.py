@@ -12,8 +12,9 @@ import orjson
 import pytest
 
 from app.encoding import CSV, NPY, Encoded, encode
+from app.engine.signals import Signals
 from app.engine.work import ComputePart, JoinParts, MeshFromSample, StoreMesh, TaskResult
-from app.engine.worker import Clock, Signals, Worker
+from app.engine.worker import Clock, Worker
 from app.errors import Problem
 from app.queries import DistancesQuery, MatrixQuery, PathQuery
 from app.schemas.points import VertexPoint
