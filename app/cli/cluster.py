@@ -51,7 +51,7 @@ def head(
     from app.engine.ray_node import running_head
 
     with _failing_clearly(), running_head(host, port, folder, settings) as running:
-        typer.echo(f"the head listens at {host}:{port}; {running.records.told}")
+        typer.echo(f"the head listens at {host}:{port}; {running.records.durability}")
         stopped = _stopped()
         while not stopped.wait(_LOOK_S):
             running.check()

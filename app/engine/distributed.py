@@ -14,7 +14,7 @@ import structlog
 from structlog.contextvars import get_contextvars
 
 from app.engine.cluster import BEAT_S, LEASE_S, SILENCE_S, Cluster, HostLostError, HostReport
-from app.engine.interface import Load, ProgressCallback
+from app.engine.interface import Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.placement import Occupancy, choose
 from app.engine.wire import Message, Wire, WireError, decode
 from app.engine.work import MeshFromFile, Outcome, StoreMesh, Task, TaskResult, WritesResult
@@ -105,6 +105,7 @@ class DistributedEngine:
         self.is_draining = False
         self.on_wait: Callable[[float], None] = lambda _seconds: None
         self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
+        self.on_unclaimed: UnclaimedCallback = ignore_unclaimed
         self._background: set[asyncio.Task[None]] = set()
         self._stopping: set[asyncio.Task[None]] = set()
 
@@ -174,6 +175,7 @@ class DistributedEngine:
 
     async def _run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
         note = _rising(on_progress)
+        waits_for_host = task.is_promised
         refusal: Problem | None = None
         without: set[str] = set()
         """Hosts that were lost with this task, or that refused it"""
@@ -181,7 +183,7 @@ class DistributedEngine:
         while True:
             name = self._place(task, without)
             if name is None:
-                if not task.is_promised:
+                if not waits_for_host:
                     raise _no_host() if refusal is None else ProblemError(refusal)
                 await asyncio.sleep(_SEARCH_S)
                 without.clear()
@@ -197,6 +199,7 @@ class DistributedEngine:
                 task = _once_more(task)
                 continue
             if outcome is None:  # another host computes the same
+                task = replace(task, is_promised=True)
                 continue
             if isinstance(outcome, TaskResult):
                 return outcome
@@ -342,6 +345,8 @@ class DistributedEngine:
         is_new = host.report is None
         host.note(report)
         self._supersede_flights(name)
+        for result in report.unclaimed:
+            self._spawn(self.on_unclaimed(result), self._background)
         if is_new:
             logger.info("host joined", host=name, workers=report.workers)
 
@@ -413,7 +418,11 @@ def _within(whole: Period, parts: Mapping[str, Period]) -> Mapping[str, Period]:
 
 
 def _once_more(task: Task) -> Task:
-    """Return a task to be done again; the host that was lost may still write where it did."""
+    """Return a task to be done again, which no host refuses because its queue is full.
+
+    The host that was lost may still write where it did.
+    """
+    task = replace(task, is_promised=True)
     if isinstance(task.work, StoreMesh):
         folder = task.work.folder
         return replace(task, work=replace(task.work, folder=folder.with_name(f"{folder.name}-2")))

@@ -1,7 +1,7 @@
 """The scrub: every file of a store is verified again and again, slowly, in the background.
 
 Disks lose bits in silence. The scrub finds that before a client does, while the mesh may still be
-at hand elsewhere.
+at hand elsewhere. It also removes what killed workers have left.
 """
 
 import asyncio
@@ -14,6 +14,8 @@ import structlog
 from anyio import to_thread
 
 from app.service.maintenance import Damage, inspect
+from app.store.atomic import remove_abandoned
+from app.store.layout import FIELDS, RESULTS
 
 logger = structlog.get_logger(module=__name__)
 
@@ -43,6 +45,8 @@ async def _scrub(root: Path, on_damage: OnDamage) -> None:
     await asyncio.sleep(_DELAY_S)
     while True:
         try:
+            for folder in (root / RESULTS, root / FIELDS):
+                await to_thread.run_sync(remove_abandoned, folder)
             await _scrub_once(root, on_damage)
         except Exception:  # such as too many open files: the next round may be luckier
             logger.exception("store not verified to its end")

@@ -107,6 +107,7 @@ class Service:
         )
         self.fields = FieldStore(settings.folder, settings.fields_bytes)
         self.engine = _engine(settings, self.store)
+        self.engine.on_unclaimed = self.results.index_unclaimed
         replicas = Replicas(self.database) if self.database.is_shared else None
         self.allowances = Allowances(self.database, replicas.id) if replicas else None
         """What callers have taken, where several services count together"""

@@ -199,6 +199,22 @@ def test_cancelling_stops_the_work() -> None:
     play(scene, "a")
 
 
+def test_a_result_that_nobody_waits_for_is_reported_to_one_replica() -> None:
+    async def main() -> None:
+        cluster, reported = FakeCluster("a"), list[str]()
+
+        async def note(name: str) -> None:
+            reported.append(name)
+
+        async with replica_of(cluster) as one, replica_of(cluster) as other:
+            one.engine.on_unclaimed = other.engine.on_unclaimed = note
+            await cluster.engines["a"].on_unclaimed(f"{MESH}/late")
+            await asyncio.sleep(4 * BEAT_S)
+            assert reported == [f"{MESH}/late"]
+
+    virtual_time.run(main())
+
+
 def test_a_stop_is_sent_again_until_it_is_answered() -> None:
     async def scene(replica: Replica) -> None:
         replica.cluster.unanswered_stops = 2
@@ -238,6 +254,22 @@ def test_a_dead_host_is_replaced_once() -> None:
         assert now() < 5 + 8 + 1
         assert replica.begun == {"a": 1, "b": 1}
         assert replica.shares == [0.0, 0.25, 0.5, 0.75], "nothing is told twice"
+
+    play(scene)
+
+
+def test_a_full_queue_does_not_refuse_what_a_lost_host_had_accepted() -> None:
+    async def scene(replica: Replica) -> None:
+        asking = replica.ask()
+        await asyncio.sleep(5)
+        lost = replica.where()
+        other = replica.cluster.engines[replica.other()]
+        other.is_full = True
+        replica.cluster.kill(lost)
+        await asking
+
+        assert await code_of(replica.ask()) == "queue_full"
+        assert [task.is_promised for task in other.begun] == [True]
 
     play(scene)
 
