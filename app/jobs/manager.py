@@ -129,6 +129,7 @@ class JobManager:
         self._retention = Retention(ttl_s)
         self._quota = quota
         self._live: dict[str, _LiveJob] = {}
+        self._accepting: set[asyncio.Task[Job]] = set()
         self._doubtful: set[str] = set()
         """Ids of jobs that may have been added to the repository, although an error said not"""
         self._is_stopping = False
@@ -157,6 +158,7 @@ class JobManager:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
             self.end_events()
+            await asyncio.gather(*self._accepting, return_exceptions=True)
             await self._interrupt()
             if self._replicas is not None:
                 with suppress(OSError):  # others find that out by themselves
@@ -172,13 +174,19 @@ class JobManager:
         """Accept a job, or return the job that has the idempotency key of ``spec``.
 
         The key of a job that failed or was dismissed is free again. The ``query`` as JSON is stored
-        until the job has finished.
+        until the job has finished. Whoever cancels the call leaves a job that runs, or none.
 
         Raises
         ------
         ProblemError
             The key belongs to another question, or the owner has as many jobs as it may.
         """
+        accepting = asyncio.create_task(self._accept(spec, query, solve))
+        self._accepting.add(accepting)
+        accepting.add_done_callback(self._accepting.discard)
+        return await asyncio.shield(accepting)
+
+    async def _accept(self, spec: JobSpec, query: bytes, solve: Solve) -> Job:
         job = Job(spec=spec, replica=self._replica_id)
         try:
             # Two requests with one key at the same time are one job, too.
@@ -188,9 +196,8 @@ class JobManager:
                     return known
                 await self._refuse_over_quota(records, spec.owner)
                 await records.add(job, query)
-        except (StateUnavailableError, asyncio.CancelledError):
-            if self._replicas is not None:
-                self._doubtful.add(job.id)
+        except StateUnavailableError:
+            self._doubtful.add(job.id)
             raise
         self._begin(job, solve)
         return job

@@ -391,6 +391,7 @@ class Service:
         )
 
         begun = [answering]
+        """Empty once a job has taken the work over, or nobody wants it any more"""
 
         async def attempt() -> Result:
             if begun:
@@ -408,10 +409,11 @@ class Service:
                 spec = self._job_spec(query, representation, context, idempotency_key)
                 job = await self.jobs.submit(spec, query.written, solve)
                 if job.spec is not spec:  # an earlier one with the same idempotency key
-                    self._abandon(answering)
+                    self._abandon(begun.pop())
                 return job
         except BaseException:
-            self._abandon(answering)
+            if begun:
+                self._abandon(begun.pop())
             raise
         result, seconds = answering.result()
         return await self.results.with_files(result) if as_file else result, seconds

@@ -11,7 +11,7 @@ from app.jobs.repository import JobRepository
 from app.state import Database
 from app.store.results import Result
 from tests.support.databases import opened
-from tests.support.jobs import SPEC
+from tests.support.jobs import SPEC, SlowSubmissions
 
 QUERY = b"{}"
 
@@ -60,6 +60,36 @@ def test_an_end_is_told_once_it_is_recorded(database: Database) -> None:
                 found = [await task for task in asked] + (await page)[0]
                 assert [each.status for each in found] == ["failed"] * 3
                 assert await others.find(None, job.id) == found[0]
+
+    asyncio.run(main())
+
+
+def test_a_submission_that_is_cancelled_leaves_a_job_that_runs_or_none(database: Database) -> None:
+    """Else the next request with the same key would get a job that never ends."""
+    spec = SPEC.model_copy(update={"idempotency_key": "a key"})
+
+    async def main() -> None:
+        may_end = asyncio.Event()
+
+        async def solve(_on_progress: object) -> Result:
+            await may_end.wait()
+            return await fail()
+
+        async with opened(database):
+            repository = SlowSubmissions(database)
+            jobs = JobManager(repository, cast(Any, "not used"), 60.0, None)
+            async with jobs.running(fail):
+                submission = asyncio.create_task(jobs.submit(spec, QUERY, solve))
+                await repository.written.wait()
+                submission.cancel()
+                await asyncio.wait({submission})
+                assert submission.cancelled()
+                repository.may_say.set()
+
+                again = await jobs.submit(spec, QUERY, solve)
+                may_end.set()
+                *_, last = [state.status async for state in jobs.watch(again, 0)]
+                assert last == "failed", "as it should"
 
     asyncio.run(main())
 
