@@ -135,7 +135,7 @@ class MeshCatalog:
                 failure = error
             for mesh_id in before.keys() - self._entries.keys():
                 await table.remove(mesh_id)
-            for mesh_id, record in self._entries.items():
+            for mesh_id, record in list(self._entries.items()):  # queries change their order
                 if mesh_id not in before:
                     await table.add(mesh_id, record)
         if failure is not None:
