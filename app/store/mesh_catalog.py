@@ -123,7 +123,8 @@ class MeshCatalog:
                 yield
             return
         failure: BaseException | None = None
-        async with self._shared.alone() as table:
+        # Whoever waits for the table holds a connection: at most one of them is of this service.
+        async with self._lock, self._shared.alone() as table:
             before = await table.all()
             self._entries = OrderedDict(before)
             for mesh_id in self._used:
