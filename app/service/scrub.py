@@ -7,12 +7,14 @@ at hand elsewhere.
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
 import structlog
 from anyio import to_thread
 
+from app.repeating import repeat
 from app.service.maintenance import Damage, inspect
 
 logger = structlog.get_logger(module=__name__)
@@ -41,12 +43,8 @@ async def scrubbing(root: Path, on_damage: OnDamage) -> AsyncIterator[None]:
 
 async def _scrub(root: Path, on_damage: OnDamage) -> None:
     await asyncio.sleep(_DELAY_S)
-    while True:
-        try:
-            await _scrub_once(root, on_damage)
-        except Exception:  # such as too many open files: the next round may be luckier
-            logger.exception("store not verified to its end")
-        await asyncio.sleep(_PERIOD_S)
+    round_ = partial(_scrub_once, root, on_damage)
+    await repeat(round_, _PERIOD_S, "store not verified to its end")
 
 
 async def _scrub_once(root: Path, on_damage: OnDamage) -> None:

@@ -12,6 +12,7 @@ from app.state import Database
 from app.store.results import Result
 from tests.support.databases import opened
 from tests.support.jobs import SPEC, SlowSubmissions
+from tests.support.waiting import LONG_S
 
 QUERY = b"{}"
 
@@ -90,6 +91,32 @@ def test_a_submission_that_is_cancelled_leaves_a_job_that_runs_or_none(database:
                 may_end.set()
                 *_, last = [state.status async for state in jobs.watch(again, 0)]
                 assert last == "failed", "as it should"
+
+    asyncio.run(main())
+
+
+class FailingRemoval(JobRepository):
+    """Fails once to remove a job, in a way that nobody has thought of."""
+
+    fails = True
+
+    async def remove(self, job_id: str) -> None:
+        if self.fails:
+            self.fails = False
+            raise ValueError(job_id)
+        await super().remove(job_id)
+
+
+def test_jobs_expire_after_any_failure(database: Database) -> None:
+    async def main() -> None:
+        async with asyncio.timeout(LONG_S), opened(database):
+            repository = FailingRemoval(database)
+            jobs = JobManager(repository, cast(Any, "not used"), 0.01, None)
+            async with jobs.running(fail):
+                await jobs.submit(SPEC, QUERY, fail)
+                while await repository.count(None):
+                    await asyncio.sleep(0.01)
+        assert not repository.fails
 
     asyncio.run(main())
 
