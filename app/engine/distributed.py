@@ -20,6 +20,7 @@ from app.engine.wire import Message, Wire, WireError, decode
 from app.engine.work import MeshFromFile, Outcome, StoreMesh, Task, TaskResult, WritesResult
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.queries import code_version
+from app.repeating import repeat
 from app.settings import Settings, variable_of
 from app.store.interface import Store
 from app.tracing import Period, record_span
@@ -135,7 +136,7 @@ class DistributedEngine:
     async def start(self) -> None:
         """Look for hosts, in the background; the store must be claimed."""
         self._store_id = self._store.identity()
-        self._spawn(self._search(), self._background)
+        self._spawn(repeat(self._search, _SEARCH_S, "hosts not looked for"), self._background)
 
     def drain(self) -> None:
         """Refuse new tasks, see ``Engine``."""
@@ -304,13 +305,11 @@ class DistributedEngine:
                         return
 
     async def _search(self) -> None:
-        """Look for hosts that have joined, for ever."""
-        while True:
-            for name in await self._cluster.hosts():
-                if name not in self._hosts:
-                    self._hosts[name] = _Host()
-                    self._spawn(self._attend(name), self._background)
-            await asyncio.sleep(_SEARCH_S)
+        """Look for hosts that have joined."""
+        for name in await self._cluster.hosts():
+            if name not in self._hosts:
+                self._hosts[name] = _Host()
+                self._spawn(self._attend(name), self._background)
 
     async def _attend(self, name: str) -> None:
         """Exchange beats with a host until it is lost."""

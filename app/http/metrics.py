@@ -1,6 +1,7 @@
 """Metrics for operators: events are counted, and the service's state is read when scraped."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import get_args
 
 from anyio import to_thread
@@ -93,7 +94,8 @@ class Metrics(Collector):
     async def exposition(self, accept: str) -> tuple[bytes, str]:
         """Return all metrics in the text format that ``accept`` asks for, and its media type."""
         service = self._service
-        self._jobs = await service.jobs.count()
+        with suppress(OSError):  # the last counts stay while the database is away
+            self._jobs = await service.jobs.count()
         pids, store = service.engine.load.pids, service.settings.folder
         self._resources = await to_thread.run_sync(measure, pids, store)
         write, media_type = choose_encoder(accept)

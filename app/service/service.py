@@ -35,9 +35,10 @@ from app.engine.interface import Engine, ProgressCallback
 from app.engine.single_flight import SingleFlight
 from app.engine.supplied import SuppliedEngine
 from app.engine.work import EstimateQuery, MeshInput, RunQuery, StoreMesh, Task, TaskResult
-from app.errors import ProblemError, StateUnavailableError, problem, problem_of
+from app.errors import ProblemError, problem, problem_of
 from app.jobs import Job, JobManager, JobRepository, JobSpec
 from app.queries import KINDS, Estimate, MatrixQuery, MeshSize, Query, fingerprint, result_key
+from app.repeating import repeat
 from app.service.concurrency import ConcurrencyLimit
 from app.service.maintenance import Damage
 from app.service.matrix_parts import MatrixInParts
@@ -180,7 +181,9 @@ class Service:
                     await self.mesh_catalog.reconcile()
                 if share is not None:
                     share.let_others_in()
-                following = asyncio.create_task(self._follow_catalog())
+                following = asyncio.create_task(
+                    repeat(self.mesh_catalog.keep_up, _CATALOG_PERIOD_S, "catalogue not kept up")
+                )
             yield
         finally:
             if following is not None:
@@ -188,12 +191,6 @@ class Service:
             if self.allowances is not None:
                 await self.allowances.close()
             await self.database.close()
-
-    async def _follow_catalog(self) -> None:
-        while True:
-            with suppress(StateUnavailableError):  # to be tried again
-                await self.mesh_catalog.keep_up()
-            await asyncio.sleep(_CATALOG_PERIOD_S)
 
     def announce_end(self) -> None:
         """Say that the service is not ready, so that no new clients are sent to it."""
@@ -392,6 +389,7 @@ class Service:
         )
 
         begun = [answering]
+        """Empty once a job has taken the work over, or nobody wants it any more"""
 
         async def attempt() -> Result:
             if begun:
@@ -409,10 +407,11 @@ class Service:
                 spec = self._job_spec(query, representation, context, idempotency_key)
                 job = await self.jobs.submit(spec, query.written, solve)
                 if job.spec is not spec:  # an earlier one with the same idempotency key
-                    self._abandon(answering)
+                    self._abandon(begun.pop())
                 return job
         except BaseException:
-            self._abandon(answering)
+            if begun:
+                self._abandon(begun.pop())
             raise
         result, seconds = answering.result()
         return await self.results.with_files(result) if as_file else result, seconds

@@ -1,7 +1,7 @@
 """The engine over several machines: its promises, against links and hosts that fail."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from time import time_ns
@@ -326,6 +326,26 @@ def test_a_host_that_was_cut_off_works_again() -> None:
         await replica.ask()
 
     play(scene, "a")
+
+
+def test_hosts_are_looked_for_again_after_any_failure() -> None:
+    class Failing(FakeCluster):
+        is_broken = True
+
+        async def hosts(self) -> Collection[str]:
+            if self.is_broken:
+                raise ValueError("nobody has thought of it")
+            return await super().hosts()
+
+    async def main() -> None:
+        cluster = Failing("a")
+        async with replica_of(cluster) as replica:
+            assert not replica.engine.is_ready
+            cluster.is_broken = False
+            await asyncio.sleep(SILENCE_S)
+            assert replica.engine.is_ready
+
+    virtual_time.run(main())
 
 
 def test_work_of_a_replica_that_is_gone_ends() -> None:

@@ -11,7 +11,8 @@ from app.jobs.repository import JobRepository
 from app.state import Database
 from app.store.results import Result
 from tests.support.databases import opened
-from tests.support.jobs import SPEC
+from tests.support.jobs import SPEC, SlowSubmissions
+from tests.support.waiting import LONG_S
 
 QUERY = b"{}"
 
@@ -60,6 +61,62 @@ def test_an_end_is_told_once_it_is_recorded(database: Database) -> None:
                 found = [await task for task in asked] + (await page)[0]
                 assert [each.status for each in found] == ["failed"] * 3
                 assert await others.find(None, job.id) == found[0]
+
+    asyncio.run(main())
+
+
+def test_a_submission_that_is_cancelled_leaves_a_job_that_runs_or_none(database: Database) -> None:
+    """Else the next request with the same key would get a job that never ends."""
+    spec = SPEC.model_copy(update={"idempotency_key": "a key"})
+
+    async def main() -> None:
+        may_end = asyncio.Event()
+
+        async def solve(_on_progress: object) -> Result:
+            await may_end.wait()
+            return await fail()
+
+        async with opened(database):
+            repository = SlowSubmissions(database)
+            jobs = JobManager(repository, cast(Any, "not used"), 60.0, None)
+            async with jobs.running(fail):
+                submission = asyncio.create_task(jobs.submit(spec, QUERY, solve))
+                await repository.written.wait()
+                submission.cancel()
+                await asyncio.wait({submission})
+                assert submission.cancelled()
+                repository.may_say.set()
+
+                again = await jobs.submit(spec, QUERY, solve)
+                may_end.set()
+                *_, last = [state.status async for state in jobs.watch(again, 0)]
+                assert last == "failed", "as it should"
+
+    asyncio.run(main())
+
+
+class FailingRemoval(JobRepository):
+    """Fails once to remove a job, in a way that nobody has thought of."""
+
+    fails = True
+
+    async def remove(self, job_id: str) -> None:
+        if self.fails:
+            self.fails = False
+            raise ValueError(job_id)
+        await super().remove(job_id)
+
+
+def test_jobs_expire_after_any_failure(database: Database) -> None:
+    async def main() -> None:
+        async with asyncio.timeout(LONG_S), opened(database):
+            repository = FailingRemoval(database)
+            jobs = JobManager(repository, cast(Any, "not used"), 0.01, None)
+            async with jobs.running(fail):
+                await jobs.submit(SPEC, QUERY, fail)
+                while await repository.count(None):
+                    await asyncio.sleep(0.01)
+        assert not repository.fails
 
     asyncio.run(main())
 
