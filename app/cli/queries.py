@@ -31,15 +31,15 @@ from app.cli.arguments import (
     accuracy,
     writable,
 )
-from app.cli.ask import Answered, WrittenMembers, ask
+from app.cli.ask import WrittenMembers, ask
 from app.cli.output import AsJson, Output
 from app.cli.steps import Failure
+from app.cli.summary import bound_in_words, print_bound, print_end, print_seconds, print_size
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from app.encoding import Answer
-    from geodesic_core import TriangleMesh
 
 LINES = ".obj", ".csv", ".svg", ".geojson", ".json"
 """Suffixes of files that hold lines."""
@@ -112,7 +112,7 @@ def distance(
     print_size(output, answered.mesh)
     output.say(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
     output.say(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
-    output.say(f"error bound {bound_in_words(found['error_bound'])}")
+    print_bound(output, found["error_bound"])
     print_end(output, answered)
 
 
@@ -172,8 +172,8 @@ def path(
     print_size(output, answered.mesh)
     output.say(f"length      {found['length']!r}")
     output.say(f"points      {len(found['points'])}")
-    output.say(f"error bound {bound_in_words(found['error_bound'])}")
-    _print_seconds(output, answered)
+    print_bound(output, found["error_bound"])
+    print_seconds(output, answered)
     for step in found.get("steps", ()):
         output.say(
             f"leg {step.leg}, {step.name:12} {1e3 * step.seconds:8.2f} ms, bound {step.bound!r}, "
@@ -262,7 +262,7 @@ def isolines(
             f"level       {each['level']!r}: {closed} closed, {len(lines) - closed} open, "
             f"{float(length)!r} long"
         )
-    output.say(f"error bound {bound_in_words(answered.answer.members['error_bound'])}")
+    print_bound(output, answered.answer.members["error_bound"])
     print_end(output, answered)
 
 
@@ -357,27 +357,6 @@ def _array(array: Any) -> "Answer":
     from app.encoding import Answer
 
     return Answer({"array": array}, ("array",))
-
-
-def print_size(output: Output, mesh: "TriangleMesh") -> None:
-    """Print the size of the mesh."""
-    output.say(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
-
-
-def _print_seconds(output: Output, answered: Answered) -> None:
-    read, solve = answered.read_seconds, answered.solve_seconds
-    output.say(f"took        {read:.3f} s to read, {solve:.3f} s to solve")
-
-
-def print_end(output: Output, answered: Answered) -> None:
-    """Print the seconds that a query took, and where its answer is."""
-    _print_seconds(output, answered)
-    output.say_written()
-
-
-def bound_in_words(bound: "Mapping[str, Any]") -> str:
-    """Return an error bound, as the lines of commands state it."""
-    return f"{bound['value']!r} ({bound['type']}, {bound['kind']})"
 
 
 def _as_option(point: "Mapping[str, Any]") -> str:

@@ -30,8 +30,8 @@ from app.cli.arguments import (
 )
 from app.cli.ask import WrittenMembers, ask
 from app.cli.output import AsJson, Output, print_json
-from app.cli.queries import bound_in_words, print_end, print_size
 from app.cli.steps import Failure, read, showing
+from app.cli.summary import print_bound, print_end, print_size
 
 if TYPE_CHECKING:
     from typing import Literal
@@ -265,5 +265,5 @@ def _ask_matrix(
     cells = len(source) if layout is Layout.PAIRS else len(source) * len(target)
     print_size(output, answered.mesh)
     output.say(f"reached     {reached} of {cells} distances")
-    output.say(f"error bound {bound_in_words(answered.answer.members['error_bound'])}")
+    print_bound(output, answered.answer.members["error_bound"])
     print_end(output, answered)
