@@ -317,3 +317,8 @@ def accuracy(
             option = "--" + name.replace("_", "-")
             raise typer.BadParameter(f"{option} goes with --method {needed} only")
     return {"method": method.value, **{name: value for name, (value, _) in given.items()}}
+
+
+def limits(max_distance: float | None, barriers: BlockedFaces | None) -> dict[str, Any]:
+    """Return the members of a request that state where paths may go."""
+    return {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}

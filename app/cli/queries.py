@@ -11,7 +11,6 @@ import typer
 from app.cli.arguments import (
     AbsoluteError,
     Barriers,
-    BlockedFaces,
     BoundedMethod,
     BoundedMethodOption,
     EffortOption,
@@ -29,6 +28,7 @@ from app.cli.arguments import (
     Source,
     Targets,
     accuracy,
+    limits,
     writable,
 )
 from app.cli.ask import WrittenMembers, ask
@@ -96,7 +96,7 @@ def distance(
     output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error, effort)
     members["include"] = ["nearest_source", *(["gradient"] if gradient else [])]
-    members |= {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}
+    members |= limits(max_distance, barriers)
     points: WrittenMembers = {"sources": source}
     answered = ask("distances", mesh_file, merge, "Computing distances", points, members)
     import numpy as np
@@ -158,11 +158,7 @@ def path(
     if method is not Method.EXACT and (via or explain):
         name = "--via" if via else "--explain"
         raise typer.BadParameter(f"{name} goes with --method exact only")
-    members |= {
-        "max_distance": max_distance,
-        "explain": explain,
-        "barriers": barriers or BlockedFaces(),
-    }
+    members |= {"explain": explain} | limits(max_distance, barriers)
     points: WrittenMembers = {"source": source, "target": target, "waypoints": via or []}
     answered = ask("path", mesh_file, merge, "Computing the path", points, members)
     found = answered.answer.members
@@ -206,7 +202,7 @@ def paths(
     """Compute shortest paths from one point to several others, in one sweep."""
     output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error, effort)
-    members |= {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}
+    members |= limits(max_distance, barriers)
     points: WrittenMembers = {"source": source, "targets": target}
     answered = ask("paths", mesh_file, merge, "Computing the paths", points, members)
     output.write(answered.answer)
@@ -247,17 +243,15 @@ def isolines(
     if (count is None) == (level is None):
         raise typer.BadParameter("give --count, or --level at least once, and not both")
     members |= {"levels": level, "count": count, "chord_error": chord_error}
-    members |= {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}
+    members |= limits(max_distance, barriers)
     points: WrittenMembers = {"sources": source}
     answered = ask("isolines", mesh_file, merge, "Drawing isolines", points, members)
     output.write(answered.answer)
     print_size(output, answered.mesh)
     for each in answered.answer.members["isolines"]:
         lines = each["lines"]
-        closed, length = (
-            sum(line["closed"] for line in lines),
-            sum(line["length"] for line in lines),
-        )
+        closed = sum(line["closed"] for line in lines)
+        length = sum(line["length"] for line in lines)
         output.say(
             f"level       {each['level']!r}: {closed} closed, {len(lines) - closed} open, "
             f"{float(length)!r} long"
@@ -278,11 +272,7 @@ def borders(
 ) -> None:
     """Draw the borders between the parts of the surface that are nearest to each source."""
     output = Output(out, as_json)
-    members = {
-        "chord_error": chord_error,
-        "max_distance": max_distance,
-        "barriers": barriers or BlockedFaces(),
-    }
+    members = {"chord_error": chord_error} | limits(max_distance, barriers)
     points: WrittenMembers = {"sources": source}
     answered = ask("borders", mesh_file, merge, "Drawing borders", points, members)
     output.write(answered.answer)
@@ -314,7 +304,7 @@ def nearest(
     output = Output(out, as_json)
     if k > len(candidate):
         raise typer.BadParameter(f"-k is {k}, but there are only {len(candidate)} candidates")
-    members = {"k": k, "max_distance": max_distance, "barriers": barriers or BlockedFaces()}
+    members = {"k": k} | limits(max_distance, barriers)
     points: WrittenMembers = {"source": source, "candidates": candidate}
     answered = ask("nearest", mesh_file, merge, "Looking for the nearest", points, members)
     found = answered.answer.members["nearest"]

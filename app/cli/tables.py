@@ -10,7 +10,6 @@ from app.cli import local_matrix, remote_matrix
 from app.cli.arguments import (
     AbsoluteError,
     Barriers,
-    BlockedFaces,
     EffortOption,
     Layout,
     MaxDistance,
@@ -25,6 +24,7 @@ from app.cli.arguments import (
     SomeSources,
     SomeTargets,
     accuracy,
+    limits,
     writable,
 )
 from app.cli.ask import WrittenMembers, ask
@@ -111,16 +111,12 @@ def matrix(
 ) -> None:
     """Compute distances from several points to several others, or between all points of a file."""
     options = accuracy(method, relative_error, absolute_error, effort)
-    source, target, blocked = source or [], target or [], barriers or BlockedFaces()
+    source, target = source or [], target or []
     named = {"--points": points, "--sources": sources, "--targets": targets}
     files = {name: file for name, file in named.items() if file is not None}
     if not files:
         _check_points(source, target, dtype, threads, service)
-        members = options | {
-            "layout": layout.value,
-            "max_distance": max_distance,
-            "barriers": blocked,
-        }
+        members = options | {"layout": layout.value} | limits(max_distance, barriers)
         _ask_matrix(mesh_file, Output(out, as_json), source, target, layout, members, merge)
         return
     _check_files(list(files), source, target, layout)
@@ -135,7 +131,7 @@ def matrix(
         stops[0] if stops else None,
         options,
         max_distance,
-        blocked.of(mesh),
+        () if barriers is None else barriers.of(mesh),
         dtype.value,
     )
     if service is None:
