@@ -8,7 +8,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
 
-from app.cli.arguments import Point
+from app.cli.points import Point
 from app.cli.words import with_options
 
 if TYPE_CHECKING:

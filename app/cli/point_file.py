@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 import typer
 
-from app.cli.arguments import Point
+from app.cli.points import Point
 from app.cli.steps import Failure
 
 if TYPE_CHECKING:

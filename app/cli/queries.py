@@ -20,10 +20,8 @@ from app.cli.arguments import (
     MeshFile,
     Method,
     MethodOption,
-    Point,
     PointOrCurveSource,
     PointOrCurveSources,
-    Position,
     RelativeError,
     Source,
     Targets,
@@ -33,6 +31,7 @@ from app.cli.arguments import (
 )
 from app.cli.ask import WrittenMembers, ask
 from app.cli.output import AsJson, Output
+from app.cli.points import Point, Position
 from app.cli.steps import Failure
 from app.cli.summary import bound_in_words, print_bound, print_end, print_seconds, print_size
 

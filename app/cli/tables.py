@@ -19,7 +19,6 @@ from app.cli.arguments import (
     Method,
     MethodOption,
     Number,
-    Point,
     RelativeError,
     SomeSources,
     SomeTargets,
@@ -31,6 +30,7 @@ from app.cli.ask import WrittenMembers, ask
 from app.cli.matrix_file import Wanted, print_written
 from app.cli.output import AsJson, Output
 from app.cli.point_file import points_of
+from app.cli.points import Point
 from app.cli.steps import read
 from app.cli.summary import print_bound, print_end, print_size
 
