@@ -40,12 +40,16 @@ _LABEL = re.compile(r"@(.+(?:\.label|\.gii))(?:=(.+))?")
 
 def faces(text: str) -> Sequence[int]:
     """Return the faces that an option lists, or those of ``@FILE``, one or more a line."""
-    if text.startswith("@"):
-        try:
-            lines = Path(text[1:]).read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise typer.BadParameter(f"cannot read {text[1:]}: {error}") from None
-        return [face for line in lines if line.strip() for face in faces(line.strip())]
+    if not text.startswith("@"):
+        return _listed(text)
+    try:
+        lines = Path(text[1:]).read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise typer.BadParameter(f"cannot read {text[1:]}: {error}") from None
+    return [face for line in lines if line.strip() for face in _listed(line.strip())]
+
+
+def _listed(text: str) -> Sequence[int]:
     if not _FACES.fullmatch(text):
         raise typer.BadParameter(f"{text!r} is not a list of faces: write it as 3,7,40-59")
     found: list[int] = []
