@@ -36,7 +36,7 @@ from app.cli.steps import Failure
 from app.cli.summary import bound_in_words, print_bound, print_end, print_seconds, print_size
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from app.encoding import Answer
 
@@ -169,11 +169,7 @@ def path(
     output.say(f"points      {len(found['points'])}")
     print_bound(output, found["error_bound"])
     print_seconds(output, answered)
-    for step in found.get("steps", ()):
-        output.say(
-            f"leg {step.leg}, {step.name:12} {1e3 * step.seconds:8.2f} ms, bound {step.bound!r}, "
-            f"{step.windows} windows, {len(step.faces)} faces"
-        )
+    _print_steps(output, found.get("steps", ()))
     output.say_written()
 
 
@@ -334,6 +330,15 @@ def locate(
     output.say(f"position    {','.join(map(repr, point['position']))}")
     output.say(f"distance    {point['distance']!r}")
     output.say_written()
+
+
+def _print_steps(output: Output, steps: "Iterable[Any]") -> None:
+    """Print what each step of a search has found."""
+    for step in steps:
+        output.say(
+            f"leg {step.leg}, {step.name:12} {1e3 * step.seconds:8.2f} ms, bound {step.bound!r}, "
+            f"{step.windows} windows, {len(step.faces)} faces"
+        )
 
 
 _NO_PATH = {
