@@ -66,8 +66,8 @@ def node(folder: Folder, address: Address = None, store: Store = None) -> None:
         settings = settings.model_copy(update={"copies": (folder / "copies").resolve()})
     from app.engine.ray_cluster import start_host
     from app.engine.ray_node import joined
+    from app.store.choice import store_of
     from app.store.layout import StoreError
-    from app.store.opening import store_of
 
     try:
         store_id = store_of(settings).identity()
