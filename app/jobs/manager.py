@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator, Set
 from contextlib import asynccontextmanager, suppress
 from functools import partial
 from typing import Any
@@ -135,6 +135,10 @@ class JobManager:
         self._accepting: set[asyncio.Task[Job]] = set()
         self._doubtful: set[str] = set()
         """Ids of jobs that may have been added to the repository, although an error said not"""
+        self._newest = 0
+        """Number of the newest job at the last beat"""
+        self._unfinished: frozenset[str] = frozenset()
+        """Ids of the jobs that had not finished then"""
         self._is_stopping = False
 
     @asynccontextmanager
@@ -350,6 +354,7 @@ class JobManager:
         living = await replicas.beat()
         await self._record_ends()
         live_jobs, doubtful = list(self._live.values()), frozenset(self._doubtful)
+        added, newest = await self._repository.added(self._newest)
         records = {job.id: job for job in await self._repository.unfinished()}
         for live in live_jobs:
             record = records.get(live.job.id)
@@ -366,6 +371,8 @@ class JobManager:
             if is_left or (job.id in doubtful and job.id not in self._live):
                 await self._resume(job, solve_again)
         self._doubtful -= doubtful  # the others were not added
+        await self._note_ends((self._unfinished | added) - records.keys())
+        self._unfinished, self._newest = frozenset(records), newest
 
     async def _let_go(self, live: _LiveJob) -> None:
         """Stop a job that another replica has dismissed, removed, or taken over."""
@@ -375,8 +382,7 @@ class JobManager:
         self._live.pop(live.job.id, None)
         live.cancel()
         live.update(record or live.job.dismissed())
-        if record is not None and record.is_finished:
-            self._note_end(record)
+        await self._note_ends({live.job.id})
 
     async def _resume(self, job: Job, solve_again: SolveAgain) -> None:
         """Run a stored job, unless it has been run too often, or another replica was faster."""
@@ -399,18 +405,24 @@ class JobManager:
 
     async def _note_finished(self) -> None:
         """Note the jobs that have finished, by whichever replica, and forget those removed."""
-        known = {job.id: job for job in self._retention.jobs}
+        known = self._retention.jobs
         finished = await self._repository.finished()
-        for job in finished:
-            if job.id not in known:
-                self._note_end(job)
-        for job_id in known.keys() - {job.id for job in finished}:
-            self._forget(known[job_id])
+        for job in known:
+            if job.id not in finished:
+                self._forget(job)
+        await self._note_ends(finished)
 
-    def _note_end(self, job: Job) -> None:
-        self._retention.add_older(job)
-        if job.result is not None:
-            self._results.pin(job.result)
+    async def _note_ends(self, ids: Set[str]) -> None:
+        """Note those of some jobs that have finished, and are not known to have."""
+        unknown = [job_id for job_id in ids if not self._knows(job_id)]
+        for job in await self._repository.ended(unknown):
+            if not self._knows(job.id):
+                self._retention.add_older(job)
+                if job.result is not None:
+                    self._results.pin(job.result)
+
+    def _knows(self, job_id: str) -> bool:
+        return job_id in self._retention or job_id in self._live
 
     def _begin(self, job: Job, solve: Solve) -> None:
         live = self._live[job.id] = _LiveJob(job)
@@ -507,7 +519,8 @@ class JobManager:
         self._forget(job)
 
     def _forget(self, job: Job | FinishedJob) -> None:
-        self._live.pop(job.id, None)
-        self._retention.discard(job.id)
-        if job.result is not None:
+        """Forget a job that has been removed, unless it is not known, or not any more."""
+        was_live = self._live.pop(job.id, None) is not None
+        was_retained = self._retention.discard(job.id)
+        if job.result is not None and (was_live or was_retained):
             self._results.unpin(job.result)

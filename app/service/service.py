@@ -48,10 +48,10 @@ from app.service.scrub import scrubbing
 from app.settings import Settings, variable_of
 from app.state import Allowances, Database, MeshRecords, Replicas, database_of
 from app.store import layout
+from app.store.choice import store_of
 from app.store.fields import FieldStore
 from app.store.interface import Store
 from app.store.mesh_catalog import MeshCatalog
-from app.store.opening import store_of
 from app.store.ownership import Share
 from app.store.results import Result, ResultStore, result_name
 

@@ -148,7 +148,7 @@ _ERRORS_OF_THE_DISK = frozenset({sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN})
 
 @contextmanager
 def _as_os_errors(folder: Path) -> Iterator[None]:
-    """Raise the errors of SQLite as ``JobRepository`` promises them, for a database in a folder."""
+    """Raise the errors of SQLite as ``Statements`` promises them, for a database in a folder."""
     try:
         yield
     except sqlite3.Error as error:
