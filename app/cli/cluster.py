@@ -62,11 +62,6 @@ def node(folder: Folder, address: Address = None, store: Store = None) -> None:
     settings = _with_whole_paths(read_settings(address=address, store=store), folder)
     from app.engine.ray_cluster import start_host
     from app.engine.ray_node import joined
-<<<<<<< HEAD
-=======
-    from app.store.choice import store_of
-    from app.store.layout import StoreError
->>>>>>> wt-jobs
 
     store_id = _identity_of_store(settings)
     with _failing_clearly(), joined(folder, settings) as processes:
@@ -94,8 +89,8 @@ def _with_whole_paths(settings: "Settings", folder: Path) -> "Settings":
 
 
 def _identity_of_store(settings: "Settings") -> str:
+    from app.store.choice import store_of
     from app.store.layout import StoreError
-    from app.store.opening import store_of
 
     try:
         return store_of(settings).identity()
