@@ -19,7 +19,9 @@ from app.encoding import Representation, coding_quality, negotiate, negotiate_co
 from app.encoding.representation import ARRAYS, TEXTS
 from app.errors import Fault, problem
 from app.schemas.requests import AnswerParameters
-from app.service.service import PhaseSeconds, RequestContext, Service
+from app.service.answering import PhaseSeconds
+from app.service.request_context import RequestContext
+from app.service.service import Service
 
 T = TypeVar("T")
 

@@ -116,10 +116,10 @@ class Metrics(Collector):
         stopped = "Tasks stopped while they ran: by hang-up, deadline, or dismissal of a job"
         yield _counter("geodesic_cancellations", stopped, load.cancelled)
         lookups = "Lookups of answers in the store"
-        yield _counters("geodesic_results_lookups", lookups, "outcome", service.lookups)
+        yield _counters("geodesic_results_lookups", lookups, "outcome", service.answering.lookups)
         answered, took = "Queries that workers answered", "Seconds that solving them took"
-        yield _counters("geodesic_solves", answered, "kind", service.solves)
-        yield _counters("geodesic_solve_seconds", took, "kind", service.solve_seconds)
+        yield _counters("geodesic_solves", answered, "kind", service.answering.solves)
+        yield _counters("geodesic_solve_seconds", took, "kind", service.answering.solve_seconds)
         files = service.results.nbytes
         yield _gauge("geodesic_results_bytes", "Size of the stored answers that are files", files)
         yield _gauge("geodesic_meshes", "Meshes in the store", len(catalog.ids))

@@ -26,7 +26,9 @@ from app.http.responses import (
 )
 from app.http.uploads import spool
 from app.schemas.meshes import ListParameters, MeshDocument, MeshList, UploadParameters
-from app.service.service import RequestContext, Service, StoredMesh
+from app.service.request_context import RequestContext
+from app.service.service import Service, StoredMesh
+from app.service.time_limit import time_limit
 
 router = APIRouter(prefix="/meshes", tags=["meshes"])
 
@@ -231,7 +233,7 @@ async def _add_upload(
         raise problem("invalid_request", fault.message, errors=(fault,))
     async with (
         service.mesh_catalog.scratch_folder() as folder,
-        service.time_limit(context.deadline_s),
+        time_limit(service.settings, context.deadline_s),
     ):
         path = folder / "upload"
         limit = service.settings.max_upload_bytes

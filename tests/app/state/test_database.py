@@ -1,4 +1,4 @@
-"""What both databases promise."""
+"""Promises of both databases."""
 
 import asyncio
 
