@@ -368,8 +368,9 @@ class TriangleMesh:
 
         Notes
         -----
-        A point within 1e-12 of the bounding box from a vertex or an edge counts as on it. The first
-        call builds a search tree, O(F log F); each takes O(log F) in practice.
+        A point within 1e-12 of the bounding box from a vertex or an edge counts as on it, and the
+        surface may be as much beyond ``max_distance``: that is rounding. The first call builds a
+        search tree, O(F log F); each takes O(log F) in practice.
 
         Examples
         --------
@@ -389,14 +390,14 @@ class TriangleMesh:
             )
         limit = as_limit(max_distance)
         face, point, distance = self._nearest_face(wanted - self.origin)
-        if distance > limit:
+        largest = float(np.abs(point + self.origin).max())
+        snap = max(SNAP * self.diagonal, ROUNDED_COORDINATE * largest)
+        if distance > limit + snap:
             raise InvalidPoint(
                 f"the nearest point of the surface is {distance:g} away from {wanted.tolist()}, "
                 f"which is more than max_distance = {limit:g}"
             )
         corners = self.vertices[self.faces[face]] - self.origin
-        largest = float(np.abs(point + self.origin).max())
-        snap = max(SNAP * self.diagonal, ROUNDED_COORDINATE * largest)
         weights = canonical.weights_of(point, corners, snap)
         return self._point_in_face(face, weights, "position")
 

@@ -171,6 +171,26 @@ def test_locating_stops_at_max_distance():
         mesh.locate(outside, 0.999 * away)
 
 
+@pytest.mark.parametrize("height", [1e-12, 3e-13, 1e-13, 1e-16, 1e-40, 0.0])
+def test_points_of_slivers_are_located_where_they_are(height):
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0.5, height, 0], [0.5, -1, 0]])
+    mesh = gc.TriangleMesh(corners, [[0, 1, 2], [1, 0, 3]])
+    for weights in np.random.default_rng(6).dirichlet((1, 1, 1), 100):
+        place = weights @ corners[:3]
+        found = mesh.position(mesh.locate(place))
+        np.testing.assert_allclose(found, place, rtol=0, atol=3e-12)
+
+
+def test_positions_on_the_surface_are_at_no_distance():
+    mesh = mesh_of(zoo.SMALL["crumpled_sphere"])
+    for point in random_points(mesh, 50, seed=12):
+        assert mesh.locate(mesh.position(point), max_distance=0) == mesh.locate(
+            mesh.position(point)
+        )
+    with pytest.raises(gc.errors.InvalidPoint, match="max_distance = 0"):
+        mesh.locate(mesh.vertices.max(axis=0) + 1e-9, max_distance=0)
+
+
 @pytest.mark.parametrize("position", [(1, 2), "here", (1, 2, math.nan), (1, math.inf, 0), None])
 def test_positions_that_are_none(position):
     with pytest.raises(gc.errors.InvalidPoint, match="three finite numbers"):
