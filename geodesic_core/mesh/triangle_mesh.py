@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -84,6 +84,18 @@ class TriangleMesh:
     >>> gc.TriangleMesh(corners, [[0, 1, 3], [0, 3, 2]])
     TriangleMesh(4 vertices, 2 faces)
     """
+
+    vertices: Floats
+    """(V, 3) float64, read-only; mesh units."""
+    faces: Ints
+    """(F, 3) int32, read-only."""
+    vertex_map: Longs | None
+    """(given vertices,) int64: the vertex that each given one became; None where none moved."""
+    face_map: Longs | None
+    """(F,) int64: the polygon that each face came from; None where each polygon is one face."""
+    topology: Topology
+    """Half-edges and flat geometry, see `geodesic_core.kernels.mesh.half_edges`."""
+    _notes: tuple[str, ...]
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, merge: Merge = "none") -> None:
         self._build(as_vertices(vertices), as_faces(faces), None, merge, ())
@@ -172,17 +184,21 @@ class TriangleMesh:
         topology: Topology,
         notes: Sequence[str] = (),
     ) -> None:
-        self.vertices = _frozen(vertices)
-        """(V, 3) float64, read-only; mesh units."""
-        self.faces = _frozen(faces)
-        """(F, 3) int32, read-only."""
-        self.vertex_map = None if vertex_map is None else _frozen(vertex_map)
-        """(given vertices,) int64: the vertex that each given one became; None where none moved."""
-        self.face_map = None if face_map is None else _frozen(face_map)
-        """(F,) int64: the polygon that each face came from; None where each polygon is one face."""
-        self.topology = Topology(*(_frozen(array) for array in topology))
-        """Half-edges and flat geometry, see `geodesic_core.kernels.mesh.half_edges`."""
-        self._notes = tuple(notes)
+        self.__dict__.update(
+            vertices=_frozen(vertices),
+            faces=_frozen(faces),
+            vertex_map=None if vertex_map is None else _frozen(vertex_map),
+            face_map=None if face_map is None else _frozen(face_map),
+            topology=Topology(*(_frozen(array) for array in topology)),
+            _notes=tuple(notes),
+        )
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        """Refuse a change: the topology and results would still be those of the mesh before."""
+        raise AttributeError(
+            f"{name} cannot be set: a TriangleMesh does not change. Make another one, "
+            "TriangleMesh(vertices, faces)"
+        )
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "TriangleMesh":
@@ -579,7 +595,7 @@ class TriangleMesh:
         """Become a copy; pickle and `copy` forget that arrays are read-only."""
         for name, value in state.items():
             self.__dict__[name] = _frozen(value) if isinstance(value, np.ndarray) else value
-        self.topology = Topology(*(_frozen(array) for array in self.topology))
+        self.__dict__["topology"] = Topology(*(_frozen(array) for array in self.topology))
 
     def to_trimesh(self) -> Any:
         """Return the mesh as one of trimesh, with the same numbers of vertices and faces.
