@@ -591,6 +591,10 @@ class TriangleMesh:
         """Sentences on the defects of this mesh and their remedies, for its user."""
         return (*self._notes, *warnings_of(self.report))
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy needs: all but the search tree of `locate`, which is built again."""
+        return {name: value for name, value in self.__dict__.items() if name != "_nearest_face"}
+
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         """Become a copy; pickle and `copy` forget that arrays are read-only."""
         for name, value in state.items():
