@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.fields import point_query
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.certificates import check_path
@@ -169,6 +170,18 @@ def test_locating_stops_at_max_distance():
     assert mesh.locate(outside, 1.001 * away) == mesh.point(2)
     with pytest.raises(gc.errors.InvalidPoint, match=f"{away:g} away .* max_distance"):
         mesh.locate(outside, 0.999 * away)
+
+
+def test_distances_trace_no_path(monkeypatch):
+    mesh = mesh_of(zoo.SMALL["sphere"])
+    field = gc.exact_distance(mesh, [0, 5])
+    point = random_points(mesh, 1, seed=3)[0]
+    path = field.path_to(point)
+    traced = []
+    monkeypatch.setattr(point_query, "traced_path", lambda *_: traced.append(1))
+    assert field.distance_at(point) == pytest.approx(path.length, rel=SAME)
+    assert field.nearest_source_at(point) in (0, 1)
+    assert not traced
 
 
 @pytest.mark.parametrize("height", [1e-12, 3e-13, 1e-13, 1e-16, 1e-40, 0.0])
