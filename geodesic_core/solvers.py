@@ -38,7 +38,7 @@ from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.rows import Method, Solve
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
-from geodesic_core.validation import as_barriers, as_limit, check_choice, is_number
+from geodesic_core.validation import as_barriers, as_limit, check_choice, is_index, is_number
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -1046,6 +1046,6 @@ def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, f
 
 
 def _as_effort(effort: Effort) -> int:
-    if not is_number(effort) or effort not in get_args(Effort):
+    if not is_index(effort) or effort not in get_args(Effort):
         raise InvalidArgument(f"effort is {effort!r}; it must be 1, 2, 4 or 8")
     return int(effort)

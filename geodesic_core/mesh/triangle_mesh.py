@@ -43,7 +43,7 @@ from geodesic_core.tolerances import (
     SNAP,
     WEIGHT_ERROR,
 )
-from geodesic_core.validation import as_barriers, as_limit, is_number
+from geodesic_core.validation import as_barriers, as_limit, is_number, unboxed
 
 Merge = Literal["none", "exact"]
 
@@ -444,7 +444,7 @@ class TriangleMesh:
         >>> mesh.point(gc.SurfacePoint.edge(1, 0, 1.0)) == mesh.point(3)  # the end of an edge
         True
         """
-        index: Any = point
+        index: Any = unboxed(point)
         if isinstance(point, SurfacePoint):
             if point.vertex_index is None:
                 canonical.check_index(point.face_index, len(self.faces), "face", name)
@@ -540,7 +540,7 @@ class TriangleMesh:
             point = self.point(point)
             if point.vertex_index is None:
                 return self.origin + self.position_from_origin(point)
-        vertex: Any = point.vertex_index if isinstance(point, SurfacePoint) else point
+        vertex = point.vertex_index if isinstance(point, SurfacePoint) else unboxed(point)
         canonical.check_index(vertex, len(self.vertices), "vertex", "point")
         position: Floats = self.vertices[vertex]
         return position
