@@ -126,7 +126,7 @@ def resolve_chord_error(mesh: TriangleMesh, chord_error: float | None = None) ->
         The surface.
     chord_error
         The largest distance of chords from their arcs, mesh units; None for the default, a
-        thousandth of the mean edge length.
+        thousandth of the mean edge length, or the least that is taken where that is more.
 
     Returns
     -------
@@ -146,9 +146,9 @@ def resolve_chord_error(mesh: TriangleMesh, chord_error: float | None = None) ->
     >>> gc.resolve_chord_error(mesh, 0.1)
     0.1
     """
-    if chord_error is None:
-        return CHORD_SHARE * float(mesh.topology.geometry[:, LENGTH].mean())
     finest = FINEST_CHORD * mesh.diagonal
+    if chord_error is None:
+        return max(CHORD_SHARE * float(mesh.topology.geometry[:, LENGTH].mean()), finest)
     if not is_number(chord_error) or not (math.isfinite(chord_error) and chord_error >= finest):
         raise InvalidArgument(
             f"chord_error is {chord_error!r}; it must be a finite number, {finest:g} or more"
