@@ -51,7 +51,7 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import LEVEL
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DistanceField:
     """Geodesic distances from the sources to all vertices, and queries on them.
 

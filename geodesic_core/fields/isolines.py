@@ -31,7 +31,7 @@ FINEST_CHORD = 1e-9
 grows with the inverse of its root."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Isoline:
     """A polyline of points at one distance; between two points it lies in one face.
 

@@ -17,7 +17,7 @@ from geodesic_core.tolerances import TIE
 from geodesic_core.validation import as_limit, is_index
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
     """The nearest of some candidates, nearest first.
 
