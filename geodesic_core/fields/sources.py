@@ -47,7 +47,7 @@ class Source:
     start_distance: float = 0.0
 
 
-Sources = Point | Curve | Source | Sequence[Point | Curve | Source]
+Sources = Points | Curve | Source | Sequence[Point | Curve | Source]
 """Every way to write the sources of a field"""
 
 

@@ -2,6 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from geodesic_core.errors import InvalidPoint
 from geodesic_core.validation import is_index, is_number
@@ -139,8 +143,8 @@ class SurfacePoint:
         return cls(index, barycentric)
 
 
-Point = int | SurfacePoint
+Point = int | np.integer[Any] | SurfacePoint
 """Either way to write a point: a vertex by its index."""
 
-Points = Point | Sequence[Point]
+Points = Point | Sequence[Point] | NDArray[np.integer[Any]]
 """One point or several."""

@@ -24,7 +24,7 @@ from geodesic_core.mesh.degeneracies import (
     of_three_vertices,
 )
 from geodesic_core.mesh.report import NAMED, MeshReport, report_of, warnings_of
-from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangulation import triangulated
 from geodesic_core.mesh.validation import (
     as_faces,
@@ -417,7 +417,7 @@ class TriangleMesh:
         weights = canonical.weights_of(point, corners, snap)
         return self._point_in_face(face, weights, "position")
 
-    def point(self, point: int | SurfacePoint, name: str = "point") -> SurfacePoint:
+    def point(self, point: Point, name: str = "point") -> SurfacePoint:
         """Return a point in its canonical form, the same to the bit for all spellings of it.
 
         Parameters
@@ -511,7 +511,7 @@ class TriangleMesh:
             raise InvalidPoint(f"no {kind} joins the vertices {start} and {end}")
         return point
 
-    def position(self, point: int | SurfacePoint) -> Floats:
+    def position(self, point: Point) -> Floats:
         """Return the position of a point; of a vertex exactly the mesh's own.
 
         Parameters
