@@ -20,15 +20,11 @@ from geodesic_core.kernels.isolines.thinning import thin_lines
 from geodesic_core.kernels.mesh.half_edges import LENGTH, LENGTH_LEFT, TAIL
 from geodesic_core.kernels.sweep.state import FACE, NODE
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import LEVEL, PIECE
+from geodesic_core.tolerances import FINEST_CHORD, LEVEL, PIECE
 from geodesic_core.validation import is_index, is_number
 
 CHORD_SHARE = 1e-3
 """Share of the mean edge length that chords may stray from their arcs by default."""
-
-FINEST_CHORD = 1e-9
-"""Share of the bounding box's diagonal below which no chord error is taken: what it takes in points
-grows with the inverse of its root."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -15,11 +15,8 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import InvalidPoint
 from geodesic_core.kernels.mesh.half_edges import APEX, HEAD, Topology, next_around, previous
 from geodesic_core.mesh.surface_point import SurfacePoint
-from geodesic_core.tolerances import EDGE_STEPS, WEIGHT, WEIGHT_ERROR
+from geodesic_core.tolerances import EDGE_STEPS, ROUNDED_SUM, WEIGHT, WEIGHT_ERROR
 from geodesic_core.validation import is_index, is_number
-
-ROUNDING = 4.0 * np.finfo(np.float64).eps
-"""By how much the sum of three weights may differ from one."""
 
 
 def at_vertex(topology: Topology, faces: Ints, vertex: int) -> SurfacePoint:
@@ -47,8 +44,8 @@ def in_face(
     """
     cleaned = [float(weight) if weight > WEIGHT else 0.0 for weight in weights]
     total = math.fsum(cleaned)
-    if abs(total - 1.0) <= ROUNDING:
-        total = 1.0  # else a canonical point would change each time it is made canonical
+    if abs(total - 1.0) <= ROUNDED_SUM:
+        total = 1.0
     u, v, w = (weight / total for weight in cleaned)
     share: dict[int, float] = {}
     for node, part in zip(topology.inner_vertex[faces[face]].tolist(), (u, v, w), strict=True):
