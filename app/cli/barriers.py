@@ -55,7 +55,10 @@ def _listed(text: str) -> Sequence[int]:
     found: list[int] = []
     for part in text.split(","):
         first, _, last = part.partition("-")
-        found += range(int(first), int(last or first) + 1)
+        run = range(int(first), int(last or first) + 1)
+        if not run:
+            raise typer.BadParameter(f"{part!r} runs backwards: write it as {last}-{first}")
+        found += run
     return found
 
 

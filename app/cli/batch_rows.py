@@ -53,14 +53,14 @@ class Questions:
 
 
 def ask(questions: Questions, file: Path) -> list[Row]:
-    """Return the rows of a mesh, at least one."""
+    """Return the rows of a mesh, at least one; whatever fails is a row, and stops no other mesh."""
     import geodesic_core as gc
 
     start = perf_counter()
     try:
         mesh = gc.load_mesh(file, merge=questions.merge)
-    except (gc.GeodesicError, OSError) as error:
-        return [Row(str(file), error=_line(error))]
+    except Exception as error:  # noqa: BLE001 - above
+        return [Row(str(file), error=_reason(error))]
     read = Row(str(file), len(mesh.vertices), len(mesh.faces), read_s=perf_counter() - start)
     return [
         row for source in questions.sources for row in _rows_from(questions, source, mesh, read)
@@ -89,8 +89,8 @@ def _rows_from(questions: Questions, source: Point, mesh: "TriangleMesh", read: 
         targets = [resolve_point(mesh, target.point) for target in questions.targets]
         point = resolve_point(mesh, source.point)
         field = solve(mesh, point, targets=targets, retain="distances", **options)
-    except gc.GeodesicError as error:
-        return [replace(read, error=_line(error))]
+    except Exception as error:  # noqa: BLE001 - see `ask`
+        return [replace(read, error=_reason(error))]
     answers = _of_targets(questions, targets, field) if targets else [_of_all_vertices(field)]
     found = replace(
         read,
@@ -122,5 +122,10 @@ def _of_all_vertices(field: "DistanceField") -> dict[str, Any]:
     }
 
 
-def _line(error: Exception) -> str:
-    return with_options(" ".join(str(error).split()))
+def _reason(error: Exception) -> str:
+    """Return why a mesh or a question failed, in a line; what nobody expects has its kind."""
+    from geodesic_core import GeodesicError
+
+    line = with_options(" ".join(str(error).split()))
+    is_expected = isinstance(error, GeodesicError | OSError)
+    return line if is_expected else f"{type(error).__name__}: {line}"

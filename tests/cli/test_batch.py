@@ -12,6 +12,7 @@ import geodesic_core as gc
 from app.cli import batch
 from app.cli.batch_rows import Questions, Row, ask
 from app.cli.parcels import parcels_of
+from app.cli.points import Point
 from tests.support.commands import Run, error_line
 
 
@@ -43,6 +44,19 @@ def test_each_mesh_has_a_row_for_each_source(run: Run, meshes: list[Path]) -> No
         assert float(row["farthest"]) == field.distances.max()
         assert float(row["mean"]) == pytest.approx(field.distances.mean(), rel=1e-14)
         assert (int(row["faces"]), row["unreachable"]) == (len(mesh.faces), "0")
+
+
+@pytest.mark.parametrize("failing", ["load_mesh", "exact_distance"])
+def test_a_failure_that_nobody_expects_is_a_row_too(
+    meshes: list[Path], monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    def fail(*_arguments: object, **_options: object) -> None:
+        raise MemoryError("no room")
+
+    monkeypatch.setattr(gc, failing, fail)
+    questions = Questions([Point.parse("0")], [], {"method": "exact"}, "none")
+    (row,) = ask(questions, meshes[0])
+    assert row.error == "MemoryError: no room"
 
 
 def test_a_mesh_that_fails_does_not_stop_the_others(run: Run, meshes: list[Path]) -> None:

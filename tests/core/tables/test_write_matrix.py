@@ -249,6 +249,11 @@ def hold(mesh: gc.TriangleMesh, out: Path, has_begun, may_end) -> None:
     gc.write_matrix(mesh, out, range(9), cancel=cancel)
 
 
+def test_a_file_that_cannot_be_written_is_refused(mesh):
+    with pytest.raises(gc.errors.InvalidArgument, match=r"table\.npy cannot be written: "):
+        gc.write_matrix(mesh, "/proc/table.npy", range(9))
+
+
 @pytest.mark.jit
 @pytest.mark.slow
 def test_two_processes_do_not_write_one_table(mesh, tmp_path):
