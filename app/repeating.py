@@ -10,7 +10,13 @@ logger = structlog.get_logger(module=__name__)
 
 
 async def repeat(do: Callable[[], Awaitable[object]], pause_s: float, failure: str) -> NoReturn:
-    """Do something again and again, with a pause after each time; ``failure`` is logged."""
+    """Do something again and again, with a pause after each time; ``failure`` is logged.
+
+    It ends when its task is cancelled, even if ``do`` lost that: `asyncio.wait_for`, which psycopg
+    uses, does so in Python 3.11 where what it waits for happens at the same moment.
+    """
+    this = asyncio.current_task()
+    assert this is not None, "a coroutine runs in a task"  # noqa: S101
     while True:
         try:
             await do()
@@ -18,4 +24,6 @@ async def repeat(do: Callable[[], Awaitable[object]], pause_s: float, failure: s
             logger.warning(failure, error=repr(error))
         except Exception:
             logger.exception(failure)
+        if this.cancelling():
+            raise asyncio.CancelledError
         await asyncio.sleep(pause_s)

@@ -154,6 +154,7 @@ class Service:
         finally:
             if following is not None:
                 following.cancel()
+                await asyncio.wait({following})
             if self.allowances is not None:
                 await self.allowances.close()
             await self.database.close()

@@ -102,6 +102,7 @@ def test_a_wheel_has_the_sources_of_its_package_and_nothing_else(
     sources.discard("geodesic_core/hatch_build.py")
     others: dict[str, set[str]] = {
         "app": {"app/openapi.json"},
+        "geodesic_core": {"geodesic_core/py.typed"},
         "geodesic_client": {"geodesic_client/py.typed"},
     }
     assert names == sources | others.get(package, set())

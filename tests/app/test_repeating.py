@@ -1,6 +1,7 @@
 """Work that is done again and again."""
 
 import asyncio
+from contextlib import suppress
 
 import pytest
 
@@ -31,3 +32,21 @@ def test_work_goes_on_after_any_failure(log: Log) -> None:
         ("work not done", "error"),
         ("work not done", "error"),
     ]
+
+
+def test_work_ends_although_it_loses_its_cancellation() -> None:
+    """As `asyncio.wait_for` does in Python 3.11, now and then."""
+    times = []
+
+    async def lose_it() -> None:
+        times.append(virtual_time.now())
+        with suppress(asyncio.CancelledError):
+            await asyncio.sleep(60.0)
+
+    async def main() -> None:
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(7.0):
+                await repeat(lose_it, 2.0, "work not done")
+
+    virtual_time.run(main())
+    assert times == [0.0]

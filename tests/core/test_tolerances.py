@@ -560,7 +560,7 @@ def is_rough(saddles: int, excess: float, vertices: int = 2 * ROUGH_VERTICES) ->
     mesh = gc.samples.plane(8)
     angles = np.full(vertices, 2 * math.pi)
     angles[:saddles] += excess
-    mesh.topology = mesh.topology._replace(total_angle=angles)
+    vars(mesh)["topology"] = mesh.topology._replace(total_angle=angles)
     return mesh.is_rough
 
 

@@ -501,9 +501,9 @@ def test_an_answer_that_comes_too_late_counts_and_is_found(
         check_problem(ask_all(**{"X-Timeout-Ms": "100"}), 504, "deadline_exceeded")
     wait_until(lambda: service.results.nbytes > before)
 
-    hits = service.lookups["hit"]
+    hits = service.answering.lookups["hit"]
     assert len(ask_all().content) == service.results.nbytes - before
-    assert service.lookups["hit"] == hits + 1
+    assert service.answering.lookups["hit"] == hits + 1
 
 
 def test_the_server_s_own_deadline_names_its_setting(tmp_path: Path) -> None:
