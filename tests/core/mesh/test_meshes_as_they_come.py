@@ -12,6 +12,7 @@ import geodesic_core as gc
 from tests.support import zoo
 from tests.support.certificates import check_path
 from tests.support.oracles import unfolding
+from tests.support.splitting import split_at
 
 SEAMLESS = zoo.SMALL["crumpled_sphere"]
 
@@ -328,6 +329,30 @@ def test_paths_through_faces_of_no_area(name):
             path = gc.shortest_path(mesh, source, target)
             check_path(mesh, path, source, target, field.distances[target])
             check_path(mesh, field.path_to(target), source, target, field.distances[target])
+
+
+WINDING = (
+    [(0.82, 0.65), (0.98, 0.94), (0.08, 0.27), (0.04, 0.21), (0.02, 0.97), (0.68, 0.12)],
+    [(2, 1, 4), (0, 3, 2), (2, 0, 1), (5, 0, 2), (3, 0, 2), (2, 0, 3)],
+)
+"""Three copies of an edge, and more faces around vertex 2: many wrong ways about it."""
+
+
+def test_a_path_is_found_among_many_faces_that_are_wound_about():
+    flat, faces = WINDING
+    mesh = gc.TriangleMesh(np.pad(flat, ((0, 0), (0, 1))), faces)
+    inside = [(0.1, 0.6, 0.3), (0.6, 0.2, 0.2)]
+    for face, weights in itertools.product([0, 2, 3], inside):  # others the oracle does not know
+        point = gc.SurfacePoint.face(face, weights)
+        vertices, pieces, (at,) = split_at(mesh, [point])
+        expected = unfolding.distance_matrix(vertices, pieces)[at]
+        field = gc.exact_distance(mesh, point)
+        for target in range(6):
+            distance = expected[target]
+            back = gc.exact_distance(mesh, target).distance_at(point)
+            assert back == pytest.approx(distance, rel=1e-12)
+            check_path(mesh, field.path_to(target), point, target, distance)
+            check_path(mesh, gc.shortest_path(mesh, point, target), point, target, distance)
 
 
 def test_points_inside_a_face_of_no_area():
