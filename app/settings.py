@@ -290,7 +290,8 @@ class Settings(BaseSettings):
         )
         if unknown:
             raise ValueError(
-                f"unknown setting {', '.join(unknown)}; the settings are {', '.join(sorted(known))}"
+                f"unknown setting {', '.join(unknown)}{_hint(unknown)}; the settings are "
+                f"{', '.join(sorted(known))}"
             )
         return self
 
@@ -301,6 +302,16 @@ _AT_MOST = (
     ("max_caller_connections", "max_connections"),
 )
 """Pairs of settings of which the first must not exceed the second"""
+
+
+def _hint(unknown: list[str]) -> str:
+    """Return what to do where Kubernetes has set variables for a Service such as ``geodesic``."""
+    if not any(name.endswith("_SERVICE_HOST") for name in unknown):
+        return ""
+    return (
+        " (Kubernetes sets such variables for a Service; enableServiceLinks: false in the pod's "
+        "spec keeps them out)"
+    )
 
 
 def variable_of(field: str) -> str:

@@ -1,6 +1,6 @@
 """The meshes of the benchmarks: made here, or read from a folder."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -8,9 +8,12 @@ import numpy as np
 from trimesh.remesh import subdivide, subdivide_loop
 
 import geodesic_core as gc
-from geodesic_core.arrays import Floats, Ints
+from geodesic_core.arrays import Floats, Ints, Longs
 
-REFINED = {"Loop": subdivide_loop, "split": subdivide}
+REFINED: Mapping[str, Callable[[Floats, Ints], tuple[Floats, Longs]]] = {
+    "Loop": subdivide_loop,
+    "split": subdivide,
+}
 """Ways to make four faces of each: smoothed, or in the planes of the old ones."""
 
 
@@ -33,7 +36,8 @@ class Inputs:
                 mesh = gc.load_mesh(path)
                 vertices, faces = mesh.vertices, mesh.faces
                 for way in ways:
-                    vertices, faces = REFINED[way](vertices, faces)
+                    vertices, corners = REFINED[way](vertices, faces)
+                    faces = corners.astype(np.int32)
                 yield name, vertices, faces
             else:
                 print(f"{name}: not in the meshes folder, left out")

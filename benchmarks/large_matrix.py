@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Callable
 from functools import partial
 from typing import get_args
 
@@ -10,7 +11,6 @@ import numpy as np
 import geodesic_core as gc
 from benchmarks.inputs import Inputs
 from benchmarks.tables import Section, rated
-from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
 from geodesic_core.search.plan import Plan
 from geodesic_core.search.rows import Method, Rows, rows_of
@@ -47,7 +47,7 @@ def run(_inputs: Inputs, _runs: int) -> Section:
     mesh, cores = cortex(), available_cores()
     points = [mesh.point(i) for i in range(len(mesh.vertices))]
     plan = Plan.of(mesh, points, None, Control(), in_order=False)
-    sweeps = np.arange(0, plan.sweeps, EVERY)
+    sweeps = range(0, plan.sweeps, EVERY)
 
     rows = []
     for name in get_args(Method):
@@ -84,9 +84,9 @@ def run(_inputs: Inputs, _runs: int) -> Section:
     )
 
 
-def _seconds(plan: Plan, sweeps: Floats, make: object, threads: int) -> float:
+def _seconds(plan: Plan, sweeps: range, make: Callable[[], Rows], threads: int) -> float:
     def work(rows: Rows, part: int, control: Control) -> None:
-        sweep = int(sweeps[part])
+        sweep = sweeps[part]
         rows.distances(sweep, plan.targets_of(sweep), control)
 
     workers = [partial(work, make()) for _ in range(threads)]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 from benchmarks.inputs import Inputs
 from benchmarks.serving import Client, serving
@@ -20,7 +20,7 @@ from benchmarks.tables import Section, rated
 NAME = "horse97k.ply"
 TARGETS = 200
 TURN_S = 5.0
-SIZE = {"width": 800, "height": 600}
+SIZE: ViewportSize = {"width": 800, "height": 600}
 FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 PICTURE_S, TASK_MS, HTTP_RATE, PAGE_RATE = 3.0, 50.0, 30.0, 15.0
 
@@ -161,7 +161,8 @@ def _follow(page: Page, address: str, body: bytes) -> float:
     page.wait_for_selector("#legend:visible")
     page.wait_for_selector("html[data-state=ready]")
     image = np.asarray(Image.open(BytesIO(page.screenshot())).convert("RGB"), int)
-    box = page.locator("#canvas").bounding_box() or {}
+    box = page.locator("#canvas").bounding_box()
+    assert box is not None, "it is visible"  # noqa: S101
     rows, columns = np.nonzero(np.ptp(image, axis=2) > 45)  # the mesh, by its colours
     inside = (columns > box["x"] + 200) & (rows < SIZE["height"] - 120)
     chosen = Random(1).sample(  # noqa: S311

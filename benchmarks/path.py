@@ -310,7 +310,7 @@ def _add_landmarks(solver: gc.Solver, far: Iterator[Pair]) -> list[float]:
     seconds = []
     for pair in far:
         seconds.append(timed(partial(solver.shortest_path, *pair))[0])
-        if solver._search._landmarks.count == LANDMARKS:  # nobody else needs to know
+        if solver._shared_search()._landmarks.count == LANDMARKS:  # nobody else needs to know
             break
     return seconds
 

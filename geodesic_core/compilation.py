@@ -8,18 +8,20 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from geodesic_core import samples
-from geodesic_core.errors import Cancelled, InternalError
+from geodesic_core.control import Control
+from geodesic_core.errors import InternalError, InvalidArgument
 from geodesic_core.kernels.jit import cache, machine, progress
 from geodesic_core.mesh.curve import Curve
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.threads import available_cores
 from geodesic_core.solvers import Solver, approximate_distance, exact_distance, fast_distance
+from geodesic_core.validation import check_choice
 
 _POLL_S = 0.1
 _INSIDE = SurfacePoint.face(0, (0.2, 0.3, 0.5))
@@ -115,6 +117,8 @@ def compile_kernels(
 
     Raises
     ------
+    InvalidArgument
+        A kind of call is unknown, or ``cancel`` cannot be called.
     Cancelled
         ``cancel`` returned True. Kernels that were finished are in the cache.
     InternalError
@@ -130,20 +134,21 @@ def compile_kernels(
     --------
     >>> gc.compile_kernels(["exact"])
     """
-    waiting = [name for name in workloads or WORKLOADS if not cache.is_complete(name)]
+    names, control = _checked(workloads), Control(cancel=cancel)
+    waiting = [name for name in names if not cache.is_complete(name)]
     if not waiting or not cache.is_in_use():
         return
     if getattr(sys, "frozen", False):  # an application without an interpreter to start
         run_shared(waiting)
         return
-    _stop_if_asked(cancel)
+    control.checkpoint(0.0)
     running: list[subprocess.Popen[bytes]] = []
     try:
         with progress.shown(cache.folder_for(machine.best_target())):
             running += [_start(waiting) for _ in range(min(available_cores(), len(waiting)))]
             while running:
                 time.sleep(_POLL_S)
-                _stop_if_asked(cancel)
+                control.checkpoint(sum(map(cache.is_complete, waiting)) / len(waiting))
                 for process in [each for each in running if each.poll() is not None]:
                     running.remove(process)
                     if process.returncode:
@@ -156,9 +161,23 @@ def compile_kernels(
             process.wait()
 
 
-def _stop_if_asked(cancel: Callable[[], bool] | None) -> None:
-    if cancel is not None and cancel():
-        raise Cancelled
+def _checked(workloads: Sequence[str] | None) -> Sequence[str]:
+    """Return the names of workloads, all of them for None.
+
+    Raises
+    ------
+    InvalidArgument
+        They are no names of workloads.
+    """
+    names = list(WORKLOADS)
+    if workloads is None:
+        return names
+    if isinstance(workloads, str) or not isinstance(workloads, Iterable):
+        raise InvalidArgument(f"workloads is {workloads!r}; it must be a sequence of names")
+    chosen = list(workloads)
+    for name in chosen:
+        check_choice("workload", name, names)
+    return chosen
 
 
 def warm_up(workloads: Sequence[str] | None = None) -> None:
@@ -173,6 +192,8 @@ def warm_up(workloads: Sequence[str] | None = None) -> None:
 
     Raises
     ------
+    InvalidArgument
+        A kind of call is unknown.
     InternalError
         A compiling process failed; its message is on standard error.
 
@@ -180,8 +201,9 @@ def warm_up(workloads: Sequence[str] | None = None) -> None:
     --------
     >>> gc.warm_up(["exact"])
     """
-    compile_kernels(workloads)
-    for name in workloads or WORKLOADS:
+    names = _checked(workloads)
+    compile_kernels(names)
+    for name in names:
         run(name)
 
 

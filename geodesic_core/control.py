@@ -53,7 +53,7 @@ class Control:
     Raises
     ------
     InvalidArgument
-        The deadline or the limit is not a number above 0.
+        The deadline or the limit is not a number above 0, or one of the others cannot be called.
 
     Examples
     --------
@@ -80,6 +80,10 @@ class Control:
     """Numbers of the items that the call watches, from 1"""
 
     def __post_init__(self) -> None:
+        for name in ("progress", "cancel"):
+            value = getattr(self, name)
+            if value is not None and not callable(value):
+                raise InvalidArgument(f"{name} is {value!r}; it must be a function")
         for name in ("deadline_s", "memory_limit"):
             value = getattr(self, name)
             if value is not None and (not is_number(value) or not value > 0):

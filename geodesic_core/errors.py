@@ -15,7 +15,8 @@ They form a tree::
     └── InternalError           a broken invariant: a defect of this library, please report it
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 
 class GeodesicError(Exception):
@@ -30,6 +31,18 @@ class GeodesicError(Exception):
     ...     print(error)
     the source 0 is vertex 7, but vertices are numbered 0 to 3
     """
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle what the error holds, since constructors differ."""
+        return _rebuilt, (type(self), self.args, self.__dict__)
+
+
+def _rebuilt(
+    kind: type[GeodesicError], args: tuple[Any, ...], attributes: Mapping[str, Any]
+) -> GeodesicError:
+    error = kind.__new__(kind, *args)
+    error.__dict__.update(attributes)
+    return error
 
 
 class InvalidMesh(GeodesicError):  # noqa: N818 - the contract's names read as the refusal itself

@@ -28,6 +28,7 @@ from geodesic_core.fields.sources import (
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
+from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.curve import Polyline
 from geodesic_core.mesh.surface_point import Point, Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -38,7 +39,7 @@ from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.rows import Method, Solve
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
-from geodesic_core.validation import as_barriers, as_limit, check_choice, is_number
+from geodesic_core.validation import as_limit, check_choice, is_index, is_number
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -124,7 +125,7 @@ def exact_distance(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     bounds = exact_bounds(as_limit(max_distance))
-    mesh, control = _with_barriers(as_mesh(mesh), barriers, control)
+    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
     return _solve(mesh, sources, targets, bounds, EXACT, retain, control)
 
 
@@ -193,7 +194,7 @@ def approximate_distance(
     control = Control(progress, cancel, deadline_s, memory_limit)
     errors = _as_errors(relative_error, absolute_error)
     limit = as_limit(max_distance)
-    mesh, control = _with_barriers(as_mesh(mesh), barriers, control)
+    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
     return _solve_within(mesh, sources, targets, limit, retain, control, errors=errors)
 
 
@@ -260,7 +261,7 @@ def fast_distance(
     places = _as_effort(effort)
     check_choice("retain", retain, ("distances", "paths"))
     limit = as_limit(max_distance)
-    mesh, control = _with_barriers(as_mesh(mesh), barriers, control)
+    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
     return _solve_fast(mesh, sources, targets, limit, retain, control, effort=places)
 
 
@@ -320,6 +321,7 @@ def shortest_path(
     waypoints: Points = (),
     max_distance: float | None = None,
     *,
+    barriers: Iterable[int] = (),
     explain: bool = False,
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
@@ -341,6 +343,8 @@ def shortest_path(
     max_distance
         Largest length of the path past all waypoints, mesh units; None for no limit. The search
         ends once it is certain that every path is longer.
+    barriers
+        As in `exact_distance`.
     explain
         Also record the steps of the search, in `GeodesicPath.steps`.
     progress, cancel, deadline_s, memory_limit
@@ -376,9 +380,9 @@ def shortest_path(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     limit = as_limit(max_distance)
-    surface = as_mesh(mesh)
-    stops = _as_stops(surface, source, target, waypoints, control)
-    return _shortest_through(PathSearch(surface), stops, limit, control, explain=explain)
+    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
+    stops = _as_stops(mesh, source, target, waypoints, control)
+    return _shortest_through(PathSearch(mesh), stops, limit, control, explain=explain)
 
 
 def distance_matrix(
@@ -392,6 +396,7 @@ def distance_matrix(
     relative_error: float | None = 1e-3,
     absolute_error: float | None = None,
     effort: Effort = 2,
+    barriers: Iterable[int] = (),
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
@@ -419,6 +424,8 @@ def distance_matrix(
         error bound.
     relative_error, absolute_error, effort
         For the method that takes them.
+    barriers
+        As in `exact_distance`.
     threads
         Largest number of threads; None for one per core that the process may use.
     progress, cancel, deadline_s, memory_limit
@@ -460,12 +467,10 @@ def distance_matrix(
     [[1.0, 1.0, 1.414]]
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    surface = as_mesh(mesh)
-    solve = row_solver(surface, method, relative_error, absolute_error, effort)
-    make = partial(TargetSweep, surface), partial(PathSearch, surface)
-    return find_matrix(
-        surface, solve, *make, sources, targets, max_distance, layout, threads, control
-    )
+    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
+    solve = row_solver(mesh, method, relative_error, absolute_error, effort)
+    make = partial(TargetSweep, mesh), partial(PathSearch, mesh)
+    return find_matrix(mesh, solve, *make, sources, targets, max_distance, layout, threads, control)
 
 
 class Solver:
@@ -474,7 +479,8 @@ class Solver:
     Paths need scratch memory, about two thirds of the mesh's own arrays, and get faster with
     landmarks, which are added as searches go on (64 bytes a vertex). Matrices and nearest
     candidates need a third. Threads may share a solver: calls that use its memory wait for each
-    other.
+    other. A call with barriers does without both; for several with the same ones, make a solver of
+    `TriangleMesh.with_barriers`.
 
     Parameters
     ----------
@@ -673,6 +679,7 @@ class Solver:
         waypoints: Points = (),
         max_distance: float | None = None,
         *,
+        barriers: Iterable[int] = (),
         explain: bool = False,
         progress: Callable[[float], None] | None = None,
         cancel: Callable[[], bool] | None = None,
@@ -686,7 +693,7 @@ class Solver:
 
         Parameters
         ----------
-        source, target, waypoints, max_distance, explain
+        source, target, waypoints, max_distance, barriers, explain
             As in the function `shortest_path`.
         progress, cancel, deadline_s, memory_limit
             See `Control`.
@@ -709,9 +716,10 @@ class Solver:
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
         limit = as_limit(max_distance)
-        stops = _as_stops(self.mesh, source, target, waypoints, control)
-        with self._lock.held(control):
-            search = self._shared_search()
+        solver, control = self._with_barriers(barriers, control)
+        stops = _as_stops(solver.mesh, source, target, waypoints, control)
+        with solver._lock.held(control):
+            search = solver._shared_search()
             path = _shortest_through(search, stops, limit, control, explain=explain)
             search.add_landmark_if_due(stops[0], replace(control, progress=None))
             return path
@@ -727,6 +735,7 @@ class Solver:
         relative_error: float | None = 1e-3,
         absolute_error: float | None = None,
         effort: Effort = 2,
+        barriers: Iterable[int] = (),
         threads: int | None = None,
         progress: Callable[[float], None] | None = None,
         cancel: Callable[[], bool] | None = None,
@@ -741,7 +750,7 @@ class Solver:
         ----------
         sources, targets, max_distance, layout, method, relative_error, absolute_error, effort
             As in the function `distance_matrix`.
-        threads
+        barriers, threads
             As in the function `distance_matrix`.
         progress, cancel, deadline_s, memory_limit
             See `Control`.
@@ -764,11 +773,12 @@ class Solver:
         [[1.0, 1.414], [1.414, 1.0]]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        solve = row_solver(self.mesh, method, relative_error, absolute_error, effort)
-        shared = self._shared_sweep, self._shared_search
-        with self._lock.held(control):
+        solver, control = self._with_barriers(barriers, control)
+        mesh, shared = solver.mesh, (solver._shared_sweep, solver._shared_search)
+        solve = row_solver(mesh, method, relative_error, absolute_error, effort)
+        with solver._lock.held(control):
             return find_matrix(
-                self.mesh, solve, *shared, sources, targets, max_distance, layout, threads, control
+                mesh, solve, *shared, sources, targets, max_distance, layout, threads, control
             )
 
     def nearest(
@@ -778,6 +788,7 @@ class Solver:
         k: int = 1,
         max_distance: float | None = None,
         *,
+        barriers: Iterable[int] = (),
         progress: Callable[[float], None] | None = None,
         cancel: Callable[[], bool] | None = None,
         deadline_s: float | None = None,
@@ -789,7 +800,7 @@ class Solver:
 
         Parameters
         ----------
-        source, candidates, k, max_distance
+        source, candidates, k, max_distance, barriers
             As in the function `nearest`.
         progress, cancel, deadline_s, memory_limit
             See `Control`.
@@ -811,10 +822,16 @@ class Solver:
         [1, 0]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        with self._lock.held(control):
+        solver, control = self._with_barriers(barriers, control)
+        with solver._lock.held(control):
             return find_nearest(
-                self.mesh, self._shared_sweep, source, candidates, k, max_distance, control
+                solver.mesh, solver._shared_sweep, source, candidates, k, max_distance, control
             )
+
+    def _with_barriers(self, barriers: Iterable[int], control: Control) -> tuple["Solver", Control]:
+        """Return a solver of the mesh with the barriers of a call, itself where there are none."""
+        mesh, control = with_barriers(self.mesh, barriers, control)
+        return (self if mesh is self.mesh else Solver(mesh)), control
 
     def _shared_search(self) -> PathSearch:
         if self._search is None:
@@ -874,19 +891,6 @@ def kernel_digest() -> str:
     True
     """
     return sources_digest()
-
-
-def _with_barriers(
-    mesh: TriangleMesh, barriers: Iterable[int], control: Control
-) -> tuple[TriangleMesh, Control]:
-    """Return the mesh with its barriers, and the control of a call that holds what that takes."""
-    faces = as_barriers(barriers, len(mesh.faces))
-    if len(faces) == 0:
-        return mesh, control
-    control = control.holding(sum(array.nbytes for array in mesh.topology))
-    control.check_memory(0)
-    control.checkpoint(0.0)
-    return mesh.with_barriers(faces), control
 
 
 def row_solver(
@@ -1046,6 +1050,6 @@ def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, f
 
 
 def _as_effort(effort: Effort) -> int:
-    if not is_number(effort) or effort not in get_args(Effort):
+    if not is_index(effort) or effort not in get_args(Effort):
         raise InvalidArgument(f"effort is {effort!r}; it must be 1, 2, 4 or 8")
     return int(effort)

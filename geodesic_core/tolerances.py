@@ -213,6 +213,12 @@ Half a step of `EDGE_STEPS`, so that a point near a vertex has one spelling ther
 WEIGHT_ERROR = 1e-9
 """How far barycentric weights may be below zero, or their sum from one: written with ten digits."""
 
+ROUNDED_SUM = 2.0**-50
+"""By how much the sum of three barycentric weights may differ from one: a few roundings.
+
+Weights that are divided by such a sum would change each time that a point is made canonical.
+"""
+
 EDGE_STEPS = 2.0**40
 """Into how many steps an edge is divided, to tell the points on it apart.
 
@@ -255,6 +261,12 @@ CROSSING = 1e-11
 
 PIECE = 1e-9
 """Share of a level below which a piece of its isoline is left out: rounding, at ends of arcs."""
+
+FINEST_CHORD = 1e-9
+"""Share of the bounding box's diagonal that a chord error must have at least.
+
+The number of points of a line grows with the inverse of the error's root.
+"""
 
 LARGEST_COORDINATE = 1e50
 """Mesh units up to which a coordinate may be: sixth powers of lengths do not overflow."""

@@ -1,6 +1,7 @@
 """Validation of arguments."""
 
 import math
+import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -11,13 +12,20 @@ from geodesic_core.errors import InvalidArgument
 
 
 def is_number(value: Any) -> bool:
-    """Tell whether a value is a real number, and not a truth value."""
-    return isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    """Tell whether a value is a real number that a float can hold, and not a truth value."""
+    if isinstance(value, int):
+        return not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    return isinstance(value, float | np.floating | np.integer)
 
 
 def is_index(value: Any) -> bool:
     """Tell whether a value is an integer, and not a truth value."""
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def unboxed(value: Any) -> Any:
+    """Return the value in an array of no dimensions, and anything else as it is."""
+    return value[()] if isinstance(value, np.ndarray) and value.ndim == 0 else value
 
 
 def as_limit(max_distance: float | None) -> float:
@@ -57,6 +65,7 @@ def as_barriers(barriers: Any, face_count: int) -> Longs:
         They are not integers from 0 to ``face_count`` - 1. A mask is refused: as a list it could
         not be told from ids.
     """
+    barriers = unboxed(barriers)
     if isinstance(barriers, str | bytes) or not isinstance(barriers, Iterable):
         raise InvalidArgument(f"barriers is {barriers!r}; it must be a sequence of face ids")
     if isinstance(barriers, np.ndarray) and barriers.dtype.kind in "iu" and barriers.ndim == 1:

@@ -1,14 +1,15 @@
-"""Arguments of several commands, and their parsers."""
+"""Arguments of several commands."""
 
 import math
-import re
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, get_args
 
 import typer
+
+from app.cli.barriers import BlockedFaces
+from app.cli.points import Point, PointOrCurve
 
 
 class Merge(StrEnum):
@@ -56,114 +57,6 @@ class SampleName(StrEnum):
     TERRAIN = "terrain"
     OBSTACLES = "obstacles"
     PLANE = "plane"
-
-
-@dataclass(frozen=True)
-class Point:
-    """A point of the mesh, as it was written and as it was parsed."""
-
-    text: str
-    point: Any
-
-    @classmethod
-    def parse(cls, text: str) -> "Point":
-        """Return the point that an option names."""
-        from app.queries.point_text import parse
-
-        try:
-            return cls(text, parse(text))
-        except ValueError as error:
-            raise typer.BadParameter(str(error)) from None
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the point as a member of a request."""
-        return dict(vars(self.point))
-
-
-@dataclass(frozen=True)
-class PointOrCurve:
-    """A point, or the points of a curve, as they were written."""
-
-    points: Sequence[Point]
-
-    @classmethod
-    def parse(cls, text: str) -> "PointOrCurve":
-        """Return the point or the curve that an option names."""
-        return cls([Point.parse(part) for part in text.split("/")])
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the point or the curve as a member of a request."""
-        parts = [point.as_json() for point in self.points]
-        return parts[0] if len(parts) == 1 else {"polyline": parts}
-
-
-@dataclass(frozen=True)
-class Position:
-    """A position in space, as it was written and as it was parsed."""
-
-    text: str
-    coordinates: tuple[float, float, float]
-
-    @classmethod
-    def parse(cls, text: str) -> "Position":
-        """Return the position that an option names."""
-        try:
-            return cls(text, Point.parse(f"p{text}").point.position)
-        except typer.BadParameter:
-            raise typer.BadParameter(f"{text!r} is not a position: write it as x,y,z") from None
-
-    def as_json(self) -> tuple[float, float, float]:
-        """Return the position as a member of a request."""
-        return self.coordinates
-
-
-@dataclass(frozen=True)
-class BlockedFaces:
-    """The faces that an option lists, or those in a label of the surface."""
-
-    listed: Sequence[int] = ()
-    file: Path | None = None
-    """Of the label"""
-    label: str | None = None
-    """The one of several in a file"""
-
-    @classmethod
-    def parse(cls, text: str) -> "BlockedFaces":
-        """Return the faces that an option lists, those of ``@FILE``, or those in a label there."""
-        label = _LABEL.fullmatch(text)
-        return cls(faces(text)) if label is None else cls((), Path(label[1]), label[2])
-
-    def of(self, mesh: Any) -> Sequence[int]:
-        """Return the faces, of a mesh."""
-        if self.file is None:
-            return self.listed
-        from geodesic_core import load_label
-
-        found: Sequence[int] = load_label(self.file, mesh, self.label).tolist()
-        return found
-
-
-_LABEL = re.compile(r"@(.+(?:\.label|\.gii))(?:=(.+))?")
-
-
-def faces(text: str) -> Sequence[int]:
-    """Return the faces that an option lists, or those of ``@FILE``, one or more a line."""
-    if text.startswith("@"):
-        try:
-            lines = Path(text[1:]).read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError) as error:
-            raise typer.BadParameter(f"cannot read {text[1:]}: {error}") from None
-        return [face for line in lines if line.strip() for face in faces(line.strip())]
-    if not _FACES.fullmatch(text):
-        raise typer.BadParameter(f"{text!r} is not a list of faces: write it as 3,7,40-59")
-    found: list[int] = []
-    for part in text.split(","):
-        first, _, last = part.partition("-")
-        found += range(int(first), int(last or first) + 1)
-    return found
-
-
-_FACES = re.compile(r"[0-9]{1,9}(-[0-9]{1,9})?(,[0-9]{1,9}(-[0-9]{1,9})?)*")
 
 
 def effort(text: str) -> int:
@@ -317,3 +210,8 @@ def accuracy(
             option = "--" + name.replace("_", "-")
             raise typer.BadParameter(f"{option} goes with --method {needed} only")
     return {"method": method.value, **{name: value for name, (value, _) in given.items()}}
+
+
+def limits(max_distance: float | None, barriers: BlockedFaces | None) -> dict[str, Any]:
+    """Return the members of a request that state where paths may go."""
+    return {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}

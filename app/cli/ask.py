@@ -5,7 +5,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from app.cli.arguments import BlockedFaces, Merge, Point, PointOrCurve, Position
+from app.cli.arguments import Merge
+from app.cli.barriers import BlockedFaces
+from app.cli.points import Point, PointOrCurve, Position
 from app.cli.steps import Failure, read, showing
 from app.cli.words import words_of
 

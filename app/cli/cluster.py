@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from threading import Event
 from types import FrameType
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -51,7 +51,7 @@ def head(
     from app.engine.ray_node import running_head
 
     with _failing_clearly(), running_head(host, port, folder, settings) as running:
-        typer.echo(f"the head listens at {host}:{port}; {running.records.told}")
+        typer.echo(f"the head listens at {host}:{port}; {running.records.durability}")
         stopped = _stopped()
         while not stopped.wait(_LOOK_S):
             running.check()
@@ -59,40 +59,55 @@ def head(
 
 def node(folder: Folder, address: Address = None, store: Store = None) -> None:
     """Make this machine a host of a cluster until interrupted; it then finishes running work."""
-    settings = read_settings(address=address, store=store)
-    if isinstance(settings.store, Path):
-        settings = settings.model_copy(update={"store": settings.store.resolve()})
-    else:
-        settings = settings.model_copy(update={"copies": (folder / "copies").resolve()})
+    settings = _with_whole_paths(read_settings(address=address, store=store), folder)
     from app.engine.ray_cluster import start_host
     from app.engine.ray_node import joined
-    from app.store.layout import StoreError
-    from app.store.opening import store_of
 
-    try:
-        store_id = store_of(settings).identity()
-    except StoreError as error:
-        raise Failure(str(error)) from error
-    with _failing_clearly(), joined(folder, settings) as ray:
-        import ray as client
+    store_id = _identity_of_store(settings)
+    with _failing_clearly(), joined(folder, settings) as processes:
+        import ray
 
         host = start_host(settings, store_id)
         try:
-            client.get(host.beat.remote([]))
-        except client.exceptions.RayError as error:
+            ray.get(host.beat.remote([]))
+        except ray.exceptions.RayError as error:
             raise Failure(f"the host does not start: {error}; see its logs in {folder}") from error
         typer.echo(f"host of the cluster at {settings.address}, with {settings.workers} workers")
         stopped = _stopped()
         while not stopped.wait(_LOOK_S):
-            ray.check()
+            processes.check()
         typer.echo("draining")
         stopped.clear()  # a second signal ends the time that running work gets
-        draining, end = host.drain.remote(), time.monotonic() + settings.drain_s
-        while time.monotonic() < end and not stopped.is_set():
-            if client.wait([draining], timeout=_LOOK_S)[0]:
-                break
-        with suppress(client.exceptions.RayError):  # it has ended by itself
-            client.get(host.close.remote())
+        _drain(host, settings.drain_s, stopped)
+
+
+def _with_whole_paths(settings: "Settings", folder: Path) -> "Settings":
+    """Return the settings of a node with paths that hold in any folder; copies go into its own."""
+    if isinstance(settings.store, Path):
+        return settings.model_copy(update={"store": settings.store.resolve()})
+    return settings.model_copy(update={"copies": (folder / "copies").resolve()})
+
+
+def _identity_of_store(settings: "Settings") -> str:
+    from app.store.choice import store_of
+    from app.store.layout import StoreError
+
+    try:
+        return store_of(settings).identity()
+    except StoreError as error:
+        raise Failure(str(error)) from error
+
+
+def _drain(host: Any, seconds: float, stopped: Event) -> None:
+    """Let a host finish its running work, for some seconds or until stopped, and end it."""
+    import ray
+
+    draining, end = host.drain.remote(), time.monotonic() + seconds
+    while time.monotonic() < end and not stopped.is_set():
+        if ray.wait([draining], timeout=_LOOK_S)[0]:
+            break
+    with suppress(ray.exceptions.RayError):  # it has ended by itself
+        ray.get(host.close.remote())
 
 
 @contextmanager

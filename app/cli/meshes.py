@@ -16,6 +16,7 @@ from app.cli.arguments import (
 )
 from app.cli.output import AsJson, Output, print_json, print_parts
 from app.cli.steps import read
+from app.cli.summary import print_size
 from app.cli.words import with_options
 
 
@@ -63,7 +64,7 @@ def sample(
         sizes = {"vertices": len(mesh.vertices), "faces": len(mesh.faces)}
         print_json({**sizes, "written": str(out)})
         return
-    output.say(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
+    print_size(output, mesh)
     output.say_written()
 
 

@@ -11,7 +11,6 @@ import typer
 from app.cli.arguments import (
     AbsoluteError,
     Barriers,
-    BlockedFaces,
     BoundedMethod,
     BoundedMethodOption,
     EffortOption,
@@ -21,25 +20,25 @@ from app.cli.arguments import (
     MeshFile,
     Method,
     MethodOption,
-    Point,
     PointOrCurveSource,
     PointOrCurveSources,
-    Position,
     RelativeError,
     Source,
     Targets,
     accuracy,
+    limits,
     writable,
 )
-from app.cli.ask import Answered, WrittenMembers, ask
+from app.cli.ask import WrittenMembers, ask
 from app.cli.output import AsJson, Output
+from app.cli.points import Point, Position
 from app.cli.steps import Failure
+from app.cli.summary import bound_in_words, print_bound, print_end, print_seconds, print_size
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
     from app.encoding import Answer
-    from geodesic_core import TriangleMesh
 
 LINES = ".obj", ".csv", ".svg", ".geojson", ".json"
 """Suffixes of files that hold lines."""
@@ -96,7 +95,7 @@ def distance(
     output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error, effort)
     members["include"] = ["nearest_source", *(["gradient"] if gradient else [])]
-    members |= {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}
+    members |= limits(max_distance, barriers)
     points: WrittenMembers = {"sources": source}
     answered = ask("distances", mesh_file, merge, "Computing distances", points, members)
     import numpy as np
@@ -112,7 +111,7 @@ def distance(
     print_size(output, answered.mesh)
     output.say(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
     output.say(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
-    output.say(f"error bound {bound_in_words(found['error_bound'])}")
+    print_bound(output, found["error_bound"])
     print_end(output, answered)
 
 
@@ -158,11 +157,7 @@ def path(
     if method is not Method.EXACT and (via or explain):
         name = "--via" if via else "--explain"
         raise typer.BadParameter(f"{name} goes with --method exact only")
-    members |= {
-        "max_distance": max_distance,
-        "explain": explain,
-        "barriers": barriers or BlockedFaces(),
-    }
+    members |= {"explain": explain} | limits(max_distance, barriers)
     points: WrittenMembers = {"source": source, "target": target, "waypoints": via or []}
     answered = ask("path", mesh_file, merge, "Computing the path", points, members)
     found = answered.answer.members
@@ -172,13 +167,9 @@ def path(
     print_size(output, answered.mesh)
     output.say(f"length      {found['length']!r}")
     output.say(f"points      {len(found['points'])}")
-    output.say(f"error bound {bound_in_words(found['error_bound'])}")
-    _print_seconds(output, answered)
-    for step in found.get("steps", ()):
-        output.say(
-            f"leg {step.leg}, {step.name:12} {1e3 * step.seconds:8.2f} ms, bound {step.bound!r}, "
-            f"{step.windows} windows, {len(step.faces)} faces"
-        )
+    print_bound(output, found["error_bound"])
+    print_seconds(output, answered)
+    _print_steps(output, found.get("steps", ()))
     output.say_written()
 
 
@@ -206,7 +197,7 @@ def paths(
     """Compute shortest paths from one point to several others, in one sweep."""
     output = Output(out, as_json)
     members = accuracy(method, relative_error, absolute_error, effort)
-    members |= {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}
+    members |= limits(max_distance, barriers)
     points: WrittenMembers = {"source": source, "targets": target}
     answered = ask("paths", mesh_file, merge, "Computing the paths", points, members)
     output.write(answered.answer)
@@ -247,22 +238,20 @@ def isolines(
     if (count is None) == (level is None):
         raise typer.BadParameter("give --count, or --level at least once, and not both")
     members |= {"levels": level, "count": count, "chord_error": chord_error}
-    members |= {"max_distance": max_distance, "barriers": barriers or BlockedFaces()}
+    members |= limits(max_distance, barriers)
     points: WrittenMembers = {"sources": source}
     answered = ask("isolines", mesh_file, merge, "Drawing isolines", points, members)
     output.write(answered.answer)
     print_size(output, answered.mesh)
     for each in answered.answer.members["isolines"]:
         lines = each["lines"]
-        closed, length = (
-            sum(line["closed"] for line in lines),
-            sum(line["length"] for line in lines),
-        )
+        closed = sum(line["closed"] for line in lines)
+        length = sum(line["length"] for line in lines)
         output.say(
             f"level       {each['level']!r}: {closed} closed, {len(lines) - closed} open, "
             f"{float(length)!r} long"
         )
-    output.say(f"error bound {bound_in_words(answered.answer.members['error_bound'])}")
+    print_bound(output, answered.answer.members["error_bound"])
     print_end(output, answered)
 
 
@@ -278,11 +267,7 @@ def borders(
 ) -> None:
     """Draw the borders between the parts of the surface that are nearest to each source."""
     output = Output(out, as_json)
-    members = {
-        "chord_error": chord_error,
-        "max_distance": max_distance,
-        "barriers": barriers or BlockedFaces(),
-    }
+    members = {"chord_error": chord_error} | limits(max_distance, barriers)
     points: WrittenMembers = {"sources": source}
     answered = ask("borders", mesh_file, merge, "Drawing borders", points, members)
     output.write(answered.answer)
@@ -314,7 +299,7 @@ def nearest(
     output = Output(out, as_json)
     if k > len(candidate):
         raise typer.BadParameter(f"-k is {k}, but there are only {len(candidate)} candidates")
-    members = {"k": k, "max_distance": max_distance, "barriers": barriers or BlockedFaces()}
+    members = {"k": k} | limits(max_distance, barriers)
     points: WrittenMembers = {"source": source, "candidates": candidate}
     answered = ask("nearest", mesh_file, merge, "Looking for the nearest", points, members)
     found = answered.answer.members["nearest"]
@@ -347,6 +332,15 @@ def locate(
     output.say_written()
 
 
+def _print_steps(output: Output, steps: "Iterable[Any]") -> None:
+    """Print what each step of a search has found."""
+    for step in steps:
+        output.say(
+            f"leg {step.leg}, {step.name:12} {1e3 * step.seconds:8.2f} ms, bound {step.bound!r}, "
+            f"{step.windows} windows, {len(step.faces)} faces"
+        )
+
+
 _NO_PATH = {
     "disconnected": "there is no path: the points are in different connected components",
     "beyond_max_distance": "there is no path within --max-distance {limit:g}",
@@ -357,27 +351,6 @@ def _array(array: Any) -> "Answer":
     from app.encoding import Answer
 
     return Answer({"array": array}, ("array",))
-
-
-def print_size(output: Output, mesh: "TriangleMesh") -> None:
-    """Print the size of the mesh."""
-    output.say(f"mesh        {len(mesh.vertices)} vertices, {len(mesh.faces)} faces")
-
-
-def _print_seconds(output: Output, answered: Answered) -> None:
-    read, solve = answered.read_seconds, answered.solve_seconds
-    output.say(f"took        {read:.3f} s to read, {solve:.3f} s to solve")
-
-
-def print_end(output: Output, answered: Answered) -> None:
-    """Print the seconds that a query took, and where its answer is."""
-    _print_seconds(output, answered)
-    output.say_written()
-
-
-def bound_in_words(bound: "Mapping[str, Any]") -> str:
-    """Return an error bound, as the lines of commands state it."""
-    return f"{bound['value']!r} ({bound['type']}, {bound['kind']})"
 
 
 def _as_option(point: "Mapping[str, Any]") -> str:

@@ -1,36 +1,23 @@
-"""Matrices that a service computes, on all machines of its cluster if it has one."""
+"""Matrices of any size that a service computes, on all machines of its cluster if it has one."""
 
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import asdict
 from hashlib import file_digest
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from app.cli.steps import Failure, showing
+from app.cli.matrix_file import Wanted, Written
+from app.cli.steps import Failure, Step, showing
 
 if TYPE_CHECKING:
-    from geodesic_client import StoredMatrix
+    from geodesic_client import Client, StoredMatrix
 
-    from geodesic_core import SurfacePoint, TriangleMesh
-
-    Points = Sequence[SurfacePoint] | Literal["all"]
+    from app.cli.point_file import Points
 
 
-def write_matrix(
-    service: str,
-    mesh: "TriangleMesh",
-    out: Path,
-    sources: "Points",
-    targets: "Points",
-    *,
-    accuracy: Mapping[str, Any],
-    max_distance: float | None,
-    barriers: Sequence[int],
-    dtype: Literal["float64", "float32"],
-) -> "tuple[StoredMatrix, str]":
-    """Have the service at a URL compute a matrix, and write it; return it, and its SHA-256.
+def write_matrix(wanted: Wanted, service: str) -> Written:
+    """Have the service at a URL compute a matrix, and write it.
 
     The same command goes on where it was, both in the computation and in the transfer. Raises
     `Failure` where the service refuses or does not answer.
@@ -44,42 +31,56 @@ def write_matrix(
 
     try:
         with Client(service, api_key=os.environ.get(SERVICE_KEY_VARIABLE)) as client:
-            with showing("Sending the mesh") as step:
-                stored = client.upload((mesh.vertices, mesh.faces), progress=_watched(step))
-            with showing(f"Computing the matrix at {service}") as step:
-                matrix = client.store_matrix(
-                    stored,
-                    _written(sources),
-                    _written(targets),
-                    **accuracy,
-                    layout="sparse" if out.suffix.lower() == ".npz" else "dense",
-                    max_distance=max_distance,
-                    barriers=barriers,
-                    dtype=dtype,
-                    progress=_watched(step),
-                )
+            mesh_id, matrix = _computed(client, wanted, service)
             with showing("Receiving the matrix") as step:
-                client.save_matrix(matrix, out, progress=_watched(step))
+                client.save_matrix(matrix, wanted.out, progress=_watched(step))
             client.dismiss_job(matrix.job_id)  # makes room there
     except GeodesicClientError as error:
         raise Failure(str(error)) from None
-    with out.open("rb") as file:
+    with wanted.out.open("rb") as file:
         checksum = file_digest(file, "sha256").hexdigest()
+    written = Written(matrix.shape, asdict(matrix.error_bound), checksum)
+    _write_facts(wanted, written, service, mesh_id)
+    return written
+
+
+def _computed(client: "Client", wanted: Wanted, service: str) -> "tuple[str, StoredMatrix]":
+    """Return the id of the mesh at a service, and the matrix there."""
+    mesh = wanted.mesh
+    with showing("Sending the mesh") as step:
+        stored = client.upload((mesh.vertices, mesh.faces), progress=_watched(step))
+    with showing(f"Computing the matrix at {service}") as step:
+        matrix = client.store_matrix(
+            stored,
+            _as_members(wanted.sources),
+            _as_members(wanted.sources if wanted.targets is None else wanted.targets),
+            **wanted.accuracy,
+            layout="sparse" if wanted.out.suffix.lower() == ".npz" else "dense",
+            max_distance=wanted.max_distance,
+            barriers=wanted.barriers,
+            dtype=wanted.dtype,
+            progress=_watched(step),
+        )
+    return stored.id, matrix
+
+
+def _write_facts(wanted: Wanted, written: Written, service: str, mesh_id: str) -> None:
+    """Write beside a matrix what it is, as the library does."""
     facts = {
         "service": service,
-        "mesh": stored.id,
-        "shape": matrix.shape,
-        **accuracy,
-        "error_bound": asdict(matrix.error_bound),
-        "max_distance": max_distance,
-        "dtype": dtype,
-        "sha256": checksum,
+        "mesh": mesh_id,
+        "shape": written.shape,
+        **wanted.accuracy,
+        "error_bound": written.error_bound,
+        "max_distance": wanted.max_distance,
+        "dtype": wanted.dtype,
+        "sha256": written.sha256,
     }
-    out.with_name(f"{out.name}.json").write_text(json.dumps(facts, indent=1) + "\n")
-    return matrix, checksum
+    beside = wanted.out.with_name(f"{wanted.out.name}.json")
+    beside.write_text(json.dumps(facts, indent=1) + "\n")
 
 
-def _watched(step: Any) -> Callable[[float], None]:
+def _watched(step: Step) -> Callable[[float], None]:
     """Return a callback that shows the progress of a step, and ends it at Ctrl-C."""
 
     def note(share: float) -> None:
@@ -90,7 +91,8 @@ def _watched(step: Any) -> Callable[[float], None]:
     return note
 
 
-def _written(points: "Points") -> Any:
+def _as_members(points: "Points") -> Any:
+    """Return points as members of a request."""
     if isinstance(points, str):
         return points
     return [

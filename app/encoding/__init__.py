@@ -7,7 +7,7 @@ so that no answer is in memory as a whole twice.
 
 from app.encoding.answer import Answer, Encoded
 from app.encoding.arrays import array_headers, npy_parts, too_large_for
-from app.encoding.negotiation import negotiate, negotiate_coding
+from app.encoding.negotiation import coding_quality, negotiate, negotiate_coding
 from app.encoding.registry import encode
 from app.encoding.representation import (
     CSV,
@@ -44,6 +44,7 @@ __all__ = [
     "Surface",
     "Table",
     "array_headers",
+    "coding_quality",
     "encode",
     "negotiate",
     "negotiate_coding",

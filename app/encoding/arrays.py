@@ -54,7 +54,7 @@ def to_npz(answer: Answer, dtype: str) -> Encoded:
 def _body(answer: Answer, dtype: str) -> NDArray[Any]:
     array: NDArray[Any] | None = answer.members[answer.arrays[0]]
     if array is None:  # no path: the headers state the reason
-        array = np.empty(0)
+        array = np.empty((0, 3))
     try:
         with np.errstate(over="raise"):
             return np.ascontiguousarray(array, dtype=np.dtype(dtype).newbyteorder("<"))

@@ -14,15 +14,20 @@ _LONGEST = 4096
 
 
 def headers_of(answer: Answer, left_out: Collection[str]) -> dict[str, str]:
-    """Return the small members of an answer, except some, as headers ``Geodesic-…``."""
-    headers = {}
+    """Return the members of an answer, except some, as headers ``Geodesic-…``.
+
+    ``Geodesic-Omitted`` names those that are too long.
+    """
+    headers, omitted = {}, []
     for name, value in answer.members.items():
         if name in left_out:
             continue
         text = value if isinstance(value, str) else _ascii(value)
         if text is not None and len(text) <= _LONGEST:
             headers["Geodesic-" + name.replace("_", "-").title()] = text
-    return headers
+        else:
+            omitted.append(name)
+    return headers | ({"Geodesic-Omitted": ",".join(omitted)} if omitted else {})
 
 
 def _ascii(value: Any) -> str | None:

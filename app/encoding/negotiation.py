@@ -16,23 +16,37 @@ def negotiate(
     """
     if name is not None:
         return FORMATS[name] if FORMATS[name] in offers else None
-    wanted = sorted(_accepted(accept or "*/*"), key=lambda item: -item[1])
-    refused = {media for media, quality in wanted if quality <= 0}
-    for media, quality in wanted:
-        for offered in offers:
-            if quality > 0 and offered not in refused and _matches(media, offered):
-                return offered
-    return None
+    return _best(accept or "*/*", tuple(offers))
+
+
+@lru_cache  # a client sends the same headers with each request
+def _best(accept: str, offers: tuple[str, ...]) -> str | None:
+    """Return the offer of the highest quality; of several, one of the first range that has any."""
+    ranges = _accepted(accept)
+    qualities = {offer: _quality(offer, ranges) for offer in offers}
+    best = max(qualities.values())
+    liked = [offer for offer in offers if qualities[offer] == best > 0]
+    return next((each for media, _ in ranges for each in liked if _matches(media, each)), None)
+
+
+def _quality(offer: str, ranges: Sequence[tuple[str, float]]) -> float:
+    """Return the quality of the most specific range that an offer matches; 0 without one."""
+    matching = [(-media.count("*"), quality) for media, quality in ranges if _matches(media, offer)]
+    return max(matching, default=(0, 0.0))[1]
 
 
 def negotiate_coding(accept_encoding: str | None) -> str | None:
     """Return the content coding for ``Accept-Encoding``: the fastest of those liked best."""
-    qualities = dict(_accepted(accept_encoding or ""))
-    others = qualities.get("*", 0.0)
-    wanted = {coding: qualities.get(coding, others) for coding in CODINGS}
+    wanted = {coding: coding_quality(accept_encoding, coding) for coding in CODINGS}
     best = max(wanted, key=lambda coding: wanted[coding])
-    is_accepted = wanted[best] > 0 and wanted[best] >= qualities.get("identity", 0.0)
-    return best if is_accepted else None
+    plain = dict(_accepted(accept_encoding or "")).get("identity", 0.0)
+    return best if wanted[best] > 0 and wanted[best] >= plain else None
+
+
+def coding_quality(accept_encoding: str | None, coding: str) -> float:
+    """Return how much ``Accept-Encoding`` likes a coding, from 0, not at all, to 1."""
+    qualities = dict(_accepted(accept_encoding or ""))
+    return qualities.get(coding, qualities.get("*", 0.0))
 
 
 @lru_cache  # a client sends the same headers with each request
@@ -41,11 +55,17 @@ def _accepted(header: str) -> tuple[tuple[str, float], ...]:
     for item in header.split(","):
         media, *parameters = (part.strip().lower() for part in item.split(";"))
         quality = next((text[2:] for text in parameters if text.startswith("q=")), "1")
-        try:
-            ranges.append((media, float(quality)))
-        except ValueError:
-            ranges.append((media, 1.0))
+        ranges.append((media, _number(quality)))
     return tuple(ranges)
+
+
+def _number(quality: str) -> float:
+    """Return a quality as a number; one that is not valid counts as none."""
+    try:
+        number = float(quality)
+    except ValueError:
+        return 1.0
+    return number if 0.0 <= number <= 1.0 else 1.0
 
 
 def _matches(media: str, offered: str) -> bool:

@@ -21,7 +21,8 @@ def _written(lines: Sequence[Line]) -> Iterator[Buffer]:
             yield b"g %b\n" % group.encode()
         count = len(line.points)
         if not count:
-            properties = " ".join(f"{name}={value}" for name, value in line.properties.items())
+            known = (item for item in line.properties.items() if item[1] is not None)
+            properties = " ".join(f"{name}={value}" for name, value in known)
             yield b"# no line: %b\n" % properties.encode()
             continue
         yield ("v %r %r %r\n" * count % tuple(line.points.ravel().tolist())).encode()

@@ -44,6 +44,8 @@ class HostReport:
     """Names of the results that it computes, with whether a worker has begun"""
     shares: Mapping[str, float]
     """Share done of the work under each ticket, for work that has begun"""
+    unclaimed: Sequence[str]
+    """Names of results that were written although nobody waits for them, each reported once"""
 
 
 class Cluster(Protocol):

@@ -14,12 +14,13 @@ import structlog
 from structlog.contextvars import get_contextvars
 
 from app.engine.cluster import BEAT_S, LEASE_S, SILENCE_S, Cluster, HostLostError, HostReport
-from app.engine.interface import Load, ProgressCallback
+from app.engine.interface import Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.placement import Occupancy, choose
 from app.engine.wire import Message, Wire, WireError, decode
 from app.engine.work import MeshFromFile, Outcome, StoreMesh, Task, TaskResult, WritesResult
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.queries import code_version
+from app.repeating import repeat
 from app.settings import Settings, variable_of
 from app.store.interface import Store
 from app.tracing import Period, record_span
@@ -105,6 +106,7 @@ class DistributedEngine:
         self.is_draining = False
         self.on_wait: Callable[[float], None] = lambda _seconds: None
         self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
+        self.on_unclaimed: UnclaimedCallback = ignore_unclaimed
         self._background: set[asyncio.Task[None]] = set()
         self._stopping: set[asyncio.Task[None]] = set()
 
@@ -134,7 +136,7 @@ class DistributedEngine:
     async def start(self) -> None:
         """Look for hosts, in the background; the store must be claimed."""
         self._store_id = self._store.identity()
-        self._spawn(self._search(), self._background)
+        self._spawn(repeat(self._search, _SEARCH_S, "hosts not looked for"), self._background)
 
     def drain(self) -> None:
         """Refuse new tasks, see ``Engine``."""
@@ -174,6 +176,7 @@ class DistributedEngine:
 
     async def _run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
         note = _rising(on_progress)
+        waits_for_host = task.is_promised
         refusal: Problem | None = None
         without: set[str] = set()
         """Hosts that were lost with this task, or that refused it"""
@@ -181,7 +184,7 @@ class DistributedEngine:
         while True:
             name = self._place(task, without)
             if name is None:
-                if not task.is_promised:
+                if not waits_for_host:
                     raise _no_host() if refusal is None else ProblemError(refusal)
                 await asyncio.sleep(_SEARCH_S)
                 without.clear()
@@ -197,6 +200,7 @@ class DistributedEngine:
                 task = _once_more(task)
                 continue
             if outcome is None:  # another host computes the same
+                task = replace(task, is_promised=True)
                 continue
             if isinstance(outcome, TaskResult):
                 return outcome
@@ -301,13 +305,11 @@ class DistributedEngine:
                         return
 
     async def _search(self) -> None:
-        """Look for hosts that have joined, for ever."""
-        while True:
-            for name in await self._cluster.hosts():
-                if name not in self._hosts:
-                    self._hosts[name] = _Host()
-                    self._spawn(self._attend(name), self._background)
-            await asyncio.sleep(_SEARCH_S)
+        """Look for hosts that have joined."""
+        for name in await self._cluster.hosts():
+            if name not in self._hosts:
+                self._hosts[name] = _Host()
+                self._spawn(self._attend(name), self._background)
 
     async def _attend(self, name: str) -> None:
         """Exchange beats with a host until it is lost."""
@@ -342,6 +344,8 @@ class DistributedEngine:
         is_new = host.report is None
         host.note(report)
         self._supersede_flights(name)
+        for result in report.unclaimed:
+            self._spawn(self.on_unclaimed(result), self._background)
         if is_new:
             logger.info("host joined", host=name, workers=report.workers)
 
@@ -413,7 +417,11 @@ def _within(whole: Period, parts: Mapping[str, Period]) -> Mapping[str, Period]:
 
 
 def _once_more(task: Task) -> Task:
-    """Return a task to be done again; the host that was lost may still write where it did."""
+    """Return a task to be done again, which no host refuses because its queue is full.
+
+    The host that was lost may still write where it did.
+    """
+    task = replace(task, is_promised=True)
     if isinstance(task.work, StoreMesh):
         folder = task.work.folder
         return replace(task, work=replace(task.work, folder=folder.with_name(f"{folder.name}-2")))

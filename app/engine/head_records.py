@@ -37,7 +37,7 @@ class FolderRecords:
         return {"RAY_gcs_storage": "rocksdb", "RAY_gcs_storage_path": str(self.folder)}
 
     @property
-    def told(self) -> str:
+    def durability(self) -> str:
         """How durable they are, in words."""
         return f"its records stay in {self.folder} when it stops"
 
@@ -59,7 +59,7 @@ class RedisRecords:
     claim: "Lock" = field(repr=False)
 
     @property
-    def told(self) -> str:
+    def durability(self) -> str:
         """How durable they are, in words."""
         if self.is_durable:
             return f"its records stay in the Redis at {self.place} when it stops"

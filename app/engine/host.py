@@ -44,6 +44,8 @@ class Host:
         self._stopped: dict[str, float] = {}
         """Tickets that were stopped before their tasks came, and until when that counts"""
         self._expiring: asyncio.Task[None] | None = None
+        self._unclaimed: list[str] = []
+        engine.on_unclaimed = self._note_unclaimed
 
     async def start(self) -> None:
         """Start the engine; returns at once."""
@@ -91,6 +93,7 @@ class Host:
         for ticket in tickets:
             if ticket in self._leases:
                 self._leases[ticket].end = self._lease_end()
+        unclaimed, self._unclaimed = self._unclaimed, []
         report = HostReport(
             load=replace(self._engine.load, pids=()),
             workers=self._settings.workers,
@@ -101,6 +104,7 @@ class Host:
             store=self._store,
             computing=self._flights.under_way(),
             shares={ticket: self._shares[ticket] for ticket in tickets if ticket in self._shares},
+            unclaimed=unclaimed,
         )
         return encode(report)
 
@@ -127,6 +131,9 @@ class Host:
 
     def _note(self, ticket: str, share: float) -> None:
         self._shares[ticket] = share
+
+    async def _note_unclaimed(self, name: str) -> None:
+        self._unclaimed.append(name)
 
     async def _expire(self) -> None:
         """Stop work that nobody renews, for ever."""

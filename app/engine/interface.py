@@ -1,13 +1,21 @@
 """The interface between the service and whatever computes its answers."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Coroutine, Mapping
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 from app.engine.work import Task, TaskResult
 
 ProgressCallback = Callable[[float], None]
 """Receives the share of the work that is done: 0 when it begins, and never less than before"""
+
+
+UnclaimedCallback = Callable[[str], Coroutine[Any, Any, None]]
+"""Receives the name of a result that was written although nobody waits for it any longer"""
+
+
+async def ignore_unclaimed(name: str) -> None:
+    """Leave a result where it is, uncounted."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +47,8 @@ class Engine(Protocol):
     """Receives the seconds that a task has waited for a worker, whether it got one or gave up"""
     on_work: Callable[[str, float], None]
     """Receives the client of a task and the seconds that a worker was busy with it"""
+    on_unclaimed: UnclaimedCallback
+    """Receives results of tasks that were cancelled too late to stop their work"""
 
     @property
     def load(self) -> Load:

@@ -14,12 +14,12 @@ from typing import Any
 import structlog
 
 import geodesic_core as gc
-from app.engine import worker
-from app.engine.interface import Load, ProgressCallback
+from app.engine.interface import Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.queue import FairQueue
 from app.engine.slot import Slot, WorkerLostError
 from app.engine.work import Outcome, Task, TaskResult
 from app.engine.worker import WorkerConfig
+from app.engine.worker_process import FIRST_KERNELS
 from app.errors import Problem, ProblemError, draining, over_limit, problem
 from app.settings import Settings
 from app.tracing import Period, record_span
@@ -68,6 +68,7 @@ class LocalEngine:
         self._is_stopping = threading.Event()
         self.on_wait: Callable[[float], None] = lambda _seconds: None
         self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
+        self.on_unclaimed: UnclaimedCallback = ignore_unclaimed
         self._background: set[asyncio.Task[None]] = set()
 
     @property
@@ -124,6 +125,7 @@ class LocalEngine:
         deaths = 0
         while True:
             slot = await self._acquire(task)
+            task = replace(task, is_promised=True)  # accepted: a second wait is not refused
             queued = perf_counter() - start
             try:
                 outcome = await self._run_in(slot, task, on_progress)
@@ -184,13 +186,16 @@ class LocalEngine:
         """
         slot.ask_to_stop()
         await asyncio.wait({outcome}, timeout=self._settings.cancel_grace_s)
-        if outcome.done() and outcome.exception() is None:
-            self._release(slot)
-        else:
+        if not outcome.done() or outcome.exception() is not None:
             slot.retire()
+            return
+        self._release(slot)
+        late = outcome.result()
+        if isinstance(late, TaskResult) and late.result is not None and late.result.has_files:
+            await self.on_unclaimed(late.result.name)
 
     async def _compile_and_supervise(self) -> None:
-        await self._compile(worker.FIRST_KERNELS)
+        await self._compile(FIRST_KERNELS)
         for slot in reversed(self._slots):
             self._spawn(self._supervise(slot))
         await self._compile(None)

@@ -22,7 +22,7 @@ LATE = (
 
 def _preload() -> None:
     import geodesic_core
-    from app.engine.worker import FIRST_KERNELS
+    from app.engine.worker_process import FIRST_KERNELS
 
     for name in LATE:
         import_module(name)

@@ -17,7 +17,7 @@ from app.engine.local import LocalEngine
 from app.engine.supplied import SuppliedEngine
 from app.settings import Settings
 from app.store import layout
-from app.store.opening import store_of
+from app.store.choice import store_of
 
 logger = structlog.get_logger(module=__name__)
 

@@ -160,7 +160,8 @@ class Processes:
             said = self._log.read_text(errors="replace")
             for sign, meaning in _SIGNS.items():
                 if sign in said:
-                    raise ClusterError(meaning.format(address=address, told=_told(said, sign)))
+                    versions = _versions_in(said, sign)
+                    raise ClusterError(meaning.format(address=address, versions=versions))
             if "Ray runtime started" in said:
                 return
             if not self.are_alive:
@@ -186,12 +187,13 @@ class Processes:
 _SIGNS: Mapping[str, str] = {
     "InvalidAuthToken": "the cluster at {address} has another token: give this machine the token "
     "of the head",
-    "Version mismatch": "this machine and the head at {address} have different versions: {told}",
+    "Version mismatch": "this machine and the head at {address} have different versions: "
+    "{versions}",
 }
 """What Ray's log says where it cannot start, and what that means"""
 
 
-def _told(said: str, sign: str) -> str:
+def _versions_in(said: str, sign: str) -> str:
     """Return the versions that Ray has compared, in one line."""
     lines = said.partition(sign)[2].splitlines()[:7]
     return " ".join(" ".join(lines).removeprefix(": ").split())

@@ -25,9 +25,6 @@ class SingleFlight(Generic[T]):
     def __init__(self) -> None:
         self._flights: dict[str, _Flight[T]] = {}
 
-    def __contains__(self, name: str) -> bool:
-        return name in self._flights
-
     def under_way(self) -> dict[str, bool]:
         """Return the names of all, with whether each has begun."""
         return {name: flight.has_begun for name, flight in self._flights.items()}

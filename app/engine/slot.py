@@ -9,9 +9,11 @@ from multiprocessing.context import ForkServerProcess
 
 from structlog.contextvars import get_contextvars
 
-from app.engine import worker
+from app.engine import worker_process
 from app.engine.fork_server import CONTEXT
+from app.engine.signals import Signals
 from app.engine.work import Outcome, Work
+from app.engine.worker import WorkerConfig
 
 _MAX_AFFINITY_KEYS = 64
 
@@ -32,9 +34,9 @@ class Slot:
     closes when the worker dies, whatever the worker was doing.
     """
 
-    def __init__(self, config: worker.WorkerConfig) -> None:
+    def __init__(self, config: WorkerConfig) -> None:
         self._config = config
-        self._signals: worker.Signals = CONTEXT.RawValue(worker.Signals)
+        self._signals: Signals = CONTEXT.RawValue(Signals)
         self._number = 0  # of the present work
         self._outcome: asyncio.Future[Outcome] | None = None
         self._process: ForkServerProcess | None = None
@@ -72,7 +74,7 @@ class Slot:
         ours, theirs = socket.socketpair()
         with theirs:
             arguments = (self._config, self._signals, theirs)
-            process = CONTEXT.Process(target=worker.run, args=arguments, daemon=True)
+            process = CONTEXT.Process(target=worker_process.run, args=arguments, daemon=True)
             process.start()
         return process, ours
 
@@ -162,7 +164,7 @@ class Slot:
 
 
 async def _receive(reader: asyncio.StreamReader) -> Outcome:
-    size = int.from_bytes(await reader.readexactly(worker.SIZE_BYTES))
+    size = int.from_bytes(await reader.readexactly(worker_process.SIZE_BYTES))
     outcome: Outcome = pickle.loads(await reader.readexactly(size))  # noqa: S301 - our own process
     return outcome
 

@@ -1,22 +1,41 @@
 """An engine whose workers see a folder, though meshes and answers are elsewhere."""
 
-from collections.abc import Callable
+import asyncio
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
-from app.engine.interface import Engine, Load, ProgressCallback
-from app.engine.work import JoinParts, MeshFromFile, StoreMesh, Task, TaskResult
-from app.errors import ProblemError
+from app.engine.interface import Engine, Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
+from app.engine.work import (
+    EstimateQuery,
+    JoinParts,
+    MeshFromFile,
+    StoreMesh,
+    Task,
+    TaskResult,
+    WritesResult,
+)
+from app.errors import ProblemError, StoreUnavailableError
 from app.store.interface import Supply
+from app.store.results import Result
 
 
 class SuppliedEngine:
     """Has what a task needs brought to the folder before ``engine`` does it; see ``Engine``.
 
-    What the task has written is sent before it counts as done.
+    What the task has written is sent before it counts as done. What it has written for nobody is
+    removed, or reported as unclaimed where it was being sent by then.
     """
 
     def __init__(self, engine: Engine, supply: Supply) -> None:
         self._engine = engine
         self._supply = supply
+        self._users: Counter[str] = Counter()
+        """Blocks that need the files of a result in the folder, see `_using`"""
+        self._unclaimed: set[asyncio.Task[None]] = set()
+        """Results that are being sent for nobody"""
+        self.on_unclaimed: UnclaimedCallback = ignore_unclaimed
+        engine.on_unclaimed = self._remove_unused
 
     @property
     def on_wait(self) -> Callable[[float], None]:
@@ -71,18 +90,66 @@ class SuppliedEngine:
         """Do the work of a task, see ``Engine``."""
         if isinstance(task.work, StoreMesh):
             return await self._store(task, task.work, on_progress)
-        mesh_id = task.work.query.mesh_id
-        parts = task.work.parts if isinstance(task.work, JoinParts) else ()
+        if isinstance(task.work, EstimateQuery):
+            return await self._compute(task, task.work, on_progress)
+        with self._using(task.work.result_name):
+            done = await self._compute(task, task.work, on_progress)
+            if done.result is not None and done.result.has_files:
+                await self._send(done.result)
+        return done
+
+    @contextmanager
+    def _using(self, name: str) -> Iterator[None]:
+        """Leave the files of a result in the folder inside the block; the last block removes them.
+
+        A task that was cancelled may still write or send them while the next one begins.
+        """
+        self._users[name] += 1
+        try:
+            yield
+        finally:
+            self._users[name] -= 1
+            if not self._users[name]:
+                del self._users[name]
+                self._supply.discard_result(name)
+
+    async def _remove_unused(self, name: str) -> None:
+        with self._using(name):
+            pass
+
+    async def _compute(
+        self, task: Task, work: WritesResult | EstimateQuery, on_progress: ProgressCallback
+    ) -> TaskResult:
+        mesh_id = work.query.mesh_id
+        parts = work.parts if isinstance(work, JoinParts) else ()
         async with self._supply.holding(mesh_id), self._supply.bringing_results(parts):
             try:
-                done = await self._engine.run(task, on_progress)
+                return await self._engine.run(task, on_progress)
             except ProblemError as error:
                 if error.problem.code == "mesh_damaged":
                     await self._supply.distrust(mesh_id)
                 raise
-        if done.result is not None and done.result.has_files:
-            await self._supply.send_result(done.result)
-        return done
+
+    async def _send(self, result: Result) -> None:
+        """Send a result; a call that is cancelled leaves that to the background."""
+        sending = asyncio.create_task(self._send_whole(result))
+        try:
+            await asyncio.shield(sending)
+        except asyncio.CancelledError:
+            reporting = asyncio.create_task(self._report(sending, result.name))
+            self._unclaimed.add(reporting)
+            reporting.add_done_callback(self._unclaimed.discard)
+            raise
+
+    async def _send_whole(self, result: Result) -> None:
+        with self._using(result.name):
+            await self._supply.send_result(result)
+
+    async def _report(self, sending: "asyncio.Task[None]", name: str) -> None:
+        """Report a result once it is sent: nobody waits for it."""
+        with suppress(StoreUnavailableError):
+            await sending
+            await self.on_unclaimed(name)
 
     async def _store(
         self, task: Task, work: StoreMesh, on_progress: ProgressCallback

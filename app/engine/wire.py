@@ -46,7 +46,7 @@ from app.store.meshes import WrittenMesh
 from app.store.results import Result, ResultManifest
 from app.tracing import Period
 
-VERSION = 6
+VERSION = 7
 """To be raised with every change of the types below, and of what they mean"""
 
 _MAGIC = b"GEOD"
@@ -265,12 +265,12 @@ class Wire:
             case _Store(mesh_input, folder, owner, name):
                 return StoreMesh(self._input_in(mesh_input), self._path_in(folder), owner, name)
             case _Run(query, representation, name):
-                self._path_in(name)  # raises where it would lead out of the store
-                return RunQuery(_query_in(query), representation, name)
+                return RunQuery(_query_in(query), representation, _inside(name))
             case _Part(query, dtype, part, name):
-                return ComputePart(_matrix_in(query), dtype, part, name)
+                return ComputePart(_matrix_in(query), dtype, part, _inside(name))
             case _Join(query, dtype, parts, reached, name):
-                return JoinParts(_matrix_in(query), dtype, tuple(parts), reached, name)
+                names = tuple(map(_inside, parts))
+                return JoinParts(_matrix_in(query), dtype, names, reached, _inside(name))
             case _Estimate(query, representation):
                 return EstimateQuery(_query_in(query), representation)
 
@@ -304,10 +304,7 @@ class Wire:
         return path.relative_to(self._store).as_posix()
 
     def _path_in(self, path: str) -> Path:
-        parts = PurePosixPath(path)
-        if parts.is_absolute() or ".." in parts.parts or "\0" in path:
-            raise DamagedMessageError(f"{path!r} is no place in the store")
-        return self._store / parts
+        return self._store / _inside(path)
 
 
 def encode(value: object) -> bytes:
@@ -345,6 +342,14 @@ def _decoder(kind: Any) -> msgspec.msgpack.Decoder[Any]:
     return msgspec.msgpack.Decoder(kind)
 
 
+def _inside(path: str) -> str:
+    """Return a path in the store, or a name that files there have; raise where it leads out."""
+    parts = PurePosixPath(path)
+    if parts.is_absolute() or ".." in parts.parts or "\0" in path:
+        raise DamagedMessageError(f"{path!r} is no place in the store")
+    return path
+
+
 def _query_out(query: Query[Any]) -> _Query:
     return _Query(query.kind, query.mesh_id, query.written)
 
@@ -354,7 +359,7 @@ def _query_in(query: _Query) -> Query[Any]:
     if kind is None:
         raise DamagedMessageError(f"there is no kind of query {query.kind!r}")
     try:
-        return kind(query.mesh_id, kind.model.model_validate_json(query.request))
+        return kind(_inside(query.mesh_id), kind.model.model_validate_json(query.request))
     except ValueError as error:
         raise DamagedMessageError(f"the query of kind {query.kind} cannot be read") from error
 
@@ -388,4 +393,4 @@ def _result_in(result: _Result | None) -> Result | None:
     manifest = ResultManifest(
         headers=result.headers, size=result.size, crc32=result.crc32, code=result.code
     )
-    return Result(result.name, manifest, result.body, result.has_files, result.is_reusable)
+    return Result(_inside(result.name), manifest, result.body, result.has_files, result.is_reusable)

@@ -1,20 +1,9 @@
-"""The worker process: it does one piece of work at a time, with meshes and fields cached."""
+"""A worker: it does one piece of work at a time, with meshes and fields cached."""
 
-import os
-import pickle
-import select
-import signal
-import socket
-import threading
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager, suppress
-from contextvars import copy_context
-from ctypes import Structure, c_double, c_longlong
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from gc import freeze
-from io import BufferedRWPair
 from pathlib import Path
 from time import perf_counter, time_ns
 from typing import Any, NamedTuple
@@ -22,14 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import structlog
 from numpy.typing import NDArray
-from setproctitle import setproctitle
-from structlog.contextvars import bound_contextvars
 
 import geodesic_core as gc
-from app import logs
 from app.encoding import JSON, array_headers, encode, npy_parts, too_large_for
-from app.engine.memory import limit_memory, refuse_beyond_limit
+from app.engine.memory import refuse_beyond_limit
 from app.engine.mesh_json import read_json_mesh
+from app.engine.priority import low_priority_thread
+from app.engine.signals import Signals
 from app.engine.work import (
     ComputePart,
     EstimateQuery,
@@ -63,14 +51,8 @@ from app.tracing import Period
 
 logger = structlog.get_logger(module=__name__)
 
-TITLE = "geodesic-worker"
 REACHED = "Geodesic-Reached"
 """Header of a part of a matrix: the number of finite distances"""
-SIZE_BYTES = 8
-"""Length of the number before each outcome"""
-
-_LONG_WORK_NICENESS = 10
-"""Niceness of long work: small work and the API process go first"""
 
 
 @dataclass(frozen=True)
@@ -79,20 +61,6 @@ class WorkerConfig:
 
     settings: Settings
     results: Path
-
-
-class Signals(Structure):
-    """Memory that a worker shares with the service."""
-
-    _fields_ = (
-        ("stop_number", c_longlong),  # of the work to stop; earlier work has ended
-        ("begun_number", c_longlong),  # of the work that was begun last
-        ("progress", c_double),  # share of that work that is done
-        # Totals of this worker and those before it in its slot:
-        ("mesh_evictions", c_longlong),  # open meshes closed to make room
-        ("field_evictions", c_longlong),  # cached fields dropped to make room
-        ("stored_field_evictions", c_longlong),  # fields removed from the store to make room
-    )
 
 
 class _Matrix(NamedTuple):
@@ -120,7 +88,7 @@ class Worker:
         self._stored = FieldStore(self.settings.folder, self.settings.fields_bytes)
         self.fields = FieldCache(self.settings.worker_field_bytes, self._stored, code_version())
         self._matrix: _Matrix | None = None
-        self._writer = _low_priority_thread()
+        self._writer = low_priority_thread()
         self._before = Signals.from_buffer_copy(self.signals)  # what former workers have counted
 
     def do(self, number: int, work: Work) -> Outcome:
@@ -201,7 +169,7 @@ class Worker:
                 result = write_result(
                     self.config.results,
                     work.result_name,
-                    self._verified_parts(encoded.parts, opened),
+                    self._verified_parts(encoded.parts, opened, cancel),
                     encoded.headers,
                     code_version(),
                     is_cheap=clock.seconds["compute"] < SMALL_SECONDS,
@@ -226,7 +194,7 @@ class Worker:
                 result = write_result(
                     self.config.results,
                     work.result_name,
-                    self._verified_parts(npy_parts(rows), opened),
+                    self._verified_parts(npy_parts(rows), opened, cancel),
                     {REACHED: str(parts.reached(rows))},
                     code_version(),
                     is_cheap=False,
@@ -241,8 +209,7 @@ class Worker:
             opened = self._open(work.query)
 
         def part(number: int) -> NDArray[Any]:
-            if cancel():
-                raise gc.errors.Cancelled("cancelled while parts were joined")
+            _stop_if(cancel)
             rows: NDArray[Any] = np.load(body_path(root, work.parts[number]), mmap_mode="r")
             return rows
 
@@ -251,8 +218,9 @@ class Worker:
             answer = work.query.answer_of_parts(opened, work.reached, cancel)
         with clock.phase("encode"):
             headers = array_headers(answer, np.dtype(work.dtype), parts.shape)
-            write = partial(parts.write, part=part)
-            result = write_result_file(root, work.result_name, write, headers, code_version())
+            write, check = partial(parts.write, part=part), partial(_stop_if, cancel)
+            name = work.result_name
+            result = write_result_file(root, name, write, headers, code_version(), check)
         return TaskResult(clock.seconds, clock.periods, result=result)
 
     def _parts_of(
@@ -288,9 +256,13 @@ class Worker:
             self._verify(opened)
             raise
 
-    def _verified_parts(self, parts: Iterable[Buffer], opened: OpenMesh) -> Iterator[Buffer]:
+    def _verified_parts(
+        self, parts: Iterable[Buffer], opened: OpenMesh, cancel: Callable[[], bool]
+    ) -> Iterator[Buffer]:
         """Yield the parts of a body, and raise at its end where the mesh was damaged meanwhile."""
-        yield from parts
+        for part in parts:
+            _stop_if(cancel)
+            yield part
         self._verify(opened)
 
     def _verify(self, opened: OpenMesh) -> None:
@@ -337,6 +309,11 @@ class Worker:
         """Empty all caches."""
         for name in list(self.meshes):
             self._close(name)
+
+
+def _stop_if(cancel: Callable[[], bool]) -> None:
+    if cancel():
+        raise gc.errors.Cancelled("cancelled while the answer was written")
 
 
 @contextmanager
@@ -386,62 +363,3 @@ def _make_mesh(mesh_input: MeshInput, max_faces: int) -> gc.TriangleMesh:
 
 _JSON_GROWS = 40
 """Bytes that orjson takes for each byte of JSON: at most 37 were measured. Without, it crashes."""
-
-
-def run(config: WorkerConfig, signals: Signals, connection: socket.socket) -> None:
-    """Run a worker process: do the work that arrives on ``connection``, until that closes."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for the service, which ends its workers
-    setproctitle(TITLE)
-    logs.install(config.settings.log_format)
-    threading.Thread(target=_die_with, args=(connection,), daemon=True).start()
-    worker = Worker(config, signals)
-    low_priority = _low_priority_thread()
-    warm_up(config.settings.worker_memory_bytes)
-    with connection.makefile("rwb") as messages, suppress(EOFError, BrokenPipeError):
-        _send(messages, None)
-        while True:
-            number, work, is_small, log_fields = pickle.load(messages)  # noqa: S301 - our own service
-            signals.begun_number = number
-            with bound_contextvars(**log_fields):
-                do = partial(copy_context().run, worker.do, number, work)
-                outcome = do() if is_small else low_priority.submit(do).result()
-            _send(messages, outcome)
-
-
-FIRST_KERNELS = ("exact", "paths")
-"""Workloads that a worker is ready for when it starts; other kernels are loaded at first use."""
-
-
-def warm_up(allowed_memory: int) -> None:
-    """Load the first kernels, and then limit the memory."""
-    gc.warm_up(FIRST_KERNELS)
-    freeze()  # loaded objects live for ever; each full collection over them takes 90 ms
-    limit_memory(allowed_memory)
-
-
-def _low_priority_thread() -> ThreadPoolExecutor:
-    """Start a thread that yields to others when all cores are busy.
-
-    On Linux each thread has a niceness of its own, which cannot be lowered again. So a worker that
-    raised its own would keep it for small work as well.
-    """
-    thread = ThreadPoolExecutor(1)
-    thread.submit(os.nice, _LONG_WORK_NICENESS).result()
-    return thread
-
-
-def _send(messages: BufferedRWPair, outcome: Outcome) -> None:
-    """Send a length-prefixed outcome, so that a non-blocking reader knows when it is complete."""
-    pickled = pickle.dumps(outcome)
-    messages.write(len(pickled).to_bytes(SIZE_BYTES))
-    messages.write(pickled)
-    messages.flush()
-
-
-def _die_with(connection: socket.socket) -> None:
-    # The other end closes when the service ends, however it ends, and when the slot does. A busy
-    # worker does not read. PR_SET_PDEATHSIG would watch the fork server instead.
-    hung_up = select.poll()
-    hung_up.register(connection, 0)
-    hung_up.poll()
-    os._exit(1)

@@ -15,11 +15,13 @@ from pydantic import BaseModel, Field
 from starlette.requests import ClientDisconnect
 
 from app.access import Caller
-from app.encoding import Representation, negotiate, negotiate_coding
+from app.encoding import Representation, coding_quality, negotiate, negotiate_coding
 from app.encoding.representation import ARRAYS, TEXTS
 from app.errors import Fault, problem
 from app.schemas.requests import AnswerParameters
-from app.service.service import PhaseSeconds, RequestContext, Service
+from app.service.answering import PhaseSeconds
+from app.service.request_context import RequestContext
+from app.service.service import Service
 
 T = TypeVar("T")
 
@@ -62,7 +64,7 @@ class TimeoutHeader(BaseModel):
         default=None,
         alias="x-timeout-ms",
         gt=0,
-        description="The longest time that the client waits, in milliseconds",
+        description="The longest time that the client waits, in milliseconds; it bounds no job",
     )
 
 
@@ -124,6 +126,16 @@ def negotiated(
     if media_type in TEXTS and "range" not in headers:
         coding = negotiate_coding(headers.get("accept-encoding"))
     return Representation(media_type, parameters.dtype, coding)
+
+
+def check_accepted(request: Request, media_type: str, coding: str | None) -> None:
+    """Refuse to send an answer whose type or coding the client does not accept."""
+    headers = request.headers
+    if negotiate(headers.get("accept"), None, [media_type]) is None:
+        raise problem("not_acceptable", f"this answer is available as {media_type}")
+    if coding is not None and coding_quality(headers.get("accept-encoding"), coding) <= 0:
+        hint = f"send the header Accept-Encoding: {coding} (curl: --compressed)"
+        raise problem("not_acceptable", f"this answer is stored in {coding}", hint=hint)
 
 
 async def while_connected(request: Request, work: Coroutine[Any, Any, T]) -> T:

@@ -11,7 +11,7 @@ from starlette.responses import Response
 from starlette.routing import compile_path
 
 from app.errors import EXCEPTIONS, Fault, Problem, ProblemError, pointer, problem_of_status
-from app.http.failures import note_failure
+from app.http.failures import CLIENT_CLOSED, note_failure
 from app.http.middleware.request_id import body_too_large
 from app.http.responses import problem_response
 from app.schemas.points import TAGS
@@ -40,7 +40,7 @@ def install(app: FastAPI, settings: Settings) -> None:
         return _respond(request, problem_of_status(error.status_code, detail, headers))
 
     async def on_disconnect(_request: Request, _error: ClientDisconnect) -> Response:
-        return Response(status_code=499)  # for the access log: no client reads it
+        return Response(status_code=CLIENT_CLOSED)
 
     handlers: dict[Any, Any] = {
         **dict.fromkeys((kind for kind, _ in EXCEPTIONS if kind is not BaseException), on_failure),

@@ -6,6 +6,9 @@ from app.errors import Problem, ProblemError, problem_of
 
 logger = structlog.get_logger(module=__name__)
 
+CLIENT_CLOSED = 499
+"""The status, in log and metrics alone, of a request whose client hung up: no client reads it."""
+
 
 def note_failure(error: Exception) -> Problem:
     """Log an exception, unless the client is its cause; return its problem.

@@ -1,6 +1,7 @@
 """Metrics for operators: events are counted, and the service's state is read when scraped."""
 
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from typing import get_args
 
 from anyio import to_thread
@@ -93,7 +94,8 @@ class Metrics(Collector):
     async def exposition(self, accept: str) -> tuple[bytes, str]:
         """Return all metrics in the text format that ``accept`` asks for, and its media type."""
         service = self._service
-        self._jobs = await service.jobs.count()
+        with suppress(OSError):  # the last counts stay while the database is away
+            self._jobs = await service.jobs.count()
         pids, store = service.engine.load.pids, service.settings.folder
         self._resources = await to_thread.run_sync(measure, pids, store)
         write, media_type = choose_encoder(accept)
@@ -114,10 +116,10 @@ class Metrics(Collector):
         stopped = "Tasks stopped while they ran: by hang-up, deadline, or dismissal of a job"
         yield _counter("geodesic_cancellations", stopped, load.cancelled)
         lookups = "Lookups of answers in the store"
-        yield _counters("geodesic_results_lookups", lookups, "outcome", service.lookups)
+        yield _counters("geodesic_results_lookups", lookups, "outcome", service.answering.lookups)
         answered, took = "Queries that workers answered", "Seconds that solving them took"
-        yield _counters("geodesic_solves", answered, "kind", service.solves)
-        yield _counters("geodesic_solve_seconds", took, "kind", service.solve_seconds)
+        yield _counters("geodesic_solves", answered, "kind", service.answering.solves)
+        yield _counters("geodesic_solve_seconds", took, "kind", service.answering.solve_seconds)
         files = service.results.nbytes
         yield _gauge("geodesic_results_bytes", "Size of the stored answers that are files", files)
         yield _gauge("geodesic_meshes", "Meshes in the store", len(catalog.ids))

@@ -21,7 +21,8 @@ from app.errors import CODES, PROBLEM_JSON, Problem
 from app.jobs import Job
 from app.queries import Estimate
 from app.schemas.service import ProblemDocument
-from app.service.service import Manifest, PhaseSeconds
+from app.service.answering import PhaseSeconds
+from app.service.service import Manifest
 from app.store.meshes import PUBLIC_ARRAYS
 from app.store.results import RemoteBody, RemoteFile, Result, ResultStore
 

@@ -1,7 +1,7 @@
 """The record of a job, from its acceptance to its end."""
 
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, NamedTuple
 from uuid import uuid4
 
 from pydantic import AliasChoices, BaseModel, ConfigDict, Field
@@ -109,6 +109,16 @@ class Job(BaseModel):
 
     def _next(self, **changes: Any) -> "Job":
         return self.model_copy(update={"version": self.version + 1, **changes})
+
+
+class EndedJob(NamedTuple):
+    """A finished job, as far as its retention needs it; any release can read that."""
+
+    id: str
+    owner: str | None
+    result: str | None
+    """Name of its answer in the result store"""
+    finished: datetime
 
 
 def _now_after(earlier: datetime) -> datetime:

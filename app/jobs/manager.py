@@ -2,8 +2,10 @@
 
 import asyncio
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Iterator, Set
 from contextlib import asynccontextmanager, suppress
+from functools import partial
+from typing import Any
 
 import structlog
 from structlog.contextvars import bound_contextvars
@@ -21,6 +23,7 @@ from app.errors import (
 from app.jobs.job import Job, JobSpec
 from app.jobs.repository import JobRecords, JobRepository
 from app.jobs.retention import FinishedJob, Retention
+from app.repeating import repeat
 from app.settings import variable_of
 from app.state import Replicas
 from app.state.replicas import BEAT_S
@@ -35,7 +38,7 @@ SolveAgain = Callable[[JobSpec, bytes, ProgressCallback], Awaitable[Result]]
 """The same for a stored job, from its query as JSON"""
 
 _TIDY_PERIOD_S = 60.0
-"""Seconds between two removals of expired jobs"""
+"""Seconds between two removals of expired jobs, and of the other chores"""
 
 _MOST_RUNS = 3
 """Runs of a job: the first, and two more where the service ended while it ran. A job may itself be
@@ -129,8 +132,13 @@ class JobManager:
         self._retention = Retention(ttl_s)
         self._quota = quota
         self._live: dict[str, _LiveJob] = {}
+        self._accepting: set[asyncio.Task[Job]] = set()
         self._doubtful: set[str] = set()
         """Ids of jobs that may have been added to the repository, although an error said not"""
+        self._newest = 0
+        """Number of the newest job at the last beat"""
+        self._unfinished: frozenset[str] = frozenset()
+        """Ids of the jobs that had not finished then"""
         self._is_stopping = False
 
     @asynccontextmanager
@@ -147,9 +155,7 @@ class JobManager:
                 await self._resume(job, solve_again)
         else:
             await self._keep_up(self._replicas, solve_again)
-        tasks = [asyncio.create_task(self._tidy())]
-        if self._replicas is not None:
-            tasks.append(asyncio.create_task(self._beat(self._replicas, solve_again)))
+        tasks = [asyncio.create_task(loop) for loop in self._loops(solve_again)]
         try:
             yield
         finally:
@@ -157,10 +163,20 @@ class JobManager:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
             self.end_events()
+            await asyncio.gather(*self._accepting, return_exceptions=True)
             await self._interrupt()
             if self._replicas is not None:
                 with suppress(OSError):  # others find that out by themselves
                     await self._replicas.leave()
+
+    def _loops(self, solve_again: SolveAgain) -> Iterator[Coroutine[Any, Any, None]]:
+        """Yield what goes on in the background; a failure of one stops no other."""
+        period_s = self._tidy_period_s
+        yield repeat(self._record_ends, period_s, "ends of jobs not recorded")
+        yield repeat(self._remove_expired, period_s, "expired jobs not removed")
+        if self._replicas is not None:
+            yield repeat(self._note_finished, period_s, "finished jobs not noted")
+            yield self._beat(self._replicas, solve_again)
 
     def end_events(self) -> None:
         """End every `watch`, since the service is about to stop."""
@@ -172,13 +188,19 @@ class JobManager:
         """Accept a job, or return the job that has the idempotency key of ``spec``.
 
         The key of a job that failed or was dismissed is free again. The ``query`` as JSON is stored
-        until the job has finished.
+        until the job has finished. Whoever cancels the call leaves a job that runs, or none.
 
         Raises
         ------
         ProblemError
             The key belongs to another question, or the owner has as many jobs as it may.
         """
+        accepting = asyncio.create_task(self._accept(spec, query, solve))
+        self._accepting.add(accepting)
+        accepting.add_done_callback(self._accepting.discard)
+        return await asyncio.shield(accepting)
+
+    async def _accept(self, spec: JobSpec, query: bytes, solve: Solve) -> Job:
         job = Job(spec=spec, replica=self._replica_id)
         try:
             # Two requests with one key at the same time are one job, too.
@@ -188,9 +210,8 @@ class JobManager:
                     return known
                 await self._refuse_over_quota(records, spec.owner)
                 await records.add(job, query)
-        except (StateUnavailableError, asyncio.CancelledError):
-            if self._replicas is not None:
-                self._doubtful.add(job.id)
+        except StateUnavailableError:
+            self._doubtful.add(job.id)
             raise
         self._begin(job, solve)
         return job
@@ -323,21 +344,17 @@ class JobManager:
         )
 
     async def _beat(self, replicas: Replicas, solve_again: SolveAgain) -> None:
-        """Keep up with the other replicas, again and again."""
-        while True:
-            await asyncio.sleep(BEAT_S)
-            try:
-                await self._keep_up(replicas, solve_again)
-            except OSError as error:
-                logger.warning("state of jobs not reached, to be tried again", error=str(error))
-            except Exception:
-                logger.exception("jobs of replicas not compared")
+        """Keep up with the other replicas, which has been done just now, again and again."""
+        await asyncio.sleep(BEAT_S)
+        keep_up = partial(self._keep_up, replicas, solve_again)
+        await repeat(keep_up, BEAT_S, "jobs of replicas not compared")
 
     async def _keep_up(self, replicas: Replicas, solve_again: SolveAgain) -> None:
         """Record progress, stop what others dismissed or took over, and take over what is left."""
         living = await replicas.beat()
         await self._record_ends()
         live_jobs, doubtful = list(self._live.values()), frozenset(self._doubtful)
+        added, newest = await self._repository.added(self._newest)
         records = {job.id: job for job in await self._repository.unfinished()}
         for live in live_jobs:
             record = records.get(live.job.id)
@@ -354,6 +371,8 @@ class JobManager:
             if is_left or (job.id in doubtful and job.id not in self._live):
                 await self._resume(job, solve_again)
         self._doubtful -= doubtful  # the others were not added
+        await self._note_ends((self._unfinished | added) - records.keys())
+        self._unfinished, self._newest = frozenset(records), newest
 
     async def _let_go(self, live: _LiveJob) -> None:
         """Stop a job that another replica has dismissed, removed, or taken over."""
@@ -363,8 +382,7 @@ class JobManager:
         self._live.pop(live.job.id, None)
         live.cancel()
         live.update(record or live.job.dismissed())
-        if record is not None and record.is_finished:
-            self._note_end(record)
+        await self._note_ends({live.job.id})
 
     async def _resume(self, job: Job, solve_again: SolveAgain) -> None:
         """Run a stored job, unless it has been run too often, or another replica was faster."""
@@ -387,18 +405,24 @@ class JobManager:
 
     async def _note_finished(self) -> None:
         """Note the jobs that have finished, by whichever replica, and forget those removed."""
-        known = {job.id: job for job in self._retention.jobs}
+        known = self._retention.jobs
         finished = await self._repository.finished()
-        for job in finished:
-            if job.id not in known:
-                self._note_end(job)
-        for job_id in known.keys() - {job.id for job in finished}:
-            self._forget(known[job_id])
+        for job in known:
+            if job.id not in finished:
+                self._forget(job)
+        await self._note_ends(finished)
 
-    def _note_end(self, job: Job) -> None:
-        self._retention.add_older(job)
-        if job.result is not None:
-            self._results.pin(job.result)
+    async def _note_ends(self, ids: Set[str]) -> None:
+        """Note those of some jobs that have finished, and are not known to have."""
+        unknown = [job_id for job_id in ids if not self._knows(job_id)]
+        for job in await self._repository.ended(unknown):
+            if not self._knows(job.id):
+                self._retention.add_older(job)
+                if job.result is not None:
+                    self._results.pin(job.result)
+
+    def _knows(self, job_id: str) -> bool:
+        return job_id in self._retention or job_id in self._live
 
     def _begin(self, job: Job, solve: Solve) -> None:
         live = self._live[job.id] = _LiveJob(job)
@@ -486,25 +510,17 @@ class JobManager:
             if live.job.is_finished:
                 await self._record_end(live)
 
-    async def _tidy(self) -> None:
-        """Record what could not be recorded before, and remove expired jobs; again and again."""
-        while True:
-            try:
-                await self._record_ends()
-                if self._replicas is not None:
-                    await self._note_finished()
-                for job in self._retention.due():
-                    await self._remove(job)
-            except OSError:  # such as a full disk: there may be room the next time
-                logger.exception("jobs neither recorded nor removed")
-            await asyncio.sleep(self._tidy_period_s)
+    async def _remove_expired(self) -> None:
+        for job in self._retention.due():
+            await self._remove(job)
 
     async def _remove(self, job: Job | FinishedJob) -> None:
         await self._repository.remove(job.id)
         self._forget(job)
 
     def _forget(self, job: Job | FinishedJob) -> None:
-        self._live.pop(job.id, None)
-        self._retention.discard(job.id)
-        if job.result is not None:
+        """Forget a job that has been removed, unless it is not known, or not any more."""
+        was_live = self._live.pop(job.id, None) is not None
+        was_retained = self._retention.discard(job.id)
+        if job.result is not None and (was_live or was_retained):
             self._results.unpin(job.result)

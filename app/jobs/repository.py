@@ -1,14 +1,18 @@
 """The records of jobs, in a database: they outlive the process that wrote them."""
 
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import asynccontextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from app.jobs.job import Job
+from app.jobs.job import EndedJob, Job
 from app.state import Database, Statements, read_database, read_shared_database
 
 _RECORD = "CAST(record AS TEXT)"
+
+_IDS_AT_ONCE = 500
+"""Ids of one statement: databases accept some thousands, and each keeps others waiting"""
 
 
 class JobRecords:
@@ -103,9 +107,30 @@ class JobRecords:
         """Return the jobs that have not finished, the oldest first."""
         return await self._jobs("WHERE finished IS NULL ORDER BY number")
 
-    async def finished(self) -> list[Job]:
-        """Return the jobs that have finished."""
-        return await self._jobs("WHERE finished IS NOT NULL")
+    async def added(self, after: int) -> tuple[set[str], int]:
+        """Return the ids of the jobs added after that with a number, and the newest number."""
+        rows = await self._statements.rows("SELECT id, number FROM jobs WHERE number > ?", after)
+        return {job_id for job_id, _ in rows}, max((number for _, number in rows), default=after)
+
+    async def finished(self) -> set[str]:
+        """Return the ids of the jobs that have finished."""
+        rows = await self._statements.rows("SELECT id FROM jobs WHERE finished IS NOT NULL")
+        return {job_id for (job_id,) in rows}
+
+    async def ended(self, ids: Sequence[str]) -> list[EndedJob]:
+        """Return those of some jobs that have finished."""
+        found: list[Any] = []
+        for start in range(0, len(ids), _IDS_AT_ONCE):
+            some = ids[start : start + _IDS_AT_ONCE]
+            found += await self._statements.rows(
+                "SELECT id, owner, record ->> 'result', finished FROM jobs "  # noqa: S608 - no value
+                f"WHERE finished IS NOT NULL AND id IN ({', '.join('?' * len(some))})",
+                *some,
+            )
+        return [
+            EndedJob(job_id, owner, result, datetime.fromisoformat(finished))
+            for job_id, owner, result, finished in found
+        ]
 
     async def _forget_query(self, job_id: str) -> None:
         await self._statements.run_on_reserve("DELETE FROM queries WHERE job_id = ?", job_id)

@@ -9,7 +9,7 @@ from math import ceil
 from time import monotonic
 from typing import NamedTuple
 
-from app.jobs.job import Job
+from app.jobs.job import EndedJob, Job
 
 
 class FinishedJob(NamedTuple):
@@ -32,28 +32,31 @@ class Retention:
 
     def add(self, job: Job) -> None:
         """Add a job that has finished just now."""
-        self._add(job, age_s=0.0)
+        self._add(job.id, job.spec.owner, job.result, age_s=0.0)
 
-    def add_older(self, job: Job) -> None:
-        """Add a job that finished before the service started.
+    def add_older(self, job: EndedJob) -> None:
+        """Add a job that finished before the service started, or at another replica.
 
         By the calendar its end may be to come: then its age is none.
         """
-        assert job.finished is not None, "the caller has seen its end"  # noqa: S101
-        self._add(job, max(0.0, (datetime.now(UTC) - job.finished).total_seconds()))
+        age_s = max(0.0, (datetime.now(UTC) - job.finished).total_seconds())
+        self._add(job.id, job.owner, job.result, age_s)
 
-    def _add(self, job: Job, age_s: float) -> None:
+    def _add(self, job_id: str, owner: str | None, result: str | None, age_s: float) -> None:
         due = monotonic() + self._ttl_s - age_s
-        self._finished[job.id] = FinishedJob(job.id, job.spec.owner, job.result, due)
+        self._finished[job_id] = FinishedJob(job_id, owner, result, due)
+
+    def __contains__(self, job_id: str) -> bool:
+        return job_id in self._finished
 
     @property
     def jobs(self) -> list[FinishedJob]:
         """All jobs."""
         return list(self._finished.values())
 
-    def discard(self, job_id: str) -> None:
-        """Forget a job that has been removed."""
-        self._finished.pop(job_id, None)
+    def discard(self, job_id: str) -> bool:
+        """Forget a job that has been removed; tell whether it was there."""
+        return self._finished.pop(job_id, None) is not None
 
     def due(self) -> list[FinishedJob]:
         """Return the jobs that are to be removed by now."""

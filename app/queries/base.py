@@ -251,15 +251,19 @@ def code_version() -> str:
 def result_key(query: Query[Any], representation: Representation) -> str:
     """Return the name of the answer to ``query`` in a representation.
 
-    It is the hash that `fingerprint` returns, unless the answer differs from run to run: then each
-    run has a name of its own.
+    It is a hash, of the code that answers as well, unless the answer differs from run to run: then
+    each run has a name of its own.
     """
-    return fingerprint(query, representation) if query.is_repeatable else uuid4().hex
+    return _hash(query, representation, code_version()) if query.is_repeatable else uuid4().hex
 
 
 def fingerprint(query: Query[Any], representation: Representation) -> str:
-    """Return the hash of ``query`` in a representation, as answered by this code."""
-    names = [type(query).__name__, query.mesh_id, representation, code_version()]
+    """Return the hash of ``query`` in a representation, the same in all releases."""
+    return _hash(query, representation)
+
+
+def _hash(query: Query[Any], representation: Representation, *more: str) -> str:
+    names = [type(query).__name__, query.mesh_id, representation, *more]
     digest = hashlib.blake2b(orjson.dumps(names), digest_size=16)
     digest.update(query.written)
     return digest.hexdigest()

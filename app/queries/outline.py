@@ -37,7 +37,8 @@ def no_outline(reason: str, field: gc.DistanceField | None = None) -> dict[str, 
     bound = CERTAIN
     if field is not None and field.error_bound.kind == "estimated" and reason != "disconnected":
         bound = bound_of(field.error_bound)
-    return {"status": "no_path", "reason": reason, "points": None, "error_bound": bound}
+    nothing = dict.fromkeys(("length", "points", "locations", "faces"))
+    return {"status": "no_path", "reason": reason, **nothing, "error_bound": bound}
 
 
 def expected_outline(

@@ -34,8 +34,8 @@ def surface_of(mesh: gc.TriangleMesh, columns: Mapping[str, Values]) -> Surface:
 def line_of(outline: Mapping[str, Any], number: int | None = None) -> Line:
     """Return a path, or the reason why there is none; its ``number`` where there are several."""
     properties: dict[str, Any] = {} if number is None else {"path": number}
-    properties |= {"status": outline.get("reason", "ok"), "length": outline.get("length")}
-    locations = outline.get("locations", ())
+    properties |= {"status": outline.get("reason", "ok"), "length": outline["length"]}
+    locations = outline["locations"] or ()
     columns: dict[str, list[Any]] = {"face": [each["face"] for each in locations]}
     columns |= {x: [each["barycentric"][i] for each in locations] for i, x in enumerate("uvw")}
     points = np.empty((0, 3)) if outline["points"] is None else outline["points"]

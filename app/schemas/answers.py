@@ -182,12 +182,10 @@ class Outline(BaseModel):
 
     status: Literal["ok", "no_path"]
     reason: Literal["disconnected", "beyond_max_distance"] | None = None
-    length: float | None = None
+    length: float | None = Field(description="The length in mesh units; null without a path")
     points: list[tuple[float, float, float]] | None
-    locations: list[Location] | None = None
-    faces: list[int] | None = Field(
-        default=None, description="The face of each segment of the path"
-    )
+    locations: list[Location] | None
+    faces: list[int] | None = Field(description="The face of each segment of the path")
     error_bound: ErrorBound
 
 

@@ -1,19 +1,23 @@
 """The scrub: every file of a store is verified again and again, slowly, in the background.
 
 Disks lose bits in silence. The scrub finds that before a client does, while the mesh may still be
-at hand elsewhere.
+at hand elsewhere. It also removes what killed workers have left.
 """
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
 import structlog
 from anyio import to_thread
 
+from app.repeating import repeat
 from app.service.maintenance import Damage, inspect
+from app.store.atomic import remove_abandoned
+from app.store.layout import FIELDS, RESULTS
 
 logger = structlog.get_logger(module=__name__)
 
@@ -41,15 +45,13 @@ async def scrubbing(root: Path, on_damage: OnDamage) -> AsyncIterator[None]:
 
 async def _scrub(root: Path, on_damage: OnDamage) -> None:
     await asyncio.sleep(_DELAY_S)
-    while True:
-        try:
-            await _scrub_once(root, on_damage)
-        except Exception:  # such as too many open files: the next round may be luckier
-            logger.exception("store not verified to its end")
-        await asyncio.sleep(_PERIOD_S)
+    round_ = partial(_scrub_once, root, on_damage)
+    await repeat(round_, _PERIOD_S, "store not verified to its end")
 
 
 async def _scrub_once(root: Path, on_damage: OnDamage) -> None:
+    for folder in (root / RESULTS, root / FIELDS):
+        await to_thread.run_sync(remove_abandoned, folder)
     files = inspect(root)
     while True:
         start = perf_counter()

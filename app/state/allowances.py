@@ -5,7 +5,7 @@ from collections import Counter
 from math import ceil
 
 from app.errors import StateUnavailableError
-from app.state.database import Database
+from app.state.database import Database, Statements
 
 _MINUTE_S = 60.0
 _PURGE_EVERY = 1000
@@ -59,19 +59,15 @@ class Allowances:
 
         Beyond ``limit`` it is not counted.
         """
-        async with self._database.alone(f"running {kind} {caller}") as statements:
-            rows = await statements.rows(
-                "SELECT COALESCE(SUM(count), 0) FROM running WHERE kind = ? AND caller = ? "
-                "AND replica <> ? AND replica IN (SELECT id FROM replicas)",
-                kind,
-                caller,
-                self._replica,
-            )
-            running = int(rows[0][0]) + self._running[kind, caller] + 1
-            if running > limit:
-                return running
-            self._running[kind, caller] += 1
-            try:
+        is_counted = False
+        try:
+            async with self._database.alone(f"running {kind} {caller}") as statements:
+                elsewhere = await self._running_elsewhere(statements, kind, caller)
+                running = elsewhere + self._running[kind, caller] + 1
+                if running > limit:
+                    return running
+                self._running[kind, caller] += 1
+                is_counted = True
                 await statements.run(
                     "INSERT INTO running VALUES (?, ?, ?, ?) "
                     "ON CONFLICT (replica, kind, caller) DO UPDATE SET count = excluded.count",
@@ -80,9 +76,11 @@ class Allowances:
                     caller,
                     self._running[kind, caller],
                 )
-            except BaseException:
+        except BaseException:
+            if is_counted:  # the database may have counted it, too
                 self._lower(kind, caller)
-                raise
+                self._write_in_background(kind, caller)
+            raise
         return running
 
     async def end(self, kind: str, caller: str) -> None:
@@ -90,18 +88,27 @@ class Allowances:
         self._lower(kind, caller)
         try:
             await self._write(kind, caller)
-        except (StateUnavailableError, asyncio.CancelledError) as error:
-            retry = asyncio.create_task(self._write_later(kind, caller))
-            self._retries.add(retry)
-            retry.add_done_callback(self._retries.discard)
-            if isinstance(error, asyncio.CancelledError):
-                raise
+        except StateUnavailableError:
+            self._write_in_background(kind, caller)
+        except asyncio.CancelledError:
+            self._write_in_background(kind, caller)
+            raise
 
     async def close(self) -> None:
         """Give up what is still to be written; the rows end with this replica."""
         for retry in self._retries:
             retry.cancel()
         await asyncio.gather(*self._retries, return_exceptions=True)
+
+    async def _running_elsewhere(self, statements: Statements, kind: str, caller: str) -> int:
+        ((count,),) = await statements.rows(
+            "SELECT COALESCE(SUM(count), 0) FROM running WHERE kind = ? AND caller = ? "
+            "AND replica <> ? AND replica IN (SELECT id FROM replicas)",
+            kind,
+            caller,
+            self._replica,
+        )
+        return int(count)
 
     def _lower(self, kind: str, caller: str) -> None:
         self._running[kind, caller] -= 1
@@ -118,7 +125,12 @@ class Allowances:
             else:
                 await statements.run(f"DELETE FROM running {where}", *row)  # noqa: S608 - no value
 
-    async def _write_later(self, kind: str, caller: str) -> None:
+    def _write_in_background(self, kind: str, caller: str) -> None:
+        retry = asyncio.create_task(self._write_until_done(kind, caller))
+        self._retries.add(retry)
+        retry.add_done_callback(self._retries.discard)
+
+    async def _write_until_done(self, kind: str, caller: str) -> None:
         while True:
             try:
                 await self._write(kind, caller)

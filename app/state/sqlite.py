@@ -9,11 +9,11 @@ import errno
 import os
 import sqlite3
 import tempfile
-from collections import defaultdict
 from collections.abc import AsyncIterator, Iterator, Sequence
 from contextlib import asynccontextmanager, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 import aiosqlite
 from anyio import to_thread
@@ -38,7 +38,8 @@ class SqliteDatabase:
         self._path = path
         self._database: aiosqlite.Connection | None = None
         self._reserve = _reserve_of(path)
-        self._locks: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
+        self._locks: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
+        """Each lives as long as a block holds it or waits for it"""
 
     def prepare(self) -> None:
         """Create the file, or the tables that it lacks, and verify it.
@@ -72,13 +73,9 @@ class SqliteDatabase:
     @asynccontextmanager
     async def alone(self, name: str) -> AsyncIterator[Statements]:
         """Run the statements of the block one block of this name at a time."""
-        lock = self._locks[name]
-        try:
-            async with lock:
-                yield self
-        finally:
-            if not lock.locked():
-                self._locks.pop(name, None)
+        lock = self._locks.setdefault(name, asyncio.Lock())
+        async with lock:
+            yield self
 
     async def rows(self, statement: str, *values: Any) -> Sequence[Any]:
         """Return the rows that a statement yields."""
@@ -151,7 +148,7 @@ _ERRORS_OF_THE_DISK = frozenset({sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN})
 
 @contextmanager
 def _as_os_errors(folder: Path) -> Iterator[None]:
-    """Raise the errors of SQLite as ``JobRepository`` promises them, for a database in a folder."""
+    """Raise the errors of SQLite as ``Statements`` promises them, for a database in a folder."""
     try:
         yield
     except sqlite3.Error as error:

@@ -67,7 +67,10 @@ class Supply(Protocol):
         """Send the files of a mesh; False where it is to be written again."""
 
     async def send_result(self, result: Result) -> None:
-        """Send the files of a result, and remove them here."""
+        """Send the files of a result."""
+
+    def discard_result(self, name: str) -> None:
+        """Remove the files of a result here, if there are any."""
 
     async def distrust(self, mesh_id: str) -> None:
         """Pull a mesh again before it is used."""

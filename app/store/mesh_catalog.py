@@ -123,7 +123,8 @@ class MeshCatalog:
                 yield
             return
         failure: BaseException | None = None
-        async with self._shared.alone() as table:
+        # Whoever waits for the table holds a connection: at most one of them is of this service.
+        async with self._lock, self._shared.alone() as table:
             before = await table.all()
             self._entries = OrderedDict(before)
             for mesh_id in self._used:
@@ -135,7 +136,7 @@ class MeshCatalog:
                 failure = error
             for mesh_id in before.keys() - self._entries.keys():
                 await table.remove(mesh_id)
-            for mesh_id, record in self._entries.items():
+            for mesh_id, record in list(self._entries.items()):  # queries change their order
                 if mesh_id not in before:
                     await table.add(mesh_id, record)
         if failure is not None:

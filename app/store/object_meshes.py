@@ -18,6 +18,7 @@ from threading import Lock
 from time import monotonic
 from typing import Any, NamedTuple
 from uuid import uuid4
+from weakref import WeakValueDictionary
 
 from anyio import CapacityLimiter, to_thread
 
@@ -63,7 +64,8 @@ class ObjectMeshes:
         self._temporary = folder / TEMPORARY
         self._capacity = capacity
         self._known: dict[str, _Known] = {}
-        self._pulls: dict[str, asyncio.Lock] = {}
+        self._pulls: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
+        """Each lives as long as a pull holds it or waits for it"""
         self._pins: Counter[str] = Counter()
         self._limiter = CapacityLimiter(_CALLS)
         self._installing = Lock()  # a cancelled pull goes on in its thread
@@ -189,21 +191,17 @@ class ObjectMeshes:
 
     async def _pull(self, mesh_id: str) -> None:
         lock = self._pulls.setdefault(mesh_id, asyncio.Lock())
-        try:
-            async with lock:
-                known = await self._current(mesh_id)
-                if await to_thread.run_sync(self._has_copy, mesh_id, known.content):
-                    return
-                try:
-                    await self._call(self._fetch, mesh_id, known)
-                except FileNotFoundError:
-                    self._known.pop(mesh_id, None)
-                    if (await self._current(mesh_id)).content == known.content:
-                        raise mesh_damaged(mesh_id, "an array is missing") from None
-                    await self._call(self._fetch, mesh_id, await self._current(mesh_id))
-        finally:
-            if self._pins[mesh_id] == 1:  # nobody waits
-                self._pulls.pop(mesh_id, None)
+        async with lock:
+            known = await self._current(mesh_id)
+            if await to_thread.run_sync(self._has_copy, mesh_id, known.content):
+                return
+            try:
+                await self._call(self._fetch, mesh_id, known)
+            except FileNotFoundError:
+                self._known.pop(mesh_id, None)
+                if (await self._current(mesh_id)).content == known.content:
+                    raise mesh_damaged(mesh_id, "an array is missing") from None
+                await self._call(self._fetch, mesh_id, await self._current(mesh_id))
 
     async def _call(self, do: Any, *arguments: Any) -> Any:
         return await to_thread.run_sync(do, *arguments, limiter=self._limiter)

@@ -135,7 +135,10 @@ class ObjectStore:
     async def send_result(self, result: Result) -> None:
         """Send a result."""
         await self.results.send(result, self._local_results.body(result))
-        self._local_results.remove(result.name)
+
+    def discard_result(self, name: str) -> None:
+        """Remove the local files of a result."""
+        self._local_results.remove(name)
 
     async def distrust(self, mesh_id: str) -> None:
         """Drop the copy of a mesh."""

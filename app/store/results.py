@@ -10,9 +10,8 @@ import errno
 import zlib
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from io import SEEK_END
 from itertools import chain
 from pathlib import Path
 from typing import IO, Protocol
@@ -20,12 +19,12 @@ from typing import IO, Protocol
 from anyio import to_thread
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from app.errors import problem
+from app.errors import StoreUnavailableError, problem
 from app.settings import variable_of
 from app.store.atomic import atomic_write, remove_partial
 from app.store.last_use import note_use, order_of_use
 from app.store.log import warn
-from app.store.verified import checksum_of, read_checksum
+from app.store.verified import checksum_of
 
 Buffer = bytes | memoryview
 
@@ -33,6 +32,8 @@ Buffer = bytes | memoryview
 SMALL = 2**16
 """Bytes of a body that is also held in memory: most of them, but for fields and long lines"""
 
+_CHUNK = 2**20
+"""Bytes that are read at a time"""
 
 _ENTRY = 4096
 """Bytes that a result in memory takes besides its body: objects, names and headers"""
@@ -126,14 +127,20 @@ def write_result_file(
     write: Callable[[IO[bytes]], None],
     headers: Mapping[str, str],
     code: str,
+    check: Callable[[], None],
 ) -> Result:
-    """Write a result whose body ``write`` writes into a file, in any order; see `write_result`."""
+    """Write a result whose body ``write`` writes into a file, in any order; see `write_result`.
+
+    While the file is read for its checksum, ``check`` is called again and again; it may raise.
+    """
+    size = checksum = 0
     with atomic_write(body_path(root, name)) as file:
         write(file)
-        file.flush()
-        size, checksum = file.seek(0, SEEK_END), read_checksum(file.name)
-    if checksum is None:
-        raise OSError(errno.EIO, "the disk cannot read what was written", name)
+        file.seek(0)
+        while chunk := file.read(_CHUNK):
+            check()
+            size += len(chunk)
+            checksum = zlib.crc32(chunk, checksum)
     return _add_manifest(root, name, size, checksum, headers, code)
 
 
@@ -324,6 +331,15 @@ class ResultStore:
             size = await self._files.size(name)
             if size is not None:
                 self._count(name, size)
+
+    async def index_unclaimed(self, name: str) -> None:
+        """Index a result that was written although nobody waits for it.
+
+        Where the store does not answer, the next start finds it.
+        """
+        with suppress(StoreUnavailableError):
+            await self.index(name)
+            self.make_room()
 
     def add(self, result: Result, *, is_reusable: bool = True) -> Result:
         """Acquire a result that a worker has just written."""

@@ -9,16 +9,27 @@ import pickle
 import signal
 from itertools import count
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TextIO
 from uuid import uuid4
 
 import gevent
 import locust
+from locust.contrib.fasthttp import FastResponse
 from locust.env import Environment
 
 from benchmarks.failures.plan import LongQuestion
 from benchmarks.soak.plan import Request
-from benchmarks.soak.traffic import ASYNC, DICE, LIMITS, LONG_S, Founder, User, recording, store
+from benchmarks.soak.traffic import (
+    ASYNC,
+    DICE,
+    LIMITS,
+    LONG_S,
+    Founder,
+    User,
+    header_of,
+    recording,
+    store,
+)
 
 NO_CONNECTION = (0, "")
 LOOK_S = 0.2
@@ -32,7 +43,7 @@ class Client(User):
     abstract = True
     hosts: ClassVar[list[str]]
     places: ClassVar = count()
-    promises: ClassVar[Any]
+    promises: ClassVar[TextIO]
     """A file with a line of JSON for each"""
 
     def __init__(self, environment: Environment) -> None:
@@ -43,14 +54,14 @@ class Client(User):
         """Note a job or a mesh that was answered with 2xx, or that such a job was kept."""
         self.promises.write(json.dumps({"caller": self.caller} | promise) + "\n")
 
-    def exchange(self, *arguments: Any, **options: Any) -> Any:
+    def exchange(self, *arguments: Any, **options: Any) -> FastResponse:
         """Send something; where nobody listens, wait before anything else is sent."""
         response = super().exchange(*arguments, **options)
         if response.status_code == 0:
             gevent.sleep(RECONNECT_S)
         return response
 
-    def is_refused(self, response: Any) -> bool:
+    def is_refused(self, response: FastResponse) -> bool:
         """Whether an answer is a refusal that may come, after which one asks again."""
         return response.status_code == 0 or response.status_code >= 429
 
@@ -93,7 +104,7 @@ class Worker(Client):
         while self.is_refused(response):  # the same key: it may have been accepted
             gevent.sleep(LOOK_S)
             response = self.submit(request, headers)
-        link = response.headers["location"]
+        link = header_of(response, "location")
         self.note_promise(job=link, digest=request.expected.digest)
         status = ""
         while status not in ENDED:
@@ -107,7 +118,7 @@ class Worker(Client):
                 self.note_promise(kept=link)
                 self.exchange("dismissJob", "DELETE", link, 200, 404)  # or an answer went astray
 
-    def submit(self, request: Request, headers: dict[str, str]) -> Any:
+    def submit(self, request: Request, headers: dict[str, str]) -> FastResponse:
         """Send a query as a job; return the answer."""
         return self.exchange(
             request.operation, "POST", request.path, 202, data=request.body, headers=headers
@@ -142,8 +153,8 @@ def main() -> None:
     User.plan, LongAsker.question = load.plan, load.long
     refusals = {(int(each[:3]), each[4:]) for each in arguments.refusal}
     User.refusals = LIMITS | refusals | ({NO_CONNECTION} if arguments.breaks else set())
-    Client.hosts, kinds = arguments.urls, [Asker, LongAsker, Worker, Uploader]
-    User.host = arguments.urls[0]
+    Client.hosts, User.host = arguments.urls, arguments.urls[0]
+    kinds: list[type[locust.User]] = [Asker, LongAsker, Worker, Uploader]
     environment = Environment(user_classes=kinds, stop_timeout=LONG_S)
     runner = environment.create_local_runner()
     gevent.signal_handler(signal.SIGTERM, lambda: gevent.spawn(runner.quit))

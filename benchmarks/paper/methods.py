@@ -6,7 +6,7 @@ import numpy as np
 import potpourri3d as peer
 
 import geodesic_core as gc
-from geodesic_core.arrays import Floats
+from geodesic_core.arrays import Floats, Ints
 
 FEWEST, MOST = 1e-9, 0.5
 """Bounds of the errors that are searched for a number of windows"""
@@ -28,7 +28,7 @@ def errors_of(distances: Floats, true: Floats) -> Errors:
     return Errors(float(differences.max()), float((differences / true[away]).mean()))
 
 
-def marching(vertices: Floats, faces: Floats, source: int) -> Floats:
+def marching(vertices: Floats, faces: Ints, source: int) -> Floats:
     """Return the distances of potpourri3d's fast marching, cold."""
     solver = peer.MeshFastMarchingDistanceSolver(vertices, faces)
     distances: Floats = solver.compute_distance([[(source, [])]])

@@ -42,8 +42,8 @@ def eight(level: int) -> Surface:
             [(x + a, y + b, z) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))] for z in (0, 1)
         )
         quads += [high, low[::-1]]
-        for i, (a, b) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
-            if (x + a, y + b) not in cubes:
+        for i, (dx, dy) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
+            if (x + dx, y + dy) not in cubes:
                 j = (i + 1) % 4
                 quads.append([low[i], low[j], high[j], high[i]])
     corners, places = np.unique(np.reshape(quads, (-1, 3)), axis=0, return_inverse=True)
@@ -70,7 +70,10 @@ def knot(faces: int) -> Surface:
 
 def subdivided(surface: Surface, level: int) -> Surface:
     """Return a surface that is subdivided ``level`` times by Loop's scheme."""
-    vertices, faces = subdivide_loop(*surface, iterations=level) if level else surface
+    vertices, faces = surface
+    if level:
+        # trimesh has types in part.
+        vertices, faces = subdivide_loop(vertices, faces, level)  # type: ignore[no-untyped-call]
     return np.asarray(vertices, float), np.asarray(faces, np.int32)
 
 

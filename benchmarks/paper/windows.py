@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import partial
 
 from matplotlib.figure import Figure
 
@@ -24,10 +25,11 @@ def figure_6(levels: Mapping[str, Sequence[int]], runs: int) -> Report:
     rows, figure = [], Figure(figsize=(5.5, 4), layout="constrained")
     axes = figure.subplots()
     for color, (name, make) in zip(("C0", "C1", "C2", "C3"), SURFACES.items(), strict=True):
-        last, points = None, []
+        last: int | None = None
+        points: list[tuple[int, int]] = []
         for level in levels[name]:
             mesh = gc.TriangleMesh(*make(level))
-            ((seconds, field),) = by_turns([lambda mesh=mesh: gc.exact_distance(mesh, 0)], runs)
+            ((seconds, field),) = by_turns([partial(gc.exact_distance, mesh, 0)], runs)
             made, theirs = field.stats.windows_created, published.FIGURE_6[name][level]
             exponent = None if last is None else math.log(made / last, 4)
             last = made
@@ -69,7 +71,7 @@ def figure_7(runs: int, faces: int = KNOT_FACES) -> Report:
     smooth = surfaces.knot(faces)
     for noise, (seconds, per_edge) in published.FIGURE_7.items():
         mesh = gc.TriangleMesh(*surfaces.noisy(smooth, noise, SEED))
-        ((took, field),) = by_turns([lambda mesh=mesh: gc.exact_distance(mesh, 0)], runs)
+        ((took, field),) = by_turns([partial(gc.exact_distance, mesh, 0)], runs)
         made.append(field.stats.windows_per_edge_created)
         rows.append([f"{noise:.0%}", beside(took, seconds, 3), beside(made[-1], per_edge, 1)])
     figure = Figure(figsize=(5, 3.4), layout="constrained")

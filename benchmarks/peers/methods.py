@@ -102,12 +102,12 @@ def _command(vertices: Floats, faces: Ints, command: str) -> Query:
     """Return a query to an executable, see `executable`."""
     import trimesh
 
-    folder = Path(tempfile.mkdtemp())
-    path = folder / "mesh.obj"
-    path.write_text(trimesh.Trimesh(vertices, faces, process=False).export(file_type="obj"))
+    folder = tempfile.TemporaryDirectory()  # is there as long as the query
+    trimesh.Trimesh(vertices, faces, process=False).export(Path(folder.name, "mesh.obj"))
 
     def query(source: int) -> Floats:
-        ran = subprocess.run([command, path, str(source)], capture_output=True, check=True)
+        mesh = Path(folder.name, "mesh.obj")
+        ran = subprocess.run([command, mesh, str(source)], capture_output=True, check=True)
         return np.array(ran.stdout.split(), float)
 
     return query

@@ -37,6 +37,8 @@ def run(inputs: Inputs, executables: Mapping[str, str]) -> str:
             trial = try_out(method, vertices, faces, 0, executables.get(name, ""))
             if exact is None:  # ours is the first
                 exact = trial.distances
+            if exact is None:
+                raise RuntimeError(f"no exact distances on {mesh}: {trial.end}")
             rows.append(_row(mesh, name, trial, exact))
             if trial.distances is not None:
                 points.append((name, mesh, trial.query_s, _errors(trial.distances, exact)[0]))

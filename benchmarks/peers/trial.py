@@ -42,7 +42,7 @@ def try_out(method: Method, vertices: Floats, faces: Ints, source: int, command:
     with tempfile.TemporaryDirectory() as folder:
         question = Path(folder) / "question.npz"
         np.savez(question, vertices=vertices, faces=faces, source=source)
-        arguments = [sys.executable, "-m", __spec__.name, method.name, command, question]
+        arguments = [sys.executable, "-m", __spec__.name, method.name, command, str(question)]
         try:
             ran = subprocess.run(
                 arguments, capture_output=True, text=True, timeout=PATIENCE_S, check=False

@@ -129,8 +129,8 @@ def _queries(opened: OpenMesh, random: Random) -> Iterator[Request]:
     def ask(kind: str, form: str = "json", dtype: str = "float64", **body: Any) -> Request:
         return _query(opened, kind, body, form, dtype)
 
-    approximate = {"method": "approximate", "relative_error": 0.01}
-    fast = {"method": "fast", "effort": 1}
+    approximate: dict[str, Any] = {"method": "approximate", "relative_error": 0.01}
+    fast: dict[str, Any] = {"method": "fast", "effort": 1}
     barriers = random.sample(range(len(triangles)), 5)
     yield ask("path", source=vertex(), target=vertex())
     yield ask("path", source=inside(), target=vertex(), waypoints=[vertex()])

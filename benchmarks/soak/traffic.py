@@ -9,7 +9,7 @@ import json
 import pickle
 import socket
 import time
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import count
 from pathlib import Path
@@ -47,7 +47,7 @@ class User(locust.FastHttpUser):
     abstract = True
     network_timeout = connection_timeout = LONG_S
     wait_time = locust.between(0.0, 0.1)
-    callers: ClassVar = ("alice", "bob")
+    callers: ClassVar[Sequence[str]] = ("alice", "bob")
     refusals: ClassVar[Collection[tuple[int, str]]] = LIMITS
     """Statuses and codes that are right answers to anything"""
     plan: ClassVar[Plan]
@@ -85,9 +85,15 @@ class User(locust.FastHttpUser):
     ) -> FastResponse:
         """Send something, and record a fault unless its answer is a right one."""
         own = {"Authorization": f"Bearer {SECRETS[self.caller]}", **headers}
-        with self.client.request(
-            method, path, name=operation, data=data, headers=own, catch_response=True
-        ) as response:
+        response = self.client.request(
+            method,
+            path,
+            name=operation,
+            data=data,  # type: ignore[arg-type] # Locust sends bytes as well
+            headers=own,
+            catch_response=True,
+        )
+        with response:
             fault = fault_of(response, statuses, request, self.refusals)
             if fault:
                 response.failure(f"{method} {path}: {fault}")
@@ -127,7 +133,7 @@ class Reader(User):
         request = DICE.choice(asked)
         response = self.send(request)
         if response.status_code == 200:
-            known = {**request.headers, "If-None-Match": response.headers["etag"]}
+            known = {**request.headers, "If-None-Match": header_of(response, "etag")}
             self.exchange(request.operation, "GET", request.path, 304, headers=known)
 
 
@@ -212,7 +218,7 @@ class Impatient(User):
             **query.headers,
         }
         lines = "".join(f"{name}: {value}\r\n" for name, value in head.items())
-        url = urlsplit(self.client.base_url)
+        url = urlsplit(self.client.base_url or "")
         with socket.create_connection((url.hostname, url.port)) as connection:
             connection.sendall(
                 f"POST {query.path} HTTP/1.1\r\n{lines}\r\n".encode() + (query.body or b"")
@@ -306,7 +312,15 @@ def submit(user: User, request: Request) -> str | None:
     response = user.exchange(
         request.operation, "POST", request.path, 202, data=request.body, headers=headers
     )
-    return response.headers["location"] if response.status_code == 202 else None
+    return header_of(response, "location") if response.status_code == 202 else None
+
+
+def header_of(response: FastResponse, name: str) -> str:
+    """Return a header that an answer must have, once."""
+    value = None if response.headers is None else response.headers[name]
+    if not isinstance(value, str):
+        raise TypeError(f"{name} is {value!r}")
+    return value
 
 
 def long_query(plan: Plan) -> Request:
@@ -345,7 +359,7 @@ def fault_of(
     return ""
 
 
-def code_of(response: Any) -> str:
+def code_of(response: FastResponse) -> str:
     """Return the code of a problem; nothing for other answers."""
     headers = response.headers
     is_problem = headers and headers.get("content-type") == "application/problem+json"
@@ -363,7 +377,7 @@ def main() -> None:
     bound.add_argument("--requests", type=int)
     arguments = parser.parse_args()
     User.plan = pickle.loads(arguments.plan.read_bytes())  # noqa: S301 - written by our parent
-    kinds = [Reader, Uploader, Client, Wrong, Impatient, Greedy, Hoarder]
+    kinds: list[type[locust.User]] = [Reader, Uploader, Client, Wrong, Impatient, Greedy, Hoarder]
     User.host = arguments.url
     environment = Environment(user_classes=kinds, stop_timeout=LONG_S)
     runner = environment.create_local_runner()
@@ -412,7 +426,7 @@ def recording(
         yield
 
 
-def outcome_of(response: Any) -> str:
+def outcome_of(response: FastResponse) -> str:
     """Return the status of an answer, with its code where it is a problem."""
     return f"{response.status_code} {code_of(response)}".strip()
 

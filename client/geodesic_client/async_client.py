@@ -1,7 +1,7 @@
 """The client for coroutines, on asyncio or trio."""
 
 from collections.abc import AsyncIterator, Iterator
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 import anyio
 import httpx2
@@ -75,7 +75,7 @@ class AsyncClient(Operations):
         if isinstance(step, Pause):
             await anyio.sleep(step.seconds)
             return None
-        async for attempt in connection.attempts():
+        async for attempt in connection.attempts(step):
             with attempt:
                 return await self._send(step)
         return None
@@ -84,7 +84,7 @@ class AsyncClient(Operations):
         content: bytes | AsyncIterator[bytes] = (
             request.content if isinstance(request.content, bytes) else _each(request.content())
         )
-        options: dict[str, Any] = {"params": request.params, "headers": request.headers}
+        options = connection.options(request)
         try:
             response = await self._http.request(
                 request.method, request.path, content=content, **options

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 import httpx2
 
@@ -70,7 +70,7 @@ class Client(Operations):
         if isinstance(step, Pause):
             time.sleep(step.seconds)
             return None
-        for attempt in connection.attempts():
+        for attempt in connection.attempts(step):
             with attempt:
                 return self._send(step)
         return None
@@ -79,7 +79,7 @@ class Client(Operations):
         content: bytes | Iterator[bytes] = (
             request.content if isinstance(request.content, bytes) else request.content()
         )
-        options: dict[str, Any] = {"params": request.params, "headers": request.headers}
+        options = connection.options(request)
         try:
             response = self._http.request(request.method, request.path, content=content, **options)
         except httpx2.TransportError as error:

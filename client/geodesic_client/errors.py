@@ -8,6 +8,7 @@
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import httpx2
@@ -20,7 +21,7 @@ class GeodesicClientError(Exception):
 class UnreachableError(GeodesicClientError):
     """No service answered: there is none at the address, or the connection broke."""
 
-    def __init__(self, message: str, *, may_retry: bool) -> None:
+    def __init__(self, message: str, *, may_retry: bool = False) -> None:
         super().__init__(message)
         self.may_retry = may_retry
 
@@ -63,41 +64,46 @@ class ProblemError(GeodesicClientError):
         self.setting: str | None = document.get("setting")
         self.request_id: str | None = document.get("request_id")
         self.retry_after = retry_after
+        super().__init__(status, document, retry_after)  # pickle calls it with these
+
+    def __str__(self) -> str:
         hint = f" ({self.hint})" if self.hint else ""
-        super().__init__(f"{self.code}: {self.detail}{hint}")
+        return f"{self.code}: {self.detail}{hint}"
 
 
 def check(response: httpx2.Response) -> httpx2.Response:
     """Return a response that is an answer; raise `ProblemError` for any other."""
-    if response.status_code < 400:
+    if response.is_success:
         return response
-    try:
-        document = response.json()
-    except ValueError:  # a proxy on the way, for example
-        document = {
-            "detail": f"the answer has status {response.status_code}, but is not a problem document"
-        }
     seconds = response.headers.get("retry-after", "")
     retry_after = float(seconds) if seconds.isdecimal() else None
-    raise ProblemError(response.status_code, document, retry_after)
+    raise ProblemError(response.status_code, _document_of(response), retry_after)
+
+
+def _document_of(response: httpx2.Response) -> Mapping[str, Any]:
+    """Return the problem document of a response, or one about it if a proxy sent it, say."""
+    if response.has_redirect_location:
+        return {"detail": f"the service has another address: {response.headers['location']}"}
+    with suppress(ValueError):
+        document = response.json()
+        if isinstance(document, dict):
+            return document
+    return {
+        "detail": f"the answer has status {response.status_code}, but is not a problem document"
+    }
+
+
+_UNSENT = httpx2.ConnectError, httpx2.ConnectTimeout
+_BROKEN = httpx2.NetworkError, httpx2.RemoteProtocolError
 
 
 def unreachable(error: httpx2.TransportError) -> UnreachableError:
-    """Return the error for a request that was not answered."""
-    broken = httpx2.NetworkError, httpx2.RemoteProtocolError, httpx2.ConnectTimeout
-    message = f"no answer from {error.request.url}: {error or type(error).__name__}"
-    return UnreachableError(message, may_retry=isinstance(error, broken))
+    """Return the error for a request that was not answered.
 
-
-def pause_before_retry(error: Exception) -> bool | float:
-    """Tell whether to send a request again: True, or the seconds that the service asks to wait.
-
-    Every request may be sent twice: meshes are named by their content, jobs by a key, and queries
-    change nothing.
+    If the connection broke, the service may have received the request. It may be sent again all the
+    same: meshes are named by their content, jobs by a key, and queries change nothing. But a second
+    ``DELETE`` would find nothing, or remove a job that the first one only stopped.
     """
-    match error:
-        case ProblemError(status=429 | 503, retry_after=seconds):
-            return True if seconds is None else seconds
-        case UnreachableError(may_retry=may_retry):
-            return may_retry
-    return False
+    repeatable = _UNSENT if error.request.method == "DELETE" else (*_UNSENT, *_BROKEN)
+    message = f"no answer from {error.request.url}: {error or type(error).__name__}"
+    return UnreachableError(message, may_retry=isinstance(error, repeatable))

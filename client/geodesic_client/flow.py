@@ -36,6 +36,8 @@ class Request:
     headers: Mapping[str, str] = field(default_factory=dict)
     content: bytes | Callable[[], Iterator[bytes]] = b""
     """The body, or what begins to read it: it is read again for each attempt"""
+    is_optional: bool = False
+    """Whether it may fail without harm; it is then sent only once, and not waited for long"""
 
 
 @dataclass(frozen=True)
@@ -67,35 +69,53 @@ def send(request: Request) -> Flow[httpx2.Response]:
 
 
 def answer(query: Query[T], progress: Progress) -> Flow[T]:
-    """Return the answer to a query, which becomes a job of the service if it takes long."""
+    """Return the answer to a query, which becomes a job of the service if it takes long.
+
+    The job is removed in the end. Otherwise it would take up space and quota for a day.
+    """
     prefer = f"respond-async, wait={JOB_AFTER_S}"
     headers = {**query.request.headers, "Prefer": prefer, "Idempotency-Key": uuid4().hex}
     response = yield from send(replace(query.request, headers=headers))
     if response.status_code == httpx2.codes.ACCEPTED:
-        response = yield from result_of(to_job(response.json()), progress)
+        job = to_job(response.json())
+        response = yield from result_of(job, progress)
+        yield from remove(job)
     progress(1.0)
     return query.decode(response)
 
 
-def result_of(job: Job, progress: Progress) -> Flow[httpx2.Response]:
-    """Wait for a job, and return its result."""
-    yield from end_of(job, progress)
-    return (yield from send(Request("GET", f"/v1/jobs/{job.id}/results")))
-
-
-def end_of(job: Job, progress: Progress) -> Flow[None]:
-    """Wait for a job. Whatever ends the wait early, ends the job."""
-    link = f"/v1/jobs/{job.id}"
-    pause = FIRST_PAUSE_S
+def result_of(
+    job: Job, progress: Progress, headers: Mapping[str, str] | None = None
+) -> Flow[httpx2.Response]:
+    """Wait for a job, and return its result. If anything prevents that, remove the job."""
     try:
-        while not job.is_finished:
-            progress(job.progress)
-            yield Pause(pause)
-            pause = min(1.5 * pause, LONGEST_PAUSE_S)
-            job = to_job((yield from send(Request("GET", link))).json())
+        yield from end_of(job, progress)
+        return (yield from send(Request("GET", f"{_link(job)}/results", headers=headers or {})))
     except GeneratorExit:
         raise
     except BaseException:
-        with suppress(GeodesicClientError):
-            yield from send(Request("DELETE", link))
+        yield from remove(job)
         raise
+
+
+def end_of(job: Job, progress: Progress) -> Flow[None]:
+    """Wait for a job."""
+    pause = FIRST_PAUSE_S
+    while not job.is_finished:
+        progress(job.progress)
+        yield Pause(pause)
+        pause = min(1.5 * pause, LONGEST_PAUSE_S)
+        job = to_job((yield from send(Request("GET", _link(job)))).json())
+
+
+def remove(job: Job) -> Flow[None]:
+    """Remove a job, if the service can do so now; stop it first if it has not finished."""
+    request = Request("DELETE", _link(job), is_optional=True)
+    with suppress(GeodesicClientError):
+        last = to_job((yield from send(request)).json())
+        if last.status == "dismissed":  # it has only been stopped
+            yield from send(request)
+
+
+def _link(job: Job) -> str:
+    return f"/v1/jobs/{job.id}"

@@ -48,12 +48,12 @@ from geodesic_client.flow import (
     Query,
     Request,
     answer,
-    end_of,
     ignore_progress,
+    result_of,
     send,
 )
 from geodesic_client.method import Method
-from geodesic_client.points import Point
+from geodesic_client.points import Point, as_points
 
 T = TypeVar("T")
 Accuracy = Literal["exact", "approximate", "fast"]
@@ -134,7 +134,7 @@ def array(mesh: Mesh | str, name: ArrayName) -> Flow[NDArray[Any]]:
 
 def distances(
     mesh: Mesh | str,
-    sources: Sequence[Point],
+    sources: Point | Sequence[Point],
     *,
     targets: Sequence[Point] | None = None,
     method: Accuracy = "exact",
@@ -146,9 +146,12 @@ def distances(
     include: Sequence[Literal["nearest_source", "gradient"]] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[Distances]:
-    """Return the distance of each vertex, or of each target, from the nearest source."""
+    """Return the distance of each vertex, or of each target, from the nearest source.
+
+    ``sources`` is a point, or several.
+    """
     body = _body(
-        sources=sources,
+        sources=as_points(sources),
         targets=targets,
         method=method,
         relative_error=relative_error,
@@ -220,7 +223,7 @@ def paths(
 
 def isolines(
     mesh: Mesh | str,
-    sources: Sequence[Point],
+    sources: Point | Sequence[Point],
     *,
     levels: Sequence[float] | None = None,
     count: int | None = None,
@@ -232,9 +235,12 @@ def isolines(
     barriers: Sequence[int] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[Isolines]:
-    """Return the lines at some distances (``levels``), or at ``count`` evenly spaced ones."""
+    """Return the lines at some distances (``levels``), or at ``count`` evenly spaced ones.
+
+    ``sources`` is a point, or several.
+    """
     body = _body(
-        sources=sources,
+        sources=as_points(sources),
         levels=levels,
         count=count,
         method=method,
@@ -329,9 +335,9 @@ def store_matrix(
     request = _request(mesh, "matrix", body, media_type, {"dtype": dtype})
     headers = {**request.headers, "Prefer": "respond-async", "Idempotency-Key": uuid4().hex}
     job = to_job((yield from send(replace(request, headers=headers))).json())
-    yield from end_of(job, progress)
+    response = yield from result_of(job, progress, _range(0, 1))
     progress(1.0)
-    return to_stored_matrix(job.id, (yield from _part_of_result(job.id, 0, 1)))
+    return to_stored_matrix(job.id, response)
 
 
 def matrix_rows(matrix: StoredMatrix, first: int, last: int) -> Flow[NDArray[Any]]:
@@ -343,7 +349,8 @@ def matrix_rows(matrix: StoredMatrix, first: int, last: int) -> Flow[NDArray[Any
     row = matrix.shape[1] * matrix.dtype.itemsize
     begin, end = (matrix.rows_at + row * number for number in (first, last))
     part = (yield from _part_of_result(matrix.job_id, begin, end)).content
-    return np.frombuffer(part, matrix.dtype).reshape(last - first, matrix.shape[1])
+    # A copy, because an array over bytes is read-only.
+    return np.frombuffer(part, matrix.dtype).reshape(last - first, matrix.shape[1]).copy()
 
 
 def save_matrix(
@@ -419,8 +426,12 @@ def dismiss_job(job: Job | str) -> Flow[Job]:
 
 def _part_of_result(job_id: str, begin: int, end: int) -> Flow[httpx2.Response]:
     """Return the bytes of an answer from ``begin`` to before ``end``, or to its end."""
-    headers = {"Range": f"bytes={begin}-{end - 1}"}
-    return (yield from send(Request("GET", f"/v1/jobs/{job_id}/results", {}, headers)))
+    request = Request("GET", f"/v1/jobs/{job_id}/results", headers=_range(begin, end))
+    return (yield from send(request))
+
+
+def _range(begin: int, end: int) -> dict[str, str]:
+    return {"Range": f"bytes={begin}-{end - 1}"}
 
 
 def _ask(

@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 Point = int | Mapping[str, Any]
 """The index of a vertex, or the result of a function of this module"""
 
@@ -29,5 +31,11 @@ def curve(points: Sequence[Point]) -> Point:
 
 def starting_at(source: Point, distance: float) -> Point:
     """Return a source at which distances begin with ``distance`` instead of 0."""
-    members = {"vertex": source} if isinstance(source, int) else source
+    members = source if isinstance(source, Mapping) else {"vertex": source}
     return {**members, "start_distance": distance}
+
+
+def as_points(points: Point | Sequence[Point]) -> Sequence[Point]:
+    """Return several points; a single one becomes a list."""
+    is_single = isinstance(points, int | np.integer | Mapping)
+    return [points] if is_single else points  # type: ignore[list-item, return-value]

@@ -305,7 +305,9 @@ export interface paths {
         };
         /**
          * Read the answer of a job
-         * @description Return the answer in the format of the query, or the problem that the query met.
+         * @description Return the answer in the format and coding of the query, or the problem that the query met.
+         *
+         *     A request whose `Accept` or `Accept-Encoding` excludes them gets 406.
          */
         get: operations["getJobResults"];
         put?: never;
@@ -1670,8 +1672,11 @@ export interface components {
             status: "ok" | "no_path";
             /** Reason */
             reason?: ("disconnected" | "beyond_max_distance") | null;
-            /** Length */
-            length?: number | null;
+            /**
+             * Length
+             * @description The length in mesh units; null without a path
+             */
+            length: number | null;
             /** Points */
             points: [
                 number,
@@ -1679,12 +1684,12 @@ export interface components {
                 number
             ][] | null;
             /** Locations */
-            locations?: components["schemas"]["Location"][] | null;
+            locations: components["schemas"]["Location"][] | null;
             /**
              * Faces
              * @description The face of each segment of the path
              */
-            faces?: number[] | null;
+            faces: number[] | null;
             error_bound: components["schemas"]["ErrorBound"];
             /**
              * @description discriminator enum property added by openapi-typescript
@@ -1800,8 +1805,11 @@ export interface components {
             status: "ok" | "no_path";
             /** Reason */
             reason?: ("disconnected" | "beyond_max_distance") | null;
-            /** Length */
-            length?: number | null;
+            /**
+             * Length
+             * @description The length in mesh units; null without a path
+             */
+            length: number | null;
             /** Points */
             points: [
                 number,
@@ -1809,12 +1817,12 @@ export interface components {
                 number
             ][] | null;
             /** Locations */
-            locations?: components["schemas"]["Location"][] | null;
+            locations: components["schemas"]["Location"][] | null;
             /**
              * Faces
              * @description The face of each segment of the path
              */
-            faces?: number[] | null;
+            faces: number[] | null;
             error_bound: components["schemas"]["ErrorBound"];
             target: components["schemas"]["ResolvedPoint"];
         };
@@ -2300,7 +2308,7 @@ export interface operations {
                 estimate?: boolean;
             };
             header?: {
-                /** @description The longest time that the client waits, in milliseconds */
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
@@ -2320,7 +2328,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The distances; as PLY, the mesh with the distances at its vertices, for all vertices only. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The distances; as PLY, the mesh with the distances at its vertices, for all vertices only. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -2570,7 +2578,7 @@ export interface operations {
                 max_distance?: number;
             };
             header?: {
-                /** @description The longest time that the client waits, in milliseconds */
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
@@ -2588,7 +2596,7 @@ export interface operations {
         };
         requestBody?: never;
         responses: {
-            /** @description The path; its points in binary. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The path; its points in binary. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -2817,7 +2825,7 @@ export interface operations {
                 explain?: boolean;
             };
             header?: {
-                /** @description The longest time that the client waits, in milliseconds */
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
@@ -2837,7 +2845,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The path; its points in binary. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The path; its points in binary. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -3073,7 +3081,7 @@ export interface operations {
                 estimate?: boolean;
             };
             header?: {
-                /** @description The longest time that the client waits, in milliseconds */
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
@@ -3093,7 +3101,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The paths, in the order of the targets. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The paths, in the order of the targets. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -3323,7 +3331,7 @@ export interface operations {
                 estimate?: boolean;
             };
             header?: {
-                /** @description The longest time that the client waits, in milliseconds */
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
@@ -3343,7 +3351,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The lines of each level, closed and open. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The lines of each level, closed and open. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -3573,7 +3581,7 @@ export interface operations {
                 estimate?: boolean;
             };
             header?: {
-                /** @description The longest time that the client waits, in milliseconds */
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
@@ -3593,7 +3601,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The lines, closed and open. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The lines, closed and open. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -3823,7 +3831,7 @@ export interface operations {
                 estimate?: boolean;
             };
             header?: {
-                /** @description The longest time that the client waits, in milliseconds */
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
@@ -3843,7 +3851,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The distances; in binary, a sparse matrix has the format that `scipy.sparse.load_npz` reads. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The distances; in binary, a sparse matrix has the format that `scipy.sparse.load_npz` reads. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -4075,7 +4083,7 @@ export interface operations {
                 estimate?: boolean;
             };
             header?: {
-                /** @description The longest time that the client waits, in milliseconds */
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
@@ -4095,7 +4103,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The candidates, nearest first. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The candidates, nearest first. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -4321,7 +4329,7 @@ export interface operations {
                 estimate?: boolean;
             };
             header?: {
-                /** @description The longest time that the client waits, in milliseconds */
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
                 /** @description `respond-async`: answer with a job at once (RFC 7240); `respond-async, wait=2`: only if the answer is not ready after two seconds */
                 prefer?: string;
@@ -4341,7 +4349,7 @@ export interface operations {
             };
         };
         responses: {
-            /** @description The points, in the order of the positions. In formats other than JSON the rest comes as `Geodesic-…` headers */
+            /** @description The points, in the order of the positions. In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` names what is too long for one */
             200: {
                 headers: {
                     Vary: components["headers"]["Vary"];
@@ -4689,7 +4697,7 @@ export interface operations {
                 faces?: number;
             };
             header?: {
-                /** @description The longest time that the client waits, in milliseconds */
+                /** @description The longest time that the client waits, in milliseconds; it bounds no job */
                 "x-timeout-ms"?: number;
             };
             path?: never;
@@ -5721,6 +5729,16 @@ export interface operations {
             };
             /** @description job_not_found, mesh_not_found */
             404: {
+                headers: {
+                    "X-Request-ID": components["headers"]["X-Request-ID"];
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["ProblemDocument"];
+                };
+            };
+            /** @description not_acceptable */
+            406: {
                 headers: {
                     "X-Request-ID": components["headers"]["X-Request-ID"];
                     [name: string]: unknown;

@@ -36,7 +36,7 @@ RINGS = 2
 at first; where a border leads out of them, a second sweep looks farther."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Border:
     """A polyline of points that are equally near to two sources, and no nearer to a third.
 

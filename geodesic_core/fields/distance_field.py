@@ -51,7 +51,7 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import LEVEL
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DistanceField:
     """Geodesic distances from the sources to all vertices, and queries on them.
 
@@ -490,7 +490,7 @@ class DistanceField:
             path = self._nearest_to(location, control).path
             if path is None:
                 raise self._no_path(location)
-            return path
+            return path()
         winners, windows = self._winners_and_windows.get(control)
         arrival = self._arrival_at(location, winners, windows)
         if arrival.source < 0:
@@ -504,9 +504,10 @@ class DistanceField:
         """Unit vectors (V, 3), float64: where distance grows fastest, tangent to the surface.
 
         At each vertex, the direction opposite to the first segment of the shortest path to its
-        nearest source. If several paths are equally short, it is that of one of them. NaN at
-        sources, and where `distances` is infinite. O(V). A field that does not retain paths first
-        runs the sweep again, without control, unless `path_to` has found a path before.
+        nearest source. If several paths are equally short, it is that of one of them. NaN where
+        a vertex lies at a source, and where `distances` is infinite. O(V). A field that does not
+        retain paths first runs the sweep again, without control, unless `path_to` has found a path
+        before.
 
         Examples
         --------

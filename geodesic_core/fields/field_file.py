@@ -9,16 +9,16 @@ A file holds, each in a member of its own:
 - ``sweep.…``, the arrays of `DistanceField.arrays`, whose layout belongs to that code.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.errors import InvalidArgument
+from geodesic_core.errors import GeodesicError, InvalidArgument
 from geodesic_core.files import as_output, written
 from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -86,16 +86,34 @@ def read_field_file(
     return blocked, sweep
 
 
-def _members_of(path: str | Path) -> dict[str, NDArray[Any]]:
+@contextmanager
+def refused_if_damaged(path: str | Path) -> Iterator[None]:
+    """Turn any failure to read a field's file into a refusal of the file.
+
+    Raises
+    ------
+    InvalidArgument
+        Something failed.
+    """
     try:
-        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-            members = dict(file)
+        yield
+    except GeodesicError:
+        raise
     except OSError as error:
         raise InvalidArgument(f"cannot read {path}: {error.strerror}") from error
-    except (BadZipFile, EOFError, TypeError, ValueError) as error:
+    except Exception as error:  # readers of zip files and of arrays raise all kinds
         raise InvalidArgument(
             f"{path} is damaged, or was not written by DistanceField.save"
         ) from error
+
+
+def _members_of(path: str | Path) -> dict[str, NDArray[Any]]:
+    with (
+        refused_if_damaged(path),
+        Path(path).open("rb") as stream,
+        np.load(stream, allow_pickle=False) as file,
+    ):
+        members = dict(file)
     if not members.keys() >= {"mesh", "kernels", "barriers"}:
         raise InvalidArgument(f"{path} was not written by DistanceField.save")
     return members

@@ -44,8 +44,9 @@ def gradient_at_vertices(mesh: TriangleMesh, winners: Winners, nodes: Nodes) -> 
     for v in reached[np.isnan(gradient[reached, 0])]:
         located, _ = located_path(mesh, winners, nodes, v)
         away = located.points[-1] - located.points
-        elsewhere = np.linalg.norm(away, axis=1) > SAME_PLACE * winners.distance[v]
-        gradient[v] = _unit(away[elsewhere][-1:])
+        away = away[np.linalg.norm(away, axis=1) > SAME_PLACE * winners.distance[v]]
+        if len(away):  # else it lies at the source
+            gradient[v] = _unit(away[-1:])[0]
     return gradient[topology.inner_vertex]
 
 

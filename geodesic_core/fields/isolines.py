@@ -20,18 +20,14 @@ from geodesic_core.kernels.isolines.thinning import thin_lines
 from geodesic_core.kernels.mesh.half_edges import LENGTH, LENGTH_LEFT, TAIL
 from geodesic_core.kernels.sweep.state import FACE, NODE
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import LEVEL, PIECE
+from geodesic_core.tolerances import FINEST_CHORD, LEVEL, PIECE
 from geodesic_core.validation import is_index, is_number
 
 CHORD_SHARE = 1e-3
 """Share of the mean edge length that chords may stray from their arcs by default."""
 
-FINEST_CHORD = 1e-9
-"""Share of the bounding box's diagonal below which no chord error is taken: what it takes in points
-grows with the inverse of its root."""
 
-
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Isoline:
     """A polyline of points at one distance; between two points it lies in one face.
 
@@ -126,7 +122,7 @@ def resolve_chord_error(mesh: TriangleMesh, chord_error: float | None = None) ->
         The surface.
     chord_error
         The largest distance of chords from their arcs, mesh units; None for the default, a
-        thousandth of the mean edge length.
+        thousandth of the mean edge length, or the least that is taken where that is more.
 
     Returns
     -------
@@ -146,9 +142,9 @@ def resolve_chord_error(mesh: TriangleMesh, chord_error: float | None = None) ->
     >>> gc.resolve_chord_error(mesh, 0.1)
     0.1
     """
-    if chord_error is None:
-        return CHORD_SHARE * float(mesh.topology.geometry[:, LENGTH].mean())
     finest = FINEST_CHORD * mesh.diagonal
+    if chord_error is None:
+        return max(CHORD_SHARE * float(mesh.topology.geometry[:, LENGTH].mean()), finest)
     if not is_number(chord_error) or not (math.isfinite(chord_error) and chord_error >= finest):
         raise InvalidArgument(
             f"chord_error is {chord_error!r}; it must be a finite number, {finest:g} or more"

@@ -7,7 +7,7 @@ around the answer is swept.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -87,13 +87,14 @@ def with_target(
 
 
 class NearestSource(NamedTuple):
-    """The source nearest to a point, its exact distance, and the path from there."""
+    """The source nearest to a point, its exact distance, and how to trace the path from there."""
 
     source: int
     """Index into the sources of the field; -1 where there is no path"""
     distance: float
     """Mesh units, the source's start distance counted; infinite where there is no path"""
-    path: GeodesicPath | None
+    path: Callable[[], GeodesicPath] | None
+    """Traces the path; None where there is none"""
 
 
 def find_nearest_source(
@@ -136,9 +137,13 @@ def find_nearest_source(
     if distance > bounds.max_distance:
         return NearestSource(-1, math.inf, None)
     nearest = int(np.flatnonzero(totals <= distance * (1.0 + TIE))[0])
-    winners = winners_of(wave, np.zeros(len(wave.vertices.distance), np.int32))
-    path = traced_path(mesh, winners, nodes, int(nodes.targets[nearest]), EXACT)
-    return NearestSource(nearest, float(totals[nearest]), reversed_path(path))
+
+    def path() -> GeodesicPath:
+        winners = winners_of(wave, np.zeros(len(wave.vertices.distance), np.int32))
+        traced = traced_path(mesh, winners, nodes, int(nodes.targets[nearest]), EXACT)
+        return reversed_path(traced)
+
+    return NearestSource(nearest, float(totals[nearest]), path)
 
 
 def _most(least: Floats, bounds: Bounds) -> Floats:

@@ -22,7 +22,7 @@ from geodesic_core.mesh.curve import (
 )
 from geodesic_core.mesh.surface_point import UNPLACED, Point, Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.validation import is_number
+from geodesic_core.validation import is_number, unboxed
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class Source:
     start_distance: float = 0.0
 
 
-Sources = Point | Curve | Source | Sequence[Point | Curve | Source]
+Sources = Points | Curve | Source | Sequence[Point | Curve | Source]
 """Every way to write the sources of a field"""
 
 
@@ -251,6 +251,7 @@ def as_sources(
     Cancelled, DeadlineExceeded
         As the control says.
     """
+    sources = unboxed(sources)
     if isinstance(sources, str | bytes):
         raise InvalidPoint(f"the source is {sources!r}; it must be a vertex index or a Source")
     if isinstance(sources, Source | SurfacePoint | Curve) or not isinstance(sources, Iterable):
@@ -281,6 +282,7 @@ def each_of(points: Points, name: str) -> Iterable[Point]:
     InvalidArgument
         They are neither.
     """
+    points = unboxed(points)
     if isinstance(points, SurfacePoint | int | np.integer) and not isinstance(points, bool):
         return [points]
     if isinstance(points, str | bytes) or not isinstance(points, Iterable):

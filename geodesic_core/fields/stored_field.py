@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from geodesic_core.fields.distance_field import DistanceField
-from geodesic_core.fields.field_file import read_field_file
+from geodesic_core.fields.field_file import read_field_file, refused_if_damaged
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 
 
@@ -48,4 +48,6 @@ def load_field(path: str | Path, mesh: MeshLike) -> DistanceField:
     >>> gc.load_field(file, mesh).path_to(3).points.tolist()
     [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
     """
-    return DistanceField.from_arrays(*read_field_file(path, as_mesh(mesh)))
+    blocked, arrays = read_field_file(path, as_mesh(mesh))
+    with refused_if_damaged(path):
+        return DistanceField.from_arrays(blocked, arrays)

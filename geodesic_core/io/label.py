@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from geodesic_core.arrays import Longs
 from geodesic_core.errors import GeodesicError, InvalidArgument
 from geodesic_core.extras import extra
-from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.io.as_mesh import MeshLike, as_mesh
 
 
-def load_label(source: str | Path, mesh: TriangleMesh, label: str | float | None = None) -> Longs:
+def load_label(source: str | Path, mesh: MeshLike, label: str | float | None = None) -> Longs:
     r"""Return the faces whose corners all lie in a label: barriers, where it is the medial wall.
 
     Parameters
@@ -21,7 +21,7 @@ def load_label(source: str | Path, mesh: TriangleMesh, label: str | float | None
         The path of a FreeSurfer label (``.label``), which lists vertices, or of a GIFTI file
         (``.label.gii``, ``.shape.gii``, ``.func.gii``), which has a value for each vertex.
     mesh
-        The surface.
+        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     label
         For a GIFTI file: the name or the number of a label, or a value. None for all values other
         than 0.
@@ -33,6 +33,8 @@ def load_label(source: str | Path, mesh: TriangleMesh, label: str | float | None
 
     Raises
     ------
+    InvalidMesh
+        The mesh cannot be used.
     InvalidArgument
         The file cannot be read, is not a label file, has no such label, or belongs to another
         surface.
@@ -56,6 +58,7 @@ def load_label(source: str | Path, mesh: TriangleMesh, label: str | float | None
     path = Path(source)
     if path.suffix not in _READERS:
         raise InvalidArgument(f"{path} is not a label file: its name must end in .label or .gii")
+    mesh = as_mesh(mesh)
     count = len(mesh.vertices if mesh.vertex_map is None else mesh.vertex_map)
     try:
         data = path.read_bytes()

@@ -15,11 +15,8 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import InvalidPoint
 from geodesic_core.kernels.mesh.half_edges import APEX, HEAD, Topology, next_around, previous
 from geodesic_core.mesh.surface_point import SurfacePoint
-from geodesic_core.tolerances import EDGE_STEPS, WEIGHT, WEIGHT_ERROR
+from geodesic_core.tolerances import EDGE_STEPS, ROUNDED_SUM, WEIGHT, WEIGHT_ERROR
 from geodesic_core.validation import is_index, is_number
-
-ROUNDING = 4.0 * np.finfo(np.float64).eps
-"""By how much the sum of three weights may differ from one."""
 
 
 def at_vertex(topology: Topology, faces: Ints, vertex: int) -> SurfacePoint:
@@ -47,8 +44,8 @@ def in_face(
     """
     cleaned = [float(weight) if weight > WEIGHT else 0.0 for weight in weights]
     total = math.fsum(cleaned)
-    if abs(total - 1.0) <= ROUNDING:
-        total = 1.0  # else a canonical point would change each time it is made canonical
+    if abs(total - 1.0) <= ROUNDED_SUM:
+        total = 1.0
     u, v, w = (weight / total for weight in cleaned)
     share: dict[int, float] = {}
     for node, part in zip(topology.inner_vertex[faces[face]].tolist(), (u, v, w), strict=True):
@@ -81,25 +78,26 @@ def _cross(a: Floats, b: Floats) -> Floats:
 def weights_of(point: Floats, corners: Floats, snap: float) -> list[float]:
     """Return the weights of a point of a face, zero where it is nearer than ``snap`` to an edge.
 
-    Each from the height above its edge; of a face of no area, from positions along its longest
-    edge.
+    Inside, each from the height above its edge. On an edge, from the position along it: on the
+    longest of several, as at the tip of a sliver, where heights are rounding.
     """
     edges = corners[_NEXT] - corners  # from each corner to the next
     away = point - corners
     normal = _cross(edges[0], edges[1])
     area = float(np.linalg.norm(normal))  # twice
     lengths = np.linalg.norm(edges, axis=1)
-    if area > 0.0:
-        parts = _cross(edges, away) @ normal / area  # height times length, by edge
-        parts[parts <= snap * lengths] = 0.0
-        weights = parts[_NEXT] / area  # what is above an edge is the share of its apex
-    else:
-        longest = int(np.argmax(lengths))
-        share = float(away[longest] @ edges[longest]) / lengths[longest] ** 2
+    # Height times length, by edge.
+    parts = _cross(edges, away) @ normal / area if area > 0.0 else np.zeros(3)
+    is_near = parts <= snap * lengths
+    if is_near.any():
+        i = int(np.argmax(np.where(is_near, lengths, -1.0)))
+        share = float(away[i] @ edges[i]) / lengths[i] ** 2
         weights = np.zeros(3)
-        weights[longest], weights[(longest + 1) % 3] = 1.0 - share, share
-    for i in np.flatnonzero(np.linalg.norm(away, axis=1) <= snap):
-        weights = np.eye(3)[i]  # of two corners, the one within reach takes all
+        weights[i], weights[(i + 1) % 3] = 1.0 - share, share
+    else:
+        weights = parts[_NEXT] / area  # what is above an edge is the share of its apex
+    for corner in np.flatnonzero(np.linalg.norm(away, axis=1) <= snap):
+        weights = np.eye(3)[corner]  # of two corners, the one within reach takes all
     return [max(float(weight), 0.0) for weight in weights]
 
 

@@ -80,7 +80,7 @@ def polyline_of(mesh: TriangleMesh, curve: Curve, name: str, control: Control) -
     if not points:
         raise InvalidArgument(f"{name} is a curve without points; give at least one")
     for i, (start, end) in enumerate(control.watched(pairwise(points))):
-        if not share_a_face(mesh, start, end):
+        if not _share_a_face(mesh, start, end):
             raise InvalidPoint(
                 f"the points {i} and {i + 1} of {name}, {start} and {end}, have no face in common; "
                 "add the points where the curve crosses edges: a shortest path has them"
@@ -88,7 +88,7 @@ def polyline_of(mesh: TriangleMesh, curve: Curve, name: str, control: Control) -
     return points
 
 
-def share_a_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> bool:
+def share_a_face(mesh: TriangleMesh, start: Point, end: Point) -> bool:
     """Tell whether two points have a face in common, as neighbours on a `Curve` must.
 
     Parameters
@@ -96,22 +96,32 @@ def share_a_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> 
     mesh
         The surface.
     start, end
-        Canonical points, as `TriangleMesh.point` and `TriangleMesh.locate` return them.
+        Vertex indices or `SurfacePoint`.
 
     Returns
     -------
     bool
         True where a straight segment in a face joins them, and where they are the same.
 
+    Raises
+    ------
+    InvalidPoint
+        One is not a point of the mesh.
+
     Examples
     --------
     >>> corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     >>> mesh = gc.TriangleMesh(corners, [[0, 1, 2], [0, 2, 3]])
-    >>> gc.share_a_face(mesh, mesh.point(0), mesh.point(2))
+    >>> gc.share_a_face(mesh, 0, 2)
     True
-    >>> gc.share_a_face(mesh, mesh.point(1), mesh.point(3))
+    >>> gc.share_a_face(mesh, 1, 3)
     False
     """
+    return _share_a_face(mesh, mesh.point(start, "start"), mesh.point(end, "end"))
+
+
+def _share_a_face(mesh: TriangleMesh, start: SurfacePoint, end: SurfacePoint) -> bool:
+    """Tell the same of canonical points."""
     if start == end:
         return True
     return bool(weights_by_face(mesh, start).keys() & weights_by_face(mesh, end))

@@ -2,9 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from geodesic_core.errors import InvalidPoint
-from geodesic_core.validation import is_index
+from geodesic_core.validation import is_index, is_number
 
 UNPLACED = -1
 """The face of a vertex that was named without a mesh, or belongs to no face."""
@@ -97,13 +101,15 @@ class SurfacePoint:
         Raises
         ------
         InvalidPoint
-            The corner is not 0, 1 or 2.
+            The corner is not 0, 1 or 2, or the share is no number.
 
         Examples
         --------
         >>> gc.SurfacePoint.edge(12, corner=1, t=0.25).barycentric
         (0.0, 0.75, 0.25)
         """
+        if not is_number(t):
+            raise InvalidPoint(f"t is {t!r}; it must be a number from 0 to 1")
         match corner:
             case 0:
                 return cls(face, (1.0 - t, t, 0.0))
@@ -137,8 +143,8 @@ class SurfacePoint:
         return cls(index, barycentric)
 
 
-Point = int | SurfacePoint
+Point = int | np.integer[Any] | SurfacePoint
 """Either way to write a point: a vertex by its index."""
 
-Points = Point | Sequence[Point]
+Points = Point | Sequence[Point] | NDArray[np.integer[Any]]
 """One point or several."""

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +24,7 @@ from geodesic_core.mesh.degeneracies import (
     of_three_vertices,
 )
 from geodesic_core.mesh.report import NAMED, MeshReport, report_of, warnings_of
-from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangulation import triangulated
 from geodesic_core.mesh.validation import (
     as_faces,
@@ -43,7 +43,7 @@ from geodesic_core.tolerances import (
     SNAP,
     WEIGHT_ERROR,
 )
-from geodesic_core.validation import as_barriers, as_limit, is_number
+from geodesic_core.validation import as_barriers, as_limit, is_number, unboxed
 
 Merge = Literal["none", "exact"]
 
@@ -84,6 +84,18 @@ class TriangleMesh:
     >>> gc.TriangleMesh(corners, [[0, 1, 3], [0, 3, 2]])
     TriangleMesh(4 vertices, 2 faces)
     """
+
+    vertices: Floats
+    """(V, 3) float64, read-only; mesh units."""
+    faces: Ints
+    """(F, 3) int32, read-only."""
+    vertex_map: Longs | None
+    """(given vertices,) int64: the vertex that each given one became; None where none moved."""
+    face_map: Longs | None
+    """(F,) int64: the polygon that each face came from; None where each polygon is one face."""
+    topology: Topology
+    """Half-edges and flat geometry, see `geodesic_core.kernels.mesh.half_edges`."""
+    _notes: tuple[str, ...]
 
     def __init__(self, vertices: ArrayLike, faces: ArrayLike, merge: Merge = "none") -> None:
         self._build(as_vertices(vertices), as_faces(faces), None, merge, ())
@@ -172,17 +184,21 @@ class TriangleMesh:
         topology: Topology,
         notes: Sequence[str] = (),
     ) -> None:
-        self.vertices = _frozen(vertices)
-        """(V, 3) float64, read-only; mesh units."""
-        self.faces = _frozen(faces)
-        """(F, 3) int32, read-only."""
-        self.vertex_map = None if vertex_map is None else _frozen(vertex_map)
-        """(given vertices,) int64: the vertex that each given one became; None where none moved."""
-        self.face_map = None if face_map is None else _frozen(face_map)
-        """(F,) int64: the polygon that each face came from; None where each polygon is one face."""
-        self.topology = Topology(*(_frozen(array) for array in topology))
-        """Half-edges and flat geometry, see `geodesic_core.kernels.mesh.half_edges`."""
-        self._notes = tuple(notes)
+        self.__dict__.update(
+            vertices=_frozen(vertices),
+            faces=_frozen(faces),
+            vertex_map=None if vertex_map is None else _frozen(vertex_map),
+            face_map=None if face_map is None else _frozen(face_map),
+            topology=Topology(*(_frozen(array) for array in topology)),
+            _notes=tuple(notes),
+        )
+
+    def __setattr__(self, name: str, value: object) -> NoReturn:
+        """Refuse a change: the topology and results would still be those of the mesh before."""
+        raise AttributeError(
+            f"{name} cannot be set: a TriangleMesh does not change. Make another one, "
+            "TriangleMesh(vertices, faces)"
+        )
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "TriangleMesh":
@@ -368,8 +384,9 @@ class TriangleMesh:
 
         Notes
         -----
-        A point within 1e-12 of the bounding box from a vertex or an edge counts as on it. The first
-        call builds a search tree, O(F log F); each takes O(log F) in practice.
+        A point within 1e-12 of the bounding box from a vertex or an edge counts as on it, and the
+        surface may be as much beyond ``max_distance``: that is rounding. The first call builds a
+        search tree, O(F log F); each takes O(log F) in practice.
 
         Examples
         --------
@@ -389,18 +406,18 @@ class TriangleMesh:
             )
         limit = as_limit(max_distance)
         face, point, distance = self._nearest_face(wanted - self.origin)
-        if distance > limit:
+        largest = float(np.abs(point + self.origin).max())
+        snap = max(SNAP * self.diagonal, ROUNDED_COORDINATE * largest)
+        if distance > limit + snap:
             raise InvalidPoint(
                 f"the nearest point of the surface is {distance:g} away from {wanted.tolist()}, "
                 f"which is more than max_distance = {limit:g}"
             )
         corners = self.vertices[self.faces[face]] - self.origin
-        largest = float(np.abs(point + self.origin).max())
-        snap = max(SNAP * self.diagonal, ROUNDED_COORDINATE * largest)
         weights = canonical.weights_of(point, corners, snap)
         return self._point_in_face(face, weights, "position")
 
-    def point(self, point: int | SurfacePoint, name: str = "point") -> SurfacePoint:
+    def point(self, point: Point, name: str = "point") -> SurfacePoint:
         """Return a point in its canonical form, the same to the bit for all spellings of it.
 
         Parameters
@@ -427,7 +444,7 @@ class TriangleMesh:
         >>> mesh.point(gc.SurfacePoint.edge(1, 0, 1.0)) == mesh.point(3)  # the end of an edge
         True
         """
-        index: Any = point
+        index: Any = unboxed(point)
         if isinstance(point, SurfacePoint):
             if point.vertex_index is None:
                 canonical.check_index(point.face_index, len(self.faces), "face", name)
@@ -494,7 +511,7 @@ class TriangleMesh:
             raise InvalidPoint(f"no {kind} joins the vertices {start} and {end}")
         return point
 
-    def position(self, point: int | SurfacePoint) -> Floats:
+    def position(self, point: Point) -> Floats:
         """Return the position of a point; of a vertex exactly the mesh's own.
 
         Parameters
@@ -523,7 +540,7 @@ class TriangleMesh:
             point = self.point(point)
             if point.vertex_index is None:
                 return self.origin + self.position_from_origin(point)
-        vertex: Any = point.vertex_index if isinstance(point, SurfacePoint) else point
+        vertex = point.vertex_index if isinstance(point, SurfacePoint) else unboxed(point)
         canonical.check_index(vertex, len(self.vertices), "vertex", "point")
         position: Floats = self.vertices[vertex]
         return position
@@ -574,11 +591,15 @@ class TriangleMesh:
         """Sentences on the defects of this mesh and their remedies, for its user."""
         return (*self._notes, *warnings_of(self.report))
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy needs: all but the search tree of `locate`, which is built again."""
+        return {name: value for name, value in self.__dict__.items() if name != "_nearest_face"}
+
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         """Become a copy; pickle and `copy` forget that arrays are read-only."""
         for name, value in state.items():
             self.__dict__[name] = _frozen(value) if isinstance(value, np.ndarray) else value
-        self.topology = Topology(*(_frozen(array) for array in self.topology))
+        self.__dict__["topology"] = Topology(*(_frozen(array) for array in self.topology))
 
     def to_trimesh(self) -> Any:
         """Return the mesh as one of trimesh, with the same numbers of vertices and faces.

@@ -1,10 +1,10 @@
 """Matrices of distances: sweeps from one side, in threads; searches where pairs are few."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import chain, islice, repeat
+from itertools import chain, repeat
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -20,8 +20,8 @@ from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.plan import Plan
 from geodesic_core.search.rows import Rows, Solve, rows_of
 from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.search.threads import available_cores, share_out
-from geodesic_core.validation import as_limit, check_choice, is_index
+from geodesic_core.search.threads import as_threads, share_within_memory
+from geodesic_core.validation import as_limit, check_choice
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -33,9 +33,6 @@ SWEEP_FROM = 6
 
 Measured: a sweep costs as much as 7 searches on a scan of 10⁵ faces, as 20 where it is smooth.
 """
-
-_GROWTH = 2
-"""Growth of the state of a sweep that is allowed for where memory is scarce."""
 
 
 def find_matrix(
@@ -56,8 +53,7 @@ def find_matrix(
     """
     limit = as_limit(max_distance)
     check_choice("layout", layout, get_args(Layout))
-    if threads is not None and not (is_index(threads) and threads >= 1):
-        raise InvalidArgument(f"threads is {threads!r}; it must be an integer, 1 or more, or None")
+    most = as_threads(threads)
     starts = as_points(mesh, sources, "source", control)
     stops = as_points(mesh, targets, "target", control)
     table: _Dense | _Sparse | _Pairs
@@ -79,7 +75,9 @@ def find_matrix(
     if table.sweeps:
         make = partial(rows_of, table.ends, limit, solve)
         rows = map(make, chain([target_sweep], repeat(partial(TargetSweep, mesh))))
-        _sweep_all(rows, table, threads or available_cores(), rest)
+        share_within_memory(
+            table.sweeps, rows, partial(_sweep, table), most, rest, held=lambda: table.nbytes
+        )
     if control.progress is not None:
         control.progress(1.0)
     return table.result()
@@ -101,25 +99,10 @@ def _searched(
         search.add_landmark_if_due(source, replace(control, progress=None))
 
 
-def _sweep_all(
-    rows: Iterator[Rows], table: "_Dense | _Sparse | _Pairs", cores: int, control: Control
-) -> None:
-    """Do all sweeps of a table, in as many threads as cores, sweeps and memory allow."""
-    first = next(rows)
-    count = min(cores, table.sweeps)
-    if control.memory_limit is not None:
-        room = control.memory_limit - control.bytes_beside - table.nbytes
-        count = max(1, min(count, room // (_GROWTH * first.nbytes)))
-
-    def sweep(rows: Rows, source: int, control: Control) -> None:
-        if control.memory_limit is not None:
-            # The states of other threads are about as large as that of the first.
-            control = control.holding(table.nbytes + (count - 1) * first.nbytes)
-        targets = table.wanted(source)
-        table.put(source, targets, rows.distances(source, targets, control))
-
-    workers = [partial(sweep, each) for each in (first, *islice(rows, count - 1))]
-    share_out(table.sweeps, workers, control)
+def _sweep(table: "_Dense | _Sparse | _Pairs", rows: Rows, source: int, control: Control) -> None:
+    """Do one of the sweeps of a table."""
+    targets = table.wanted(source)
+    table.put(source, targets, rows.distances(source, targets, control))
 
 
 class _Dense:

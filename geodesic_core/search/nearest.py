@@ -1,6 +1,6 @@
 """Nearest candidates: those with the shortest geodesic distance to a point."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.sources import as_points, ends_of
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.surface_point import Point, Points
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.target_sweep import TargetSweep
@@ -17,7 +18,7 @@ from geodesic_core.tolerances import TIE
 from geodesic_core.validation import as_limit, is_index
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Nearest:
     """The nearest of some candidates, nearest first.
 
@@ -42,6 +43,7 @@ def nearest(
     k: int = 1,
     max_distance: float | None = None,
     *,
+    barriers: Iterable[int] = (),
     progress: Callable[[float], None] | None = None,
     cancel: Callable[[], bool] | None = None,
     deadline_s: float | None = None,
@@ -62,6 +64,8 @@ def nearest(
         reached.
     max_distance
         Limit, mesh units; None for no limit. Candidates beyond it are left out.
+    barriers
+        As in `exact_distance`.
     progress, cancel, deadline_s, memory_limit
         See `Control`.
 
@@ -88,7 +92,7 @@ def nearest(
     [1]
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    surface = as_mesh(mesh)
+    surface, control = with_barriers(as_mesh(mesh), barriers, control)
     return find_nearest(
         surface, lambda: TargetSweep(surface), source, candidates, k, max_distance, control
     )

@@ -3,6 +3,7 @@
 import json
 import os
 import shutil
+import tempfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -35,8 +36,10 @@ class Blocks:
         Raises
         ------
         InvalidArgument
-            It holds blocks of another question, or another process works on it.
+            It holds blocks of another question, another process works on it, or it cannot be
+            written.
         """
+        self._check_writable()
         lock = FileLock(self.folder.with_suffix(".lock"))
         try:
             lock.acquire(timeout=0)
@@ -53,6 +56,13 @@ class Blocks:
                 f"choose another file"
             )
         return lock
+
+    def _check_writable(self) -> None:
+        try:  # of the lock, other failures look as if another process had it
+            with tempfile.TemporaryFile(dir=self.folder.parent):
+                pass
+        except OSError as error:
+            raise InvalidArgument(f"{self._out()} cannot be written: {error.strerror}") from None
 
     def _out(self) -> str:
         return self.folder.name.removeprefix(".").removesuffix(".part")

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
+from itertools import repeat
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
@@ -20,17 +21,18 @@ from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.path import ErrorBound
 from geodesic_core.fields.sources import as_points
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.plan import Plan
 from geodesic_core.search.rows import Method, Rows, Solve, rows_of
 from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.search.threads import available_cores, share_out
+from geodesic_core.search.threads import as_threads, share_within_memory
 from geodesic_core.solvers import Effort, error_bound, kernel_digest, row_solver
 from geodesic_core.tables import dense, sparse
 from geodesic_core.tables.blocks import Blocks
 from geodesic_core.tables.formats import DENSE, SPARSE, SUFFIXES, require, sha256_of, write_table
-from geodesic_core.validation import as_limit, check_choice, is_index
+from geodesic_core.validation import as_limit, check_choice
 
 Everywhere = Literal["all"]
 """Every vertex of the mesh"""
@@ -146,15 +148,14 @@ def write_matrix(
     control = Control(progress, cancel, deadline_s, memory_limit)
     limit = as_limit(max_distance)
     check_choice("dtype", dtype, ("float64", "float32"))
-    if threads is not None and not (is_index(threads) and threads >= 1):
-        raise InvalidArgument(f"threads is {threads!r}; it must be an integer, 1 or more, or None")
+    most = as_threads(threads)
     path = Path(out)
     suffix = path.suffix.lower()
     check_choice("the suffix of out", suffix, SUFFIXES)
     if not path.parent.is_dir():
         raise InvalidArgument(f"there is no folder {path.parent}")
     require(suffix)
-    mesh = as_mesh(mesh).with_barriers(barriers)
+    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
     solve = row_solver(mesh, method, relative_error, absolute_error, effort)
     bound = error_bound(
         mesh,
@@ -186,7 +187,7 @@ def write_matrix(
     sweep = _Sweep(mesh, plan, limit, solve, np.dtype(dtype), make)
     blocks = Blocks.beside(path)
     with blocks.open(facts):
-        swept = sweep.run(blocks, threads or available_cores(), control)
+        swept = sweep.run(blocks, most, control)
         write_table(plan, blocks, sweep.dtype, facts, path)
         written = MatrixFile(path, plan.shape, bound, sha256_of(path), swept)
         text = json.dumps(facts | {"sha256": written.sha256}, indent=1)
@@ -255,6 +256,6 @@ class _Sweep:
         make = partial(
             rows_of, self.plan.ends, self.limit, self.solve, partial(TargetSweep, self.mesh)
         )
-        workers = [partial(work, make()) for _ in range(min(threads, len(sweeps)))]
-        share_out(len(sweeps), workers, control)
+        states = (make() for _ in repeat(None))
+        share_within_memory(len(sweeps), states, work, threads, control, held=lambda: 0)
         return len(sweeps)

@@ -55,6 +55,12 @@ def test_kubernetes_is_valid_by_its_schemas(document: dict[str, Any]) -> None:
     kubernetes_validate.validate(document, KUBERNETES_VERSION, strict=True)
 
 
+def test_pods_get_no_variables_of_services() -> None:
+    """Kubernetes would tell later pods of the Service `geodesic` by variables, see `Settings`."""
+    pods = [document["spec"]["template"]["spec"] for document in KUBERNETES if containers(document)]
+    assert [pod.get("enableServiceLinks") for pod in pods] == [False, False, False]
+
+
 @pytest.mark.parametrize("arguments", list(dict(commands()).values()), ids=dict(commands()))
 def test_commands_are_those_of_the_command_line(arguments: list[str]) -> None:
     name, *options = arguments

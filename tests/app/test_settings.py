@@ -181,6 +181,19 @@ def test_unknown_variable_stops_the_start(monkeypatch: pytest.MonkeyPatch, name:
         Settings()
 
 
+def test_variables_of_a_kubernetes_service_stop_the_start_and_are_explained(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("GEODESIC_SERVICE_HOST", "10.0.0.7")
+    monkeypatch.setenv("GEODESIC_SERVICE_PORT", "80")
+    monkeypatch.setenv("GEODESIC_PORT", "tcp://10.0.0.7:80")
+
+    with pytest.raises(ValidationError, match="enableServiceLinks: false") as refusal:
+        Settings()
+
+    assert "GEODESIC_PORT, GEODESIC_SERVICE_HOST, GEODESIC_SERVICE_PORT" in str(refusal.value)
+
+
 def test_variables_that_the_library_reads_are_no_mistakes(monkeypatch: pytest.MonkeyPatch) -> None:
     sources = (path.read_text() for path in LIBRARY.rglob("*.py") if path.name != "hatch_build.py")
     read = {name for source in sources for name in re.findall(r"GEODESIC_[A-Z_]+", source)}

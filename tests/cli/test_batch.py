@@ -10,6 +10,9 @@ import pytest
 
 import geodesic_core as gc
 from app.cli import batch
+from app.cli.batch_rows import Questions, Row, ask
+from app.cli.parcels import parcels_of
+from app.cli.points import Point
 from tests.support.commands import Run, error_line
 
 
@@ -43,6 +46,19 @@ def test_each_mesh_has_a_row_for_each_source(run: Run, meshes: list[Path]) -> No
         assert (int(row["faces"]), row["unreachable"]) == (len(mesh.faces), "0")
 
 
+@pytest.mark.parametrize("failing", ["load_mesh", "exact_distance"])
+def test_a_failure_that_nobody_expects_is_a_row_too(
+    meshes: list[Path], monkeypatch: pytest.MonkeyPatch, failing: str
+) -> None:
+    def fail(*_arguments: object, **_options: object) -> None:
+        raise MemoryError("no room")
+
+    monkeypatch.setattr(gc, failing, fail)
+    questions = Questions([Point.parse("0")], [], {"method": "exact"}, "none")
+    (row,) = ask(questions, meshes[0])
+    assert row.error == "MemoryError: no room"
+
+
 def test_a_mesh_that_fails_does_not_stop_the_others(run: Run, meshes: list[Path]) -> None:
     Path("broken.ply").write_text("ply\nthis is none")
     files = [meshes[0], "broken.ply", "missing.ply", *meshes[1:]]
@@ -71,22 +87,26 @@ def test_a_mesh_that_fails_does_not_stop_the_others(run: Run, meshes: list[Path]
         assert name in ran.err
 
 
-def dying(questions: batch.Questions, file: Path) -> list[batch.Row]:
+def dying(questions: Questions, file: Path) -> list[Row]:
     """Ask as usual, but die at one of the meshes."""
     if file.stem == "knot":
         os.kill(os.getpid(), signal.SIGKILL)
-    return batch._ask(questions, file)
+    return ask(questions, file)
 
 
 def test_a_process_that_dies_costs_its_own_mesh_alone(
-    meshes: list[Path], monkeypatch: pytest.MonkeyPatch
+    run: Run, meshes: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    questions = batch.Questions([batch.Point.parse("0")], [], {"method": "exact"}, "none")
-    monkeypatch.setattr(batch, "_QUESTION", dying)
-    rows = dict(batch._answers(meshes, questions, 2, batch._pool(2)))
-    assert "the process died" in str(rows[meshes[1]][0].error)
-    for path in (meshes[0], meshes[2]):
-        assert rows[path][0].farthest == gc.exact_distance(gc.load_mesh(path), 0).distances.max()
+    monkeypatch.setattr(batch, "ask", dying)
+    ran = run("batch", *meshes, "--source", 0, "--processes", 2, "--out", "t.csv")
+    assert ran.code == 1
+    assert ran.figure("meshes") == "3, 1 of them failed"
+    assert ran.err.startswith("knot.ply: the process died")
+    rows = rows_of(Path("t.csv"))
+    assert [bool(row["error"]) for row in rows] == [False, True, False]
+    for row in (rows[0], rows[2]):
+        field = gc.exact_distance(gc.load_mesh(row["mesh"]), 0)
+        assert float(row["farthest"]) == field.distances.max()
 
 
 def test_small_meshes_are_handed_over_together_and_large_ones_alone(tmp_path: Path) -> None:
@@ -96,7 +116,7 @@ def test_small_meshes_are_handed_over_together_and_large_ones_alone(tmp_path: Pa
         mesh.touch()
         os.truncate(mesh, size)
     missing = tmp_path / "missing.ply"
-    parcels = list(batch._parcels([*meshes, missing], 1))
+    parcels = list(parcels_of([*meshes, missing], 1))
     assert parcels[:2] == [meshes[:2], [meshes[2]]]
     assert [mesh for parcel in parcels for mesh in parcel] == [*meshes, missing]
     lengths = [len(parcel) for parcel in parcels[2:]]
@@ -105,7 +125,7 @@ def test_small_meshes_are_handed_over_together_and_large_ones_alone(tmp_path: Pa
     assert lengths[-9:] == [1] * 9
     # Of a few meshes each process gets some.
     some = [meshes[0], meshes[1], meshes[5]]
-    assert list(batch._parcels(some, 2)) == [[mesh] for mesh in some]
+    assert list(parcels_of(some, 2)) == [[mesh] for mesh in some]
 
 
 @pytest.mark.parametrize(

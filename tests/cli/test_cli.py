@@ -855,6 +855,19 @@ def test_barriers_that_are_no_faces(run: Run, plane: Path) -> None:
     assert list(Path().iterdir()) == [plane]
 
 
+def test_a_file_of_barriers_names_no_file(run: Run, plane: Path) -> None:
+    Path("loop.txt").write_text("3\n@loop.txt\n")
+    ran = run("distance", plane, "--source", 0, "--barriers", "@loop.txt")
+    assert ran.code == 2
+    assert "'@loop.txt' is not a list of faces" in error_line(ran)
+
+
+def test_faces_that_run_backwards_are_refused(run: Run, plane: Path) -> None:
+    ran = run("distance", plane, "--source", 0, "--barriers", "3,59-40")
+    assert ran.code == 2
+    assert "'59-40' runs backwards: write it as 40-59" in error_line(ran)
+
+
 def test_an_output_that_cannot_be_written_is_an_error(run: Run, plane: Path) -> None:
     Path("d.npy").mkdir()
     ran = run("distance", plane, "--source", 0, "--out", "d.npy")

@@ -81,6 +81,16 @@ def test_the_file_is_the_one_of_this_machine(
     assert jobs_of(client) <= others, "the service need not hold them"
 
 
+@pytest.mark.usefixtures("asked")
+def test_json_says_what_was_written(run: Run, plane: Path) -> None:
+    ran = run("matrix", plane, "--points", "all", "--out", "there.npy", "--json", *SERVICE)
+    facts = json.loads(Path("there.npy.json").read_text())
+    told = {name: facts[name] for name in ("shape", "error_bound", "sha256")}
+    printed = ran.out[ran.out.index("{\n") :]  # after log lines of the service
+    assert json.loads(printed) == {**told, "written": "there.npy"}
+    assert "matrix      121 by 121" in ran.err
+
+
 def test_a_refusal_is_told(
     run: Run, plane: Path, asked: list[tuple[str, str | None]], monkeypatch: pytest.MonkeyPatch
 ) -> None:

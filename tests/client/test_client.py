@@ -1,6 +1,7 @@
 """The client with a service that runs, against the library."""
 
 from pathlib import Path
+from typing import Any
 
 import anyio
 import httpx2
@@ -68,6 +69,15 @@ def test_distances_are_the_library_s_to_the_bit(
     np.testing.assert_allclose(rich.gradient, field.gradient, equal_nan=True)
 
 
+@pytest.mark.parametrize("source", [7, np.int64(7), {"vertex": 7}], ids=repr)
+def test_a_single_source_needs_no_list(service: Client, mesh: Mesh, source: Any) -> None:
+    distances, lines = service.distances(mesh, source), service.isolines(mesh, source, count=3)
+    np.testing.assert_array_equal(distances.distances, service.distances(mesh, [7]).distances)
+    assert [level.level for level in lines.levels] == [
+        level.level for level in service.isolines(mesh, [7], count=3).levels
+    ]
+
+
 def test_what_cannot_be_reached_is_infinite(service: Client, apart: Mesh) -> None:
     for include in ((), ("nearest_source",)):
         found = service.distances(apart, [0], include=include)
@@ -78,6 +88,14 @@ def test_what_cannot_be_reached_is_infinite(service: Client, apart: Mesh) -> Non
     missing = service.path(apart, 0, 4)
     assert (missing.reason, missing.length) == ("disconnected", np.inf)
     assert missing.points.shape == (0, 3)
+
+
+def test_a_vertex_may_be_a_number_of_numpy(service: Client, mesh: Mesh) -> None:
+    ids = np.arange(10)
+    found = service.distances(mesh, [starting_at(ids[7], 0.5)], targets=ids[7:9])
+    assert found.distances == pytest.approx(
+        0.5 + service.distances(mesh, [7], targets=[7, 8]).distances
+    )
 
 
 def test_all_kinds_of_sources(service: Client, mesh: Mesh) -> None:
@@ -179,14 +197,37 @@ def test_a_refusal_names_the_element(service: Client, apart: Mesh) -> None:
     assert error.request_id
 
 
-def test_jobs(
+def test_a_query_that_was_a_job_leaves_none(
     service: Client, mesh: Mesh, same: gc.TriangleMesh, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(flow, "JOB_AFTER_S", 0)
+    before = service.jobs()
     shares: list[float] = []
     found = service.distances(mesh, [11], progress=shares.append)
     np.testing.assert_array_equal(found.distances, gc.exact_distance(same, 11).distances)
     assert shares[-1] == 1.0
+    assert len(shares) > 1, "it was a job"
+    assert service.jobs() == before
+
+
+def test_a_query_that_is_stopped_leaves_no_job(
+    service: Client, mesh: Mesh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stop(_share: float) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(flow, "JOB_AFTER_S", 0)
+    before = service.jobs()
+    with pytest.raises(KeyboardInterrupt):
+        service.distances(mesh, [12], progress=stop)
+    assert service.jobs() == before
+
+
+def test_jobs(service: Client, client: TestClient, mesh: Mesh) -> None:
+    headers = {"Prefer": "respond-async"}
+    link = f"/v1/meshes/{mesh.id}/distances"
+    submitted = client.post(link, json={"sources": [13]}, headers=headers)
+    client.get(f"{submitted.headers['location']}/events")  # until it has finished
     job = service.jobs()[0]
     assert service.job(job.id) == job
     assert (job.kind, job.status, job.is_finished) == ("distances", "successful", True)
@@ -236,7 +277,7 @@ def test_both_clients_by_the_address_and_the_key_of_a_service(tmp_path: Path) ->
     key = "0123456789abcdef0123456789abcdef"
     server = Server(tmp_path, GEODESIC_API_KEYS=f"ann:{key}")
     try:
-        with Client(server.url, api_key=key) as client:
+        with Client(server.url, api_key=f"{key}\n") as client:
             mesh = client.sample("plane", 200)
             assert client.path(mesh, 0, 120).length == pytest.approx(2**0.5)
 

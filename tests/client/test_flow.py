@@ -2,16 +2,26 @@
 
 import asyncio
 import json
-from collections.abc import Callable
+import pickle
 
 import httpx2
+import numpy as np
 import pytest
-from geodesic_client import AsyncClient, Client, ProblemError, UnreachableError
+from geodesic_client import (
+    AsyncClient,
+    Client,
+    ErrorBound,
+    GeodesicClientError,
+    ProblemError,
+    StoredMatrix,
+    UnreachableError,
+    connection,
+)
 from geodesic_client.flow import JOB_AFTER_S
 
 JOB = {"id": "7", "kind": "nearest", "mesh_id": "m", "status": "running", "progress": 0.5}
 ANSWER = {"nearest": [{"candidate": 1, "distance": 2.5}]}
-Reply = Callable[[httpx2.Request], httpx2.Response]
+SETTINGS = connection.settings("http://service", None)
 
 
 def problem(status: int, code: str, **headers: str) -> httpx2.Response:
@@ -47,13 +57,12 @@ class Service:
         return [f"{each.method} {each.url.path}" for each in self.requests]
 
     def client(self) -> Client:
-        http = httpx2.Client(transport=httpx2.MockTransport(self), base_url="http://service")
-        return Client(http=http)
+        transport = httpx2.MockTransport(self)
+        return Client(http=httpx2.Client(transport=transport, **SETTINGS))
 
     def async_client(self) -> AsyncClient:
         transport = httpx2.MockTransport(self.answer)
-        http = httpx2.AsyncClient(transport=transport, base_url="http://service")
-        return AsyncClient(http=http)
+        return AsyncClient(http=httpx2.AsyncClient(transport=transport, **SETTINGS))
 
 
 @pytest.fixture(autouse=True)
@@ -83,7 +92,13 @@ def test_what_takes_little_is_one_request() -> None:
 def long_replies() -> list[httpx2.Response | Exception]:
     half = httpx2.Response(202, json=JOB)
     done = httpx2.Response(200, json=JOB | {"status": "successful", "progress": 1.0})
-    return [half, done, httpx2.Response(200, json=ANSWER)]
+    return [half, done, httpx2.Response(200, json=ANSWER), done]
+
+
+def stopped() -> list[httpx2.Response | Exception]:
+    """The replies to the two requests that stop a job and remove it."""
+    dismissed = httpx2.Response(200, json=JOB | {"status": "dismissed"})
+    return [dismissed, dismissed]
 
 
 def check_long(service: Service, progress: list[float], pauses: list[float]) -> None:
@@ -91,6 +106,7 @@ def check_long(service: Service, progress: list[float], pauses: list[float]) -> 
         "POST /v1/meshes/m/nearest",
         "GET /v1/jobs/7",
         "GET /v1/jobs/7/results",
+        "DELETE /v1/jobs/7",
     ]
     assert service.requests[0].headers["idempotency-key"]
     assert progress == [0.5, 1.0]
@@ -110,18 +126,63 @@ def test_coroutines_have_the_same_conversation(pauses: list[float]) -> None:
     check_long(service, progress, pauses)
 
 
-def test_a_callback_that_raises_stops_the_job() -> None:
+@pytest.mark.parametrize(
+    "reply",
+    [
+        problem(503, "draining", **{"Retry-After": "1"}),
+        problem(404, "job_not_found"),
+        httpx2.ConnectError("refused"),
+    ],
+)
+def test_an_answer_does_not_wait_for_the_removal_of_its_job(
+    reply: httpx2.Response | Exception, pauses: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tenacity.nap.time.sleep", pauses.append)
+    service = Service(*long_replies()[:3], reply)
+    assert service.client().nearest("m", 0, [1])[0].candidate == 1
+    assert service.sent.count("DELETE /v1/jobs/7") == 1
+    assert len(pauses) == 1, "before it looked at the job"
+
+
+def test_a_job_that_fails_is_removed() -> None:
+    failed = JOB | {"status": "failed"}
+    service = Service(
+        httpx2.Response(202, json=JOB),
+        httpx2.Response(200, json=failed),
+        problem(504, "deadline_exceeded"),
+        httpx2.Response(200, json=failed),
+    )
+    with pytest.raises(ProblemError, match="deadline_exceeded"):
+        service.client().store_matrix("m", [0], [1])
+    assert service.sent[2:] == ["GET /v1/jobs/7/results", "DELETE /v1/jobs/7"]
+
+
+def test_a_callback_that_raises_stops_and_removes_the_job() -> None:
     def stop(_share: float) -> None:
         raise KeyboardInterrupt
 
-    service = Service(*long_replies()[:1], httpx2.Response(200, json=JOB))
+    service = Service(*long_replies()[:1], *stopped())
     with pytest.raises(KeyboardInterrupt):
         service.client().nearest("m", 0, [1], progress=stop)
-    assert service.sent[-1] == "DELETE /v1/jobs/7"
+    assert service.sent[1:] == ["DELETE /v1/jobs/7"] * 2
 
 
-def test_a_cancelled_task_stops_its_job(monkeypatch: pytest.MonkeyPatch) -> None:
-    service = Service(*long_replies()[:1], httpx2.Response(200, json=JOB))
+@pytest.mark.parametrize("kind", ["client", "async_client"])
+def test_a_call_that_is_stopped_waits_for_seconds_only(kind: str) -> None:
+    """A service that hangs may be the reason why it is stopped."""
+
+    def stop(_share: float) -> None:
+        raise KeyboardInterrupt
+
+    service = Service(*long_replies()[:1], httpx2.ReadTimeout("late"))
+    with pytest.raises(KeyboardInterrupt):
+        asyncio.run(getattr(service, kind)().nearest("m", 0, [1], progress=stop))
+    query, removal = (max(each.extensions["timeout"].values()) for each in service.requests)
+    assert (query, removal) == (connection.TIMEOUT_S, connection.OPTIONAL_TIMEOUT_S)
+
+
+def test_a_cancelled_task_stops_and_removes_its_job(monkeypatch: pytest.MonkeyPatch) -> None:
+    service = Service(*long_replies()[:1], *stopped())
 
     async def cancel_while_it_waits() -> None:
         waiting = asyncio.Event()
@@ -138,7 +199,7 @@ def test_a_cancelled_task_stops_its_job(monkeypatch: pytest.MonkeyPatch) -> None
             await task
 
     asyncio.run(cancel_while_it_waits())
-    assert service.sent[-1] == "DELETE /v1/jobs/7"
+    assert service.sent[1:] == ["DELETE /v1/jobs/7"] * 2
 
 
 @pytest.mark.parametrize(("status", "code"), [(429, "rate_limited"), (503, "queue_full")])
@@ -151,6 +212,38 @@ def test_a_busy_service_is_asked_again_when_it_says(
     service = Service(busy, busy, httpx2.Response(200, json={"version": "1"}))
     assert service.client().about() == {"version": "1"}
     assert waits == [7.0, 7.0]
+
+
+def test_a_call_does_not_wait_for_hours(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where the quota of jobs is reached: the first of them expires tomorrow."""
+    waits: list[float] = []
+    monkeypatch.setattr("tenacity.nap.time.sleep", waits.append)
+    full = problem(429, "quota_exceeded", **{"Retry-After": "86000"})
+    service = Service(full)
+    with pytest.raises(ProblemError, match="quota_exceeded") as caught:
+        service.client().nearest("m", 0, [1])
+    assert caught.value.retry_after == 86000.0
+    assert (len(service.requests), waits) == (1, [])
+
+
+@pytest.mark.parametrize(
+    "broken", [httpx2.ReadError("reset"), httpx2.RemoteProtocolError("disconnected")]
+)
+def test_what_a_service_may_have_removed_is_not_removed_again(
+    broken: httpx2.TransportError, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mesh would not be found, and a job that was only stopped would be removed."""
+    monkeypatch.setattr("tenacity.nap.time.sleep", lambda _: None)
+    done = httpx2.Response(200, json=JOB)
+    for name in ("delete_mesh", "dismiss_job"):
+        once = Service(broken, done)
+        with pytest.raises(UnreachableError, match="no answer"):
+            getattr(once.client(), name)("7")
+        unsent = Service(httpx2.ConnectError("refused"), problem(503, "draining"), done)
+        getattr(unsent.client(), name)("7")
+        assert (len(once.requests), len(unsent.requests)) == (1, 3)
+    query = Service(broken, httpx2.Response(200, json=ANSWER))
+    assert query.client().nearest("m", 0, [1])[0].candidate == 1
 
 
 def test_a_broken_connection_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,9 +264,31 @@ def test_a_problem_is_an_error_with_all_that_it_says() -> None:
     error = caught.value
     assert (error.status, error.code) == (404, "mesh_not_found")
     assert (error.detail, error.hint) == ("no", "wait")
+
+
+@pytest.mark.parametrize("text", ["<html>", "", "null", '"bad gateway"'])
+def test_an_error_that_is_no_document_is_a_problem(text: str) -> None:
     with pytest.raises(ProblemError, match="status 502") as caught:
-        Service(httpx2.Response(502, text="<html>")).client().about()
+        Service(httpx2.Response(502, text=text)).client().about()
     assert caught.value.code == "unknown"
+
+
+def test_a_redirection_is_a_problem_that_names_the_address() -> None:
+    moved = httpx2.Response(301, headers={"Location": "https://service/v1"})
+    with pytest.raises(ProblemError, match="another address: https://service/v1"):
+        Service(moved).client().about()
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        ProblemError(429, {"code": "rate_limited", "detail": "no", "hint": "wait"}, 7.0),
+        UnreachableError("no answer", may_retry=True),
+    ],
+)
+def test_errors_pass_between_processes(error: GeodesicClientError) -> None:
+    copy = pickle.loads(pickle.dumps(error))  # noqa: S301 - of this test
+    assert (type(copy), str(copy), vars(copy)) == (type(error), str(error), vars(error))
 
 
 def test_lists_are_read_to_their_end() -> None:
@@ -184,6 +299,18 @@ def test_lists_are_read_to_their_end() -> None:
     )
     assert [job.id for job in service.client().jobs()] == ["0", "1", "2"]
     assert service.requests[1].url.params["cursor"] == "2"
+
+
+def test_rows_of_a_matrix_can_be_changed() -> None:
+    table = np.arange(6, dtype=np.float32).reshape(3, 2)
+    bound = ErrorBound("relative", 0.0, "guaranteed")
+    size = 128 + table.nbytes
+    matrix = StoredMatrix("7", "dense", table.shape, table.dtype, "exact", bound, size, "e")
+    service = Service(httpx2.Response(206, content=table[1:].tobytes()))
+    rows = service.client().matrix_rows(matrix, 1, 3)
+    rows += 1
+    np.testing.assert_array_equal(rows, table[1:] + 1)
+    assert service.requests[0].headers["range"] == "bytes=136-151"
 
 
 @pytest.mark.parametrize("name", ["distances", "upload", "path"])

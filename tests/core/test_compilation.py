@@ -8,7 +8,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core import compilation
-from geodesic_core.errors import InternalError, InvalidArgument
+from geodesic_core.errors import Cancelled, InternalError, InvalidArgument
 from geodesic_core.kernels.jit import cache, machine, progress
 from tests.support import each_kind
 from tests.support.paths import ROOT
@@ -52,6 +52,27 @@ except gc.errors.Cancelled:
     ended = run("-c", program, NUMBA_CACHE_DIR=str(tmp_path))
     assert ended.stdout.strip() == "cancelled"
     assert not list(tmp_path.rglob("*.all"))
+
+
+@pytest.mark.parametrize("workloads", ["exact", ["exactt"], ["exact", 3], 3], ids=repr)
+@pytest.mark.parametrize("call", [gc.compile_kernels, gc.warm_up])
+def test_unknown_workloads_are_refused(call, workloads):
+    with pytest.raises(InvalidArgument, match="workload"):
+        call(workloads)
+
+
+def test_no_workload_is_none_to_compile(monkeypatch):
+    monkeypatch.setattr(cache, "is_complete", lambda _: False)
+    monkeypatch.setattr(compilation, "_start", lambda _: pytest.fail("started"))
+    gc.compile_kernels([])
+
+
+def test_cancelling_says_so(monkeypatch):
+    monkeypatch.setattr(cache, "is_complete", lambda _: False)
+    with pytest.raises(Cancelled, match="cancelled with 0% done"):
+        gc.compile_kernels(cancel=lambda: True)
+    with pytest.raises(InvalidArgument, match="cancel is 3"):
+        gc.compile_kernels(cancel=3)
 
 
 def test_a_process_that_fails_is_an_error(monkeypatch):

@@ -970,3 +970,23 @@ def test_piece_is_the_length_of_what_is_left_out(radius, lines):
     source = gc.Source(gc.SurfacePoint.face(0, (0.3, 0.3, 0.4)), 1.0)
     field = gc.exact_distance(mesh, source)
     assert len(field.isolines([1.0 + radius * tolerances.PIECE])[0]) == lines
+
+
+@SCALES
+@pytest.mark.parametrize(("share", "is_taken"), [(0.99, False), (1.01, True)])
+def test_finest_chord_is_the_least_chord_error(scale, share, is_taken):
+    mesh = gc.TriangleMesh(scale * zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
+    chord_error = share * tolerances.FINEST_CHORD * mesh.diagonal
+    if is_taken:
+        assert gc.resolve_chord_error(mesh, chord_error) == chord_error
+    else:
+        with pytest.raises(gc.errors.InvalidArgument, match="chord_error"):
+            gc.resolve_chord_error(mesh, chord_error)
+
+
+def test_rounded_sum_is_how_far_weights_stay_as_they_are(cube):
+    for excess, stays in ((0.9, True), (-0.9, True), (5.0, False), (-5.0, False)):
+        weights = (0.25, 0.25, 0.5 + excess * tolerances.ROUNDED_SUM)
+        point = cube.point(gc.SurfacePoint.face(0, weights))
+        assert (point.barycentric == weights) == stays
+        assert cube.point(point) == point

@@ -1,16 +1,20 @@
 """Large bodies: while they are read and checked, others are answered."""
 
 import json
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
 from threading import Event, Lock
 from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
+import geodesic_core as gc
 from app.http.routes import query_request, query_route
 from app.queries import DistancesQuery, LocateQuery
-from tests.support.service import check_problem
+from tests.support.service import ServiceClient, check_problem, serving, store_mesh
 
 POINTS = 9_000
 MANY = {"sources": [{"vertex": 0}], "targets": [{"vertex": i % 100} for i in range(POINTS)]}
@@ -62,6 +66,51 @@ def test_large_bodies_are_checked_one_at_a_time(
     with ThreadPoolExecutor(4) as pool:
         answers = list(pool.map(lambda _: client.post(link, json=MANY).status_code, range(4)))
     assert answers == [200] * 4
+
+
+@contextmanager
+def another_is_checked(client: ServiceClient) -> Iterator[None]:
+    """Let large bodies wait, as while another one is checked."""
+    limiter = client.app.state.large_bodies
+    client.portal.call(limiter.acquire_on_behalf_of, "another")
+    try:
+        yield
+    finally:
+        client.portal.call(limiter.release_on_behalf_of, "another")
+
+
+def test_a_large_body_waits_no_longer_than_its_deadline(tmp_path: Path) -> None:
+    mesh_id = store_mesh(tmp_path, gc.samples.plane(200))
+    with serving(tmp_path, deadline_s=0.3) as client, another_is_checked(client):
+        refused = client.post(f"/v1/meshes/{mesh_id}/distances", json=MANY)
+
+    check_problem(refused, 504, "deadline_exceeded")
+
+
+def test_a_large_body_waits_no_longer_than_its_client(client: ServiceClient, plane: str) -> None:
+    body, sent = json.dumps(MANY).encode(), []
+    scope = {
+        "type": "http",
+        "method": "POST",
+        "path": f"/v1/meshes/{plane}/distances",
+        "query_string": b"",
+        "headers": [(b"content-type", b"application/json")],
+        "client": None,
+        "server": None,
+        "state": {},
+    }
+    messages = [{"type": "http.disconnect"}, {"type": "http.request", "body": body}]
+
+    async def receive() -> Any:
+        return messages.pop()
+
+    async def send(message: Any) -> None:
+        sent.append(message)
+
+    with another_is_checked(client):
+        client.portal.call(client.app, scope, receive, send)
+
+    assert sent[0]["status"] == 499
 
 
 def test_small_bodies_need_no_thread(

@@ -9,7 +9,7 @@ from starlette.testclient import TestClient
 
 from app.encoding import negotiate_coding
 from app.encoding.codings import zstd
-from tests.support.service import upload_sample
+from tests.support.service import check_problem, upload_sample
 from tests.support.waiting import wait_until
 
 
@@ -123,6 +123,25 @@ def test_no_part_of_a_compressed_answer_of_a_job_is_sent(client: TestClient, kno
     assert (response.status_code, same) == (200, expected)
     assert response.headers["accept-ranges"] == "none"
     assert len(json.loads(gzip.decompress(same))["distances"]) > 0
+
+
+def test_a_client_that_cannot_read_the_answer_of_a_job_is_told_so(
+    client: TestClient, knot: str
+) -> None:
+    sent = {"Accept-Encoding": "gzip", "Prefer": "respond-async"}
+    body = {"sources": [{"vertex": 4}]}
+    job = client.post(f"/v1/meshes/{knot}/distances", json=body, headers=sent).json()
+    wait_until(lambda: client.get(job["links"]["self"]).json()["status"] == "successful")
+    link = job["links"]["results"]
+
+    for accepted in ("identity", "zstd", "gzip;q=0"):
+        refused = client.get(link, headers={"Accept-Encoding": accepted})
+        problem = check_problem(refused, 406, "not_acceptable")
+        assert "gzip" in problem["hint"]
+    check_problem(client.get(link, headers={"Accept": "image/png"}), 406, "not_acceptable")
+    for accepted in ("gzip", "*", "br, *;q=0.1"):
+        assert client.get(link, headers={"Accept-Encoding": accepted}).status_code == 200
+    assert client.get(link, headers={"Accept": "text/html, */*;q=0.1"}).status_code == 200
 
 
 def test_estimates_are_of_the_plain_body(client: TestClient, link: str) -> None:

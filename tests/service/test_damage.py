@@ -1,6 +1,8 @@
 """A store whose files are damaged while a service runs on it."""
 
 import asyncio
+import os
+import time
 from collections.abc import Iterator, Sequence
 from io import BytesIO
 from pathlib import Path
@@ -13,6 +15,7 @@ from structlog.testing import capture_logs
 import geodesic_core as gc
 from app.service import scrub
 from app.store import verified
+from app.store.atomic import atomic_write
 from app.store.meshes import MeshStore
 from tests.support.faults import FAULTS, MANIFEST_FAULTS, Fault, flip_bytes
 from tests.support.service import check_problem, distances, serving, upload_sample
@@ -156,6 +159,29 @@ def lines() -> Iterator[Sequence[Any]]:
     with capture_logs() as lines:
         yield lines
     print(*lines[-20:], sep="\n")  # noqa: T201 - pytest shows it
+
+
+@pytest.mark.usefixtures("scrubs_at_once")
+def test_the_scrub_removes_what_was_left_unfinished_a_day_ago(tmp_path: Path) -> None:
+    with serving(tmp_path) as client:
+        mesh_id = upload_sample(client, "plane", 50_000)
+        assert distances(client, mesh_id, NPY).status_code == 200
+        complete = set(tmp_path.glob("results/*/*"))
+        days_ago = time.time() - 2 * 86_400
+        for path in complete:
+            os.utime(path, (days_ago, days_ago))
+
+        with atomic_write(tmp_path / "results" / mesh_id / "new.body"):
+            being_written = set(tmp_path.glob("results/*/*")) - complete
+            left = [tmp_path / name / mesh_id / "tmp12345678" for name in ("results", "fields")]
+            for path in left:
+                path.parent.mkdir(exist_ok=True)
+                path.touch()
+                os.utime(path, (days_ago, days_ago))
+            wait_until(lambda: not any(path.exists() for path in left))
+
+            assert len(being_written) == 1
+            assert set(tmp_path.glob("results/*/*")) == complete | being_written
 
 
 @pytest.mark.usefixtures("scrubs_at_once")

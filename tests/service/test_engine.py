@@ -19,10 +19,14 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
+from app.engine.interface import ProgressCallback
+from app.engine.local import LocalEngine
 from app.engine.slot import Slot
 from app.engine.work import Task, TaskResult
 from app.main import create_app
 from app.queries import DistancesQuery
+from app.service.progress import ignore_progress
+from app.service.service import Service
 from app.settings import Settings
 from tests.support.clocks import Clock
 from tests.support.dying import die
@@ -411,6 +415,36 @@ def test_what_proves_not_to_be_small_begins_anew(
     assert sum((processor_time(pid) - before[pid])[10] for pid in before) > 0, "the second is long"
 
 
+def test_what_proves_not_to_be_small_waits_however_full_the_queue_is(
+    two: ServiceClient, small: str, clock: Clock
+) -> None:
+    reports: list[float] = []
+
+    async def begin(
+        task: Task, on_progress: ProgressCallback = ignore_progress, **load: int
+    ) -> "asyncio.Task[TaskResult]":
+        running = asyncio.create_task(two.engine.run(task, on_progress))
+        await until(lambda: all(getattr(two.load, name) == many for name, many in load.items()))
+        return running
+
+    async def run() -> list[TaskResult]:
+        with stopped(two.workers()):
+            running = [await begin(new_task(small), busy=busy) for busy in (1, 2)]
+            not_small = await begin(new_task(small, is_small=True), reports.append, busy=3)
+            running += [await begin(new_task(small), waiting=waiting) for waiting in (1, 2)]
+            clock.now += 10.0
+            before_now = len(reports)
+            await until(lambda: len(reports) > before_now)  # the engine has looked at its clock
+            os.kill(pid_for_small_work, signal.SIGCONT)
+            await until(lambda: two.load.waiting == 3 or not_small.done())
+        return await asyncio.gather(not_small, *running)
+
+    assert isinstance(two.engine, LocalEngine)
+    pid_for_small_work = two.engine._small.pid or 0
+
+    assert len(two.portal.call(run)) == 5, "and none was refused"
+
+
 def test_clients_take_turns(two: ServiceClient, small: str) -> None:
     """A client that asks for much keeps no other waiting for all of it."""
     begun: list[str] = []
@@ -451,6 +485,27 @@ def test_many_at_once(two: ServiceClient, small: str) -> None:
     assert {response.status_code for response in responses} == {200}
 
 
+def test_an_answer_that_comes_too_late_counts_and_is_found(
+    two: ServiceClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def ask_all(**headers: str) -> Any:
+        body = {"sources": [{"vertex": 0, "start_distance": start}]}
+        return two.post(link, json=body, headers={"Accept": "application/x-npy", **headers})
+
+    service: Service = two.app.state.service  # type: ignore[attr-defined]
+    link = f"/v1/meshes/{upload_sample(two, 'plane', 50_000)}/distances"
+    start, before = next(start_distances), service.results.nbytes
+    monkeypatch.setattr(Slot, "ask_to_stop", lambda _: None)  # as if its work was over by then
+
+    with stopped(two.workers()):
+        check_problem(ask_all(**{"X-Timeout-Ms": "100"}), 504, "deadline_exceeded")
+    wait_until(lambda: service.results.nbytes > before)
+
+    hits = service.lookups["hit"]
+    assert len(ask_all().content) == service.results.nbytes - before
+    assert service.lookups["hit"] == hits + 1
+
+
 def test_the_server_s_own_deadline_names_its_setting(tmp_path: Path) -> None:
     client = ServiceClient(tmp_path, deadline_s=0.2)  # is not started: no worker comes
     client.app.state.service.mesh_catalog.prepare()
@@ -485,7 +540,7 @@ def test_work_that_does_not_stop_is_killed(tmp_path: Path) -> None:
 
 
 def test_workers_that_cannot_start(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.engine.worker.run", die)
+    monkeypatch.setattr("app.engine.worker_process.run", die)
     sample = {"sample": "plane", "faces": 10}
     with TestClient(create_app(Settings(store=tmp_path, workers=1))) as client:
         # The first asks before it is known that none can start, the second after.
@@ -531,7 +586,7 @@ def test_an_interrupt_while_workers_start_is_no_failure(
         closed.set()
         await close(slot)
 
-    monkeypatch.setattr("app.engine.worker.run", die)
+    monkeypatch.setattr("app.engine.worker_process.run", die)
     monkeypatch.setattr(Slot, "close", close_and_tell)
     app = create_app(Settings(store=tmp_path, workers=1))
     app.state.service.engine.drain()

@@ -262,6 +262,7 @@ def test_a_path_in_each_format_is_the_same(client: TestClient, knot: str) -> Non
     assert table.headers["geodesic-length"] == repr(answer["length"])
     assert json.loads(table.headers["geodesic-error-bound"]) == answer["error_bound"]
     assert "geodesic-locations" not in table.headers
+    assert "geodesic-omitted" not in table.headers
 
     collection = ask(client, knot, "path", "geojson", **body).json()
     (feature,) = collection["features"]
@@ -304,6 +305,16 @@ def test_a_path_to_where_it_starts_is_a_point(client: TestClient, plane: str) ->
     assert top < -point[1] < top + height
 
 
+def test_members_too_long_for_a_header_are_named(client: TestClient, knot: str) -> None:
+    stops = [{"vertex": vertex} for vertex in range(0, 900, 10)]
+    body = {"source": stops[0], "target": stops[-1], "waypoints": stops[1:-1]}
+    headers = ask(client, knot, "path", "npy", **body).headers
+
+    assert headers["geodesic-omitted"] == "waypoints"
+    assert "geodesic-waypoints" not in headers
+    assert "geodesic-faces" in headers
+
+
 def test_where_there_is_no_path_each_format_says_why(client: TestClient, apart: str) -> None:
     body = {"source": {"vertex": 0}, "target": {"vertex": 4}}
     for name in ("npy", "octets", "obj", "csv", "svg", "geojson"):
@@ -311,7 +322,7 @@ def test_where_there_is_no_path_each_format_says_why(client: TestClient, apart: 
         assert response.headers["geodesic-status"] == "no_path"
         assert response.headers["geodesic-reason"] == "disconnected"
     assert polylines_of(ask(client, apart, "path", "obj", **body).text) == []
-    assert "disconnected" in ask(client, apart, "path", "obj", **body).text
+    assert ask(client, apart, "path", "obj", **body).text == "# no line: status=disconnected\n"
     (row,) = rows_of(ask(client, apart, "path", "csv", **body))
     assert row.pop("status") == "disconnected"
     assert not any(row.values())

@@ -259,7 +259,7 @@ def test_an_answer_that_is_there_within_the_wait_is_no_job(one: ServiceClient, s
 
 
 def test_what_takes_longer_than_the_wait_goes_on_as_a_job(one: ServiceClient, small: str) -> None:
-    solves = one.app.state.service.solves
+    solves = one.app.state.service.answering.solves
     before = solves["distances"]
     with stopped(one.workers()):
         response = submit(one, small, waiting(1))

@@ -472,6 +472,19 @@ def test_a_report_is_revalidated(client: TestClient, plane: str) -> None:
     assert client.get(link, headers={"If-None-Match": '"x"'}).status_code == 200
 
 
+def test_a_report_that_has_changed_has_another_tag(client: TestClient) -> None:
+    body = {"vertices": [[0, 0, 0], [1, 0, 0], [0, 3, 0]], "faces": [[0, 1, 2]]}
+    tags = []
+    for name in ("first", "second"):
+        link = client.post("/v1/meshes", params={"name": name}, json=body).headers["location"]
+        tags.append(client.get(link).headers["etag"])
+        again = client.get(link, headers={"If-None-Match": tags[0]})
+        client.delete(link)
+
+    assert len(set(tags)) == 2
+    assert again.json()["name"] == "second"
+
+
 def test_list_in_parts(tmp_path: Path) -> None:
     with serving(tmp_path) as client:
         ids = {upload_sample(client, "plane", faces) for faces in (50, 100, 200, 400, 800)}

@@ -17,6 +17,7 @@ from starlette.testclient import TestClient
 
 from app.main import create_app
 from app.settings import MIB, Settings
+from tests.support.postgres import Server as Postgres
 from tests.support.processes import stopped
 from tests.support.service import (
     ServiceClient,
@@ -169,6 +170,24 @@ def test_jobs_queue_workers_and_cancellations(watched: ServiceClient) -> None:
     for job in (first, second):
         watched.delete(job)
     assert grown(before, scrape(watched), "jobs", status="dismissed") == 0
+
+
+def test_jobs_are_those_of_before_while_the_database_is_away(
+    postgres: Postgres, tmp_path: Path
+) -> None:
+    with serving(tmp_path, state=postgres.new_database()) as client:
+        job = submit(client, upload_sample(client, "plane", 200), 0)
+        wait_until(lambda: client.get(job).json()["status"] == "successful")
+        assert value(scrape(client), "jobs", status="successful") == 1
+        postgres.stop()
+        try:
+            check_problem(client.get(job), 503, "state_unavailable")
+            away = scrape(client)
+        finally:
+            postgres.start()
+
+    assert value(away, "jobs", status="successful") == 1
+    assert value(away, "requests_total", operation="getJob", status="503") == 1
 
 
 def test_workers_that_are_lost(watched: ServiceClient) -> None:

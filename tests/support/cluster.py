@@ -103,7 +103,8 @@ class ProcessCluster:
         return [node for node in self.nodes if node.process.poll() is None]
 
     def serve(self) -> Server:
-        server = Server(self.store, **self.settings, GEODESIC_ENGINE="ray")
+        settings = self.settings | {"GEODESIC_ENGINE": "ray"}
+        server = Server(self.store, **settings)  # type: ignore[arg-type] # all are settings
         self.servers.append(server)
         return server
 

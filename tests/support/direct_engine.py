@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Awaitable, Callable, Collection
 
-from app.engine.interface import Load, ProgressCallback
+from app.engine.interface import Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.work import Task, TaskResult
 from app.engine.worker import Worker
 from app.errors import Problem, ProblemError
@@ -26,6 +26,7 @@ class DirectEngine:
         self._turn = asyncio.Lock()
         self.on_wait: Callable[[float], None] = lambda _seconds: None
         self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
+        self.on_unclaimed: UnclaimedCallback = ignore_unclaimed
 
     @property
     def load(self) -> Load:

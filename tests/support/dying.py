@@ -4,5 +4,5 @@ import os
 
 
 def die(*_: object) -> None:
-    """Take the place of ``app.engine.worker.run``."""
+    """Take the place of ``app.engine.worker_process.run``."""
     os._exit(3)

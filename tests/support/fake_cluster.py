@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 
 from app.engine.cluster import HostLostError, HostReport
 from app.engine.host import Host
-from app.engine.interface import Load, ProgressCallback
+from app.engine.interface import Load, ProgressCallback, UnclaimedCallback, ignore_unclaimed
 from app.engine.wire import decode, encode
 from app.engine.work import Task, TaskResult
-from app.errors import ProblemError
+from app.errors import ProblemError, problem
 from app.settings import Settings
 from app.tracing import Period
 
@@ -34,11 +34,14 @@ class SleepingEngine:
         self.queue_s = 0.0
         """What results say that they have waited"""
         self.refusal: ProblemError | None = None
+        self.is_full = False
+        """Whether its queue takes only what was promised"""
         self.begun: list[Task] = []
         self.ended: list[str] = []
         self.running = 0
         self.on_wait: Callable[[float], None] = lambda _seconds: None
         self.on_work: Callable[[str, float], None] = lambda _client, _seconds: None
+        self.on_unclaimed: UnclaimedCallback = ignore_unclaimed
 
     @property
     def load(self) -> Load:
@@ -61,6 +64,8 @@ class SleepingEngine:
     async def run(self, task: Task, on_progress: ProgressCallback) -> TaskResult:
         if self.refusal is not None:
             raise self.refusal
+        if self.is_full and not task.is_promised:
+            raise problem("queue_full", "no place")
         self.begun.append(task)
         self.running += 1
         try:

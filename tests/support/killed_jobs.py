@@ -29,7 +29,9 @@ from app.jobs import Job, read_jobs
 from app.queries import DistancesQuery, MeshSize, code_version, field_cache
 from app.schemas.requests import DistancesRequest
 from app.service.maintenance import inspect, jobs_of, leftovers
-from app.service.service import RequestContext, Service
+from app.service.question import Question
+from app.service.request_context import RequestContext
+from app.service.service import Service
 from app.settings import Settings
 from tests.support.direct_engine import DirectEngine
 from tests.support.killing import Killer, in_child
@@ -80,7 +82,7 @@ class Store:
         service = Service(Settings(store=self.root))
         wait = before_work or self.until_running_is_recorded
         engine = DirectEngine(new_worker(self.root), wait)
-        service.engine = engine
+        service.engine = service.answering.engine = engine
         async with service.running():
             yield service, engine
 
@@ -90,7 +92,8 @@ class Store:
 
     async def submit(self, service: Service, media_type: str, key: str | None = None) -> str:
         query = DistancesQuery.ask(self.mesh_id, SIZE, DistancesRequest(sources=[{"vertex": 3}]))
-        job = await service.submit(query, SIZE, Representation(media_type), CONTEXT, key)
+        question = Question(query, SIZE, Representation(media_type), CONTEXT.caller.name)
+        job = await service.query_jobs.submit(question, CONTEXT, key)
         return job.id
 
 

@@ -5,8 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from app.encoding import Representation
+from app.engine.signals import Signals
 from app.engine.work import Outcome, RunQuery
-from app.engine.worker import Signals, Worker, WorkerConfig
+from app.engine.worker import Worker, WorkerConfig
 from app.errors import Problem
 from app.queries import DistancesQuery, Query, result_key
 from app.schemas.requests import DistancesRequest

@@ -10,7 +10,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from structlog.contextvars import bound_contextvars
 
 from app.errors import PROBLEM_JSON, Problem, draining, problem_of_status
-from app.http.failures import note_failure
+from app.http.failures import CLIENT_CLOSED, note_failure
 from app.http.responses import common_headers, problem_response
 from app.settings import Settings, variable_of
 from app.tracing import trace_fields
@@ -46,7 +46,7 @@ class RequestIdMiddleware:
                 has_started = True
                 headers = MutableHeaders(scope=message)
                 headers.update(own_headers)
-                if message["status"] >= 400 and headers.get("content-type") != PROBLEM_JSON:
+                if _is_plain_error(message["status"], headers):
                     is_replaced = True
                     await answer(self._framework_problem(message["status"], headers, scope))
             if not is_replaced:
@@ -73,6 +73,12 @@ class RequestIdMiddleware:
             return body_too_large(scope, self.settings)
         retained = {"Content-Range": headers["content-range"]} if "content-range" in headers else {}
         return problem_of_status(status, "", retained)
+
+
+def _is_plain_error(status: int, headers: Headers) -> bool:
+    """Tell whether an error is the framework's plain text, not a problem."""
+    is_problem = headers.get("content-type") == PROBLEM_JSON
+    return status >= 400 and status != CLIENT_CLOSED and not is_problem
 
 
 def body_too_large(scope: Scope, settings: Settings) -> Problem:

@@ -8,8 +8,8 @@ from fastapi import APIRouter, Depends, Header, Query, Request, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 
 from app.encoding import JSON
-from app.errors import problem
-from app.http.dependencies import CallerDep, ServiceDep
+from app.errors import ProblemError, problem
+from app.http.dependencies import CallerDep, ServiceDep, check_accepted
 from app.http.responses import (
     FILE_HEADERS,
     QUERY_PROBLEMS,
@@ -118,6 +118,7 @@ async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> di
             "job_not_found",
             "job_not_finished",
             "job_dismissed",
+            "not_acceptable",
             *QUERY_PROBLEMS,
             "range_not_satisfiable",
         ),
@@ -126,13 +127,21 @@ async def dismiss_job(job: JobDep, service: ServiceDep, caller: CallerDep) -> di
 async def get_job_results(
     job_id: str, request: Request, service: ServiceDep, caller: CallerDep
 ) -> Response:
-    """Return the answer in the format of the query, or the problem that the query met."""
+    """Return the answer in the format and coding of the query, or the problem that the query met.
+
+    A request whose `Accept` or `Accept-Encoding` excludes them gets 406.
+    """
     job, result = await service.jobs.result(caller.owner, job_id)
+    media_type = job.spec.media_type
+    try:
+        check_accepted(request, media_type, result.manifest.headers.get("Content-Encoding"))
+    except ProblemError:
+        service.results.release(result)
+        raise
     unchanged = not_modified(request, etag_of(result.key), REVALIDATED)
     if unchanged is not None:
         service.results.release(result)
         return unchanged
-    media_type = job.spec.media_type
     return result_response(request, result, {}, media_type, service.results, REVALIDATED)
 
 

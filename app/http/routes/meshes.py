@@ -1,8 +1,10 @@
 """Routes of meshes: upload, list, describe, read arrays, delete."""
 
+import hashlib
 from collections.abc import Mapping
 from typing import Annotated
 
+import orjson
 from fastapi import APIRouter, Query, Request, Response
 
 from app.encoding import NPY
@@ -24,7 +26,9 @@ from app.http.responses import (
 )
 from app.http.uploads import spool
 from app.schemas.meshes import ListParameters, MeshDocument, MeshList, UploadParameters
-from app.service.service import RequestContext, Service, StoredMesh
+from app.service.request_context import RequestContext
+from app.service.service import Service, StoredMesh
+from app.service.time_limit import time_limit
 
 router = APIRouter(prefix="/meshes", tags=["meshes"])
 
@@ -161,10 +165,12 @@ async def get_mesh(
     mesh_id: str, request: Request, response: Response, service: ServiceDep
 ) -> Response | dict[str, object]:
     """Return the report of a mesh, the same as after its upload."""
-    manifest = await service.manifest(mesh_id)
-    headers = {**REVALIDATED, "ETag": etag_of(mesh_id)}
+    document = mesh_document(await service.manifest(mesh_id))
+    # A mesh that is deleted and uploaded again has the same id, but perhaps another name.
+    etag = etag_of(hashlib.blake2b(orjson.dumps(document), digest_size=16).hexdigest())
+    headers = {**REVALIDATED, "ETag": etag}
     response.headers.update(headers)
-    return not_modified(request, etag_of(mesh_id), headers) or mesh_document(manifest)
+    return not_modified(request, etag, headers) or document
 
 
 @router.delete(
@@ -227,7 +233,7 @@ async def _add_upload(
         raise problem("invalid_request", fault.message, errors=(fault,))
     async with (
         service.mesh_catalog.scratch_folder() as folder,
-        service.time_limit(context.deadline_s),
+        time_limit(service.settings, context.deadline_s),
     ):
         path = folder / "upload"
         limit = service.settings.max_upload_bytes

@@ -57,7 +57,10 @@ _BODY_CODES = ("malformed_body", "upload_too_large", "unsupported_media_type", *
 
 def _answers(model: type, description: str, *others: str) -> dict[int | str, dict[str, Any]]:
     """Return an answer for OpenAPI: in JSON, and in ``others``, which hold only a part of it."""
-    description += ". In formats other than JSON the rest comes as `Geodesic-…` headers"
+    description += (
+        ". In formats other than JSON the rest comes as `Geodesic-…` headers; `Geodesic-Omitted` "
+        "names what is too long for one"
+    )
     content = {name: {"schema": _schema(name)} for name in others}
     described = documented("Vary", "Server-Timing", *FILE_HEADERS)
     accepted = documented("Location", "Preference-Applied", "Cache-Control")

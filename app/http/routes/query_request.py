@@ -38,9 +38,11 @@ from app.http.responses import (
 from app.jobs import Job
 from app.queries import Query, result_key
 from app.schemas.requests import AnswerParameters
-from app.service.service import PhaseSeconds, RequestContext
+from app.service.answering import Answered
+from app.service.question import Question
+from app.service.request_context import RequestContext
+from app.service.time_limit import time_limit
 from app.settings import Settings
-from app.store.results import Result
 
 LARGE = 2**16
 """Bytes of a body that is worth a thread: it takes some milliseconds."""
@@ -48,16 +50,18 @@ LARGE = 2**16
 T = TypeVar("T")
 
 
-async def offload_if_large(request: Request, do: Callable[[], T]) -> T:
+async def offload_if_large(request: Request, deadline_s: float, do: Callable[[], T]) -> T:
     """Run work whose time grows with the body: in a thread, where the body is large.
 
     Only one thread runs at a time. Several would take the interpreter from each other, and from the
-    event loop.
+    event loop. A request waits for it no longer than its client, and no longer than ``deadline_s``.
     """
     if len(await request.body()) < LARGE:
         return do()
     limiter = request.app.state.large_bodies
-    return await to_thread.run_sync(partial(_at_half_pace, do), limiter=limiter)
+    working = to_thread.run_sync(partial(_at_half_pace, do), limiter=limiter)
+    async with time_limit(service_of(request).settings, deadline_s):
+        return await while_connected(request, working)
 
 
 def _at_half_pace(do: Callable[[], T]) -> T:
@@ -113,19 +117,18 @@ class QueryRequest:
             query.written  # noqa: B018 - computes and caches it
             return query
 
-        query = await offload_if_large(request, make_query)
+        query = await offload_if_large(request, context.deadline_s, make_query)
         representation = negotiated(request, parameters, query.offers)
         media_type = representation.media_type
+        question = Question(query, size, representation, context.caller.name)
         if parameters.estimate:
-            estimating = service.estimate(query, size, representation, context)
+            estimating = service.answering.estimate(question, context.deadline_s)
             estimate, seconds = await while_connected(request, estimating)
             note_work(request, self.mesh_id, seconds)
             return estimate_response(self.mesh_id, estimate, media_type, seconds)
         wait_s, key = self.job_after_s, self.idempotency_key
         if wait_s == 0:
-            return accepted_response(
-                await service.submit(query, size, representation, context, key)
-            )
+            return accepted_response(await service.query_jobs.submit(question, context, key))
         is_cacheable = request.method == "GET" and query.is_repeatable
         headers = {**NEGOTIATED, **(CACHED if is_cacheable else UNSTORED)}
         if is_cacheable:
@@ -134,12 +137,12 @@ class QueryRequest:
             if unchanged is not None:
                 return unchanged
         as_file = "range" in request.headers
-        answering: Coroutine[Any, Any, tuple[Result, PhaseSeconds] | Job]
+        answering: Coroutine[Any, Any, Answered | Job]
         if wait_s is None:
-            answering = service.answer(query, size, representation, context, as_file=as_file)
+            answering = service.answering.answer(question, context.deadline_s, as_file=as_file)
         else:
-            answering = service.answer_or_submit(
-                query, size, representation, context, wait_s, key, as_file=as_file
+            answering = service.query_jobs.answer_or_submit(
+                question, context, wait_s, key, as_file=as_file
             )
         answer = await while_connected(request, answering)
         if isinstance(answer, Job):

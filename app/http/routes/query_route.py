@@ -46,7 +46,8 @@ class QueryRoute(APIRoute):
             head = {"header": _headers(request), "query": _parameters(request, lists)}
             body = await request.body() if takes_body else b""
             settings = service_of(request).settings
-            whole = await offload_if_large(request, partial(read, model, head, body, settings))
+            reading = partial(read, model, head, body, settings)
+            whole = await offload_if_large(request, settings.deadline_s, reading)
             mesh_id = request.path_params["mesh_id"]
             response: Response = await self.endpoint(
                 query_request=await get_query_request(mesh_id, request, whole.header),

@@ -56,14 +56,24 @@ describe("a job", () => {
   afterEach(() => void vi.useRealTimers());
 
   /** Serve a job whose stream of events is another one at each connection. */
-  function serve(streams: (() => Response)[], results = () => new Response("answer")): Sent[] {
+  function serve(
+    streams: (() => Response)[],
+    results = () => new Response("answer"),
+    removed = () => json({ status: "successful" }),
+  ): Sent[] {
     let connections = 0;
     return fakeService({
       "POST /v1/x": () => json({ id: "j", status: "accepted", links: LINKS }, 202),
       "GET /v1/jobs/j/events": () => (streams[connections++] as () => Response)(),
       "GET /v1/jobs/j/results": results,
-      "DELETE /v1/jobs/j": () => json({ status: "dismissed" }),
+      "DELETE /v1/jobs/j": removed,
     });
+  }
+
+  const stopped = () => json({ status: "dismissed" });
+
+  function removals(requests: Sent[]): string[] {
+    return requests.filter(({ method }) => method === "DELETE").map(({ path }) => path);
   }
 
   function ask(stop = new AbortController()) {
@@ -73,7 +83,7 @@ describe("a job", () => {
     return { answer, onProgress };
   }
 
-  test("is started, watched, and its answer fetched", async () => {
+  test("is started, watched, its answer fetched, and removed", async () => {
     const requests = serve([
       () =>
         inParts([eventOf(1, "accepted"), eventOf(2, "running", 0.5), eventOf(3, "successful", 1)]),
@@ -86,6 +96,7 @@ describe("a job", () => {
       "POST /v1/x",
       `GET ${LINKS.events}`,
       `GET ${LINKS.results}`,
+      `DELETE ${LINKS.self}`,
     ]);
     const [start, watch] = requests;
     expect(start?.body).toEqual({ a: 1 });
@@ -115,18 +126,19 @@ describe("a job", () => {
     expect(lastIds).toEqual([null, "1", "1", "2"]);
   });
 
-  test("that fails answers with its problem", async () => {
+  test("that fails answers with its problem, and is removed", async () => {
     const problem = {
       detail: "Too long.",
       code: "deadline_exceeded",
       status: 504,
       request_id: "r",
     };
-    serve([() => inParts([eventOf(1, "failed")])], () => json(problem, 504));
+    const requests = serve([() => inParts([eventOf(1, "failed")])], () => json(problem, 504));
     const { answer } = ask();
 
     await expect(answer).rejects.toThrow(ProblemError);
     await expect(answer).rejects.toThrow("Too long.");
+    expect(removals(requests)).toEqual([LINKS.self]);
   });
 
   test("whose events are refused is not asked for again", async () => {
@@ -139,28 +151,34 @@ describe("a job", () => {
     expect(requests.filter(({ path }) => path === LINKS.events)).toHaveLength(1);
   });
 
-  test("is dismissed when its caller aborts, and once only", async () => {
+  test("that cannot be removed has its answer all the same", async () => {
+    const refuse = () => json({ detail: "No.", code: "draining", status: 503 }, 503);
+    serve([() => inParts([eventOf(1, "successful", 1)])], undefined, refuse);
+
+    expect(await (await ask().answer).text()).toBe("answer");
+  });
+
+  test("is stopped and removed when its caller aborts", async () => {
     const stop = new AbortController();
-    const requests = serve([() => inParts([eventOf(1, "running", 0.1)])]);
+    const requests = serve([() => inParts([eventOf(1, "running", 0.1)])], undefined, stopped);
     const { answer, onProgress } = ask(stop);
     await vi.waitFor(() => expect(onProgress).toHaveBeenCalled());
     stop.abort();
     await vi.advanceTimersByTimeAsync(10_000);
 
     await expect(answer).rejects.toMatchObject({ name: "AbortError" });
-    const dismissed = requests.filter(({ method }) => method === "DELETE");
-    expect(dismissed.map(({ path }) => path)).toEqual([LINKS.self]);
+    await vi.waitFor(() => expect(removals(requests)).toEqual([LINKS.self, LINKS.self]));
     expect(requests.some(({ path }) => path === LINKS.results)).toBe(false);
   });
 
-  test("is dismissed when its caller aborts before it has begun", async () => {
+  test("is stopped and removed when its caller aborts before it has begun", async () => {
     const stop = new AbortController();
-    const requests = serve([]);
+    const requests = serve([], undefined, stopped);
     const { answer } = ask(stop);
     stop.abort();
 
     await expect(answer).rejects.toMatchObject({ name: "AbortError" });
-    expect(requests.filter(({ method }) => method === "DELETE")).toHaveLength(1);
+    await vi.waitFor(() => expect(removals(requests)).toEqual([LINKS.self, LINKS.self]));
   });
 
   test("is left alone when its caller aborts after the answer", async () => {
@@ -168,8 +186,9 @@ describe("a job", () => {
     const requests = serve([() => inParts([eventOf(1, "successful", 1)])]);
     const { answer } = ask(stop);
     await answer;
+    const before = requests.length;
     stop.abort();
 
-    expect(requests.some(({ method }) => method === "DELETE")).toBe(false);
+    expect(requests).toHaveLength(before);
   });
 });

@@ -97,13 +97,14 @@ describe("distances", () => {
       "GET /v1/jobs/j/events": () =>
         inParts([event(1, "running", 0.25) + event(2, "running", 0.5), event(3, "successful", 1)]),
       "GET /v1/jobs/j/results": () => distances([0, 3]),
+      "DELETE /v1/jobs/j": () => json({ status: "successful" }),
     });
     const onProgress = vi.fn();
     const field = await askDistances("m", QUESTION, onProgress, signal);
 
     expect(field.largest).toBe(3);
     expect(onProgress.mock.calls).toEqual([[0.25], [0.5], [1]]);
-    expect(requests.map(({ method }) => method)).toEqual(["POST", "GET", "GET"]);
+    expect(requests.map(({ method }) => method)).toEqual(["POST", "GET", "GET", "DELETE"]);
   });
 
   test("from the cache took no time of computing", async () => {

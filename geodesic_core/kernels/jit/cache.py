@@ -21,6 +21,8 @@ from numba.core import serialize
 from numba.core.compiler import CompileResult
 from numba.core.runtime.nrt import rtsys
 
+from geodesic_core.errors import InvalidArgument
+from geodesic_core.files import written
 from geodesic_core.kernels.jit import machine
 
 if TYPE_CHECKING:
@@ -109,16 +111,21 @@ class StoredKernel:
         return None
 
     def save(self, compiled: Any) -> None:
-        """Write the compiled kernel into the user's cache, whole or not at all."""
+        """Write the compiled kernel into the user's cache, whole or not at all.
+
+        The disk may be full: then a warning says so, and the kernel serves this process alone.
+        """
         if self.is_storable and _is_writable():
             dump: Any = serialize.dumps
             *parts, environments = compiled._reduce()
             # Code reads constants from them, nothing else, and each imports its module when loaded.
             with_constants = tuple(each for each in environments if each.consts)
             data = dump((*parts, with_constants))
-            with tempfile.NamedTemporaryFile(dir=folder(), delete=False) as part:
-                part.write(hashlib.sha256(data).digest() + data)
-            Path(part.name).replace(folder() / self.file_name)
+            try:
+                with written(folder() / self.file_name) as file:  # by the holder of the lock alone
+                    file.write(hashlib.sha256(data).digest() + data)
+            except InvalidArgument as error:
+                _warn(error.__cause__)
 
     @contextmanager
     def lock(self) -> Iterator[None]:
@@ -140,12 +147,16 @@ def _is_writable() -> bool:
         with tempfile.TemporaryFile(dir=folder()):
             return True
     except OSError as error:
-        message = (
-            f"kernels are compiled again in each process, since they cannot be written to the "
-            f"cache ({error}); set NUMBA_CACHE_DIR to another folder"
-        )
-        warnings.warn(message, RuntimeWarning, stacklevel=2)
+        _warn(error)
         return False
+
+
+def _warn(error: BaseException | None) -> None:
+    message = (
+        f"kernels are compiled again in each process, since they cannot be written to the cache "
+        f"({error}); set NUMBA_CACHE_DIR to another folder"
+    )
+    warnings.warn(message, RuntimeWarning, stacklevel=2)
 
 
 def is_in_use() -> bool:

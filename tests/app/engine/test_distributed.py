@@ -1,7 +1,7 @@
 """The engine over several machines: its promises, against links and hosts that fail."""
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 from time import time_ns
@@ -199,6 +199,22 @@ def test_cancelling_stops_the_work() -> None:
     play(scene, "a")
 
 
+def test_a_result_that_nobody_waits_for_is_reported_to_one_replica() -> None:
+    async def main() -> None:
+        cluster, reported = FakeCluster("a"), list[str]()
+
+        async def note(name: str) -> None:
+            reported.append(name)
+
+        async with replica_of(cluster) as one, replica_of(cluster) as other:
+            one.engine.on_unclaimed = other.engine.on_unclaimed = note
+            await cluster.engines["a"].on_unclaimed(f"{MESH}/late")
+            await asyncio.sleep(4 * BEAT_S)
+            assert reported == [f"{MESH}/late"]
+
+    virtual_time.run(main())
+
+
 def test_a_stop_is_sent_again_until_it_is_answered() -> None:
     async def scene(replica: Replica) -> None:
         replica.cluster.unanswered_stops = 2
@@ -238,6 +254,22 @@ def test_a_dead_host_is_replaced_once() -> None:
         assert now() < 5 + 8 + 1
         assert replica.begun == {"a": 1, "b": 1}
         assert replica.shares == [0.0, 0.25, 0.5, 0.75], "nothing is told twice"
+
+    play(scene)
+
+
+def test_a_full_queue_does_not_refuse_what_a_lost_host_had_accepted() -> None:
+    async def scene(replica: Replica) -> None:
+        asking = replica.ask()
+        await asyncio.sleep(5)
+        lost = replica.where()
+        other = replica.cluster.engines[replica.other()]
+        other.is_full = True
+        replica.cluster.kill(lost)
+        await asking
+
+        assert await code_of(replica.ask()) == "queue_full"
+        assert [task.is_promised for task in other.begun] == [True]
 
     play(scene)
 
@@ -294,6 +326,26 @@ def test_a_host_that_was_cut_off_works_again() -> None:
         await replica.ask()
 
     play(scene, "a")
+
+
+def test_hosts_are_looked_for_again_after_any_failure() -> None:
+    class Failing(FakeCluster):
+        is_broken = True
+
+        async def hosts(self) -> Collection[str]:
+            if self.is_broken:
+                raise ValueError("nobody has thought of it")
+            return await super().hosts()
+
+    async def main() -> None:
+        cluster = Failing("a")
+        async with replica_of(cluster) as replica:
+            assert not replica.engine.is_ready
+            cluster.is_broken = False
+            await asyncio.sleep(SILENCE_S)
+            assert replica.engine.is_ready
+
+    virtual_time.run(main())
 
 
 def test_work_of_a_replica_that_is_gone_ends() -> None:

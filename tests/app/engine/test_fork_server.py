@@ -7,7 +7,7 @@ import pytest
 
 import geodesic_core as gc
 from app.engine.fork_server import PRELOADED
-from app.engine.worker import FIRST_KERNELS
+from app.engine.worker_process import FIRST_KERNELS
 from tests.support.fresh import told_by
 from tests.support.paths import ROOT
 from tests.support.syntax import syntax_tree
@@ -41,7 +41,7 @@ StoredKernel.load = lambda self, context: loaded.append(self) or load(self, cont
 import {PRELOADED}
 print(len(loaded) > 0)
 loaded.clear()
-app.engine.worker.gc.warm_up(app.engine.worker.FIRST_KERNELS)
+app.engine.worker_process.gc.warm_up(app.engine.worker_process.FIRST_KERNELS)
 print(len(loaded))
 """
 

@@ -60,11 +60,11 @@ def test_ray_is_told_where_they_are_and_nobody_else(redis_server: Redis) -> None
 def test_it_is_told_whether_they_are_durable(redis_server: Redis) -> None:
     url = SecretStr(redis_server.url())
     with in_redis(url, TOKEN) as records:
-        assert f"in the Redis at {redis_server.host}:{redis_server.port}" in records.told
-        assert "crash" not in records.told
+        assert f"in the Redis at {redis_server.host}:{redis_server.port}" in records.durability
+        assert "crash" not in records.durability
     redis_server.keep_no_log()
     with in_redis(url, TOKEN) as records:
-        assert "but a crash of that Redis loses them" in records.told
+        assert "but a crash of that Redis loses them" in records.durability
 
 
 @pytest.mark.usefixtures("short_lease")

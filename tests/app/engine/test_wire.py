@@ -2,9 +2,12 @@
 
 import struct
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import msgspec
+import orjson
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -196,22 +199,39 @@ def test_an_outcome_is_no_task() -> None:
         Wire(HERE).decode_outcome(MESSAGE)
 
 
+MATRIX = wire._Query("matrix", MESH_ID, orjson.dumps(REQUESTS["matrix"]))
+NAME = f"{MESH_ID}/key"
+
+
 @pytest.mark.parametrize("path", ["/etc/passwd", "../x", "a/../../x", "a\0b"])
-def test_paths_stay_in_the_store(path: str) -> None:
-    read = wire.decode(MESSAGE, wire._Task)
-    stray = wire.encode(
-        wire._Task(
-            wire._Store(wire._Sample("knot", 10, "none"), path, None, None),
-            read.client,
-            read.affinity_keys,
-            read.is_small,
-            read.is_promised,
-            read.log_fields,
-        )
-    )
+@pytest.mark.parametrize(
+    "work",
+    [
+        lambda path: wire._Store(wire._Sample("knot", 10, "none"), path, None, None),
+        lambda path: wire._Store(wire._File(path, "obj", "none"), "tmp/x", None, None),
+        lambda path: wire._Run(MATRIX, FORM, path),
+        lambda path: wire._Run(msgspec.structs.replace(MATRIX, mesh_id=path), FORM, NAME),
+        lambda path: wire._Part(MATRIX, "float64", 0, path),
+        lambda path: wire._Join(MATRIX, "float64", [NAME], 1, path),
+        lambda path: wire._Join(MATRIX, "float64", [NAME, path], 1, NAME),
+    ],
+    ids=["folder", "file", "result", "mesh", "part", "matrix", "a part of a matrix"],
+)
+def test_paths_and_names_stay_in_the_store(work: Callable[[str], Any], path: str) -> None:
+    def sent(path: str) -> bytes:
+        return wire.encode(wire._Task(work(path), "alice", (), False, False, {}))
+
+    assert Wire(HERE).decode_task(sent("a/b")).task.client == "alice"
+    with pytest.raises(DamagedMessageError, match="no place in the store"):
+        Wire(HERE).decode_task(sent(path))
+
+
+def test_the_name_of_a_result_that_returns_stays_in_the_store() -> None:
+    manifest = ResultManifest(headers={}, size=3, crc32=1)
+    result = Result("a/../../x", manifest, b"abc", has_files=False)
 
     with pytest.raises(DamagedMessageError, match="no place in the store"):
-        Wire(HERE).decode_task(stray)
+        returned(TaskResult({}, result=result))
 
 
 def test_unknown_kinds_and_codes_are_refused() -> None:

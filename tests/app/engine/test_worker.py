@@ -1,5 +1,7 @@
 """A worker, in this process: what it keeps open, and work that fails or is stopped."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -9,16 +11,17 @@ import numpy as np
 import orjson
 import pytest
 
-from app.encoding import NPY
-from app.engine.work import MeshFromSample, StoreMesh, TaskResult
-from app.engine.worker import Clock, Signals, Worker
+from app.encoding import CSV, NPY, Encoded, encode
+from app.engine.signals import Signals
+from app.engine.work import ComputePart, JoinParts, MeshFromSample, StoreMesh, TaskResult
+from app.engine.worker import Clock, Worker
 from app.errors import Problem
-from app.queries import DistancesQuery, PathQuery
+from app.queries import DistancesQuery, MatrixQuery, PathQuery
 from app.schemas.points import VertexPoint
-from app.schemas.requests import PathRequest
+from app.schemas.requests import MatrixRequest, PathRequest
 from app.store.fields import field_files
 from app.store.meshes import MeshStore, OpenMesh
-from geodesic_core import TriangleMesh, exact_distance, samples
+from geodesic_core import MatrixParts, TriangleMesh, exact_distance, samples
 from tests.support.logs import Log
 from tests.support.service import store_mesh
 from tests.support.waiting import wait_until
@@ -290,3 +293,53 @@ def test_work_that_is_asked_to_stop_stops(tmp_path: Path, accuracy: dict[str, An
     outcome = worker.do(3, work)
     assert isinstance(outcome, TaskResult)
     assert "encode" in outcome.seconds
+
+
+def test_an_answer_that_is_stopped_while_it_is_written_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    signals = Signals()
+    worker = Worker(worker_config(tmp_path), signals)
+    mesh_id = store_mesh(tmp_path, samples.sphere(20_000))
+    work = run_query(distances_query(mesh_id), CSV)
+
+    def encode_and_stop(*arguments: Any) -> Encoded:
+        def parts() -> Iterator[Any]:
+            first, second, *others = encoded.parts
+            yield from (first, second)
+            signals.stop_number = 1
+            yield from others
+
+        encoded = encode(*arguments)
+        return replace(encoded, parts=parts())
+
+    monkeypatch.setattr("app.engine.worker.encode", encode_and_stop)
+
+    assert worker.do(1, work) is None
+    assert not list(tmp_path.glob("results/*/*"))
+    signals.stop_number = 0
+    monkeypatch.undo()
+    assert isinstance(worker.do(2, work), TaskResult)
+
+
+def test_a_large_matrix_that_is_stopped_while_its_file_is_read_leaves_no_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    signals = Signals()
+    worker = Worker(worker_config(tmp_path), signals)
+    mesh_id = store_mesh(tmp_path, samples.sphere(100))
+    query = MatrixQuery(mesh_id, MatrixRequest(sources="all", targets="all"))
+    write = MatrixParts.write
+    part = worker.do(1, ComputePart(query, "float64", 0, f"{mesh_id}/part"))
+    assert isinstance(part, TaskResult)
+    before = set(tmp_path.glob("results/*/*"))
+
+    def write_and_stop(*arguments: Any, **options: Any) -> None:
+        write(*arguments, **options)
+        signals.stop_number = 2
+
+    monkeypatch.setattr(MatrixParts, "write", write_and_stop)
+
+    work = JoinParts(query, "float64", [f"{mesh_id}/part"], 1, f"{mesh_id}/whole")
+    assert worker.do(2, work) is None
+    assert set(tmp_path.glob("results/*/*")) == before

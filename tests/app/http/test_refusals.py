@@ -1,12 +1,11 @@
 """Refused bodies: however many elements are faulty, few are looked at."""
 
 from contextlib import nullcontext
+from pathlib import Path
 from typing import Any
 
 import anyio
 import pytest
-from anyio import CapacityLimiter
-from fastapi import FastAPI
 from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, TypeAdapter, ValidationError, create_model
 from starlette.requests import Request
@@ -14,9 +13,11 @@ from starlette.requests import Request
 from app.errors import ProblemError
 from app.http.routes import query_request
 from app.http.routes.query_route import read
+from app.main import create_app
 from app.queries import KINDS
 from app.schemas.points import Curve, CurveSource
 from app.settings import Settings
+from tests.support.waiting import LONG_S
 
 MODELS = [query.model for query in KINDS.values()]
 LISTS = [
@@ -132,20 +133,23 @@ def test_a_body_of_64_kib_may_hold_any_number_of_values(most_bytes: int) -> None
 
 @pytest.mark.parametrize("fails", [False, True])
 def test_reading_a_large_body_rests_as_long_as_it_held_the_interpreter(
-    monkeypatch: pytest.MonkeyPatch, fails: bool
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fails: bool
 ) -> None:
     clock, rests = iter([1.0, 3.5]), []
     monkeypatch.setattr(query_request, "thread_time", lambda: next(clock))
     monkeypatch.setattr(query_request, "sleep", rests.append)
 
     async def receive() -> Any:
-        return {"type": "http.request", "body": b"1" * query_request.LARGE}
+        if parts:
+            return parts.pop()
+        return await anyio.sleep_forever()
 
     async def ask() -> int:
-        app = FastAPI()
-        app.state.large_bodies = CapacityLimiter(1)
+        app = create_app(Settings(store=tmp_path, workers=1))
         request = Request({"type": "http", "app": app}, receive)
-        return await query_request.offload_if_large(request, lambda: 1 // (not fails))
+        return await query_request.offload_if_large(request, LONG_S, lambda: 1 // (not fails))
+
+    parts = [{"type": "http.request", "body": b"1" * query_request.LARGE}]
 
     with pytest.raises(ZeroDivisionError) if fails else nullcontext():
         assert anyio.run(ask) == 1

@@ -1,7 +1,9 @@
 """The line that each request has in the log."""
 
 from pathlib import Path
+from typing import Any
 
+import anyio
 import pytest
 from starlette.testclient import TestClient
 
@@ -91,3 +93,28 @@ def test_an_outage_has_no_traceback_and_its_own_status(
     assert (failure["code"], failure["error"]) == ("store_unavailable", "no route to host")
     assert "exc_info" not in failure
     assert (line["event"], line["status"]) == ("request", 503)
+
+
+def test_a_client_that_hangs_up_has_its_own_status(client: ServiceClient, log: Log) -> None:
+    scope = {
+        "type": "http",
+        "method": "POST",
+        "scheme": "http",
+        "path": "/v1/meshes",
+        "query_string": b"format=obj",
+        "headers": [(b"host", b"testserver")],
+        "client": ("10.0.0.7", 1),
+        "server": ("testserver", 80),
+        "state": {},
+    }
+
+    async def receive() -> Any:
+        return {"type": "http.disconnect"}
+
+    async def send(_message: Any) -> None:
+        pass  # nobody reads it
+
+    anyio.run(client.app, scope, receive, send)
+
+    (line,) = log
+    assert (line["operation"], line["status"]) == ("createMesh", 499)

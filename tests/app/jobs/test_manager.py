@@ -2,18 +2,23 @@
 
 import asyncio
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, NoReturn, cast
+
+import pytest
 
 from app.errors import problem
 from app.jobs.job import Job
 from app.jobs.manager import JobManager
 from app.jobs.repository import JobRepository
 from app.state import Database
-from app.store.results import Result
+from app.store.results import FolderResults, Result, ResultStore, write_result
 from tests.support.databases import opened
-from tests.support.jobs import SPEC
+from tests.support.jobs import SPEC, SlowSubmissions, new_job
+from tests.support.waiting import LONG_S
 
 QUERY = b"{}"
+HOUR_S = 3600.0
 
 
 class SlowEnds(JobRepository):
@@ -64,13 +69,70 @@ def test_an_end_is_told_once_it_is_recorded(database: Database) -> None:
     asyncio.run(main())
 
 
-class OneReplica:
-    """The only one of all replicas."""
+def test_a_submission_that_is_cancelled_leaves_a_job_that_runs_or_none(database: Database) -> None:
+    """Else the next request with the same key would get a job that never ends."""
+    spec = SPEC.model_copy(update={"idempotency_key": "a key"})
 
-    id = "one"
+    async def main() -> None:
+        may_end = asyncio.Event()
+
+        async def solve(_on_progress: object) -> Result:
+            await may_end.wait()
+            return await fail()
+
+        async with opened(database):
+            repository = SlowSubmissions(database)
+            jobs = JobManager(repository, cast(Any, "not used"), 60.0, None)
+            async with jobs.running(fail):
+                submission = asyncio.create_task(jobs.submit(spec, QUERY, solve))
+                await repository.written.wait()
+                submission.cancel()
+                await asyncio.wait({submission})
+                assert submission.cancelled()
+                repository.may_say.set()
+
+                again = await jobs.submit(spec, QUERY, solve)
+                may_end.set()
+                *_, last = [state.status async for state in jobs.watch(again, 0)]
+                assert last == "failed", "as it should"
+
+    asyncio.run(main())
+
+
+class FailingRemoval(JobRepository):
+    """Fails once to remove a job, in a way that nobody has thought of."""
+
+    fails = True
+
+    async def remove(self, job_id: str) -> None:
+        if self.fails:
+            self.fails = False
+            raise ValueError(job_id)
+        await super().remove(job_id)
+
+
+def test_jobs_expire_after_any_failure(database: Database) -> None:
+    async def main() -> None:
+        async with asyncio.timeout(LONG_S), opened(database):
+            repository = FailingRemoval(database)
+            jobs = JobManager(repository, cast(Any, "not used"), 0.01, None)
+            async with jobs.running(fail):
+                await jobs.submit(SPEC, QUERY, fail)
+                while await repository.count(None):
+                    await asyncio.sleep(0.01)
+        assert not repository.fails
+
+    asyncio.run(main())
+
+
+class LivingReplica:
+    """One of the replicas ``one`` and ``two``, which both live."""
+
+    def __init__(self, name: str = "one") -> None:
+        self.id = name
 
     async def beat(self) -> set[str]:
-        return {self.id}
+        return {"one", "two"}
 
     async def leave(self) -> None:
         pass
@@ -88,7 +150,7 @@ def test_all_replicas_tell_the_same_progress(database: Database) -> None:
 
         async with opened(database):
             repository, others = JobRepository(database), JobRepository(database)
-            replicas = cast(Any, OneReplica())
+            replicas = cast(Any, LivingReplica())
             jobs = JobManager(repository, cast(Any, "not used"), 60.0, None, replicas)
 
             async def shares() -> set[float]:
@@ -108,5 +170,89 @@ def test_all_replicas_tell_the_same_progress(database: Database) -> None:
                 while await shares() == {0.25}:
                     await asyncio.sleep(0.01)
                 assert await shares() == {0.5}
+
+    asyncio.run(main())
+
+
+def results_in(folder: Path) -> ResultStore:
+    """Return a store with room for one of two answers of 60 bytes, ``m/one`` and ``m/two``."""
+    results = ResultStore(FolderResults(folder), 100, memory=0)
+    results.prepare()
+    return results
+
+
+def answer(folder: Path, name: str = "m/one") -> Result:
+    return write_result(folder, name, [b"x" * 60], {}, "code", is_cheap=False)
+
+
+@pytest.mark.parametrize("runs_for_a_while", [False, True])
+def test_the_answer_of_a_job_is_soon_held_by_all_replicas(
+    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, runs_for_a_while: bool
+) -> None:
+    """Else one of them might remove it to make room."""
+    monkeypatch.setattr("app.jobs.manager.BEAT_S", 0.01)
+    monkeypatch.setattr("app.jobs.manager._TIDY_PERIOD_S", HOUR_S)
+
+    async def main() -> None:
+        stores = [results_in(tmp_path) for _ in range(2)]
+        one, other = (
+            JobManager(JobRepository(database), results, HOUR_S, None, cast(Any, replica))
+            for results, replica in zip(stores, map(LivingReplica, ("one", "two")), strict=True)
+        )
+
+        async def solve(_on_progress: object) -> Result:
+            if runs_for_a_while:
+                await asyncio.sleep(0.1)
+            return stores[0].add(answer(tmp_path))
+
+        async with opened(database), one.running(fail), other.running(fail):
+            answer(tmp_path, "m/two")
+            await one.submit(SPEC, QUERY, solve)
+            async with asyncio.timeout(LONG_S):
+                while stores[1].can_pin("m/two"):
+                    await asyncio.sleep(0.01)
+                    for name in ("m/one", "m/two"):
+                        await stores[1].index(name)
+
+    asyncio.run(main())
+
+
+def test_a_job_that_is_removed_twice_leaves_the_answer_to_another_one(
+    database: Database, tmp_path: Path
+) -> None:
+    async def main() -> None:
+        results = results_in(tmp_path)
+        jobs = JobManager(JobRepository(database), results, HOUR_S, None)
+
+        async def solve(_on_progress: object) -> Result:
+            return results.add(answer(tmp_path))
+
+        async with opened(database), jobs.running(fail):
+            for _ in range(2):
+                job = await jobs.submit(SPEC, QUERY, solve)
+                *_, last = [state.status async for state in jobs.watch(job, 0)]
+                assert last == "successful"
+            await asyncio.gather(*(jobs.dismiss(None, job.id) for _ in range(2)))
+            results.release(results.add(answer(tmp_path, "m/two")))
+            assert await results.find("m/one") is not None
+            assert await results.find("m/two") is None
+
+    asyncio.run(main())
+
+
+def test_a_record_of_a_newer_release_keeps_no_job_from_expiring(
+    database: Database, tmp_path: Path
+) -> None:
+    async def main() -> None:
+        async with asyncio.timeout(LONG_S), opened(database):
+            repository = JobRepository(database)
+            await repository.add(job := new_job(), QUERY)
+            record = job.dismissed().model_dump_json().replace('"dismissed"', '"unheard-of"')
+            await database.run("UPDATE jobs SET record = ?", record)
+            replicas = cast(Any, LivingReplica())
+            jobs = JobManager(repository, results_in(tmp_path), 0.01, None, replicas)
+            async with jobs.running(fail):
+                while await repository.count(None):
+                    await asyncio.sleep(0.01)
 
     asyncio.run(main())

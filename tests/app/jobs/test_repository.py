@@ -39,18 +39,45 @@ async def count_jobs(repository: JobRepository) -> None:
     mine = [new_job("alice") for _ in range(4)]
     for job in (*mine, new_job("bob"), new_job()):
         await repository.add(job, QUERY)
-    assert await repository.finished() == []
+    assert await repository.finished() == set()
 
     ended = [job.dismissed() for job in mine[:3]]
     for job in ended:
         assert await repository.update(job, None)
     assert await repository.count("alice") == 4
-    assert await repository.finished() == ended
+    assert await repository.finished() == {job.id for job in ended}
     assert await repository.count_finished() == {"dismissed": 3}
     await repository.remove(mine[1].id)
     assert await repository.count("alice") == 3
     assert await repository.count("bob") == await repository.count(None) == 1
     assert await repository.count("carol") == 0
+
+
+def test_ends_and_new_jobs_are_found_whatever_else_a_record_says(database: Database) -> None:
+    run(database, partial(find_ends, database))
+
+
+async def find_ends(database: Database, repository: JobRepository) -> None:
+    assert await repository.added(0) == (set(), 0)
+    jobs = [new_job("alice"), new_job(), new_job()]
+    for job in jobs:
+        await repository.add(job, QUERY)
+    added, newest = await repository.added(0)
+    assert added == {job.id for job in jobs}
+    assert await repository.added(newest) == (set(), newest)
+    await repository.add(later := new_job(), QUERY)
+    assert (await repository.added(newest))[0] == {later.id}
+
+    last = jobs[0].running(0.0).successful("its answer")
+    assert await repository.update(last, None)
+    record = last.model_dump_json().replace('"successful"', '"unheard-of"')
+    await database.run("UPDATE jobs SET record = ? WHERE id = ?", record, last.id)
+    assert await repository.update(jobs[1].dismissed(), None)
+    ids = [f"no job {number}" for number in range(1200)] + [job.id for job in jobs]
+    ended = {job.id: job for job in await repository.ended(ids)}
+    assert ended.keys() == {job.id for job in jobs[:2]} == await repository.finished()
+    assert ended[last.id] == (last.id, "alice", "its answer", last.finished)
+    assert ended[jobs[1].id][:3] == (jobs[1].id, None, None)
 
 
 def test_jobs_are_found_by_owner_id_and_key(database: Database) -> None:

@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from app.jobs import retention
-from app.jobs.job import Job
+from app.jobs.job import EndedJob, Job
 from app.jobs.retention import Retention
 from tests.support.clocks import TEN_YEARS, Calendar, Clock
 from tests.support.jobs import new_job
@@ -68,7 +68,8 @@ def test_what_finished_before_the_start(clock: Clock, calendar: Calendar) -> Non
 
     jobs = Retention(HOUR_S)
     for job in ended:
-        jobs.add_older(job)
+        assert job.finished is not None
+        jobs.add_older(EndedJob(job.id, None, job.result, job.finished))
 
     assert ids_due(jobs) == [old.id]
     clock.now += 601

@@ -1,12 +1,16 @@
 """Allowances that several replicas count together, on both databases."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from typing import Any
 
 import anyio
 import pytest
 
-from app.state import Allowances, Database, Replicas
+from app.errors import StateUnavailableError
+from app.state import Allowances, Database, Replicas, Statements
 from tests.support.databases import opened
+from tests.support.waiting import LONG_S
 
 
 async def new_replica(database: Database) -> tuple[Allowances, Replicas]:
@@ -61,7 +65,37 @@ async def share_concurrency(database: Database) -> None:
     assert await database.rows("SELECT * FROM running") == []
 
 
-@pytest.mark.parametrize("check", [share_a_rate, count_at_once, share_concurrency])
+class FailingOnce:
+    """A database that commits the next block, and cannot say so."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self._fails = True
+
+    @asynccontextmanager
+    async def alone(self, name: str) -> AsyncIterator[Statements]:
+        async with self._database.alone(name) as statements:
+            yield statements
+        if self._fails:
+            self._fails = False
+            raise StateUnavailableError("the connection is lost")
+
+
+async def fail_to_commit(database: Database) -> None:
+    _, replicas = await new_replica(database)
+    failing: Any = FailingOnce(database)
+    allowances = Allowances(failing, replicas.id)
+    with pytest.raises(StateUnavailableError):
+        await allowances.begin("uploads", "alice", 1)
+    with anyio.fail_after(LONG_S):
+        while await database.rows("SELECT * FROM running"):
+            await anyio.sleep(0.01)
+    assert await allowances.begin("uploads", "alice", 1) == 1
+    await allowances.end("uploads", "alice")
+    assert await database.rows("SELECT * FROM running") == []
+
+
+@pytest.mark.parametrize("check", [share_a_rate, count_at_once, share_concurrency, fail_to_commit])
 def test_allowances(database: Database, check: Callable[[Database], Awaitable[None]]) -> None:
     async def check_opened() -> None:
         async with opened(database):

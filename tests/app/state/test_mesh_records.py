@@ -126,8 +126,38 @@ async def start_after_a_crash(root: Path, database: Database) -> None:
     assert list(first.catalog.ids) == list(second.catalog.ids) == [left]
 
 
+async def use_meshes_during_an_upload(root: Path, database: Database) -> None:
+    """Queries use meshes while the shared table is told which one is evicted for a new one."""
+    first, second = await started(root, database)
+    evicted, _ = await first.add(1)
+    size = first.catalog.total
+    first, second = await started(root, database, capacity=size * 7 // 2)
+    mesh_ids = [(await first.add(scale))[0] for scale in (2, 3)]
+
+    async def query() -> None:
+        while True:
+            for mesh_id in mesh_ids:
+                first.catalog.use(mesh_id)
+            await anyio.sleep(0)
+
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(query)
+        added, change = await first.add(4)
+        tasks.cancel_scope.cancel()
+    assert change == CatalogChange(is_new=True, evicted=[evicted])
+    await second.catalog.keep_up()
+    assert set(second.catalog.ids) == {*mesh_ids, added}
+
+
 @pytest.mark.parametrize(
-    "check", [see_each_other, share_a_quota, evict_what_nobody_uses, start_after_a_crash]
+    "check",
+    [
+        see_each_other,
+        share_a_quota,
+        evict_what_nobody_uses,
+        start_after_a_crash,
+        use_meshes_during_an_upload,
+    ],
 )
 def test_catalogues(
     tmp_path: Path, database: Database, check: Callable[[Path, Database], Awaitable[None]]

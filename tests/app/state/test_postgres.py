@@ -4,12 +4,15 @@ import socket
 import subprocess
 import sys
 from contextlib import suppress
+from pathlib import Path
 
 import anyio
 import pytest
 
 from app.errors import StateUnavailableError, problem_of
-from app.state import StateError
+from app.state import MeshRecords, Replicas, StateError
+from app.store.folder_meshes import FolderMeshes
+from app.store.mesh_catalog import MeshCatalog
 from tests.support.databases import opened
 from tests.support.paths import ROOT
 from tests.support.postgres import SECRET, Server
@@ -121,3 +124,33 @@ def test_a_transaction_that_fails_leaves_nothing(postgres: Server) -> None:
             assert await database.rows("SELECT * FROM replicas") == []
 
     anyio.run(fail)
+
+
+def test_those_who_wait_for_the_meshes_leave_connections_to_others(
+    postgres: Server, tmp_path: Path
+) -> None:
+    """Else a replica could not say that it lives while another one writes a large mesh."""
+    url = postgres.new_database()
+    ours, others = PostgresDatabase(url), PostgresDatabase(url)
+    ours.prepare()
+    catalog = MeshCatalog(
+        tmp_path, FolderMeshes(tmp_path), 2**30, evicts=True, shared=MeshRecords(ours)
+    )
+
+    async def wait_for_meshes() -> None:
+        with suppress(StateUnavailableError):  # it may take too long
+            await catalog.keep_up()
+
+    async def wait_together() -> None:
+        async with (
+            opened(ours),
+            opened(others),
+            anyio.create_task_group() as tasks,
+            MeshRecords(others).alone(),
+        ):
+            for _ in range(10):
+                tasks.start_soon(wait_for_meshes)
+            await anyio.sleep(0)  # they come first
+            await Replicas(ours).beat()
+
+    anyio.run(wait_together)

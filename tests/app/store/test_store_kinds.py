@@ -14,13 +14,13 @@ from obstore.store import MemoryStore
 import geodesic_core as gc
 from app.errors import ProblemError
 from app.settings import Settings
+from app.store.choice import store_of
 from app.store.folder_store import FolderStore
 from app.store.interface import Store
 from app.store.layout import RESULTS, TEMPORARY, StoreError
 from app.store.meshes import MeshStore, WrittenMesh
 from app.store.object_store import ObjectStore
 from app.store.objects import Objects
-from app.store.opening import store_of
 from app.store.results import SMALL, Result, write_result
 from tests.support.waiting import LONG_S
 

@@ -377,7 +377,8 @@ def test_a_large_result_is_read_once_for_each_version_of_its_file(
     read = verified.read_checksum
     monkeypatch.setattr(verified, "read_checksum", lambda path: reads.append(path) or read(path))
     body = bytes(3 * SMALL)
-    result = write_result_file(root, "m/a", lambda file: file.write(body), {}, "code")
+    write = lambda file: file.write(body)  # noqa: E731
+    result = write_result_file(root, "m/a", write, {}, "code", lambda: None)
     assert (result.manifest.size, result.manifest.crc32) == (len(body), zlib.crc32(body))
     store = ResultStore(FolderResults(root), 10**6, memory=0)
     store.prepare()

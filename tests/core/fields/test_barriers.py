@@ -438,3 +438,56 @@ def test_what_may_not_take_the_memory_does_not(monkeypatch):
     )
     with pytest.raises(gc.errors.MemoryLimitExceeded):
         gc.exact_distance(mesh, 0, barriers=[5], memory_limit=1000)
+
+
+# Calls that take barriers -----------------------------------------------------------------------
+
+
+@pytest.mark.jit
+@zoo.each({name: BLOCKABLE[name] for name in ("crags", "crumpled_torus", "octahedron")})
+def test_every_call_takes_barriers_as_the_mesh_does(case):
+    mesh = gc.TriangleMesh(case.vertices, case.faces)
+    blocked = some_barriers(case, 0.2)
+    holed = mesh.with_barriers(blocked)
+    free = np.unique(holed.faces[np.setdiff1d(np.arange(len(mesh.faces)), blocked)])
+    solver, other = gc.Solver(mesh), gc.Solver(holed)
+    component = holed.components[free]
+    start, *ends = free[component == np.bincount(component).argmax()].tolist()
+    unblocked = solver.shortest_path(start, ends[-1]).length
+    for caller, same in (((gc, mesh), (gc, holed)), ((solver,), (other,))):
+        (call, *given), (twin, *taken) = caller, same
+        path = call.shortest_path(
+            *given, start, ends[-1], [ends[0]], barriers=blocked, explain=True
+        )
+        expected = twin.shortest_path(*taken, start, ends[-1], [ends[0]], explain=True)
+        np.testing.assert_array_equal(path.points, expected.points)
+        assert path.mesh.barriers.tolist() == sorted(blocked.tolist())
+        for layout in ("dense", "pairs"):
+            for method in ("exact", "fast"):
+                options = {"layout": layout, "method": method}
+                np.testing.assert_array_equal(
+                    call.distance_matrix(*given, ends, ends, barriers=blocked, **options),
+                    twin.distance_matrix(*taken, ends, ends, **options),
+                )
+        near = call.nearest(*given, start, ends, 2, barriers=blocked)
+        np.testing.assert_array_equal(
+            near.distances, twin.nearest(*taken, start, ends, 2).distances
+        )
+    assert solver.shortest_path(start, ends[-1]).length == unblocked  # they were of one call
+
+
+@pytest.mark.jit
+def test_barriers_of_a_call_count_as_its_memory():
+    mesh = gc.samples.plane(800)
+    needed = sum(array.nbytes for array in mesh.topology)
+    calls = (
+        lambda **limits: gc.shortest_path(mesh, 10, 20, **limits),
+        lambda **limits: gc.distance_matrix(mesh, 10, 20, **limits),
+        lambda **limits: gc.nearest(mesh, 10, 20, **limits),
+    )
+    for call in calls:
+        with pytest.raises(gc.errors.MemoryLimitExceeded) as caught:
+            call(memory_limit=1, barriers=[0])
+        assert caught.value.needed == needed
+        with pytest.raises(gc.errors.InvalidArgument, match="barrier 0 is face 800"):
+            call(barriers=[800])

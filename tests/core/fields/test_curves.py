@@ -350,3 +350,12 @@ def test_curves_that_are_none_are_refused_by_name():
         gc.exact_distance(mesh, gc.Curve([0, 99]))
     with pytest.raises(gc.errors.InvalidPoint, match="point 0 of source 0"):
         gc.exact_distance(mesh, gc.Curve([-1, 0]))
+
+
+def test_points_that_share_a_face_may_be_spelled_in_any_way():
+    mesh = gc.samples.plane(2)
+    assert gc.share_a_face(mesh, 0, gc.SurfacePoint.vertex(3))
+    assert gc.share_a_face(mesh, 1, gc.SurfacePoint.edge(1, 0, 0.5))
+    assert not gc.share_a_face(mesh, 1, 2)
+    with pytest.raises(gc.errors.InvalidPoint, match="the end is vertex 4"):
+        gc.share_a_face(mesh, 0, 4)

@@ -136,6 +136,29 @@ def test_what_is_no_field_is_refused(file: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("offset", "bits"),
+    [(6, 0xFF), (8, 1), (10, 8), (10, 0xFF)],
+    ids=["version", "encryption", "deflate", "compression"],
+)
+def test_damage_of_the_directory_is_refused(file: Path, offset: int, bits: int) -> None:
+    content = bytearray(file.read_bytes())
+    content[content.index(b"PK\x01\x02") + offset] ^= bits
+    file.write_bytes(content)
+    with pytest.raises(InvalidArgument, match="is damaged, or was not written"):
+        gc.load_field(file, MESH)
+
+
+@pytest.mark.parametrize("name", ["counts", "start_distances"])
+def test_a_missing_array_is_refused(file: Path, name: str) -> None:
+    with np.load(file) as whole:
+        members = {key: whole[key] for key in whole if key != f"sweep.{name}"}
+        assert len(members) < len(whole)
+    np.savez(file, **members)
+    with pytest.raises(InvalidArgument, match="is damaged, or was not written"):
+        gc.load_field(file, MESH)
+
+
+@pytest.mark.parametrize(
     ("path", "message"),
     [
         ("field.npy", "path is 'field.npy'; it must end in .npz"),

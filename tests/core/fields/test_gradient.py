@@ -101,3 +101,15 @@ def test_it_does_not_change():
     mesh = mesh_of(zoo.SMALL["octahedron"])
     field = gc.exact_distance(mesh, 0)
     assert field.gradient is field.gradient
+
+
+def test_a_vertex_at_the_place_of_the_source_has_none():
+    """A corner of a face of no area lies on its opposite edge, where the source is."""
+    corners = [[0, 0, 0], [2, 0, 0], [1, 0, 0], [1, 1, 0]]
+    mesh = gc.TriangleMesh(corners, [[0, 1, 2], [0, 1, 3]])
+    for start in (0.0, 0.5):
+        source = gc.Source(gc.SurfacePoint(0, (0.5, 0.5, 0)), start)
+        gradient = gc.exact_distance(mesh, source).gradient
+        assert np.isnan(gradient[2]).all()
+        expected = [[-1, 0, 0], [1, 0, 0], [0, 1, 0]]
+        np.testing.assert_allclose(gradient[[0, 1, 3]], expected, atol=1e-15)

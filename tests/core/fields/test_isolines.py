@@ -374,6 +374,15 @@ def test_levels_that_are_none(levels, message):
         field.isolines(levels)
 
 
+def test_the_default_chord_error_is_taken_where_small_parts_are_far_apart():
+    """A thousandth of their edges is less than a billionth of the bounding box."""
+    part = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    mesh = gc.TriangleMesh(np.vstack([part, part + 1e7]), [[0, 1, 2], [3, 4, 5]])
+    default = gc.resolve_chord_error(mesh)
+    assert default >= 1e-3
+    assert gc.resolve_chord_error(mesh, default) == default
+
+
 @pytest.mark.parametrize("chord_error", [0.0, -1.0, 1e-12, math.inf, math.nan, "1", True])
 def test_chord_errors_that_are_none(chord_error):
     field = gc.exact_distance(mesh_of(zoo.SMALL["octahedron"]), 0)

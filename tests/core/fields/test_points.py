@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.fields import point_query
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.certificates import check_path
@@ -169,6 +170,38 @@ def test_locating_stops_at_max_distance():
     assert mesh.locate(outside, 1.001 * away) == mesh.point(2)
     with pytest.raises(gc.errors.InvalidPoint, match=f"{away:g} away .* max_distance"):
         mesh.locate(outside, 0.999 * away)
+
+
+def test_distances_trace_no_path(monkeypatch):
+    mesh = mesh_of(zoo.SMALL["sphere"])
+    field = gc.exact_distance(mesh, [0, 5])
+    point = random_points(mesh, 1, seed=3)[0]
+    path = field.path_to(point)
+    traced = []
+    monkeypatch.setattr(point_query, "traced_path", lambda *_: traced.append(1))
+    assert field.distance_at(point) == pytest.approx(path.length, rel=SAME)
+    assert field.nearest_source_at(point) in (0, 1)
+    assert not traced
+
+
+@pytest.mark.parametrize("height", [1e-12, 3e-13, 1e-13, 1e-16, 1e-40, 0.0])
+def test_points_of_slivers_are_located_where_they_are(height):
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0.5, height, 0], [0.5, -1, 0]])
+    mesh = gc.TriangleMesh(corners, [[0, 1, 2], [1, 0, 3]])
+    for weights in np.random.default_rng(6).dirichlet((1, 1, 1), 100):
+        place = weights @ corners[:3]
+        found = mesh.position(mesh.locate(place))
+        np.testing.assert_allclose(found, place, rtol=0, atol=3e-12)
+
+
+def test_positions_on_the_surface_are_at_no_distance():
+    mesh = mesh_of(zoo.SMALL["crumpled_sphere"])
+    for point in random_points(mesh, 50, seed=12):
+        assert mesh.locate(mesh.position(point), max_distance=0) == mesh.locate(
+            mesh.position(point)
+        )
+    with pytest.raises(gc.errors.InvalidPoint, match="max_distance = 0"):
+        mesh.locate(mesh.vertices.max(axis=0) + 1e-9, max_distance=0)
 
 
 @pytest.mark.parametrize("position", [(1, 2), "here", (1, 2, math.nan), (1, math.inf, 0), None])

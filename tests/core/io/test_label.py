@@ -109,3 +109,10 @@ def test_gifti_needs_an_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setitem(sys.modules, "nibabel.gifti.gifti", None)
     with pytest.raises(gc.errors.MissingExtra, match="brain"):
         gc.load_label(path, BALL)
+
+
+def test_the_surface_may_be_given_in_any_form(tmp_path: Path) -> None:
+    label = freesurfer(tmp_path)
+    assert gc.load_label(label, (BALL.vertices, BALL.faces)).tolist() == FACES.tolist()
+    with pytest.raises(gc.errors.InvalidMesh, match="cannot be made from this NoneType"):
+        gc.load_label(label, None)  # type: ignore[arg-type]

@@ -185,6 +185,18 @@ def test_a_folder_that_cannot_be_written_is_reported(tmp_path):
     assert "NUMBA_CACHE_DIR" in errors
 
 
+@pytest.mark.jit
+@pytest.mark.slow
+def test_on_a_full_disk_kernels_serve_the_process_that_compiled_them(tmp_path):
+    limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000))"
+    process = start(limit + USE, tmp_path)
+    output, errors = process.communicate()
+    assert (output.strip(), process.returncode) == ("1", 0), errors
+    assert "File too large" in errors
+    assert "NUMBA_CACHE_DIR" in errors
+    assert {path.suffix for path in tmp_path.rglob("*") if path.is_file()} <= {".lock"}
+
+
 def test_long_compilation_is_reported(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr(progress, "_FIRST_S", 0.0)
     monkeypatch.delenv("GEODESIC_QUIET", raising=False)

@@ -225,7 +225,11 @@ def test_start_distances_are_finite_and_not_negative(mesh, start):
         gc.exact_distance(mesh, [0, gc.Source(1, start)])
 
 
-@pytest.mark.parametrize("limit", [-1.0, -1e-300, np.nan, -np.inf, "1", 1j], ids=repr)
+@pytest.mark.parametrize(
+    "limit",
+    [-1.0, -1e-300, np.nan, -np.inf, "1", 1j, np.complex128(1), 10**400],
+    ids=lambda limit: repr(limit)[:20],
+)
 def test_max_distance_is_a_distance(mesh, limit):
     with pytest.raises(gc.errors.InvalidArgument, match="max_distance"):
         gc.exact_distance(mesh, 0, max_distance=limit)
@@ -307,6 +311,51 @@ def test_approximate_distances_refuse_what_exact_ones_refuse(mesh):
 def test_what_is_granted_is_a_number_above_zero(mesh, name, value):
     with pytest.raises(gc.errors.InvalidArgument, match=name):
         gc.exact_distance(mesh, 0, **{name: value})
+
+
+CALLS = [
+    lambda mesh, **control: gc.exact_distance(mesh, 0, **control),
+    lambda mesh, **control: gc.approximate_distance(mesh, 0, **control),
+    lambda mesh, **control: gc.fast_distance(mesh, 0, **control),
+    lambda mesh, **control: gc.shortest_path(mesh, 0, 1, **control),
+    lambda mesh, **control: gc.distance_matrix(mesh, 0, 1, **control),
+    lambda mesh, **control: gc.nearest(mesh, 0, 1, **control),
+]
+
+
+@pytest.mark.parametrize("name", ["progress", "cancel"])
+@pytest.mark.parametrize("call", CALLS)
+def test_callbacks_can_be_called(mesh, call, name):
+    with pytest.raises(gc.errors.InvalidArgument, match=f"{name} is 3; it must be a function"):
+        call(mesh, **{name: 3})
+
+
+def test_an_array_of_no_dimensions_is_the_index_in_it(mesh):
+    index, other = np.array(3), np.array(0, np.int32)
+    expected = gc.exact_distance(mesh, 3).distances
+    for sources in (index, [index], gc.Source(index)):
+        np.testing.assert_array_equal(gc.exact_distance(mesh, sources).distances, expected)
+    assert gc.exact_distance(mesh, 3, targets=other).distance_at(other) == expected[0]
+    assert gc.distance_matrix(mesh, index, other).tolist() == [[expected[0]]]
+    assert gc.shortest_path(mesh, index, other).length == expected[0]
+    np.testing.assert_array_equal(mesh.position(index), mesh.vertices[3])
+    for wrong in (np.array(4), np.array(1.0), np.array(None), np.array(True)):
+        with pytest.raises(gc.errors.InvalidPoint):
+            gc.exact_distance(mesh, wrong)
+    with pytest.raises(gc.errors.InvalidArgument, match="must be a sequence of face ids"):
+        gc.exact_distance(mesh, 0, barriers=np.array(3))
+
+
+@pytest.mark.parametrize("effort", [2.0, np.float64(2), 3, True, "2"], ids=repr)
+def test_effort_is_one_of_four_integers(mesh, effort):
+    with pytest.raises(gc.errors.InvalidArgument, match=r"effort is .*; it must be 1, 2, 4 or 8"):
+        gc.fast_distance(mesh, 0, effort)
+
+
+@pytest.mark.parametrize("t", ["x", None, True], ids=repr)
+def test_the_share_of_an_edge_is_a_number(t):
+    with pytest.raises(gc.errors.InvalidPoint, match=r"t is .*; it must be a number from 0 to 1"):
+        gc.SurfacePoint.edge(0, 0, t)
 
 
 def test_every_refusal_is_a_geodesic_error():

@@ -58,3 +58,12 @@ def test_copies_answer_alike_and_compile_nothing(mesh: gc.TriangleMesh, copied: 
     last = len(mesh.vertices) - 1
     assert other.path_to(last).length == field.path_to(last).length
     assert len(continuous_dijkstra.advance.overloads) == versions
+
+
+@copies
+def test_a_mesh_that_has_located_points_is_copied(copied: Copied) -> None:
+    mesh = mesh_of(zoo.SMALL["sphere"])
+    point = mesh.locate([0.1, 0.2, 2.0])
+    other = copied(mesh)
+    np.testing.assert_array_equal(other.vertices, mesh.vertices)
+    assert other.locate([0.1, 0.2, 2.0]) == point

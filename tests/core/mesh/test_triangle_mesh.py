@@ -104,4 +104,7 @@ def test_is_frozen_and_apart_from_what_was_given():
     assert mesh.vertices.max() == 1
     with pytest.raises(ValueError, match="read-only"):
         mesh.vertices[0] = 1
+    with pytest.raises(AttributeError, match="a TriangleMesh does not change"):
+        mesh.vertices = mesh.vertices * 10  # type: ignore[misc]
+    assert mesh.vertices.max() == 1
     assert repr(mesh) == "TriangleMesh(4 vertices, 4 faces)"

@@ -337,7 +337,7 @@ def test_threads_are_as_many_as_memory_allows(mesh, monkeypatch):
         counts.append(len(workers))
         share_out(parts, workers, control)
 
-    monkeypatch.setattr(matrix, "share_out", counted)
+    monkeypatch.setattr(threads, "share_out", counted)
     solver = gc.Solver(mesh)
     whole = solver.distance_matrix(points, points[:4], threads=3)
     needed = solver.nbytes

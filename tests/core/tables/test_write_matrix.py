@@ -16,7 +16,7 @@ import zarr
 from scipy.sparse import load_npz
 
 import geodesic_core as gc
-from geodesic_core.search import plan
+from geodesic_core.search import plan, threads
 from geodesic_core.search.order import sweep_order
 from geodesic_core.tables.blocks import Blocks
 from geodesic_core.tables.formats import sha256_of
@@ -202,6 +202,31 @@ def test_files_do_not_depend_on_the_number_of_threads(mesh, tmp_path):
     assert len(digests) == 1
 
 
+@pytest.mark.parametrize("method", ["exact", "fast"])
+def test_threads_are_as_many_as_memory_allows(mesh, tmp_path, monkeypatch, method):
+    counts = []
+    share_out = threads.share_out
+
+    def counted(parts, workers, control):
+        counts.append(len(workers))
+        share_out(parts, workers, control)
+
+    solver = gc.Solver(mesh)
+    solver.distance_matrix(0, range(9))
+    field = gc.fast_distance(mesh, 0, retain="distances")
+    needed = solver.nbytes if method == "exact" else field.stats.peak_bytes
+    monkeypatch.setattr(threads, "share_out", counted)
+    out, points, digests = tmp_path / "table.npy", range(0, 160, 5), set()
+    for limit in (1.5, 5, 50, None):
+        memory = None if limit is None else int(limit * needed)
+        written = gc.write_matrix(mesh, out, points, method=method, threads=3, memory_limit=memory)
+        digests.add(written.sha256)
+    assert counts == [1, 2, 3, 3]
+    assert len(digests) == 1
+    with pytest.raises(gc.errors.MemoryLimitExceeded):
+        gc.write_matrix(mesh, out, points, method=method, memory_limit=int(0.4 * needed))
+
+
 def test_part_of_another_table_is_not_mixed_in(mesh, tmp_path):
     out = tmp_path / "table.npy"
     with pytest.raises(gc.errors.Cancelled):
@@ -222,6 +247,11 @@ def hold(mesh: gc.TriangleMesh, out: Path, has_begun, may_end) -> None:
         return False
 
     gc.write_matrix(mesh, out, range(9), cancel=cancel)
+
+
+def test_a_file_that_cannot_be_written_is_refused(mesh):
+    with pytest.raises(gc.errors.InvalidArgument, match=r"table\.npy cannot be written: "):
+        gc.write_matrix(mesh, "/proc/table.npy", range(9))
 
 
 @pytest.mark.jit

@@ -1,4 +1,4 @@
-"""Jobs, their queries, and replicas."""
+"""The first tables: jobs and their queries, replicas, meshes, rates, and running work."""
 
 from alembic import op
 

@@ -7,7 +7,11 @@ const ACCEPTED = 202;
 const JOB_AFTER_S = 1;
 const RETRY_MS = 1000;
 
-/** Return the answer to a query; where it takes long, report progress. An abort stops the work. */
+/**
+ * Return the answer to a query; where it takes long, report progress. An abort stops the work.
+ *
+ * No job remains: its answer would take up space and quota of the service for a day.
+ */
 export async function answerOf(
   path: string,
   body: unknown,
@@ -20,14 +24,21 @@ export async function answerOf(
   if (response.status !== ACCEPTED) return response;
   const job = (await response.json()) as Job;
   const links = job.links as { self: string; results: string; events: string };
-  const dismiss = (): void => void call(links.self, { method: "DELETE" }).catch(() => undefined);
-  if (signal.aborted) dismiss();
-  signal.addEventListener("abort", dismiss, { once: true });
   try {
     await finished(links.events, onProgress, signal);
     return await call(links.results, { signal });
   } finally {
-    signal.removeEventListener("abort", dismiss);
+    void remove(links.self);
+  }
+}
+
+/** Remove a job, if the service can do so now; stop it first if it has not finished. */
+async function remove(path: string): Promise<void> {
+  try {
+    const last = (await (await call(path, { method: "DELETE" })).json()) as Job;
+    if (last.status === "dismissed") await call(path, { method: "DELETE" });
+  } catch {
+    // The service removes it later.
   }
 }
 

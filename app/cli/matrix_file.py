@@ -1,0 +1,59 @@
+"""Files of matrices between points from files: what is to be written, and what was."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from app.cli.output import Output, print_json
+from app.cli.summary import print_bound, print_size
+
+if TYPE_CHECKING:
+    from app.cli.point_file import Points
+    from geodesic_core import TriangleMesh
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A matrix that is to be written."""
+
+    out: Path
+    mesh: "TriangleMesh"
+    sources: "Points"
+    targets: "Points | None"
+    """None where they are the sources"""
+    accuracy: Mapping[str, Any]
+    """The method, and its allowed error or its effort"""
+    max_distance: float | None
+    barriers: Sequence[int]
+    dtype: Literal["float64", "float32"]
+
+
+class Written(NamedTuple):
+    """A matrix that was written."""
+
+    shape: tuple[int, int]
+    error_bound: Mapping[str, Any]
+    sha256: str
+    continued: int | None = None
+    """Sweeps that a stopped command had done before; None where a service does them"""
+
+
+def print_written(
+    output: Output, wanted: Wanted, written: Written, read_seconds: float | None = None
+) -> None:
+    """Print what was written, and how long the mesh took to read if that is given."""
+    if output.as_json:
+        facts = {name: fact for name, fact in written._asdict().items() if fact is not None}
+        print_json({**facts, "written": str(wanted.out)})
+    sources, targets = written.shape
+    print_size(output, wanted.mesh)
+    output.say(f"matrix      {sources} by {targets}")
+    if written.continued:
+        sweeps = min(sources, targets)
+        output.say(f"continued   {written.continued} of {sweeps} sweeps were done before")
+    print_bound(output, written.error_bound)
+    output.say(f"sha256      {written.sha256}")
+    if read_seconds is not None:
+        output.say(f"took        {read_seconds:.3f} s to read")
+    output.say(f"written     {wanted.out}")

@@ -1,0 +1,28 @@
+"""Barriers of a call: faces that act as holes for it alone."""
+
+from collections.abc import Iterable
+
+from geodesic_core.control import Control
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.validation import as_barriers
+
+
+def with_barriers(
+    mesh: TriangleMesh, barriers: Iterable[int], control: Control
+) -> tuple[TriangleMesh, Control]:
+    """Return the mesh with its barriers, and the control of a call that holds what that takes.
+
+    Raises
+    ------
+    InvalidArgument
+        They are not ids of faces, or leave no face free.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As the control says.
+    """
+    faces = as_barriers(barriers, len(mesh.faces))
+    if len(faces) == 0:
+        return mesh, control
+    control = control.holding(sum(array.nbytes for array in mesh.topology))
+    control.check_memory(0)
+    control.checkpoint(0.0)
+    return mesh.with_barriers(faces), control

@@ -1,0 +1,39 @@
+"""Copies of the meshes of an object store."""
+
+import asyncio
+from pathlib import Path
+
+from obstore.store import MemoryStore
+
+import geodesic_core as gc
+from app.store.meshes import MeshStore
+from app.store.object_meshes import ObjectMeshes
+from app.store.objects import Objects
+
+
+def machine(objects: Objects, folder: Path) -> ObjectMeshes:
+    meshes = ObjectMeshes(objects, folder, 10**9)
+    meshes.prepare()
+    return meshes
+
+
+def test_pulls_at_the_same_time_leave_no_lock(tmp_path: Path) -> None:
+    objects = Objects(MemoryStore())
+    one, two = (machine(objects, tmp_path / name) for name in ("one", "two"))
+    written = MeshStore(tmp_path / "one").write_aside(
+        gc.samples.plane(20), tmp_path / "scratch", owner=None
+    )
+
+    async def main() -> None:
+        await one.send(written)
+        await one.put(written, is_new=True)
+        together = asyncio.Barrier(3)
+
+        async def use() -> None:
+            async with two.holding(written.mesh_id):
+                await together.wait()  # nobody lets go before all have the copy
+
+        await asyncio.gather(*(use() for _ in range(3)))
+
+    asyncio.run(main())
+    assert not two._pulls
