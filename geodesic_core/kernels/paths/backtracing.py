@@ -261,7 +261,7 @@ def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[O
                 other = leave(view, line, walk, not is_left)
                 open_forks = push_fork(forks, open_forks, other, -1)
             walk = leave(view, line, walk, is_left)
-            is_lost = open_forks > 0 and is_past_start(view, line, walk, sight)
+            is_lost = open_forks > 0 and is_past_start(view, line, walk)
         if is_lost:
             if open_forks == 0:
                 return Outcome.LOST, walk.node_count, -1
@@ -529,11 +529,11 @@ def cross_edge(
 
 
 @inlined
-def is_past_start(view: Any, line: Line, walk: Walk, sight: Sight) -> bool:
+def is_past_start(view: Any, line: Line, walk: Walk) -> bool:
     """Whether the walk has gone beyond the pseudosource, which was not in the face just left.
 
     Where merges are still to be undone on the edge ahead, it has not. A pseudosource on the edge
-    itself may be beyond, in a face of no area.
+    itself may be beyond, behind any number of faces of no area.
     """
     m, reference = walk.half_edge, walk.reference
     if reference >= 0 and view.winners.merge_ints[MERGE_INTS * reference + MERGED_ON] == m:
@@ -541,7 +541,7 @@ def is_past_start(view: Any, line: Line, walk: Walk, sight: Sight) -> bool:
     close = SAME_PLACE * view.mesh.geometry[ROW * m + LENGTH]
     if line.sw == 0.0:
         return walk.sigma - view.winners.distance[pseudosource_of(reference)] < -close
-    return -walk.sy < -close or (-walk.sy <= close and sight.to_source <= close)
+    return -walk.sy < -close
 
 
 @kernel

@@ -357,6 +357,30 @@ def test_a_path_is_found_among_many_faces_that_are_wound_about():
             check_path(mesh, gc.shortest_path(mesh, point, target), point, target, distance)
 
 
+QUARTERS = (
+    [(2, 2), (1, 1), (1, 3), (0, 4), (0, 3), (3, 1), (3, 2)],
+    [(5, 2, 0), (2, 0, 3), (1, 6, 5), (6, 1, 3), (2, 6, 5), (3, 5, 1), (3, 5, 6)],
+)
+"""The first two faces have no area, and lie in one line."""
+
+
+def test_a_path_ends_in_the_second_of_two_faces_of_no_area():
+    """Traced back, it is at its source's place before it is in its source's face."""
+    flat, faces = QUARTERS
+    mesh = gc.TriangleMesh(np.pad(flat, ((0, 0), (0, 1))) / 4, faces)
+    inside = gc.SurfacePoint.face(1, (0.15, 0.51, 0.34))
+    beyond = gc.SurfacePoint.face(5, (0.01, 0.42, 0.57))
+    vertices = [*mesh.vertices, mesh.position(inside), mesh.position(beyond)]
+    split = [(2, 0, 7), (0, 3, 7), (3, 2, 7), (3, 5, 8), (5, 1, 8), (1, 3, 8)]  # faces 1 and 5
+    pieces = [face for i, face in enumerate(faces) if i not in (1, 5)] + split
+    expected = unfolding.distance_matrix(np.array(vertices), pieces)[7, 8]
+    for source, target in itertools.permutations([inside, beyond]):
+        check_path(mesh, gc.shortest_path(mesh, source, target), source, target, expected)
+        for solve in (gc.exact_distance, gc.approximate_distance, gc.fast_distance):
+            path = solve(mesh, source).path_to(target)
+            assert path.length == pytest.approx(expected, rel=1e-12)
+
+
 def needles_at(thickness: float) -> gc.TriangleMesh:
     """Six needles along one line, with edges in common."""
     along = [0.53, 0.47, 0.87, 0.21, 0.32, 0.40, 0.75]
