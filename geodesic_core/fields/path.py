@@ -58,7 +58,7 @@ EXACT = ErrorBound("relative", 0.0, "guaranteed")
 StepName = Literal["dijkstra", "shorten", "approximate", "backtrace", "exact", "path"]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class SearchStep:
     """Step of the search between two points (section 5, figure 10).
 
@@ -82,7 +82,7 @@ class SearchStep:
     """(N,) int32: the region that was visited."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GeodesicPath:
     """A path over the surface, from its source to its target.
 

@@ -9,6 +9,8 @@ MAKERS = {
     "field": lambda: gc.exact_distance(MESH, [0, 8]),
     "isoline": lambda: gc.exact_distance(MESH, 0).isolines([0.5])[0][0],
     "border": lambda: gc.exact_distance(MESH, [0, 8]).borders()[0],
+    "path": lambda: gc.shortest_path(MESH, 0, 8),
+    "step": lambda: gc.shortest_path(MESH, 0, 8, explain=True).steps[0],
     "nearest": lambda: gc.nearest(MESH, 0, [3, 8]),
 }
 

@@ -64,6 +64,9 @@ from geodesic_core.kernels.sweep.state import (
 )
 from geodesic_core.tolerances import FORKS, GAP, ON_PATH, SAME_PLACE, TRIES, WIDEST_ERROR
 
+LAST_AT = 1024
+"""Half-edges that a walk remembers to have crossed, about; a power of two."""
+
 
 class Winners(NamedTuple):
     """The results of a sweep that backtracing reads; all but the first are its `Wavefront`'s."""
@@ -154,12 +157,15 @@ class Sight(NamedTuple):
 
 
 class Trail(NamedTuple):
-    """The path so far, filled from its end, as raw pointers; see `trace_path`."""
+    """The path so far, filled from its end, as raw pointers but for the last; see `trace_path`."""
 
     nodes: Any
     parameters: Any
     faces: Any
     room: int
+    last_at: Ints
+    """(LAST_AT,): by half-edge, modulo LAST_AT: which node of the path lay on it last. Anything
+    where none did: what is read here is compared with ``nodes``."""
 
 
 class Forks(NamedTuple):
@@ -188,7 +194,8 @@ def trace_path(
     on either side only where it is flat. O(faces crossed).
     """
     view = view_of(topology, winners)
-    trail = Trail(pointer(nodes), pointer(parameters), pointer(faces), len(nodes))
+    last_at = np.empty(LAST_AT, np.int32)
+    trail = Trail(pointer(nodes), pointer(parameters), pointer(faces), len(nodes), last_at)
     forks = Forks(np.empty((FORKS, 5)), np.empty((FORKS, 4), np.int32))
     nodes[0], parameters[0] = -1 - target, 0.0
     count, v = 1, target
@@ -223,7 +230,7 @@ def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[O
 
     Appends to ``trail``; ``forks`` is scratch memory.
     """
-    open_forks, milestone = 0, count
+    open_forks = 0
     line, walk, start = jump_to_window(view, v, count)
     trail.faces[count - 1] = walk.half_edge // 3
     if start >= 0:
@@ -243,8 +250,7 @@ def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[O
                 return Outcome.PATH_FULL, walk.node_count, -1
             walk = enter(view, line, walk, h, same)
             sight = look_ahead(view, line, walk)
-            milestone, is_wound = append_node(view, trail, walk, milestone)
-            is_wrong = is_wound or is_too_far(view, line, walk, sight)
+            is_wrong = append_node(view, trail, walk, count) or is_too_far(view, line, walk, sight)
             is_lost = open_forks > 0 and is_wrong
         if not is_lost:
             start = start_in_face(view, line, walk, sight, open_forks == 0)
@@ -255,7 +261,7 @@ def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[O
                 other = leave(view, line, walk, not is_left)
                 open_forks = push_fork(forks, open_forks, other, -1)
             walk = leave(view, line, walk, is_left)
-            is_lost = open_forks > 0 and is_past_start(view, line, walk, sight)
+            is_lost = open_forks > 0 and is_past_start(view, line, walk)
         if is_lost:
             if open_forks == 0:
                 return Outcome.LOST, walk.node_count, -1
@@ -398,19 +404,21 @@ def look_ahead(view: Any, line: Line, walk: Walk) -> Sight:
 
 
 @inlined
-def append_node(view: Any, trail: Any, walk: Walk, milestone: int) -> tuple[int, bool]:
-    """Append the walk's point to ``trail``; return the milestone, and whether the walk winds.
+def append_node(view: Any, trail: Any, walk: Walk, first: int) -> bool:
+    """Append the walk's point to ``trail``; return whether the line, whose first is given, winds.
 
-    In a face that the path did not come from, a line may wind about a tip without end. It does
-    where it crosses the half-edge of its *milestone* again, an earlier node. The milestone moves up
-    whenever the number of nodes has doubled, so that any cycle is found in the end.
+    In a face that the path did not come from, a line may wind about a tip without end, and fork at
+    each turn. It does wind where it crosses a half-edge again. This is found at once but where too
+    many half-edges have been crossed since to remember that one.
     """
     i, h = walk.node_count - 1, walk.half_edge
     trail.nodes[i], trail.parameters[i] = h, walk.x / view.mesh.geometry[ROW * h + LENGTH]
     trail.faces[i] = h // 3
-    milestone = min(milestone, i)
-    is_wound = milestone < i and trail.nodes[milestone] == h
-    return (i if walk.node_count >= 2 * milestone else milestone), is_wound
+    before = trail.last_at[h % LAST_AT]
+    if first <= before < i and trail.nodes[before] == h:
+        return True
+    trail.last_at[h % LAST_AT] = i
+    return False
 
 
 @inlined
@@ -521,11 +529,11 @@ def cross_edge(
 
 
 @inlined
-def is_past_start(view: Any, line: Line, walk: Walk, sight: Sight) -> bool:
+def is_past_start(view: Any, line: Line, walk: Walk) -> bool:
     """Whether the walk has gone beyond the pseudosource, which was not in the face just left.
 
     Where merges are still to be undone on the edge ahead, it has not. A pseudosource on the edge
-    itself may be beyond, in a face of no area.
+    itself may be beyond, behind any number of faces of no area.
     """
     m, reference = walk.half_edge, walk.reference
     if reference >= 0 and view.winners.merge_ints[MERGE_INTS * reference + MERGED_ON] == m:
@@ -533,7 +541,7 @@ def is_past_start(view: Any, line: Line, walk: Walk, sight: Sight) -> bool:
     close = SAME_PLACE * view.mesh.geometry[ROW * m + LENGTH]
     if line.sw == 0.0:
         return walk.sigma - view.winners.distance[pseudosource_of(reference)] < -close
-    return -walk.sy < -close or (-walk.sy <= close and sight.to_source <= close)
+    return -walk.sy < -close
 
 
 @kernel

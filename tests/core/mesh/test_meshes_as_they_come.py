@@ -12,8 +12,11 @@ import geodesic_core as gc
 from tests.support import zoo
 from tests.support.certificates import check_path
 from tests.support.oracles import unfolding
+from tests.support.splitting import split_at
 
 SEAMLESS = zoo.SMALL["crumpled_sphere"]
+DEADLINE = 60.0
+"""Seconds: else a sweep that does not end has no name. The first may compile the kernels in it."""
 
 
 def distances(vertices, faces, source=0, **options):
@@ -328,6 +331,83 @@ def test_paths_through_faces_of_no_area(name):
             path = gc.shortest_path(mesh, source, target)
             check_path(mesh, path, source, target, field.distances[target])
             check_path(mesh, field.path_to(target), source, target, field.distances[target])
+
+
+WINDING = (
+    [(0.82, 0.65), (0.98, 0.94), (0.08, 0.27), (0.04, 0.21), (0.02, 0.97), (0.68, 0.12)],
+    [(2, 1, 4), (0, 3, 2), (2, 0, 1), (5, 0, 2), (3, 0, 2), (2, 0, 3)],
+)
+"""Three copies of an edge, and more faces around vertex 2: many wrong ways about it."""
+
+
+def test_a_path_is_found_among_many_faces_that_are_wound_about():
+    flat, faces = WINDING
+    mesh = gc.TriangleMesh(np.pad(flat, ((0, 0), (0, 1))), faces)
+    inside = [(0.1, 0.6, 0.3), (0.6, 0.2, 0.2)]
+    for face, weights in itertools.product([0, 2, 3], inside):  # others the oracle does not know
+        point = gc.SurfacePoint.face(face, weights)
+        vertices, pieces, (at,) = split_at(mesh, [point])
+        expected = unfolding.distance_matrix(vertices, pieces)[at]
+        field = gc.exact_distance(mesh, point)
+        for target in range(6):
+            distance = expected[target]
+            back = gc.exact_distance(mesh, target).distance_at(point)
+            assert back == pytest.approx(distance, rel=1e-12)
+            check_path(mesh, field.path_to(target), point, target, distance)
+            check_path(mesh, gc.shortest_path(mesh, point, target), point, target, distance)
+
+
+QUARTERS = (
+    [(2, 2), (1, 1), (1, 3), (0, 4), (0, 3), (3, 1), (3, 2)],
+    [(5, 2, 0), (2, 0, 3), (1, 6, 5), (6, 1, 3), (2, 6, 5), (3, 5, 1), (3, 5, 6)],
+)
+"""The first two faces have no area, and lie in one line."""
+
+
+def test_a_path_ends_in_the_second_of_two_faces_of_no_area():
+    """Traced back, it is at its source's place before it is in its source's face."""
+    flat, faces = QUARTERS
+    mesh = gc.TriangleMesh(np.pad(flat, ((0, 0), (0, 1))) / 4, faces)
+    inside = gc.SurfacePoint.face(1, (0.15, 0.51, 0.34))
+    beyond = gc.SurfacePoint.face(5, (0.01, 0.42, 0.57))
+    vertices = [*mesh.vertices, mesh.position(inside), mesh.position(beyond)]
+    split = [(2, 0, 7), (0, 3, 7), (3, 2, 7), (3, 5, 8), (5, 1, 8), (1, 3, 8)]  # faces 1 and 5
+    pieces = [face for i, face in enumerate(faces) if i not in (1, 5)] + split
+    expected = unfolding.distance_matrix(np.array(vertices), pieces)[7, 8]
+    for source, target in itertools.permutations([inside, beyond]):
+        check_path(mesh, gc.shortest_path(mesh, source, target), source, target, expected)
+        for solve in (gc.exact_distance, gc.approximate_distance, gc.fast_distance):
+            path = solve(mesh, source).path_to(target)
+            assert path.length == pytest.approx(expected, rel=1e-12)
+
+
+def needles_at(thickness: float) -> gc.TriangleMesh:
+    """Six needles along one line, with edges in common."""
+    along = [0.53, 0.47, 0.87, 0.21, 0.32, 0.40, 0.75]
+    across = [(3, 7), (1, 10), (6, 6), (2, 4), (5, 1), (3, 9), (1, 7)]
+    faces = [(5, 3, 6), (2, 0, 6), (2, 3, 1), (2, 1, 3), (4, 2, 5), (2, 3, 4)]
+    return gc.TriangleMesh(np.column_stack([along, thickness * np.array(across)]), faces)
+
+
+@pytest.mark.parametrize("thickness", [1e-10, 1e-8, 1e-6, 1e-5, 1e-4])
+def test_windows_end_that_lie_side_by_side_from_turn_to_turn(thickness):
+    """Each turn about the tips they would cross an edge in a stretch of its own.
+
+    The oracle knows the thickest only; the others come as near to it as they are thin.
+    """
+    point = gc.SurfacePoint.face(0, (0.0, 0.25, 0.75))
+    vertices, faces, (at,) = split_at(needles_at(1e-4), [point])
+    expected = unfolding.distance_matrix(vertices, faces)[at, :7]
+    mesh, atol = needles_at(thickness), 1e-12 if thickness == 1e-4 else 3e-5
+    exact = gc.exact_distance(mesh, point, deadline_s=DEADLINE)
+    assert exact.stats.windows_created < 30
+    np.testing.assert_allclose(exact.distances, expected, rtol=0, atol=atol)
+    near = gc.approximate_distance(mesh, point, 1e-2, deadline_s=DEADLINE)
+    assert near.stats.windows_created < 30
+    np.testing.assert_allclose(near.distances, exact.distances, rtol=1e-2)
+    for target in range(7):
+        path = gc.shortest_path(mesh, point, target, deadline_s=DEADLINE)
+        check_path(mesh, path, point, target, exact.distances[target])
 
 
 def test_points_inside_a_face_of_no_area():
