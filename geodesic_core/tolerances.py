@@ -28,7 +28,7 @@ SHARP = 1e-2
 """Radians of the total angle below which an inner vertex is a tip that windows wind about for long.
 
 A window whose rays meet the tip goes around it until it has turned by π: π / SHARP times here. At
-such a tip crossings of edges are recorded, which ends that after a few turns.
+such a tip crossings of edges are recorded, which ends that after a turn or two.
 """
 
 NO_AREA = 1e-8

@@ -5,32 +5,24 @@ be trimmed against them goes on in vain until a filter finds it. Over an irregul
 into several faces and from each of them back again: windows that wind about a sharp tip, from sheet
 to sheet, would double at every edge. So here each window that crosses is recorded, from whichever
 face it came. A later one crosses only where it is nearer than all of them and than the paths along
-the edge, from its ends or from those of the windows that crossed.
+the edge.
 
 Elsewhere no shortest path goes with it, into any face. Let p, an earlier one, be as near at x. Into
 the faces beyond, p goes as well; into the face that it came from leads a straighter way than over
 x; and what bends at an end of the edge that end emits, for it emits all around.
 
-Nor does one with a window that lies beside p and is nowhere nearer than the path over the end of p
-and along the edge (`is_no_nearer_along`). That path exists, and bends there: so there is a shorter
-one. Without this rule windows that wind about needles crossed an edge in a new stretch each time,
-which nothing overlapped. A window that ties, by a share SLACK of the way along the edge, makes an
-angle of 1e-6 with it at most: what it lights, the ends of the edge reach with a detour of that
-share.
-
 In a merging sweep distances fall short, by up to ξ. A window is dropped where earlier ones are as
 near at each of its points: a path that it follows goes on with one of them. Of any other window all
 is kept but what is surely longer, for between windows that share an edge there may be a wedge that
 neither lights (`trimming.leaves_gap`). With the second rule alone windows wound about a tip until
-they were longer by ξ, and doubled at every edge. Over the end of an earlier window leads a path
-that is longer than it says by up to ξ, and no window with it: there ξ counts.
+they were longer by ξ, and doubled at every edge.
 
 A recorded window is in the frame that runs from the lower vertex of the edge to the higher.
 """
 
 from typing import Any
 
-from geodesic_core.kernels.jit import as_ints, inlined, kernel
+from geodesic_core.kernels.jit import as_ints, kernel
 from geodesic_core.kernels.mesh.half_edges import AROUND, HEAD, LENGTH, ROW, TAIL
 from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.trimming import trim, wins_throughout, without
@@ -85,8 +77,6 @@ def nearest_part(wave: Any, g: int, window: Window, surely: bool) -> tuple[bool,
             earlier = load_window(wave, pool.windows, other)
             if tail < head:
                 earlier = reversed_window(earlier, length)
-            if is_no_nearer_along(wave, window, earlier):
-                return False, window
             if merging(wave) and surely:
                 earlier = at_sigma(earlier, earlier.sigma + earlier.xi)
             window = cut_by(wave, window, earlier)
@@ -112,36 +102,14 @@ def record_crossing(wave: Any, g: int, slot: int, window: Window) -> None:
 @kernel
 def cut_by(wave: Any, window: Window, earlier: Window) -> Window:
     """Return the part of a window that wins against an earlier one: ties as between sources."""
-    slack = slack_of(wave, window, earlier)
+    source_index = wave.vertices.source_index
+    slack = -SLACK if source_index[window.root] < source_index[earlier.root] else SLACK
     lo, hi = max(earlier.b0, window.b0), min(earlier.b1, window.b1)
     if lo < hi and is_no_nearer(lo, hi, window, earlier, slack):
         b0, b1 = without(window.b0, window.b1, lo, hi)
         return between(window, b0, b1)
     lead = slack * distance_at(window, window.b0)
     return trim(at_sigma(earlier, earlier.sigma - lead), window, 0.0, 0.0)[1]
-
-
-@inlined
-def slack_of(wave: Any, window: Window, earlier: Window) -> float:
-    """Share of its own distance by which a window must be nearer than an earlier one to win."""
-    source_index = wave.vertices.source_index
-    return -SLACK if source_index[window.root] < source_index[earlier.root] else SLACK
-
-
-@kernel
-def is_no_nearer_along(wave: Any, window: Window, earlier: Window) -> bool:
-    """Whether a window beside another is nowhere nearer than over its end and along the edge.
-
-    No distance along the edge grows faster than that, so that it is enough to look at the far end.
-    """
-    if window.b0 >= earlier.b1:
-        end, far = earlier.b1, window.b1
-    elif window.b1 <= earlier.b0:
-        end, far = earlier.b0, window.b0
-    else:
-        return False
-    along = abs(far - end) * (1.0 - slack_of(wave, window, earlier))
-    return distance_at(earlier, end) + earlier.xi + along <= distance_at(window, far)
 
 
 @kernel
