@@ -205,7 +205,7 @@ class PathSearch:
         self, leg: "_Leg", upper: float, pruning_bounds: PruningBounds
     ) -> tuple[float, PruningBounds]:
         """Return a tighter upper bound, and the bounds of the next sweep (steps 2 and 3)."""
-        limit = leg.bound(upper) * (1.0 + leg.slack) + self._margin
+        limit = leg.loosened(leg.bound(upper)) + self._margin
         bounds = merging_bounds(
             math.inf, GUIDE_ERROR, math.inf, pruning_bounds._replace(limit=limit)
         )
@@ -220,7 +220,7 @@ class PathSearch:
         guide = traced_path(self.mesh, winners_of(wave, self._nearest), nodes, node, EXACT)
         upper = min(upper, guide.length)
         leg.log.add("backtrace", upper)
-        tighter = leg.bound(upper) * (1.0 + leg.slack)
+        tighter = leg.loosened(leg.bound(upper))
         return upper, pruning_bounds._replace(
             limit=tighter, known=wave.vertices.distance, ceiling=limit
         )
@@ -237,7 +237,7 @@ class PathSearch:
         )
         node = int(nodes.targets[0])
         distance = float(wave.vertices.distance[node])
-        if not distance <= upper * (1.0 + leg.slack):
+        if math.isinf(distance) or distance > leg.loosened(upper):
             raise leg.missed("by the exact sweep", upper)
         leg.log.add("exact", distance, wave)
         path = traced_path(self.mesh, winners_of(wave, self._nearest), nodes, node, EXACT)
@@ -303,6 +303,13 @@ class _Leg(NamedTuple):
         Beyond the limit by more than slivers round: a path that is missed is longer than the limit.
         """
         return min(upper, self.limit * (1.0 + STRAIGHT))
+
+    def loosened(self, length: float) -> float:
+        """Return a length with the slack: where that is infinite, even if the length is 0.
+
+        Ends in one place may have a path of length 0, and a distance that is rounded.
+        """
+        return length * (1.0 + self.slack) if self.slack < math.inf else math.inf
 
     def missed(self, how: str, upper: float) -> NoPath | InternalError:
         """Return the error of not having reached the end, though a path so long leads there."""

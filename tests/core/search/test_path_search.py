@@ -289,3 +289,15 @@ def test_a_solver_has_the_solvers_of_its_mesh():
     )
     assert solver.nbytes == 0
     assert exact.mesh is solver.mesh
+
+
+@pytest.mark.parametrize("weights", [(0.25, 0.5, 0.25), (0.3, 0.45, 0.25)])
+def test_ends_in_one_place_of_a_face_of_no_area(weights):
+    """Their distance is rounded, although a path along edges has no length."""
+    flat = [(4, 6), (1, 3), (2, 4), (4, 1), (2, 3), (5, 7), (2, 0)]
+    faces = [(5, 0, 6), (1, 5, 3), (2, 1, 0), (6, 2, 4), (0, 6, 1), (6, 2, 4)]
+    mesh = gc.TriangleMesh(np.pad(flat, ((0, 0), (0, 1))) / 4, faces)
+    point = gc.SurfacePoint.face(2, weights)
+    distance = np.linalg.norm(mesh.position(point) - mesh.vertices[2])
+    for path in (gc.shortest_path(mesh, point, 2), gc.shortest_path(mesh, 2, point)):
+        assert path.length == pytest.approx(distance, rel=1e-12, abs=1e-15)
