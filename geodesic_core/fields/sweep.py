@@ -46,7 +46,8 @@ def sweep_nodes(
     """Start a sweep at the sources of ``nodes``, run it to its end, and reach its targets.
 
     A merging sweep in which a list comes up more than `RUNS` times begins anew and merges nothing:
-    exact distances are within every error, and an exact sweep always ends.
+    exact distances are within every error, and an exact sweep ends, but for a few meshes of nothing
+    but needles (docs/accuracy.md).
 
     Raises
     ------
