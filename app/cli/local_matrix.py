@@ -2,11 +2,11 @@
 
 from dataclasses import asdict
 
-from app.cli.matrix_file import Wanted, Written
+from app.cli.matrix_file import MatrixToWrite, WrittenMatrix
 from app.cli.steps import showing
 
 
-def write_matrix(wanted: Wanted, threads: int | None) -> Written:
+def write_matrix(wanted: MatrixToWrite, threads: int | None) -> WrittenMatrix:
     """Compute a matrix, and write it; the same command goes on where it was stopped."""
     import geodesic_core as gc
 
@@ -28,4 +28,4 @@ def write_matrix(wanted: Wanted, threads: int | None) -> Written:
             cancel=step.cancel,
         )
     continued = min(found.shape) - found.swept
-    return Written(found.shape, asdict(found.error_bound), found.sha256, continued)
+    return WrittenMatrix(found.shape, asdict(found.error_bound), found.sha256, continued)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class MatrixToWrite:
     """A matrix that is to be written."""
 
     out: Path
@@ -29,7 +29,7 @@ class Wanted:
     dtype: Literal["float64", "float32"]
 
 
-class Written(NamedTuple):
+class WrittenMatrix(NamedTuple):
     """A matrix that was written."""
 
     shape: tuple[int, int]
@@ -40,7 +40,7 @@ class Written(NamedTuple):
 
 
 def print_written(
-    output: Output, wanted: Wanted, written: Written, read_seconds: float | None = None
+    output: Output, wanted: MatrixToWrite, written: WrittenMatrix, read_seconds: float | None = None
 ) -> None:
     """Print what was written, and how long the mesh took to read if that is given."""
     if output.as_json:

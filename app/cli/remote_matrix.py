@@ -7,7 +7,7 @@ from dataclasses import asdict
 from hashlib import file_digest
 from typing import TYPE_CHECKING, Any
 
-from app.cli.matrix_file import Wanted, Written
+from app.cli.matrix_file import MatrixToWrite, WrittenMatrix
 from app.cli.steps import Failure, Step, showing
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from app.cli.point_file import Points
 
 
-def write_matrix(wanted: Wanted, service: str) -> Written:
+def write_matrix(wanted: MatrixToWrite, service: str) -> WrittenMatrix:
     """Have the service at a URL compute a matrix, and write it.
 
     The same command goes on where it was, both in the computation and in the transfer. Raises
@@ -39,12 +39,12 @@ def write_matrix(wanted: Wanted, service: str) -> Written:
         raise Failure(str(error)) from None
     with wanted.out.open("rb") as file:
         checksum = file_digest(file, "sha256").hexdigest()
-    written = Written(matrix.shape, asdict(matrix.error_bound), checksum)
+    written = WrittenMatrix(matrix.shape, asdict(matrix.error_bound), checksum)
     _write_facts(wanted, written, service, mesh_id)
     return written
 
 
-def _computed(client: "Client", wanted: Wanted, service: str) -> "tuple[str, StoredMatrix]":
+def _computed(client: "Client", wanted: MatrixToWrite, service: str) -> "tuple[str, StoredMatrix]":
     """Return the id of the mesh at a service, and the matrix there."""
     mesh = wanted.mesh
     with showing("Sending the mesh") as step:
@@ -64,7 +64,7 @@ def _computed(client: "Client", wanted: Wanted, service: str) -> "tuple[str, Sto
     return stored.id, matrix
 
 
-def _write_facts(wanted: Wanted, written: Written, service: str, mesh_id: str) -> None:
+def _write_facts(wanted: MatrixToWrite, written: WrittenMatrix, service: str, mesh_id: str) -> None:
     """Write beside a matrix what it is, as the library does."""
     facts = {
         "service": service,

@@ -27,7 +27,7 @@ from app.cli.arguments import (
     writable,
 )
 from app.cli.ask import WrittenMembers, ask
-from app.cli.matrix_file import Wanted, print_written
+from app.cli.matrix_file import MatrixToWrite, print_written
 from app.cli.output import AsJson, Output
 from app.cli.point_file import points_of
 from app.cli.points import Point
@@ -124,7 +124,7 @@ def matrix(
     opened, read_seconds = read(mesh_file, merge)
     mesh, output = opened.mesh, Output(None, as_json)
     starts, *stops = (points_of(mesh, file) for file in files.values())
-    wanted = Wanted(
+    wanted = MatrixToWrite(
         out,
         mesh,
         starts,

@@ -35,6 +35,7 @@ def _quality(offer: str, ranges: Sequence[tuple[str, float]]) -> float:
     return max(matching, default=(0, 0.0))[1]
 
 
+@lru_cache
 def negotiate_coding(accept_encoding: str | None) -> str | None:
     """Return the content coding for ``Accept-Encoding``: the fastest of those liked best."""
     wanted = {coding: coding_quality(accept_encoding, coding) for coding in CODINGS}
@@ -49,7 +50,6 @@ def coding_quality(accept_encoding: str | None, coding: str) -> float:
     return qualities.get(coding, qualities.get("*", 0.0))
 
 
-@lru_cache  # a client sends the same headers with each request
 def _accepted(header: str) -> tuple[tuple[str, float], ...]:
     ranges = []
     for item in header.split(","):

@@ -125,7 +125,6 @@ class LocalEngine:
         deaths = 0
         while True:
             slot = await self._acquire(task)
-            task = replace(task, is_promised=True)  # accepted: a second wait is not refused
             queued = perf_counter() - start
             try:
                 outcome = await self._run_in(slot, task, on_progress)
@@ -135,9 +134,11 @@ class LocalEngine:
                     raise problem(
                         "worker_died", "the worker process of this request died"
                     ) from None
-                continue  # the worker had died while idle: the work has not begun
+                # The worker had died while idle, so that the work has not begun.
+                task = replace(task, is_promised=True)  # accepted: a second wait is not refused
+                continue
             if outcome is None:  # stopped, since it was not small after all
-                task = replace(task, is_small=False)
+                task = replace(task, is_small=False, is_promised=True)
                 continue
             if isinstance(outcome, Problem):
                 raise ProblemError(outcome)

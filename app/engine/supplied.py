@@ -23,8 +23,8 @@ from app.store.results import Result
 class SuppliedEngine:
     """Has what a task needs brought to the folder before ``engine`` does it; see ``Engine``.
 
-    What the task has written is sent before it counts as done. What it has written for nobody is
-    removed, or reported as unclaimed where it was being sent by then.
+    What the task has written is sent before it counts as done. If it was cancelled too late,
+    its result is removed, or reported as unclaimed where it was being sent by then.
     """
 
     def __init__(self, engine: Engine, supply: Supply) -> None:
@@ -33,7 +33,7 @@ class SuppliedEngine:
         self._users: Counter[str] = Counter()
         """Blocks that need the files of a result in the folder, see `_using`"""
         self._unclaimed: set[asyncio.Task[None]] = set()
-        """Results that are being sent for nobody"""
+        """Results that are still being sent, although their tasks were cancelled"""
         self.on_unclaimed: UnclaimedCallback = ignore_unclaimed
         engine.on_unclaimed = self._remove_unused
 
@@ -146,7 +146,7 @@ class SuppliedEngine:
             await self._supply.send_result(result)
 
     async def _report(self, sending: "asyncio.Task[None]", name: str) -> None:
-        """Report a result once it is sent: nobody waits for it."""
+        """Report a result as unclaimed once it is sent."""
         with suppress(StoreUnavailableError):
             await sending
             await self.on_unclaimed(name)

@@ -38,7 +38,7 @@ SolveAgain = Callable[[JobSpec, bytes, ProgressCallback], Awaitable[Result]]
 """The same for a stored job, from its query as JSON"""
 
 _TIDY_PERIOD_S = 60.0
-"""Seconds between two removals of expired jobs, and of the other chores"""
+"""Seconds between two rounds of upkeep, such as the removal of expired jobs"""
 
 _MOST_RUNS = 3
 """Runs of a job: the first, and two more where the service ended while it ran. A job may itself be
@@ -188,7 +188,7 @@ class JobManager:
         """Accept a job, or return the job that has the idempotency key of ``spec``.
 
         The key of a job that failed or was dismissed is free again. The ``query`` as JSON is stored
-        until the job has finished. Whoever cancels the call leaves a job that runs, or none.
+        until the job has finished. If the call is cancelled, the job runs, or was never accepted.
 
         Raises
         ------
