@@ -16,6 +16,7 @@ from app.http.metrics import Metrics
 from app.http.middleware.admission import AdmissionMiddleware
 from app.http.middleware.body_timeout import BodyTimeoutMiddleware
 from app.http.middleware.cross_site import CrossSiteMiddleware
+from app.http.middleware.head import HeadMiddleware
 from app.http.middleware.observation import ObservationMiddleware
 from app.http.middleware.probes import PROBES
 from app.http.middleware.request_id import RequestIdMiddleware
@@ -57,6 +58,7 @@ def create_app(settings: Settings) -> FastAPI:
     app.state.about = about.about(settings)
     app.state.large_bodies = CapacityLimiter(1)
     # The last one added is the outermost.
+    app.add_middleware(HeadMiddleware)
     app.add_middleware(BodyTimeoutMiddleware, settings=settings)
     app.add_middleware(AdmissionMiddleware, settings=settings, allowances=service.allowances)
     app.add_middleware(CrossSiteMiddleware, settings=settings)

@@ -56,7 +56,10 @@ def _allow(app: FastAPI, path: str) -> Mapping[str, str] | None:
     # Starlette names only the methods of the first route with this path.
     for template, operations in app.openapi()["paths"].items():
         if compile_path(template)[0].match(path):
-            return {"Allow": ", ".join(sorted(method.upper() for method in operations))}
+            methods = {method.upper() for method in operations}
+            if "GET" in methods:
+                methods.add("HEAD")
+            return {"Allow": ", ".join(sorted(methods))}
     return None
 
 

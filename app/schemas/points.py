@@ -8,11 +8,9 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
-    FiniteFloat,
     StrictInt,
     Tag,
 )
-from pydantic_core import PydanticCustomError
 
 T = TypeVar("T")
 
@@ -21,18 +19,11 @@ LARGEST_COUNT = 2**53 - 1
 Count = Annotated[StrictInt, Field(ge=1, le=LARGEST_COUNT)]
 
 
-def _no_boolean(value: Any) -> Any:
-    if isinstance(value, bool):
-        raise PydanticCustomError("number", "Input should be a number, not a boolean")
-    return value
-
-
-NOT_BOOLEAN = BeforeValidator(_no_boolean)
-"""For numbers that may come as texts, in query parameters: these cannot be strict"""
-NonNegative = Annotated[FiniteFloat, Field(ge=0), NOT_BOOLEAN]
-Coordinate = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Positive = Annotated[Coordinate, Field(gt=0)]
-Triple = tuple[Coordinate, Coordinate, Coordinate]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+"""A number of JSON: an integer or a float, and neither a text nor a boolean"""
+NonNegative = Annotated[Number, Field(ge=0)]
+Positive = Annotated[Number, Field(gt=0)]
+Triple = tuple[Number, Number, Number]
 FailFastList = Annotated[list[T], Field(fail_fast=True)]
 """A list that is refused at its first faulty item: a body has room for millions of them."""
 
@@ -62,7 +53,7 @@ class EdgePoint(StrictModel):
     edge: tuple[StrictInt, StrictInt] = Field(
         description="The two vertices that the edge joins", examples=[[0, 1]]
     )
-    t: Coordinate = Field(
+    t: Number = Field(
         description="Share of the way from the first vertex to the second, 0 to 1", examples=[0.3]
     )
 

@@ -7,16 +7,15 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
-    FiniteFloat,
     StrictBool,
     StrictInt,
+    field_validator,
     model_validator,
 )
 from pydantic_core import PydanticCustomError
 
 from app.schemas.points import (
     MOST_MEMBERS,
-    NOT_BOOLEAN,
     Count,
     Ends,
     FailFastList,
@@ -34,12 +33,14 @@ Method = Literal["exact", "approximate", "fast"]
 Layout = Literal["dense", "sparse", "pairs"]
 
 
-def _from_digit(value: Any) -> Any:
-    return int(value) if value in ("1", "2", "4", "8") else value
+def _no_boolean(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise PydanticCustomError("number", "Input should be a number, not a boolean")
+    return value
 
 
-Effort = Annotated[Literal[1, 2, 4, 8], BeforeValidator(_from_digit), NOT_BOOLEAN]
-"""A number that may come as a text, in query parameters"""
+Effort = Annotated[Literal[1, 2, 4, 8], BeforeValidator(_no_boolean)]
+"""A number; `Literal` by itself takes `true` for 1"""
 
 
 class Accuracy(StrictModel):
@@ -50,12 +51,12 @@ class Accuracy(StrictModel):
         description="`approximate`: within an allowed error; `fast`: in one quick pass, with an "
         "estimate of the error",
     )
-    relative_error: Annotated[FiniteFloat, Field(gt=0, lt=1), NOT_BOOLEAN] | None = Field(
+    relative_error: Annotated[Positive, Field(lt=1)] | None = Field(
         default=None,
         description="For `approximate`: the allowed error, as a share of the exact distance; 0.001 "
         "if neither error is given",
     )
-    absolute_error: Annotated[FiniteFloat, Field(gt=0), NOT_BOOLEAN] | None = Field(
+    absolute_error: Positive | None = Field(
         default=None,
         description="For `approximate`: the allowed error in mesh units; if both errors are given, "
         "both hold",
@@ -341,3 +342,12 @@ class PathParameters(PathAnswerParameters, AccuracyOrEffort):
         examples=[["v7"]],
     )
     max_distance: NonNegative | None = Field(default=None, description=_LONGEST)
+
+    @field_validator("relative_error", "absolute_error", "effort", "max_distance", mode="before")
+    @classmethod
+    def _number_of(cls, text: str) -> float | str:
+        # A body has numbers, an address only texts.
+        try:
+            return float(text)
+        except ValueError:
+            return text

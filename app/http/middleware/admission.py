@@ -15,6 +15,8 @@ from app.state import Allowances
 
 _OPEN = PROBES | {"/", "/docs", "/openapi.json"}
 _OPEN_FOLDERS = ("/problems/", f"{ASSETS}/")
+_OF_EACH_REPLICA = "/metrics"
+"""The path that each replica counts by itself: it is needed while their database is away"""
 _BEARER = re.compile(rb"bearer +([A-Za-z0-9._~+/-]+=*)", re.IGNORECASE)
 
 WRONG_KEYS_A_MINUTE = 10
@@ -31,7 +33,7 @@ def is_open(path: str) -> bool:
 class AdmissionMiddleware:
     """Middleware that finds the caller (``request.state.caller``), and admits or refuses it.
 
-    With ``allowances`` the limits hold for all replicas together.
+    With ``allowances`` the limits hold for all replicas together, except on scrapes.
     """
 
     def __init__(
@@ -49,7 +51,7 @@ class AdmissionMiddleware:
             await self.app(scope, receive, send)
             return
         scope["state"]["caller"] = caller = await self._admit(scope)
-        if self.allowances is None:
+        if self.allowances is None or scope["path"] == _OF_EACH_REPLICA:
             with self.rate_limits.counting(caller):
                 await self.app(scope, receive, send)
         else:

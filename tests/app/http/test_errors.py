@@ -139,7 +139,7 @@ def test_wrong_method_names_the_right_ones(client: TestClient) -> None:
     response = client.put("/v1/meshes")
 
     check_problem(response, 405, "method_not_allowed")
-    assert response.headers["allow"] == "GET, POST"
+    assert response.headers["allow"] == "GET, HEAD, POST"
 
 
 def test_a_defect_is_a_problem_too(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,6 +35,14 @@ def test_a_request_has_one_line(client: TestClient, log: Log) -> None:
     }
 
 
+def test_a_head_has_its_own_method_and_the_operation_of_get(client: TestClient, log: Log) -> None:
+    client.head("/v1")
+    client.head("/v1/meshes/abc")
+
+    found = [(line["method"], line["operation"], line["mesh_id"], line["bytes"]) for line in log]
+    assert found == [("HEAD", "getAbout", None, 0), ("HEAD", "getMesh", "abc", 0)]
+
+
 def test_refusals_have_lines_as_well(client: TestClient, log: Log) -> None:
     client.get("/nowhere")
     client.delete("/v1/meshes/abc")

@@ -1,0 +1,88 @@
+"""Numbers in the bodies of queries: as JSON has them, not texts in quotes."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from fastapi.exceptions import RequestValidationError
+from pydantic import create_model
+
+from app.http.routes.query_route import read
+from app.queries import KINDS
+from app.schemas.requests import PathParameters
+from app.settings import Settings
+
+POINTS = [
+    7,
+    {"vertex": 7},
+    {"edge": [0, 1], "t": 0.5},
+    {"face": 3, "barycentric": [1, 0, 0.0]},
+    {"position": [1, 2.5, 3], "max_distance": 4},
+]
+SOURCES = [
+    7,
+    *({**point, "start_distance": 1} for point in POINTS if isinstance(point, dict)),
+    {"polyline": POINTS, "start_distance": 0.5},
+]
+ACCURACY = {"relative_error": 0.1, "absolute_error": 1}
+LIMITS = {"max_distance": 9, "barriers": [5]}
+LINES = {"sources": SOURCES, "chord_error": 1, **LIMITS}
+BODIES: dict[str, dict[str, Any]] = {
+    "distances": {"sources": SOURCES, "targets": POINTS, "effort": 2, **ACCURACY, **LIMITS},
+    "path": {"source": 1, "target": 2, "waypoints": POINTS, "effort": 4, **ACCURACY, **LIMITS},
+    "paths": {"source": 1, "targets": POINTS, "effort": 8, **ACCURACY, **LIMITS},
+    "isolines": {"levels": [1, 1.5], "count": 3, **LINES, **ACCURACY},
+    "borders": LINES,
+    "matrix": {"sources": POINTS, "targets": POINTS, "effort": 1, **ACCURACY, **LIMITS},
+    "nearest": {"source": 1, "candidates": POINTS, "k": 2, **LIMITS},
+    "locate": {"points": [[1, 2.5, 3]], "max_distance": 1},
+}
+"""For each kind of query a body with all members that are numbers"""
+
+
+def read_body(kind: str, body: Any) -> Any:
+    model: Any = create_model("Request", body=(KINDS[kind].model, ...))
+    return read(model, {}, json.dumps(body).encode(), Settings()).body
+
+
+def is_accepted(kind: str, body: Any) -> bool:
+    try:
+        read_body(kind, body)
+    except RequestValidationError:
+        return False
+    return True
+
+
+def quoted(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the value once for each number in it, with that number in quotes, and its place."""
+    if isinstance(value, dict):
+        for name, member in value.items():
+            for where, changed in quoted(member, f"{place}/{name}"):
+                yield where, {**value, name: changed}
+    elif isinstance(value, list):
+        for i, item in enumerate(value):
+            for where, changed in quoted(item, f"{place}/{i}"):
+                yield where, [*value[:i], changed, *value[i + 1 :]]
+    else:
+        yield place, str(value)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_numbers_in_quotes_are_refused(kind: str) -> None:
+    assert is_accepted(kind, BODIES[kind])
+    accepted = [place for place, body in quoted(BODIES[kind]) if is_accepted(kind, body)]
+    assert accepted == []
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_integers_are_numbers_as_well(kind: str) -> None:
+    limit = read_body(kind, BODIES[kind]).max_distance
+    assert (limit, type(limit)) == (BODIES[kind]["max_distance"], float)
+
+
+def test_the_numbers_of_an_address_are_texts() -> None:
+    numbers = {"relative_error": "1e-3", "absolute_error": "2", "max_distance": ".5", "effort": "4"}
+    found = PathParameters.model_validate({"from": "0", "to": "1", **numbers})
+    assert (found.relative_error, found.absolute_error) == (0.001, 2.0)
+    assert (found.max_distance, found.effort) == (0.5, 4)
