@@ -240,6 +240,38 @@ def test_a_job_that_is_removed_twice_leaves_the_answer_to_another_one(
     asyncio.run(main())
 
 
+def test_a_job_that_another_replica_removed_unpins_its_answer_once(
+    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else the answer of another job, which is the same, could be evicted."""
+    monkeypatch.setattr("app.jobs.manager.BEAT_S", HOUR_S)
+    monkeypatch.setattr("app.jobs.manager._TIDY_PERIOD_S", HOUR_S)
+
+    async def main() -> None:
+        async with opened(database):
+            results, repository = results_in(tmp_path), SlowEnds(database)
+            replicas = cast(Any, LivingReplica())
+            jobs = JobManager(repository, results, HOUR_S, None, replicas)
+
+            async def solve(_on_progress: object) -> Result:
+                return results.add(answer(tmp_path))
+
+            async with jobs.running(fail):
+                removed = await jobs.submit(SPEC, QUERY, solve)
+                await repository.ending.wait()
+                await repository.remove(removed.id)
+                repository.may_end.set()
+                assert [state.status async for state in jobs.watch(removed, 0)] == ["dismissed"]
+                other = await jobs.submit(SPEC, QUERY, solve)
+                *_, last = [state.status async for state in jobs.watch(other, 0)]
+                assert last == "successful"
+                await jobs._note_finished()
+                results.release(results.add(answer(tmp_path, "m/two")))
+                assert await results.find("m/one") is not None
+
+    asyncio.run(main())
+
+
 def test_a_record_of_a_newer_release_keeps_no_job_from_expiring(
     database: Database, tmp_path: Path
 ) -> None:
