@@ -134,7 +134,7 @@ class JobManager:
         self._live: dict[str, _LiveJob] = {}
         self._accepting: set[asyncio.Task[Job]] = set()
         self._doubtful: set[str] = set()
-        """Ids of jobs that may have been added to the repository, although an error said not"""
+        """Ids of jobs that may have been added or taken over, although an error said not"""
         self._newest = 0
         """Number of the newest job at the last beat"""
         self._unfinished: frozenset[str] = frozenset()
@@ -370,7 +370,7 @@ class JobManager:
             is_left = job.replica not in living
             if is_left or (job.id in doubtful and job.id not in self._live):
                 await self._resume(job, solve_again)
-        self._doubtful -= doubtful  # the others were not added
+        self._doubtful -= doubtful  # the others were neither added nor taken over
         await self._note_ends((self._unfinished | added) - records.keys())
         self._unfinished, self._newest = frozenset(records), newest
 
@@ -399,7 +399,12 @@ class JobManager:
                 raise ProblemError(_STOPPED)
             return await solve_again(job.spec, query, on_progress)
 
-        if await self._repository.update(again, job.replica):
+        try:
+            is_taken = await self._repository.update(again, job.replica)
+        except StateUnavailableError:
+            self._doubtful.add(job.id)
+            raise
+        if is_taken:
             with bound_contextvars(request_id=job.spec.request_id):
                 self._begin(again, solve)
 

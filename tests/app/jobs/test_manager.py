@@ -7,7 +7,7 @@ from typing import Any, NoReturn, cast
 
 import pytest
 
-from app.errors import problem
+from app.errors import StateUnavailableError, problem
 from app.jobs.job import Job
 from app.jobs.manager import JobManager
 from app.jobs.repository import JobRepository
@@ -236,6 +236,38 @@ def test_a_job_that_is_removed_twice_leaves_the_answer_to_another_one(
             results.release(results.add(answer(tmp_path, "m/two")))
             assert await results.find("m/one") is not None
             assert await results.find("m/two") is None
+
+    asyncio.run(main())
+
+
+class LostWord(JobRepository):
+    """Makes the first change, but cannot say so: the connection has ended."""
+
+    fails = True
+
+    async def update(self, job: Job, holder: str | None) -> bool:
+        is_changed = await super().update(job, holder)
+        if self.fails:
+            self.fails = False
+            raise StateUnavailableError("the connection has ended")
+        return is_changed
+
+
+def test_a_job_is_run_by_who_took_it_over_without_a_word_of_that(
+    database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.jobs.manager.BEAT_S", 0.01)
+
+    async def main() -> None:
+        async with asyncio.timeout(LONG_S), opened(database):
+            repository = LostWord(database)
+            replicas = cast(Any, LivingReplica())
+            jobs = JobManager(repository, cast(Any, "not used"), HOUR_S, None, replicas)
+            async with jobs.running(fail):
+                await repository.add(new_job().accepted_again("dead"), QUERY)
+                while not await repository.count_finished():
+                    await asyncio.sleep(0.01)
+        assert not repository.fails
 
     asyncio.run(main())
 
