@@ -1,6 +1,7 @@
 """The life of jobs: what clients are told, and when."""
 
 import asyncio
+import errno
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn, cast
@@ -300,6 +301,27 @@ def test_a_job_that_another_replica_removed_unpins_its_answer_once(
                 await jobs._note_finished()
                 results.release(results.add(answer(tmp_path, "m/two")))
                 assert await results.find("m/one") is not None
+
+    asyncio.run(main())
+
+
+def test_the_key_of_a_job_is_free_as_soon_as_the_job_has_failed(database: Database) -> None:
+    """Though the database could not record that yet."""
+    spec = SPEC.model_copy(update={"idempotency_key": "a key"})
+
+    class Failing(JobRepository):
+        async def update(self, job: Job, holder: str | None) -> bool:
+            raise OSError(errno.EIO, f"no end of {job.id} for {holder}")
+
+    async def main() -> None:
+        async with opened(database):
+            jobs = JobManager(Failing(database), cast(Any, "not used"), HOUR_S, None)
+            async with jobs.running(fail):
+                first = await jobs.submit(spec, QUERY, fail)
+                while not (await jobs.find(None, first.id)).is_finished:
+                    await asyncio.sleep(0.01)
+                again = await jobs.submit(spec, QUERY, fail)
+                assert again.id != first.id
 
     asyncio.run(main())
 
