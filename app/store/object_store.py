@@ -14,7 +14,8 @@ from anyio import to_thread
 
 from app.errors import StoreUnavailableError
 from app.settings import variable_of
-from app.store.layout import RESULTS, StoreError, make_identity
+from app.store.atomic import remove_partial
+from app.store.layout import FIELDS, RESULTS, TEMPORARY, StoreError, make_identity
 from app.store.meshes import WrittenMesh
 from app.store.object_meshes import ObjectMeshes
 from app.store.object_results import ObjectResults
@@ -52,8 +53,8 @@ class ObjectStore:
     def owned(self, *, is_shared: bool = False) -> Iterator[None]:  # noqa: ARG002 - the folder is not
         """Lock the folder, which is this process's alone."""
         with owned(self.folder):
+            self._remove_unfinished()
             self.meshes.prepare()
-            _remove(self.folder / RESULTS)  # what was under way when a former process died
             yield
 
     def claim(self, service: str | None) -> None:
@@ -143,6 +144,12 @@ class ObjectStore:
     async def distrust(self, mesh_id: str) -> None:
         """Drop the copy of a mesh."""
         await self.meshes.distrust(mesh_id)
+
+    def _remove_unfinished(self) -> None:
+        """Remove what was under way when a former process died: answers, pulls, and fields."""
+        for name in (RESULTS, TEMPORARY):
+            _remove(self.folder / name)
+        remove_partial(self.folder / FIELDS)
 
     def _upload_name(self, file: Path) -> str:
         return f"{_UPLOADS}/{file.relative_to(self.folder).as_posix()}"

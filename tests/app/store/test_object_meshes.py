@@ -6,8 +6,10 @@ from pathlib import Path
 from obstore.store import MemoryStore
 
 import geodesic_core as gc
+from app.store.layout import FIELDS, RESULTS, TEMPORARY
 from app.store.meshes import MeshStore
 from app.store.object_meshes import ObjectMeshes
+from app.store.object_store import ObjectStore
 from app.store.objects import Objects
 
 
@@ -37,3 +39,22 @@ def test_pulls_at_the_same_time_leave_no_lock(tmp_path: Path) -> None:
 
     asyncio.run(main())
     assert not two._pulls
+
+
+def test_a_start_removes_what_a_killed_process_left_unfinished(tmp_path: Path) -> None:
+    store = ObjectStore(Objects(MemoryStore()), tmp_path, 10**9, "memory")
+    pull = tmp_path / TEMPORARY / "a pull"
+    pull.mkdir(parents=True)
+    files = [
+        pull / "vertices.npy",
+        tmp_path / TEMPORARY / "a file",
+        tmp_path / RESULTS / "mesh" / "key.body",
+        tmp_path / FIELDS / "mesh" / "tmp1",
+        tmp_path / FIELDS / "mesh" / "key.npz",
+    ]
+    for file in files:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(b"content")
+    with store.owned():
+        assert [file for file in files if file.exists()] == files[-1:]
+        assert (tmp_path / TEMPORARY).is_dir()
