@@ -19,7 +19,7 @@ from app.store.layout import FIELDS, RESULTS, TEMPORARY, StoreError, make_identi
 from app.store.meshes import WrittenMesh
 from app.store.object_meshes import ObjectMeshes
 from app.store.object_results import ObjectResults
-from app.store.objects import Objects
+from app.store.objects import UPLOADS, Objects
 from app.store.ownership import owned
 from app.store.results import FolderResults, Result, body_path
 
@@ -31,7 +31,6 @@ VARIABLES = {
 """Variables of the environment from which obstore takes endpoints and credentials, by scheme"""
 
 _OWNER = "owner.json"
-_UPLOADS = "uploads"
 
 
 class ObjectStore:
@@ -152,7 +151,7 @@ class ObjectStore:
         remove_partial(self.folder / FIELDS)
 
     def _upload_name(self, file: Path) -> str:
-        return f"{_UPLOADS}/{file.relative_to(self.folder).as_posix()}"
+        return f"{UPLOADS}/{file.relative_to(self.folder).as_posix()}"
 
     def _unusable(self, error: StoreUnavailableError) -> StoreError:
         variables = " and ".join(VARIABLES[self._name.partition(":")[0]])

@@ -1,8 +1,10 @@
 """Copies of the meshes of an object store."""
 
 import asyncio
+from datetime import timedelta
 from pathlib import Path
 
+import pytest
 from obstore.store import MemoryStore
 
 import geodesic_core as gc
@@ -39,6 +41,23 @@ def test_pulls_at_the_same_time_leave_no_lock(tmp_path: Path) -> None:
 
     asyncio.run(main())
     assert not two._pulls
+
+
+def test_what_uploads_left_is_removed_a_day_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A service that is killed leaves the file, and a host the arrays."""
+    objects = Objects(MemoryStore())
+    meshes = machine(objects, tmp_path)
+    left = ("uploads/tmp/scratch/upload", f"meshes/{32 * 'a'}/scratch-mesh/vertices.npy")
+    for name in left:
+        objects.write(name, b"content")
+    assert not meshes.found()
+    assert [objects.size(name) for name in left] == [7, 7]
+
+    monkeypatch.setattr("app.store.objects._ABANDONED", -timedelta(days=1))
+    assert not meshes.found()
+    assert [objects.size(name) for name in left] == [None, None]
 
 
 def test_a_start_removes_what_a_killed_process_left_unfinished(tmp_path: Path) -> None:
