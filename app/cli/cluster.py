@@ -6,7 +6,6 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from threading import Event
 from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli.configuration import read_settings
+from app.cli.ray_folder import ray_folder
 from app.cli.steps import Failure
 
 Folder = Annotated[
@@ -118,11 +118,7 @@ def joined_if_asked(settings: "Settings") -> Iterator[None]:
         return
     from app.engine.ray_node import joined
 
-    with (
-        TemporaryDirectory(prefix="geodesic-") as folder,
-        _failing_clearly(),
-        joined(Path(folder), settings),
-    ):
+    with ray_folder() as folder, _failing_clearly(), joined(folder, settings):
         yield
 
 

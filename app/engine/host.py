@@ -127,7 +127,8 @@ class Host:
         run = partial(self._engine.run, task)
         if not isinstance(task.work, WritesResult):
             return await run(on_progress)
-        return await self._flights.join(task.work.result_name, run, on_progress)
+        name, is_promised = task.work.result_name, task.is_promised
+        return await self._flights.join(name, run, on_progress, is_promised=is_promised)
 
     def _note(self, ticket: str, share: float) -> None:
         self._shares[ticket] = share

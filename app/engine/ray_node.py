@@ -5,6 +5,7 @@ each call; there is no dashboard; and no machine offers processors, so that noth
 ours is placed on it.
 """
 
+import ctypes
 import json
 import logging
 import os
@@ -240,6 +241,7 @@ def _running(
             stderr=subprocess.STDOUT,
             env=os.environ | environment,
             start_new_session=True,  # an interrupt is for this command, which ends them in order
+            preexec_fn=_end_with_parent if sys.platform == "linux" else None,  # noqa: PLW1509 - no lock
         )
     processes = Processes(process, log)
     try:
@@ -247,6 +249,18 @@ def _running(
         yield processes
     finally:
         processes.stop()
+
+
+_SYSTEM = ctypes.CDLL(None)
+_PR_SET_PDEATHSIG = 1
+
+
+def _end_with_parent() -> None:
+    """Have Linux end this process once the thread that started it is gone, even if it was killed.
+
+    Ray would go on for ever, and the next start on this machine would bring its processes again.
+    """
+    _SYSTEM.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def _token(settings: Settings) -> str:

@@ -6,8 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from app.engine.interface import ProgressCallback
+from app.errors import ProblemError
 
 T = TypeVar("T")
+
+Start = Callable[[ProgressCallback], Coroutine[Any, Any, T]]
+"""Begins a computation, which reports its progress"""
 
 
 @dataclass(eq=False)
@@ -32,14 +36,25 @@ class SingleFlight(Generic[T]):
     async def join(
         self,
         name: str,
-        start: Callable[[ProgressCallback], Coroutine[Any, Any, T]],
+        start: Start[T],
         on_progress: ProgressCallback,
+        *,
+        is_promised: bool = False,
     ) -> T:
         """Wait for the computation ``name``; ``start`` begins it where there is none.
 
         Cancelling a call leaves the computation to the others that wait. It is cancelled when the
-        last has left. Progress is reported to each.
+        last has left. Progress is reported to each. Where a computation that was begun without a
+        promise is refused for want of room, a promised call begins it again.
         """
+        while True:
+            try:
+                return await self._join(name, start, on_progress)
+            except ProblemError as error:
+                if not is_promised or error.problem.code != "queue_full":
+                    raise
+
+    async def _join(self, name: str, start: Start[T], on_progress: ProgressCallback) -> T:
         flight = self._flights.get(name) or self._start(name, start)
         flight.listeners.append(on_progress)
         if flight.has_begun:
@@ -52,9 +67,7 @@ class SingleFlight(Generic[T]):
                 flight.task.cancel()
                 self._forget(name, flight)
 
-    def _start(
-        self, name: str, start: Callable[[ProgressCallback], Coroutine[Any, Any, T]]
-    ) -> _Flight[T]:
+    def _start(self, name: str, start: Start[T]) -> _Flight[T]:
         def report(share: float) -> None:
             flight.progress, flight.has_begun = share, True
             for on_progress in flight.listeners:

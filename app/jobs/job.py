@@ -101,8 +101,8 @@ class Job(BaseModel):
         return self._finish(status="failed", problem=problem)
 
     def dismissed(self) -> "Job":
-        """Return the state of a job that was cancelled."""
-        return self._finish(status="dismissed")
+        """Return the state of a job that was cancelled, even if it had an answer."""
+        return self._finish(status="dismissed", result=None)
 
     def _finish(self, **changes: Any) -> "Job":
         return self._next(**changes, finished=_now_after(self.started or self.created))

@@ -134,7 +134,7 @@ class JobManager:
         self._live: dict[str, _LiveJob] = {}
         self._accepting: set[asyncio.Task[Job]] = set()
         self._doubtful: set[str] = set()
-        """Ids of jobs that may have been added to the repository, although an error said not"""
+        """Ids of jobs that may have been added or taken over, although an error said not"""
         self._newest = 0
         """Number of the newest job at the last beat"""
         self._unfinished: frozenset[str] = frozenset()
@@ -318,13 +318,15 @@ class JobManager:
         if key is None:
             return None
         job = await records.find_by_key(spec.owner, key)
+        if job is not None and job.id in self._live:
+            job = self._live[job.id].job
         if job is None or job.status in ("failed", "dismissed"):
             return None
         if job.spec.fingerprint != spec.fingerprint:
             message = f"{key!r} was used for a different query, by job {job.id}"
             fault = Fault("/header/Idempotency-Key", message)
             raise problem("invalid_request", message, errors=(fault,))
-        return self._live[job.id].job if job.id in self._live else job
+        return job
 
     async def _refuse_over_quota(self, records: JobRecords, owner: str | None) -> None:
         if self._quota is None:
@@ -370,7 +372,7 @@ class JobManager:
             is_left = job.replica not in living
             if is_left or (job.id in doubtful and job.id not in self._live):
                 await self._resume(job, solve_again)
-        self._doubtful -= doubtful  # the others were not added
+        self._doubtful -= doubtful  # the others were neither added nor taken over
         await self._note_ends((self._unfinished | added) - records.keys())
         self._unfinished, self._newest = frozenset(records), newest
 
@@ -399,7 +401,12 @@ class JobManager:
                 raise ProblemError(_STOPPED)
             return await solve_again(job.spec, query, on_progress)
 
-        if await self._repository.update(again, job.replica):
+        try:
+            is_taken = await self._repository.update(again, job.replica)
+        except StateUnavailableError:
+            self._doubtful.add(job.id)
+            raise
+        if is_taken:
             with bound_contextvars(request_id=job.spec.request_id):
                 self._begin(again, solve)
 

@@ -103,7 +103,8 @@ class Answering:
             self.lookups["miss" if stored is None else "hit"] += 1
             if stored is not None:
                 return stored, {}
-            done = await self._flights.join(name, partial(self._run, run, query.kind), on_progress)
+            counted = partial(self._run, run, query.kind)
+            done = await self._flights.join(name, counted, on_progress, is_promised=is_promised)
             assert done.result is not None, "this kind of work answers"  # noqa: S101
             result = self._results.add(done.result, is_reusable=query.is_repeatable)
             return result, done.seconds

@@ -33,7 +33,7 @@ from app.store.meshes import (
     mesh_not_found,
     require_id,
 )
-from app.store.objects import Objects
+from app.store.objects import UPLOADS, Objects
 
 _AT_ONCE = 4
 """Arrays that travel at the same time"""
@@ -76,7 +76,7 @@ class ObjectMeshes:
         self._temporary.mkdir(exist_ok=True)
 
     def found(self) -> Mapping[str, MeshRecord]:
-        """Return the meshes, the oldest first, and remove what uploads left half-written."""
+        """Return the meshes, the oldest first, and remove what uploads left, files included."""
         objects = list(self._objects.found(MESHES))
         ids = [each.name.split("/")[1] for each in objects if each.name.endswith(f"/{MANIFEST}")]
         with ThreadPoolExecutor(_CALLS) as pool:
@@ -86,7 +86,7 @@ class ObjectMeshes:
             for mesh_id, manifest in manifests.items()
             if manifest is not None
         }
-        for each in objects:
+        for each in (*objects, *self._objects.found(UPLOADS)):
             folder, _, file = each.name.rpartition("/")
             if each.is_old and file != MANIFEST and folder not in kept:
                 self._objects.remove(each.name)

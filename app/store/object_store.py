@@ -14,11 +14,12 @@ from anyio import to_thread
 
 from app.errors import StoreUnavailableError
 from app.settings import variable_of
-from app.store.layout import RESULTS, StoreError, make_identity
+from app.store.atomic import remove_partial
+from app.store.layout import FIELDS, RESULTS, TEMPORARY, StoreError, make_identity
 from app.store.meshes import WrittenMesh
 from app.store.object_meshes import ObjectMeshes
 from app.store.object_results import ObjectResults
-from app.store.objects import Objects
+from app.store.objects import UPLOADS, Objects
 from app.store.ownership import owned
 from app.store.results import FolderResults, Result, body_path
 
@@ -30,7 +31,6 @@ VARIABLES = {
 """Variables of the environment from which obstore takes endpoints and credentials, by scheme"""
 
 _OWNER = "owner.json"
-_UPLOADS = "uploads"
 
 
 class ObjectStore:
@@ -52,8 +52,8 @@ class ObjectStore:
     def owned(self, *, is_shared: bool = False) -> Iterator[None]:  # noqa: ARG002 - the folder is not
         """Lock the folder, which is this process's alone."""
         with owned(self.folder):
+            self._remove_unfinished()
             self.meshes.prepare()
-            _remove(self.folder / RESULTS)  # what was under way when a former process died
             yield
 
     def claim(self, service: str | None) -> None:
@@ -144,8 +144,14 @@ class ObjectStore:
         """Drop the copy of a mesh."""
         await self.meshes.distrust(mesh_id)
 
+    def _remove_unfinished(self) -> None:
+        """Remove what was under way when a former process died: answers, pulls, and fields."""
+        for name in (RESULTS, TEMPORARY):
+            _remove(self.folder / name)
+        remove_partial(self.folder / FIELDS)
+
     def _upload_name(self, file: Path) -> str:
-        return f"{_UPLOADS}/{file.relative_to(self.folder).as_posix()}"
+        return f"{UPLOADS}/{file.relative_to(self.folder).as_posix()}"
 
     def _unusable(self, error: StoreUnavailableError) -> StoreError:
         variables = " and ".join(VARIABLES[self._name.partition(":")[0]])

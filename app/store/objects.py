@@ -30,6 +30,8 @@ from app.errors import StoreUnavailableError
 if TYPE_CHECKING:
     from obstore.store import ClientConfig, RetryConfig
 
+UPLOADS = "uploads"
+
 _CLIENT: "ClientConfig" = {
     "connect_timeout": "2s",
     "read_timeout": "4s",

@@ -230,7 +230,8 @@ class FolderResults:
             name = path.relative_to(self._root).with_suffix("").as_posix()
             manifest = _manifest_path(self._root, name)
             if manifest.exists():
-                complete.append((order_of_use(manifest.stat()), name, path.stat().st_size))
+                with suppress(FileNotFoundError):  # another service has evicted it a moment ago
+                    complete.append((order_of_use(manifest.stat()), name, path.stat().st_size))
             elif is_alone:
                 path.unlink()
         if is_alone:

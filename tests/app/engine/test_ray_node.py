@@ -1,9 +1,13 @@
 """Ray on this machine: refusals before a process of Ray runs, and what its log means."""
 
+import os
+import signal
 import socket
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 from pydantic import SecretStr
@@ -12,6 +16,8 @@ from app.engine import ray_node
 from app.engine.cluster import ClusterError
 from app.engine.ray_node import Processes, host_and_port, joined, running_head
 from app.settings import Settings
+from tests.support.processes import are_gone
+from tests.support.waiting import wait_until
 
 OURS = Settings(cluster_token=SecretStr("a long secret of ours"), address="127.0.0.2:1")
 
@@ -105,6 +111,39 @@ def test_a_start_without_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         with pytest.raises(ClusterError, match=r"another program listens at 10\.0\.0\.1:6379"):
             processes.wait_until_started("10.0.0.1:6379")
         processes.stop()
+
+
+KILLED_LATER = """
+import sys
+from pathlib import Path
+from app.engine import ray_node
+from app.settings import Settings
+
+sys.executable = sys.argv[2]
+settings = Settings(cluster_token=16 * "x", address="127.0.0.2:1")
+with ray_node._running([], Path(sys.argv[1]), settings, {}) as processes:
+    print(processes._process.pid, flush=True)
+    sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems cannot do that")
+def test_what_was_started_of_ray_ends_with_a_command_that_is_killed(tmp_path: Path) -> None:
+    ray = tmp_path / "ray"
+    ray.write_text("#!/bin/sh\necho Ray runtime started\nexec sleep 1000\n")
+    ray.chmod(0o755)
+    with TemporaryDirectory(prefix="g") as folder:  # of a short path
+        command = [sys.executable, "-c", KILLED_LATER, folder, str(ray)]
+        pipe = subprocess.PIPE
+        with subprocess.Popen(command, stdin=pipe, stdout=pipe) as killed:  # noqa: S603 - ours
+            assert killed.stdout is not None
+            started = int(killed.stdout.readline())
+            killed.kill()
+        try:
+            wait_until(lambda: are_gone([started]))
+        finally:
+            with suppress(ProcessLookupError):
+                os.kill(started, signal.SIGKILL)
 
 
 def test_one_machine_imports_nothing_for_several(tmp_path: Path) -> None:

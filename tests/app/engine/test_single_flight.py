@@ -7,6 +7,7 @@ import pytest
 
 from app.engine.interface import ProgressCallback
 from app.engine.single_flight import SingleFlight
+from app.errors import ProblemError, problem
 from app.service.progress import ignore_progress
 
 
@@ -56,6 +57,27 @@ def test_all_calls_share_one_computation() -> None:
 
         assert await asyncio.gather(*waiting) == [7] * 5
         assert work.begun == 1
+
+    run(test)
+
+
+def test_a_promised_call_outlives_the_refusal_of_one_without_a_promise() -> None:
+    async def test(flights: SingleFlight[int], work: Work) -> None:
+        first = await joined(flights, work)
+        again = Work()
+        promised = [
+            asyncio.create_task(flights.join("name", again, ignore_progress, is_promised=True))
+            for _ in range(2)
+        ]
+        other = await joined(flights, work)
+        work.end.set_exception(problem("queue_full", "no place"))
+        for each in (first, other):
+            with pytest.raises(ProblemError, match="no place"):
+                await each
+        again.end.set_result(8)
+
+        assert await asyncio.gather(*promised) == [8, 8]
+        assert (work.begun, again.begun) == (1, 1)
 
     run(test)
 

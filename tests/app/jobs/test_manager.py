@@ -1,13 +1,14 @@
 """The life of jobs: what clients are told, and when."""
 
 import asyncio
+import errno
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn, cast
 
 import pytest
 
-from app.errors import problem
+from app.errors import StateUnavailableError, problem
 from app.jobs.job import Job
 from app.jobs.manager import JobManager
 from app.jobs.repository import JobRepository
@@ -236,6 +237,91 @@ def test_a_job_that_is_removed_twice_leaves_the_answer_to_another_one(
             results.release(results.add(answer(tmp_path, "m/two")))
             assert await results.find("m/one") is not None
             assert await results.find("m/two") is None
+
+    asyncio.run(main())
+
+
+class LostWord(JobRepository):
+    """Makes the first change, but cannot say so: the connection has ended."""
+
+    fails = True
+
+    async def update(self, job: Job, holder: str | None) -> bool:
+        is_changed = await super().update(job, holder)
+        if self.fails:
+            self.fails = False
+            raise StateUnavailableError("the connection has ended")
+        return is_changed
+
+
+def test_a_job_is_run_by_who_took_it_over_without_a_word_of_that(
+    database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.jobs.manager.BEAT_S", 0.01)
+
+    async def main() -> None:
+        async with asyncio.timeout(LONG_S), opened(database):
+            repository = LostWord(database)
+            replicas = cast(Any, LivingReplica())
+            jobs = JobManager(repository, cast(Any, "not used"), HOUR_S, None, replicas)
+            async with jobs.running(fail):
+                await repository.add(new_job().accepted_again("dead"), QUERY)
+                while not await repository.count_finished():
+                    await asyncio.sleep(0.01)
+        assert not repository.fails
+
+    asyncio.run(main())
+
+
+def test_a_job_that_another_replica_removed_unpins_its_answer_once(
+    database: Database, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Else the answer of another job, which is the same, could be evicted."""
+    monkeypatch.setattr("app.jobs.manager.BEAT_S", HOUR_S)
+    monkeypatch.setattr("app.jobs.manager._TIDY_PERIOD_S", HOUR_S)
+
+    async def main() -> None:
+        async with opened(database):
+            results, repository = results_in(tmp_path), SlowEnds(database)
+            replicas = cast(Any, LivingReplica())
+            jobs = JobManager(repository, results, HOUR_S, None, replicas)
+
+            async def solve(_on_progress: object) -> Result:
+                return results.add(answer(tmp_path))
+
+            async with jobs.running(fail):
+                removed = await jobs.submit(SPEC, QUERY, solve)
+                await repository.ending.wait()
+                await repository.remove(removed.id)
+                repository.may_end.set()
+                assert [state.status async for state in jobs.watch(removed, 0)] == ["dismissed"]
+                other = await jobs.submit(SPEC, QUERY, solve)
+                *_, last = [state.status async for state in jobs.watch(other, 0)]
+                assert last == "successful"
+                await jobs._note_finished()
+                results.release(results.add(answer(tmp_path, "m/two")))
+                assert await results.find("m/one") is not None
+
+    asyncio.run(main())
+
+
+def test_the_key_of_a_job_is_free_as_soon_as_the_job_has_failed(database: Database) -> None:
+    """Though the database could not record that yet."""
+    spec = SPEC.model_copy(update={"idempotency_key": "a key"})
+
+    class Failing(JobRepository):
+        async def update(self, job: Job, holder: str | None) -> bool:
+            raise OSError(errno.EIO, f"no end of {job.id} for {holder}")
+
+    async def main() -> None:
+        async with opened(database):
+            jobs = JobManager(Failing(database), cast(Any, "not used"), HOUR_S, None)
+            async with jobs.running(fail):
+                first = await jobs.submit(spec, QUERY, fail)
+                while not (await jobs.find(None, first.id)).is_finished:
+                    await asyncio.sleep(0.01)
+                again = await jobs.submit(spec, QUERY, fail)
+                assert again.id != first.id
 
     asyncio.run(main())
 

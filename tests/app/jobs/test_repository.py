@@ -203,6 +203,22 @@ async def store_queries(database: Database, repository: JobRepository) -> None:
     assert await database.rows("SELECT job_id FROM queries") == [(first.id,)]
 
 
+def test_an_end_that_comes_after_a_takeover_leaves_the_query(database: Database) -> None:
+    """Else the replica that runs the job from now on could not read it."""
+    run(database, end_late)
+
+
+async def end_late(repository: JobRepository) -> None:
+    job = new_job().accepted_again("first")
+    await repository.add(job, QUERY)
+    taken = job.accepted_again("second")
+    assert await repository.update(taken, "first")
+    assert not await repository.update(job.successful("late"), "first")
+    assert await repository.query(job.id) == QUERY
+    assert await repository.update(taken.successful("a result"), "second")
+    assert await repository.query(job.id) is None
+
+
 def test_jobs_of_a_database_without_queries_are_read(tmp_path: Path) -> None:
     """That of layout 6, as its last release made it."""
     anyio.run(read_older, tmp_path / "jobs.sqlite3")

@@ -247,6 +247,25 @@ def test_results_survive_a_restart(results: ResultStore, tmp_path: Path) -> None
     assert names == ["new.body", "new.json"]
 
 
+@pytest.mark.parametrize("suffix", [".json", ".body"])
+def test_a_result_that_another_service_removes_during_the_start_is_not_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, suffix: str
+) -> None:
+    root = tmp_path / "results"
+    for name in ("m/one", "m/two"):
+        write_result(root, name, [b"x"], {}, "code", is_cheap=False)
+    exists = Path.exists
+
+    def exists_for_the_last_time(path: Path) -> bool:
+        found = exists(path)
+        if path.stem == "one":
+            path.with_suffix(suffix).unlink()
+        return found
+
+    monkeypatch.setattr(Path, "exists", exists_for_the_last_time)
+    assert list(FolderResults(root).found(is_alone=False)) == [("m/two", 1)]
+
+
 def test_results_of_a_mesh_are_forgotten(results: ResultStore, tmp_path: Path) -> None:
     put(results, tmp_path, "m/a")
     put(results, tmp_path, "n/a")
