@@ -63,9 +63,9 @@ def batch(
 ) -> None:
     """Answer the same queries for many meshes; a mesh that fails does not stop the others.
 
-    The table has a row for each mesh and source, with the largest and the mean distance of all
-    vertices. With targets it has a row for each target, with its distance. The exit code is 1 if
-    any mesh failed.
+    The table has a row for each mesh and source, with the largest and the mean distance of the
+    vertices in reach. With targets it has a row for each target, with its distance. The exit code
+    is 1 if any mesh failed.
     """
     output = Output(out, as_json)
     if out is None and not as_json:

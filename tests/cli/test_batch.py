@@ -59,6 +59,14 @@ def test_a_failure_that_nobody_expects_is_a_row_too(
     assert row.error == "MemoryError: no room"
 
 
+def test_a_mesh_without_a_vertex_in_reach_has_its_row(run: Run, meshes: list[Path]) -> None:
+    inside = ("--source", "f0:0.3,0.3,0.4", "--max-distance", 1e-9)
+    ran = run("batch", *meshes, *inside, "--out", "t.csv")
+    assert (ran.code, ran.err) == (0, "")
+    for row in rows_of(Path("t.csv")):
+        assert (row["unreachable"], row["farthest"], row["mean"]) == (row["vertices"], "", "")
+
+
 def test_a_mesh_that_fails_does_not_stop_the_others(run: Run, meshes: list[Path]) -> None:
     Path("broken.ply").write_text("ply\nthis is none")
     files = [meshes[0], "broken.ply", "missing.ply", *meshes[1:]]

@@ -157,6 +157,12 @@ def test_distance_stops_at_max_distance(run: Run, plane: Path) -> None:
     assert answer == [d if np.isfinite(d) else None for d in expected.tolist()]
 
 
+def test_no_vertex_is_farthest_where_none_is_reached(run: Run, plane: Path) -> None:
+    ran = run("distance", plane, "--source", "f0:0.3,0.3,0.4", "--max-distance", 1e-9)
+    assert ran.figure("reached") == "0 of 121 vertices"
+    assert "farthest" not in ran.out
+
+
 @pytest.fixture
 def knot(run: Run) -> Path:
     """A curved mesh, on which windows merge."""
