@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
+from urllib.parse import urlsplit
 
 import typer
 
@@ -37,6 +38,24 @@ from app.cli.summary import print_bound, print_end, print_size
 _OF_ANY_SIZE = (".npy", ".zarr", ".npz", ".parquet")
 _BY_SERVICES = (".npy", ".npz")
 _FILE = "POINTS"
+
+
+def _web_address(text: str | None) -> str | None:
+    """Check the address of a service before any work begins."""
+    if text is not None and not _is_web_address(text):
+        raise typer.BadParameter(
+            f"{text!r} is not the address of a service: write it as http://HOST:PORT"
+        )
+    return text
+
+
+def _is_web_address(text: str) -> bool:
+    try:
+        parts = urlsplit(text)
+        return parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.port != 0
+    except ValueError:  # of the port, say
+        return False
+
 
 MatrixOut = Annotated[
     Path | None,
@@ -82,6 +101,7 @@ Service = Annotated[
     str | None,
     typer.Option(
         metavar="URL",
+        callback=_web_address,
         help="Let this service compute the matrix, on all its machines: for points from files, to "
         "a .npy or .npz file. GEODESIC_SERVICE_KEY holds the API key.",
     ),
