@@ -7,7 +7,7 @@ from urllib.parse import urlsplit
 
 import typer
 
-from app.cli import local_matrix, remote_matrix
+from app.cli import files, local_matrix, remote_matrix
 from app.cli.arguments import (
     AbsoluteError,
     Barriers,
@@ -133,17 +133,17 @@ def matrix(
     options = accuracy(method, relative_error, absolute_error, effort)
     source, target = source or [], target or []
     named = {"--points": points, "--sources": sources, "--targets": targets}
-    files = {name: file for name, file in named.items() if file is not None}
-    if not files:
+    given = {name: file for name, file in named.items() if file is not None}
+    if not given:
         _check_points(source, target, dtype, threads, service)
         members = options | {"layout": layout.value} | limits(max_distance, barriers)
         _ask_matrix(mesh_file, Output(out, as_json), source, target, layout, members, merge)
         return
-    _check_files(list(files), source, target, layout)
-    out = _checked_file(out, next(iter(files)), service, threads)
+    _check_files(list(given), source, target, layout)
+    out = _checked_file(out, next(iter(given)), service, threads)
     opened, read_seconds = read(mesh_file, merge)
     mesh, output = opened.mesh, Output(None, as_json)
-    starts, *stops = (points_of(mesh, file) for file in files.values())
+    starts, *stops = (points_of(mesh, file) for file in given.values())
     wanted = MatrixToWrite(
         out,
         mesh,
@@ -154,10 +154,12 @@ def matrix(
         () if barriers is None else barriers.of(mesh),
         dtype.value,
     )
-    if service is None:
-        print_written(output, wanted, local_matrix.write_matrix(wanted, threads), read_seconds)
-    else:
-        print_written(output, wanted, remote_matrix.write_matrix(wanted, service))
+    with files.writing(out):
+        if service is None:
+            written = local_matrix.write_matrix(wanted, threads)
+        else:
+            written = remote_matrix.write_matrix(wanted, service)
+    print_written(output, wanted, written, read_seconds)
 
 
 def _check_points(

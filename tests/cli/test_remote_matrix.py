@@ -101,6 +101,14 @@ def test_json_says_what_was_written(run: Run, plane: Path) -> None:
     assert "matrix      121 by 121" in ran.err
 
 
+@pytest.mark.usefixtures("asked")
+def test_a_file_that_cannot_be_written_is_told(run: Run, plane: Path) -> None:
+    Path("there.npy").mkdir()
+    ran = run("matrix", plane, "--points", "all", "--out", "there.npy", *SERVICE)
+    assert ran.code == 1
+    assert "error: cannot write there.npy: Is a directory" in ran.err
+
+
 def test_a_refusal_is_told(
     run: Run, plane: Path, asked: list[tuple[str, str | None]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
