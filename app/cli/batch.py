@@ -26,7 +26,7 @@ from app.cli.arguments import (
 from app.cli.batch_rows import Questions, Row, ask, seconds_of
 from app.cli.batch_table import csv_of, write_table
 from app.cli.output import AsJson, Output, print_json, print_parts
-from app.cli.parcels import answers_of, pool_of
+from app.cli.parcels import Pool, answers_of
 from app.cli.steps import showing
 
 _FAILED = 1
@@ -106,16 +106,14 @@ def _rows_of(
         from geodesic_core import compile_kernels
 
         compile_kernels(["exact", "paths"])
-        pool = pool_of(processes)
+        pool = Pool(processes)
     rows: dict[Path, list[Row]] = {}
     start, seconds = perf_counter(), 0.0
     with showing(f"Solving {len(meshes)} meshes") as step:
-        for mesh, answer in answers_of(partial(ask, questions), meshes, processes, pool):
+        for mesh, answer in answers_of(partial(ask, questions), meshes, pool, step.check):
             rows[mesh] = [_died(mesh)] if answer is None else answer
             seconds = perf_counter() - start
             step.progress(len(rows) / len(meshes))
-            if step.cancel():
-                break
     return rows, seconds
 
 

@@ -95,8 +95,7 @@ def _watched(step: Step) -> Callable[[float], None]:
 
     def note(share: float) -> None:
         step.progress(share)
-        if step.cancel():
-            raise KeyboardInterrupt
+        step.check()
 
     return note
 

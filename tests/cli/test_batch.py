@@ -1,8 +1,10 @@
 """The command that asks the same questions of many meshes."""
 
 import csv
+import multiprocessing
 import os
 import signal
+from functools import partial
 from pathlib import Path
 
 import pyarrow.parquet
@@ -115,6 +117,24 @@ def test_a_process_that_dies_costs_its_own_mesh_alone(
     for row in (rows[0], rows[2]):
         field = gc.exact_distance(gc.load_mesh(row["mesh"]), 0)
         assert float(row["farthest"]) == field.distances.max()
+
+
+def interrupting(command: int, _questions: Questions, _file: Path) -> list[Row]:
+    """Have somebody press Ctrl-C while a mesh takes long."""
+    os.kill(command, signal.SIGINT)
+    signal.pause()
+    return []
+
+
+def test_ctrl_c_does_not_wait_for_the_meshes_under_way(
+    run: Run, meshes: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    others = set(multiprocessing.active_children())
+    monkeypatch.setattr(batch, "ask", partial(interrupting, os.getpid()))
+    ran = run("batch", *meshes, "--source", 0, "--processes", 1, "--out", "t.csv")
+    assert (ran.code, ran.err) == (130, "error: interrupted\n")
+    assert not Path("t.csv").exists()
+    assert set(multiprocessing.active_children()) == others
 
 
 def test_small_meshes_are_handed_over_together_and_large_ones_alone(tmp_path: Path) -> None:
