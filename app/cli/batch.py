@@ -74,6 +74,7 @@ def batch(
     questions = Questions(source, target or [], options, merge.value)
     from app.settings import available_cores
 
+    meshes = list(dict.fromkeys(meshes))  # once each, as patterns of a shell may overlap
     count = min(processes or available_cores(), len(meshes))
     rows, seconds = _rows_of(meshes, questions, count)
     ordered = [row for mesh in meshes for row in rows[mesh]]

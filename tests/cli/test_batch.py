@@ -69,6 +69,13 @@ def test_a_mesh_without_a_vertex_in_reach_has_its_row(run: Run, meshes: list[Pat
         assert (row["unreachable"], row["farthest"], row["mean"]) == (row["vertices"], "", "")
 
 
+def test_a_mesh_that_is_named_twice_is_one(run: Run, meshes: list[Path]) -> None:
+    files = [meshes[0], "missing.ply", meshes[0], "missing.ply"]
+    ran = run("batch", *files, "--source", 0, "--out", "t.csv")
+    assert ran.figure("meshes") == "2, 1 of them failed"
+    assert [row["mesh"] for row in rows_of(Path("t.csv"))] == [str(meshes[0]), "missing.ply"]
+
+
 def test_a_mesh_that_fails_does_not_stop_the_others(run: Run, meshes: list[Path]) -> None:
     Path("broken.ply").write_text("ply\nthis is none")
     files = [meshes[0], "broken.ply", "missing.ply", *meshes[1:]]
