@@ -26,7 +26,7 @@ from app.cli.arguments import (
 from app.cli.batch_rows import Questions, Row, ask, seconds_of
 from app.cli.batch_table import csv_of, write_table
 from app.cli.output import AsJson, Output, print_json, print_parts
-from app.cli.parcels import answers_of, pool_of
+from app.cli.parcels import Pool, answers_of
 from app.cli.steps import showing
 
 _FAILED = 1
@@ -63,9 +63,9 @@ def batch(
 ) -> None:
     """Answer the same queries for many meshes; a mesh that fails does not stop the others.
 
-    The table has a row for each mesh and source, with the largest and the mean distance of all
-    vertices. With targets it has a row for each target, with its distance. The exit code is 1 if
-    any mesh failed.
+    The table has a row for each mesh and source, with the largest and the mean distance of the
+    vertices in reach. With targets it has a row for each target, with its distance. The exit code
+    is 1 if any mesh failed.
     """
     output = Output(out, as_json)
     if out is None and not as_json:
@@ -74,6 +74,7 @@ def batch(
     questions = Questions(source, target or [], options, merge.value)
     from app.settings import available_cores
 
+    meshes = list(dict.fromkeys(meshes))  # once each, as patterns of a shell may overlap
     count = min(processes or available_cores(), len(meshes))
     rows, seconds = _rows_of(meshes, questions, count)
     ordered = [row for mesh in meshes for row in rows[mesh]]
@@ -106,16 +107,14 @@ def _rows_of(
         from geodesic_core import compile_kernels
 
         compile_kernels(["exact", "paths"])
-        pool = pool_of(processes)
+        pool = Pool(processes)
     rows: dict[Path, list[Row]] = {}
     start, seconds = perf_counter(), 0.0
     with showing(f"Solving {len(meshes)} meshes") as step:
-        for mesh, answer in answers_of(partial(ask, questions), meshes, processes, pool):
+        for mesh, answer in answers_of(partial(ask, questions), meshes, pool, step.check):
             rows[mesh] = [_died(mesh)] if answer is None else answer
             seconds = perf_counter() - start
             step.progress(len(rows) / len(meshes))
-            if step.cancel():
-                break
     return rows, seconds
 
 

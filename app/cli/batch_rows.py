@@ -28,9 +28,9 @@ class Row:
     distance: float | None = None
     """From source to target, mesh units; None where there is no path"""
     farthest: float | None = None
-    """Largest distance of a vertex from the source, mesh units"""
+    """Largest distance of a vertex from the source, mesh units; None where none was reached"""
     mean: float | None = None
-    """Mean distance of the vertices"""
+    """Mean distance of the vertices that were reached"""
     unreachable: int | None = None
     """Vertices that were not reached"""
     error_bound: str | None = None
@@ -89,9 +89,9 @@ def _rows_from(questions: Questions, source: Point, mesh: "TriangleMesh", read: 
         targets = [resolve_point(mesh, target.point) for target in questions.targets]
         point = resolve_point(mesh, source.point)
         field = solve(mesh, point, targets=targets, retain="distances", **options)
+        answers = _of_targets(questions, targets, field) if targets else [_of_all_vertices(field)]
     except Exception as error:  # noqa: BLE001 - see `ask`
         return [replace(read, error=_reason(error))]
-    answers = _of_targets(questions, targets, field) if targets else [_of_all_vertices(field)]
     found = replace(
         read,
         error_bound=json.dumps(asdict(field.error_bound)),
@@ -115,11 +115,10 @@ def _of_all_vertices(field: "DistanceField") -> dict[str, Any]:
     import numpy as np
 
     reached = field.distances[np.isfinite(field.distances)]
-    return {
-        "farthest": float(reached.max()),
-        "mean": float(reached.mean()),
-        "unreachable": len(field.distances) - len(reached),
-    }
+    unreachable = {"unreachable": len(field.distances) - len(reached)}
+    if not len(reached):
+        return unreachable
+    return unreachable | {"farthest": float(reached.max()), "mean": float(reached.mean())}
 
 
 def _reason(error: Exception) -> str:

@@ -1,7 +1,7 @@
 """Output files: each is written as a whole or not at all."""
 
-from collections.abc import Iterable
-from contextlib import suppress
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,13 +26,21 @@ def encoded(answer: "Answer", name: str) -> Iterable[bytes | memoryview]:
 def write_file(path: Path, parts: Iterable[bytes | memoryview]) -> None:
     """Write the parts of a file, as a whole or not at all."""
     part = path.with_name(f".{path.name}.part")
+    with writing(path):
+        try:
+            with part.open("wb") as file:
+                file.writelines(parts)
+            part.replace(path)
+        except BaseException:
+            with suppress(OSError):
+                part.unlink()
+            raise
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Raise `Failure` where the block cannot write a file."""
     try:
-        with part.open("wb") as file:
-            file.writelines(parts)
-        part.replace(path)
-    except BaseException as error:
-        with suppress(OSError):
-            part.unlink()
-        if isinstance(error, OSError):
-            raise Failure(f"cannot write {path}: {error.strerror}") from error
-        raise
+        yield
+    except OSError as error:
+        raise Failure(f"cannot write {path}: {error.strerror or error}") from error

@@ -40,9 +40,9 @@ class WrittenMatrix(NamedTuple):
 
 
 def print_written(
-    output: Output, wanted: MatrixToWrite, written: WrittenMatrix, read_seconds: float | None = None
+    output: Output, wanted: MatrixToWrite, written: WrittenMatrix, read_seconds: float
 ) -> None:
-    """Print what was written, and how long the mesh took to read if that is given."""
+    """Print what was written, and how long the mesh took to read."""
     if output.as_json:
         facts = {name: fact for name, fact in written._asdict().items() if fact is not None}
         print_json({**facts, "written": str(wanted.out)})
@@ -54,6 +54,5 @@ def print_written(
         output.say(f"continued   {written.continued} of {sweeps} sweeps were done before")
     print_bound(output, written.error_bound)
     output.say(f"sha256      {written.sha256}")
-    if read_seconds is not None:
-        output.say(f"took        {read_seconds:.3f} s to read")
+    output.say(f"took        {read_seconds:.3f} s to read")
     output.say(f"written     {wanted.out}")

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from itertools import chain
+from multiprocessing import active_children
 from multiprocessing.synchronize import Barrier
 from pathlib import Path
 from typing import TypeVar
@@ -18,23 +19,47 @@ for each process of what is left, at least. Handed meshes of 2 ms one by one, pr
 half of the time"""
 _AHEAD = 3
 """Parcels for each process that it is at, or gets next"""
+_LOOK_S = 0.1
+"""Between two looks whether to go on"""
+
+
+class Pool(ProcessPoolExecutor):
+    """Processes that are all there, and have loaded the kernels."""
+
+    def __init__(self, processes: int) -> None:
+        from app.engine import fork_server
+
+        self.size = processes
+        others = set(active_children())
+        all_are_there = fork_server.CONTEXT.Barrier(processes)
+        super().__init__(processes, fork_server.CONTEXT, _begin, (all_are_there,))
+        for begun in [self.submit(_begun) for _ in range(processes)]:  # each starts one process
+            begun.result()
+        self._children = set(active_children()) - others
+
+    def kill(self) -> None:
+        """End all processes at once: nobody waits for their answers."""
+        for child in self._children:
+            child.kill()
 
 
 def answers_of(
-    ask: Callable[[Path], T], meshes: Sequence[Path], processes: int, pool: ProcessPoolExecutor
+    ask: Callable[[Path], T], meshes: Sequence[Path], pool: Pool, check: Callable[[], None]
 ) -> Iterator[tuple[Path, T | None]]:
     """Yield the answer for each mesh, as they come from a pool, which is shut down.
 
     A process that dies takes all that run with it: those are asked again, each by itself. The
-    answer is None for a mesh at which the process dies then, too.
+    answer is None for a mesh at which the process dies then, too. ``check`` is called often, and
+    raises what ends the work at once.
     """
-    left, lost = deque(parcels_of(meshes, processes)), list[Path]()
-    yield from _answers_of_pool(ask, left, lost, processes, pool)
+    size = pool.size
+    left, lost = deque(parcels_of(meshes, size)), list[Path]()
+    yield from _answers_of_pool(ask, left, lost, pool, check)
     while left:
-        yield from _answers_of_pool(ask, left, lost, processes, pool_of(processes))
+        yield from _answers_of_pool(ask, left, lost, Pool(size), check)
     for mesh in lost:
         died: list[Path] = []
-        yield from _answers_of_pool(ask, deque([[mesh]]), died, 1, pool_of(1))
+        yield from _answers_of_pool(ask, deque([[mesh]]), died, Pool(1), check)
         if died:
             yield mesh, None
 
@@ -66,8 +91,8 @@ def _answers_of_pool(
     ask: Callable[[Path], T],
     left: deque[list[Path]],
     lost: list[Path],
-    processes: int,
-    pool: ProcessPoolExecutor,
+    pool: Pool,
+    check: Callable[[], None],
 ) -> Iterator[tuple[Path, T]]:
     """Take parcels that are left, and yield the answers for their meshes.
 
@@ -77,16 +102,18 @@ def _answers_of_pool(
     with pool:
         try:
             while left or waiting:
-                while left and len(waiting) < _AHEAD * processes:
+                check()
+                while left and len(waiting) < _AHEAD * pool.size:
                     future = pool.submit(_ask_each, ask, left[0])
                     waiting[future] = left.popleft()
-                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                for future in wait(waiting, _LOOK_S, FIRST_COMPLETED).done:
                     answers = future.result()
                     yield from zip(waiting.pop(future), answers, strict=True)
         except BrokenProcessPool:
             lost += chain.from_iterable(waiting.values())
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
+        except BaseException:
+            pool.kill()
+            raise
 
 
 def _ask_each(ask: Callable[[Path], T], meshes: Sequence[Path]) -> list[T]:
@@ -94,22 +121,11 @@ def _ask_each(ask: Callable[[Path], T], meshes: Sequence[Path]) -> list[T]:
     return [ask(mesh) for mesh in meshes]
 
 
-def pool_of(processes: int) -> ProcessPoolExecutor:
-    """Return a pool whose processes are all there, and have loaded the kernels."""
-    from app.engine import fork_server
-
-    all_are_there = fork_server.CONTEXT.Barrier(processes)
-    pool = ProcessPoolExecutor(processes, fork_server.CONTEXT, _begin, (all_are_there,))
-    for begun in [pool.submit(_begun) for _ in range(processes)]:  # each starts one process
-        begun.result()
-    return pool
-
-
 def _begin(all_are_there: Barrier) -> None:
     """Load the kernels, unless the fork server has, and wait for the other processes."""
     from geodesic_core import warm_up
 
-    # Ctrl-C is for the command: processes end with the question that they are at.
+    # Ctrl-C is for the command, which ends its processes.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     warm_up(["exact", "paths"])
     all_are_there.wait()

@@ -8,6 +8,7 @@ import typer
 
 from app.cli.points import Point
 from app.cli.steps import Failure
+from app.cli.text_file import lines_of
 
 if TYPE_CHECKING:
     from geodesic_core import SurfacePoint, TriangleMesh
@@ -22,8 +23,12 @@ def points_of(mesh: "TriangleMesh", file: Path) -> "Points":
     from app.queries.points import resolve_point
     from geodesic_core.errors import InvalidPoint
 
+    try:
+        lines = lines_of(file)
+    except typer.BadParameter as error:
+        raise Failure(str(error)) from None
     points: list[SurfacePoint] = []
-    for number, line in enumerate(_lines_of(file), 1):
+    for number, line in enumerate(lines, 1):
         text = line.strip()
         if not text or text.startswith("#"):
             continue
@@ -34,10 +39,3 @@ def points_of(mesh: "TriangleMesh", file: Path) -> "Points":
     if not points:
         raise Failure(f"{file} has no points: write one point per line")
     return points
-
-
-def _lines_of(file: Path) -> list[str]:
-    try:
-        return file.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise Failure(f"cannot read {file}: {getattr(error, 'strerror', None) or error}") from None

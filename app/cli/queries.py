@@ -107,10 +107,11 @@ def distance(
         columns = _array(np.column_stack([distances, found["gradient"]]))
     output.write(answered.answer, in_file=columns)
     reached = np.isfinite(distances)
-    farthest = int(np.argmax(np.where(reached, distances, -1.0)))
     print_size(output, answered.mesh)
     output.say(f"reached     {np.count_nonzero(reached)} of {len(reached)} vertices")
-    output.say(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
+    if reached.any():
+        farthest = int(np.argmax(np.where(reached, distances, -1.0)))
+        output.say(f"farthest    vertex {farthest} at {float(distances[farthest])!r}")
     print_bound(output, found["error_bound"])
     print_end(output, answered)
 

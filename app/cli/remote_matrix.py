@@ -22,15 +22,15 @@ def write_matrix(wanted: MatrixToWrite, service: str) -> WrittenMatrix:
     The same command goes on where it was, both in the computation and in the transfer. Raises
     `Failure` where the service refuses or does not answer.
     """
-    from app.settings import SERVICE_KEY_VARIABLE
-
     try:
         from geodesic_client import Client, GeodesicClientError
     except ModuleNotFoundError:
         raise Failure("--service needs the package geodesic-client: pip install ./client") from None
+    import stamina
 
+    stamina.instrumentation.set_on_retry_hooks(())  # which log each request that is sent again
     try:
-        with Client(service, api_key=os.environ.get(SERVICE_KEY_VARIABLE)) as client:
+        with Client(service, api_key=_api_key()) as client:
             mesh_id, matrix = _computed(client, wanted, service)
             with showing("Receiving the matrix") as step:
                 client.save_matrix(matrix, wanted.out, progress=_watched(step))
@@ -42,6 +42,16 @@ def write_matrix(wanted: MatrixToWrite, service: str) -> WrittenMatrix:
     written = WrittenMatrix(matrix.shape, asdict(matrix.error_bound), checksum)
     _write_facts(wanted, written, service, mesh_id)
     return written
+
+
+def _api_key() -> str | None:
+    """Return the key of the environment, if any, where it can be sent; no message shows it."""
+    from app.settings import SERVICE_KEY_VARIABLE
+
+    key = os.environ.get(SERVICE_KEY_VARIABLE, "").strip()
+    if not (key.isascii() and key.isprintable()):
+        raise Failure(f"{SERVICE_KEY_VARIABLE} is no key: it has characters that no key has")
+    return key or None
 
 
 def _computed(client: "Client", wanted: MatrixToWrite, service: str) -> "tuple[str, StoredMatrix]":
@@ -85,8 +95,7 @@ def _watched(step: Step) -> Callable[[float], None]:
 
     def note(share: float) -> None:
         step.progress(share)
-        if step.cancel():
-            raise KeyboardInterrupt
+        step.check()
 
     return note
 

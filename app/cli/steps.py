@@ -46,6 +46,11 @@ class Step(NamedTuple):
     progress: Callable[[float], None]
     cancel: Callable[[], bool]
 
+    def check(self) -> None:
+        """Raise KeyboardInterrupt after Ctrl-C."""
+        if self.cancel():
+            raise KeyboardInterrupt
+
 
 @contextmanager
 def showing(label: str) -> Iterator[Step]:

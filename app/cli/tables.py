@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
+from urllib.parse import urlsplit
 
 import typer
 
-from app.cli import local_matrix, remote_matrix
+from app.cli import files, local_matrix, remote_matrix
 from app.cli.arguments import (
     AbsoluteError,
     Barriers,
@@ -37,6 +38,24 @@ from app.cli.summary import print_bound, print_end, print_size
 _OF_ANY_SIZE = (".npy", ".zarr", ".npz", ".parquet")
 _BY_SERVICES = (".npy", ".npz")
 _FILE = "POINTS"
+
+
+def _web_address(text: str | None) -> str | None:
+    """Check the address of a service before any work begins."""
+    if text is not None and not _is_web_address(text):
+        raise typer.BadParameter(
+            f"{text!r} is not the address of a service: write it as http://HOST:PORT"
+        )
+    return text
+
+
+def _is_web_address(text: str) -> bool:
+    try:
+        parts = urlsplit(text)
+        return parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.port != 0
+    except ValueError:  # of the port, say
+        return False
+
 
 MatrixOut = Annotated[
     Path | None,
@@ -82,6 +101,7 @@ Service = Annotated[
     str | None,
     typer.Option(
         metavar="URL",
+        callback=_web_address,
         help="Let this service compute the matrix, on all its machines: for points from files, to "
         "a .npy or .npz file. GEODESIC_SERVICE_KEY holds the API key.",
     ),
@@ -113,17 +133,17 @@ def matrix(
     options = accuracy(method, relative_error, absolute_error, effort)
     source, target = source or [], target or []
     named = {"--points": points, "--sources": sources, "--targets": targets}
-    files = {name: file for name, file in named.items() if file is not None}
-    if not files:
+    given = {name: file for name, file in named.items() if file is not None}
+    if not given:
         _check_points(source, target, dtype, threads, service)
         members = options | {"layout": layout.value} | limits(max_distance, barriers)
         _ask_matrix(mesh_file, Output(out, as_json), source, target, layout, members, merge)
         return
-    _check_files(list(files), source, target, layout)
-    out = _checked_file(out, next(iter(files)), service, threads)
+    _check_files(list(given), source, target, layout)
+    out = _checked_file(out, next(iter(given)), service, threads)
     opened, read_seconds = read(mesh_file, merge)
     mesh, output = opened.mesh, Output(None, as_json)
-    starts, *stops = (points_of(mesh, file) for file in files.values())
+    starts, *stops = (points_of(mesh, file) for file in given.values())
     wanted = MatrixToWrite(
         out,
         mesh,
@@ -134,10 +154,12 @@ def matrix(
         () if barriers is None else barriers.of(mesh),
         dtype.value,
     )
-    if service is None:
-        print_written(output, wanted, local_matrix.write_matrix(wanted, threads), read_seconds)
-    else:
-        print_written(output, wanted, remote_matrix.write_matrix(wanted, service))
+    with files.writing(out):
+        if service is None:
+            written = local_matrix.write_matrix(wanted, threads)
+        else:
+            written = remote_matrix.write_matrix(wanted, service)
+    print_written(output, wanted, written, read_seconds)
 
 
 def _check_points(

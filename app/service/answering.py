@@ -118,7 +118,10 @@ class Answering:
         ):
             # In parts a sparse matrix has no limit of cells: it is another answer than in memory.
             name = result_name(query.mesh_id, f"{key}.parts")
-            return name, MatrixInParts(query, question, name, self.engine, self._results).run
+            parts = MatrixInParts(
+                query, size, representation, question.client, name, self.engine, self._results
+            )
+            return name, parts.run
         name = result_name(query.mesh_id, key)
         work, is_small = RunQuery(query, representation, name), query.is_small(size)
         task = Task(work, question.client, query.affinity_keys, is_small, is_promised)

@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 
+from app.encoding import Representation
 from app.engine.interface import Engine, ProgressCallback
 from app.engine.work import ComputePart, JoinParts, Task, TaskResult
 from app.engine.worker import REACHED
-from app.queries import MatrixQuery
-from app.service.question import Question
+from app.queries import MatrixQuery, MeshSize
 from app.store.results import Result, ResultStore
 
 NotePart = Callable[[int, float], None]
@@ -29,8 +29,11 @@ class MatrixInParts:
     """The computation of one matrix."""
 
     query: MatrixQuery
-    question: Question
-    """The query again, with all that decides how it is answered"""
+    size: MeshSize
+    """The size of the mesh"""
+    representation: Representation
+    client: str
+    """The name of the caller, as in a question"""
     result_name: str
     engine: Engine
     results: ResultStore
@@ -42,8 +45,8 @@ class MatrixInParts:
 
         Raises ``ProblemError`` where the store has no room, and as ``Engine.run`` does.
         """
-        query, dtype = self.query, self.question.representation.dtype
-        areas = query.areas_of_parts(self.question.size)
+        query, dtype = self.query, self.representation.dtype
+        areas = query.areas_of_parts(self.size)
         shares = [0.0] * len(areas)
         whole = sum(areas) / (1.0 - _JOINING)
 
@@ -52,7 +55,7 @@ class MatrixInParts:
             done = sum(area * share for area, share in zip(areas, shares, strict=True))
             on_progress(done / whole)
 
-        needed = query.bytes_in_parts(self.question.representation, self.question.size)
+        needed = query.bytes_in_parts(self.representation, self.size)
         with self.results.reserving(needed) as reserve, self._using_parts():
             await self._compute(len(areas), note, reserve)
             found = [self._found[part] for part in range(len(areas))]
@@ -87,7 +90,7 @@ class MatrixInParts:
                 for each in done:
                     found = each.result()
                     size, reached = found.manifest.size, _reached(found)
-                    reserve(self.query.bytes_of_part(self.question.representation, size, reached))
+                    reserve(self.query.bytes_of_part(self.representation, size, reached))
         finally:
             for each in running:
                 each.cancel()
@@ -104,7 +107,7 @@ class MatrixInParts:
         await self.results.index(name)  # another service may have computed it
         result = await self.results.find(name)
         if result is None:
-            work = ComputePart(self.query, self.question.representation.dtype, part, name)
+            work = ComputePart(self.query, self.representation.dtype, part, name)
             done = await self.engine.run(self._task(work), partial(note, part))
             assert done.result is not None, "this kind of work answers"  # noqa: S101
             self._seconds += done.seconds["compute"]
@@ -114,7 +117,7 @@ class MatrixInParts:
         return result
 
     def _task(self, work: ComputePart | JoinParts) -> Task:
-        return Task(work, self.question.client, self.query.affinity_keys, is_promised=True)
+        return Task(work, self.client, self.query.affinity_keys, is_promised=True)
 
 
 def _reached(part: Result) -> int:

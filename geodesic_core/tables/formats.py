@@ -34,6 +34,17 @@ def require(suffix: str) -> None:
             import pyarrow.parquet  # noqa: F401
 
 
+def may_replace(out: Path) -> bool:
+    """Tell whether a table may take a place: not that of a folder, unless it is a Zarr array."""
+    if not out.is_dir():
+        return True
+    try:
+        kind = json.loads((out / "zarr.json").read_bytes())["node_type"]
+    except (OSError, LookupError, TypeError, ValueError):
+        return False
+    return out.suffix.lower() == ".zarr" and kind == "array"
+
+
 def write_table(plan: Plan, blocks: Blocks, dtype: np.dtype[Any], facts: Facts, out: Path) -> None:
     """Write the file of a table whose blocks are all there, as a whole or not at all."""
     suffix = out.suffix.lower()

@@ -31,7 +31,15 @@ from geodesic_core.search.threads import as_threads, share_within_memory
 from geodesic_core.solvers import Effort, error_bound, kernel_digest, row_solver
 from geodesic_core.tables import dense, sparse
 from geodesic_core.tables.blocks import Blocks
-from geodesic_core.tables.formats import DENSE, SPARSE, SUFFIXES, require, sha256_of, write_table
+from geodesic_core.tables.formats import (
+    DENSE,
+    SPARSE,
+    SUFFIXES,
+    may_replace,
+    require,
+    sha256_of,
+    write_table,
+)
 from geodesic_core.validation import as_limit, check_choice
 
 Everywhere = Literal["all"]
@@ -121,8 +129,8 @@ def write_matrix(
     Raises
     ------
     InvalidArgument
-        Also where the suffix is none of these, the folder does not exist, or part of another
-        matrix for this file lies beside it.
+        Also where the suffix is none of these, the folder does not exist, ``out`` is itself a
+        folder other than a Zarr array, or part of another matrix for this file lies beside it.
     InvalidPoint, Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `exact_distance`.
     MissingExtra
@@ -154,6 +162,8 @@ def write_matrix(
     check_choice("the suffix of out", suffix, SUFFIXES)
     if not path.parent.is_dir():
         raise InvalidArgument(f"there is no folder {path.parent}")
+    if not may_replace(path):
+        raise InvalidArgument(f"{path} is a folder that may hold other data: choose another name")
     require(suffix)
     mesh, control = with_barriers(as_mesh(mesh), barriers, control)
     solve = row_solver(mesh, method, relative_error, absolute_error, effort)

@@ -1,8 +1,10 @@
 """The command that asks the same questions of many meshes."""
 
 import csv
+import multiprocessing
 import os
 import signal
+from functools import partial
 from pathlib import Path
 
 import pyarrow.parquet
@@ -59,6 +61,21 @@ def test_a_failure_that_nobody_expects_is_a_row_too(
     assert row.error == "MemoryError: no room"
 
 
+def test_a_mesh_without_a_vertex_in_reach_has_its_row(run: Run, meshes: list[Path]) -> None:
+    inside = ("--source", "f0:0.3,0.3,0.4", "--max-distance", 1e-9)
+    ran = run("batch", *meshes, *inside, "--out", "t.csv")
+    assert (ran.code, ran.err) == (0, "")
+    for row in rows_of(Path("t.csv")):
+        assert (row["unreachable"], row["farthest"], row["mean"]) == (row["vertices"], "", "")
+
+
+def test_a_mesh_that_is_named_twice_is_one(run: Run, meshes: list[Path]) -> None:
+    files = [meshes[0], "missing.ply", meshes[0], "missing.ply"]
+    ran = run("batch", *files, "--source", 0, "--out", "t.csv")
+    assert ran.figure("meshes") == "2, 1 of them failed"
+    assert [row["mesh"] for row in rows_of(Path("t.csv"))] == [str(meshes[0]), "missing.ply"]
+
+
 def test_a_mesh_that_fails_does_not_stop_the_others(run: Run, meshes: list[Path]) -> None:
     Path("broken.ply").write_text("ply\nthis is none")
     files = [meshes[0], "broken.ply", "missing.ply", *meshes[1:]]
@@ -107,6 +124,24 @@ def test_a_process_that_dies_costs_its_own_mesh_alone(
     for row in (rows[0], rows[2]):
         field = gc.exact_distance(gc.load_mesh(row["mesh"]), 0)
         assert float(row["farthest"]) == field.distances.max()
+
+
+def interrupting(command: int, _questions: Questions, _file: Path) -> list[Row]:
+    """Have somebody press Ctrl-C while a mesh takes long."""
+    os.kill(command, signal.SIGINT)
+    signal.pause()
+    return []
+
+
+def test_ctrl_c_does_not_wait_for_the_meshes_under_way(
+    run: Run, meshes: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    others = set(multiprocessing.active_children())
+    monkeypatch.setattr(batch, "ask", partial(interrupting, os.getpid()))
+    ran = run("batch", *meshes, "--source", 0, "--processes", 1, "--out", "t.csv")
+    assert (ran.code, ran.err) == (130, "error: interrupted\n")
+    assert not Path("t.csv").exists()
+    assert set(multiprocessing.active_children()) == others
 
 
 def test_small_meshes_are_handed_over_together_and_large_ones_alone(tmp_path: Path) -> None:

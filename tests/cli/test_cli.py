@@ -157,6 +157,12 @@ def test_distance_stops_at_max_distance(run: Run, plane: Path) -> None:
     assert answer == [d if np.isfinite(d) else None for d in expected.tolist()]
 
 
+def test_no_vertex_is_farthest_where_none_is_reached(run: Run, plane: Path) -> None:
+    ran = run("distance", plane, "--source", "f0:0.3,0.3,0.4", "--max-distance", 1e-9)
+    assert ran.figure("reached") == "0 of 121 vertices"
+    assert "farthest" not in ran.out
+
+
 @pytest.fixture
 def knot(run: Run) -> Path:
     """A curved mesh, on which windows merge."""
@@ -853,6 +859,37 @@ def test_barriers_that_are_no_faces(run: Run, plane: Path) -> None:
         assert ran.code == 1
         assert message in error_line(ran)
     assert list(Path().iterdir()) == [plane]
+
+
+def test_a_run_of_barriers_beyond_the_mesh_is_refused_before_it_is_listed(
+    run: Run, plane: Path
+) -> None:
+    for command in (
+        ("distance", plane, "--source", 0),
+        ("matrix", plane, "--points", "all", "--out", "m.npy"),
+    ):
+        ran = run(*command, "--barriers", "3,0-999999999")
+        assert ran.code == 1
+        message = "error: --barriers: face 200 does not exist; the indices are 0 to 199\n"
+        assert error_line(ran) == message
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("missing", "No such file or directory"),
+        (".", "Is a directory"),
+        ("plane.ply", "it is not text in UTF-8"),
+    ],
+)
+def test_a_file_of_barriers_or_points_that_cannot_be_read(
+    run: Run, plane: Path, name: str, reason: str
+) -> None:
+    ran = run("distance", plane, "--source", 0, "--barriers", f"@{name}")
+    assert ran.code == 2
+    assert f"'--barriers': cannot read {name}: {reason} (" in error_line(ran)
+    ran = run("matrix", plane, "--points", name, "--out", "m.npy")
+    assert (ran.code, error_line(ran)) == (1, f"error: cannot read {name}: {reason}\n")
 
 
 def test_a_file_of_barriers_names_no_file(run: Run, plane: Path) -> None:

@@ -1,18 +1,28 @@
 """Matrices that a service computes for the command line."""
 
 import json
+import socket
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import geodesic_client
 import pytest
+import stamina
 from starlette.testclient import TestClient
 
-from tests.support.commands import Run
+from tests.support.commands import Run, error_line
 
 pytestmark = pytest.mark.service
 
 SERVICE = ["--service", "http://service.test"]
+
+
+@pytest.fixture(autouse=True)
+def retries_logged_as_before() -> Iterator[None]:
+    """The command has the client's retries logged nowhere in its process."""
+    yield
+    stamina.instrumentation.set_on_retry_hooks(None)
 
 
 @pytest.fixture
@@ -91,6 +101,14 @@ def test_json_says_what_was_written(run: Run, plane: Path) -> None:
     assert "matrix      121 by 121" in ran.err
 
 
+@pytest.mark.usefixtures("asked")
+def test_a_file_that_cannot_be_written_is_told(run: Run, plane: Path) -> None:
+    Path("there.npy").mkdir()
+    ran = run("matrix", plane, "--points", "all", "--out", "there.npy", *SERVICE)
+    assert ran.code == 1
+    assert "error: cannot write there.npy: Is a directory" in ran.err
+
+
 def test_a_refusal_is_told(
     run: Run, plane: Path, asked: list[tuple[str, str | None]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -101,6 +119,38 @@ def test_a_refusal_is_told(
     ran = run("matrix", plane, "--points", "all", "--out", "there.npy", *SERVICE)
     assert (ran.code, ran.err) == (1, "error: storage_full: no room\n")
     assert len(asked) == 1
+
+
+@pytest.mark.parametrize(
+    "address", ["foo", "", "ftp://host", "http://", "http://[::1", "http://host:99999"]
+)
+def test_an_address_of_no_service_is_refused(run: Run, plane: Path, address: str) -> None:
+    ran = run("matrix", plane, "--points", "all", "--out", "m.npy", "--service", address)
+    assert ran.code == 2
+    assert f"'--service': {address!r} is not the address of a service" in error_line(ran)
+
+
+@pytest.mark.parametrize("key", ["ключ", "two lines\x07"])
+def test_a_key_that_cannot_be_sent_is_refused_and_not_shown(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch, key: str
+) -> None:
+    monkeypatch.setenv("GEODESIC_SERVICE_KEY", key)
+    ran = run("matrix", plane, "--points", "all", "--out", "m.npy", *SERVICE)
+    assert ran.code == 1
+    assert "GEODESIC_SERVICE_KEY is no key" in error_line(ran)
+    assert key not in ran.err
+
+
+def test_a_service_that_does_not_answer_is_told_in_one_line(
+    run: Run, plane: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("geodesic_client.connection.ATTEMPTS", 2)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    address = f"http://127.0.0.1:{port}"
+    ran = run("matrix", plane, "--points", "all", "--out", "m.npy", "--service", address)
+    assert ran.code == 1
+    assert f"no answer from {address}" in error_line(ran)
 
 
 @pytest.mark.parametrize(

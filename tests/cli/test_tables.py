@@ -1,6 +1,8 @@
 """The command that writes matrices of any size."""
 
+import errno
 import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -136,3 +138,15 @@ def test_a_missing_file_of_points_is_named(run: Run, sphere: Path) -> None:
     ran = run("matrix", sphere, "--points", "missing.txt", "--out", "m.npy")
     assert ran.code == 1
     assert "cannot read missing.txt: No such file" in error_line(ran)
+
+
+def test_a_matrix_that_finds_no_room_is_an_error(
+    run: Run, sphere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_arguments: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", fail)
+    ran = run("matrix", sphere, "--points", "all", "--out", "m.npy")
+    assert ran.code == 1
+    assert error_line(ran) == "error: cannot write m.npy: No space left on device\n"

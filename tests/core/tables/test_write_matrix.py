@@ -317,3 +317,21 @@ def test_the_order_of_sweeps_is_one_and_keeps_those_left_together():
         return sum(np.linalg.norm(placed[k:] - placed[k], axis=1).max() for k in range(200))
 
     assert reach(order) < 0.7 * reach(np.arange(200))
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_folder_of_other_data_is_not_replaced(suffix, tmp_path):
+    mesh = gc.samples.plane(2)
+    out = tmp_path / f"table{suffix}"
+    zarr.create_group(out).create_array("other", shape=(1,), dtype="f8")
+    held = sorted(out.rglob("*"))
+    with pytest.raises(gc.GeodesicError, match="is a folder that may hold other data"):
+        gc.write_matrix(mesh, out, "all")
+    assert sorted(out.rglob("*")) == held
+
+
+def test_an_earlier_zarr_array_is_replaced(tmp_path):
+    mesh, out = gc.samples.plane(2), tmp_path / "table.zarr"
+    gc.write_matrix(mesh, out, "all")
+    gc.write_matrix(mesh, out, [0, 1], [3])
+    assert zarr.open_array(out, mode="r").shape == (2, 1)
