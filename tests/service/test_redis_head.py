@@ -30,7 +30,7 @@ def test_a_head_on_another_machine_knows_the_hosts(
 ) -> None:
     place = f"{redis_server.host}:{redis_server.port}"
     listening = f"the head listens at {HOST}:{cluster.port}; its records stay in the Redis"
-    assert f"{listening} at {place}\n" in cluster.head.said
+    assert f"{listening} at {place} when it stops\n" in cluster.head.said
     node = cluster.add_node()
     wait_until(lambda: hosts(cluster) == 1 and len(node.workers()) == 2)
     workers = node.workers()
