@@ -175,7 +175,7 @@ def test_the_scrub_removes_what_was_left_unfinished_a_day_ago(tmp_path: Path) ->
             being_written = set(tmp_path.glob("results/*/*")) - complete
             left = [tmp_path / name / mesh_id / "tmp12345678" for name in ("results", "fields")]
             for path in left:
-                path.parent.mkdir(exist_ok=True, parents=True)  # a field is written later, if at all
+                path.parent.mkdir(exist_ok=True, parents=True)  # a field is written later
                 path.touch()
                 os.utime(path, (days_ago, days_ago))
             wait_until(lambda: not any(path.exists() for path in left))
