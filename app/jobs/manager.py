@@ -318,15 +318,17 @@ class JobManager:
         if key is None:
             return None
         job = await records.find_by_key(spec.owner, key)
-        if job is not None and job.id in self._live:
-            job = self._live[job.id].job
-        if job is None or job.status in ("failed", "dismissed"):
+        if job is None:
+            return None
+        known = self._live[job.id].job if job.id in self._live else job
+        # The record may be behind what is known here; or ahead, if another replica dismissed it.
+        if {job.status, known.status} & {"failed", "dismissed"}:
             return None
         if job.spec.fingerprint != spec.fingerprint:
             message = f"{key!r} was used for a different query, by job {job.id}"
             fault = Fault("/header/Idempotency-Key", message)
             raise problem("invalid_request", message, errors=(fault,))
-        return job
+        return known
 
     async def _refuse_over_quota(self, records: JobRecords, owner: str | None) -> None:
         if self._quota is None:

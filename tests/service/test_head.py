@@ -9,8 +9,8 @@ from starlette.testclient import TestClient
 from tests.support.processes import stopped
 from tests.support.service import upload_sample
 
-OF_ONE_ANSWER = {"date", "server-timing", "x-request-id"}
-"""Headers that differ from one answer to the next"""
+OF_ONE_ANSWER = {"date", "server-timing", "x-request-id", "transfer-encoding"}
+"""Headers that differ from one answer to the next, or tell how its body travels"""
 
 ASYNC = {"Prefer": "respond-async"}
 PATHS = (

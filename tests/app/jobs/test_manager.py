@@ -326,6 +326,29 @@ def test_the_key_of_a_job_is_free_as_soon_as_the_job_has_failed(database: Databa
     asyncio.run(main())
 
 
+def test_the_key_of_a_job_is_free_as_soon_as_another_replica_has_dismissed_it(
+    database: Database,
+) -> None:
+    spec = SPEC.model_copy(update={"idempotency_key": "a key"})
+
+    async def go_on(*_: Any) -> Any:
+        await asyncio.sleep(LONG_S)
+
+    async def main() -> None:
+        async with opened(database):
+            here, there = (
+                JobManager(JobRepository(database), cast(Any, "not used"), HOUR_S, None)
+                for _ in range(2)
+            )
+            async with here.running(fail):
+                first = await here.submit(spec, QUERY, go_on)
+                assert (await here.submit(spec, QUERY, go_on)).id == first.id
+                await there.dismiss(None, first.id)
+                assert (await here.submit(spec, QUERY, go_on)).id != first.id
+
+    asyncio.run(main())
+
+
 def test_a_record_of_a_newer_release_keeps_no_job_from_expiring(
     database: Database, tmp_path: Path
 ) -> None:
