@@ -181,12 +181,12 @@ def test_progress_never_falls(one: ServiceClient, medium: str) -> None:
 
 
 def test_dismissing_stops_running_work(one: ServiceClient, slow: str) -> None:
-    job = job_of(submit(one, slow))
-    wait_for(one, job, "running")
     workers, cancelled = one.workers(), one.load.cancelled
-
-    response = one.delete(job)
-    wait_until(lambda: one.load.cancelled == cancelled + 1)  # another replica may run it
+    with stopped(workers):  # else it may end before another replica, which runs it, knows
+        job = job_of(submit(one, slow))
+        wait_for(one, job, "running")
+        response = one.delete(job)
+        wait_until(lambda: one.load.cancelled == cancelled + 1)
     one.wait_until_idle()
 
     assert one.workers() == workers, "it was asked to stop, not killed"
