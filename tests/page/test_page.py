@@ -494,6 +494,22 @@ def test_points_can_be_written(view: View, sphere: str) -> None:
     view.page.wait_for_selector("#error-detail:has-text('“nonsense” is not a point')")
 
 
+def test_points_that_are_located_late_do_not_undo_what_was_written_since(
+    view: View, sphere: str
+) -> None:
+    held: list[Route] = []
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.page.route("**/locate", lambda route: route.continue_() if held else held.append(route))
+    view.page.fill("#sources", "v0 p0,0,2")
+    view.page.fill("#target", "v9")
+    view.page.press("#target", "Enter")
+    view.page.wait_for_selector("#readout:visible")
+    with view.page.expect_response("**/locate"):
+        held[0].continue_()
+    view.wait()
+    assert view.page.is_visible("#readout")
+
+
 def test_a_largest_distance(view: View, sphere: str) -> None:
     view.open(f"/?mesh={sphere}&{PLAIN}&max_distance=0.5")
     view.click(0, 0)

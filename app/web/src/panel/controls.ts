@@ -22,6 +22,7 @@ export class Controls {
   private readonly sources = new PointField("sources");
   private readonly target = new PointField("target");
   private readonly waypoints = new PointField("waypoints");
+  private reading = new AbortController();
 
   constructor(
     private readonly store: Store,
@@ -112,12 +113,16 @@ export class Controls {
     const { mesh } = this.store.state;
     if (mesh === null) return;
     const text = (id: string): string => byId(id, HTMLInputElement).value.trim();
-    this.status.run("busy", "Locating points…", new AbortController(), async () => {
+    this.reading.abort(); // what was written before could be located later
+    const reading = new AbortController();
+    this.reading = reading;
+    this.status.run("busy", "Locating points…", reading, async () => {
       const [sources, targets, waypoints] = await Promise.all([
         resolved(mesh, parsePoints(this.sources.text)),
         resolved(mesh, parsePoints(this.target.text)),
         resolved(mesh, parsePoints(this.waypoints.text)),
       ]);
+      reading.signal.throwIfAborted();
       const written = new URLSearchParams({
         barriers: text("barriers"),
         max_distance: text("max-distance"),
