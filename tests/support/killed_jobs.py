@@ -90,10 +90,12 @@ class Store:
         while not any(job.status == "running" for job in read_jobs(self.root / "jobs.sqlite3")):
             await asyncio.sleep(0)
 
-    async def submit(self, service: Service, media_type: str, key: str | None = None) -> str:
+    def question(self, media_type: str) -> Question:
         query = DistancesQuery.ask(self.mesh_id, SIZE, DistancesRequest(sources=[{"vertex": 3}]))
-        question = Question(query, SIZE, Representation(media_type), CONTEXT.caller.name)
-        job = await service.query_jobs.submit(question, CONTEXT, key)
+        return Question(query, SIZE, Representation(media_type), CONTEXT.caller.name)
+
+    async def submit(self, service: Service, media_type: str, key: str | None = None) -> str:
+        job = await service.query_jobs.submit(self.question(media_type), CONTEXT, key)
         return job.id
 
 

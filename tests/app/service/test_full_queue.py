@@ -5,15 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from app.encoding import NPY, Representation
+from app.encoding import NPY
 from app.engine.interface import ProgressCallback
 from app.engine.work import Task, TaskResult
 from app.errors import ProblemError, problem
-from app.queries import DistancesQuery
-from app.schemas.requests import DistancesRequest
-from app.service.question import Question
 from tests.support.direct_engine import DirectEngine
-from tests.support.killed_jobs import CONTEXT, MESH, SIZE, Store, end_of
+from tests.support.killed_jobs import CONTEXT, MESH, Store, end_of
 from tests.support.service import store_mesh
 from tests.support.waiting import LONG_S
 from tests.support.workers import new_worker
@@ -37,8 +34,7 @@ class FullEngine(DirectEngine):
 def test_a_job_is_done_though_the_same_query_of_a_client_is_refused(tmp_path: Path) -> None:
     """The job joined it while it was on its way."""
     store = Store(tmp_path, store_mesh(tmp_path, MESH))
-    query = DistancesQuery.ask(store.mesh_id, SIZE, DistancesRequest(sources=[{"vertex": 3}]))
-    question = Question(query, SIZE, Representation(NPY), CONTEXT.caller.name)
+    question = store.question(NPY)
 
     async def main() -> None:
         async with asyncio.timeout(LONG_S), store.service() as (service, _):

@@ -3,12 +3,9 @@
 import asyncio
 from pathlib import Path
 
-from app.encoding import NPY, Representation
-from app.queries import DistancesQuery
-from app.schemas.requests import DistancesRequest
-from app.service.question import Question
+from app.encoding import NPY
 from tests.support.jobs import SlowSubmissions
-from tests.support.killed_jobs import CONTEXT, MESH, SIZE, Store, end_of
+from tests.support.killed_jobs import CONTEXT, MESH, Store, end_of
 from tests.support.service import store_mesh
 from tests.support.waiting import LONG_S
 
@@ -16,8 +13,7 @@ from tests.support.waiting import LONG_S
 def test_a_query_that_becomes_a_job_while_its_client_hangs_up_is_answered(tmp_path: Path) -> None:
     """The work that was begun for the client has been stopped by then: the job begins anew."""
     store = Store(tmp_path, store_mesh(tmp_path, MESH))
-    query = DistancesQuery.ask(store.mesh_id, SIZE, DistancesRequest(sources=[{"vertex": 3}]))
-    question = Question(query, SIZE, Representation(NPY), CONTEXT.caller.name)
+    question = store.question(NPY)
 
     async def main() -> None:
         async with asyncio.timeout(LONG_S), store.service() as (service, _):
