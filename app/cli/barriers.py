@@ -17,7 +17,7 @@ class BlockedFaces:
     """The faces that an option lists, or those in a label of the surface."""
 
     runs: Sequence[range] = ()
-    """Of faces; not a list of them all, as a run may be longer than any mesh"""
+    """Ranges of faces, not listed one by one: a range may be longer than any mesh"""
     file: Path | None = None
     """Of the label"""
     label: str | None = None
@@ -39,7 +39,7 @@ class BlockedFaces:
         return found
 
     def _listed(self, count: int) -> Sequence[int]:
-        """Return the faces of a mesh of so many faces, each once."""
+        """Return the faces, each once, of a mesh with ``count`` faces."""
         from geodesic_core.errors import InvalidArgument
 
         for run in self.runs:

@@ -19,12 +19,12 @@ for each process of what is left, at least. Handed meshes of 2 ms one by one, pr
 half of the time"""
 _AHEAD = 3
 """Parcels for each process that it is at, or gets next"""
-_LOOK_S = 0.1
-"""Between two looks whether to go on"""
+_CHECK_PERIOD_S = 0.1
+"""Seconds between two checks whether to stop"""
 
 
 class Pool(ProcessPoolExecutor):
-    """Processes that are all there, and have loaded the kernels."""
+    """A pool whose processes have all started, and have loaded the kernels."""
 
     def __init__(self, processes: int) -> None:
         from app.engine import fork_server
@@ -106,7 +106,7 @@ def _answers_of_pool(
                 while left and len(waiting) < _AHEAD * pool.size:
                     future = pool.submit(_ask_each, ask, left[0])
                     waiting[future] = left.popleft()
-                for future in wait(waiting, _LOOK_S, FIRST_COMPLETED).done:
+                for future in wait(waiting, _CHECK_PERIOD_S, FIRST_COMPLETED).done:
                     answers = future.result()
                     yield from zip(waiting.pop(future), answers, strict=True)
         except BrokenProcessPool:

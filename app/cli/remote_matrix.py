@@ -45,12 +45,14 @@ def write_matrix(wanted: MatrixToWrite, service: str) -> WrittenMatrix:
 
 
 def _api_key() -> str | None:
-    """Return the key of the environment, if any, where it can be sent; no message shows it."""
+    """Return the API key from the environment, if any; no message shows it."""
     from app.settings import SERVICE_KEY_VARIABLE
 
     key = os.environ.get(SERVICE_KEY_VARIABLE, "").strip()
     if not (key.isascii() and key.isprintable()):
-        raise Failure(f"{SERVICE_KEY_VARIABLE} is no key: it has characters that no key has")
+        raise Failure(
+            f"{SERVICE_KEY_VARIABLE} is not a valid key: it may contain only printable ASCII"
+        )
     return key or None
 
 

@@ -41,8 +41,8 @@ class JobRecords:
     async def update(self, job: Job, holder: str | None) -> bool:
         """Replace the record of a job that has not finished, and that ``holder`` runs.
 
-        The query of one that has finished is forgotten, once that is recorded. False means that
-        there is no such job any more.
+        Its query is removed once its end is recorded. False means that there is no such job any
+        more.
         """
         changed = await self._statements.run_on_reserve(
             "UPDATE jobs SET record = ? WHERE id = ? AND finished IS NULL "
@@ -133,7 +133,7 @@ class JobRecords:
         ]
 
     async def _forget_query(self, job_id: str) -> None:
-        """Remove the query of a job, unless the job has yet to run: another one may hold it."""
+        """Remove the query of a job, unless the job is unfinished: another replica may run it."""
         await self._statements.run_on_reserve(
             "DELETE FROM queries WHERE job_id = ? "
             "AND job_id NOT IN (SELECT id FROM jobs WHERE finished IS NULL)",

@@ -35,7 +35,7 @@ def require(suffix: str) -> None:
 
 
 def may_replace(out: Path) -> bool:
-    """Tell whether a table may take a place: not that of a folder, unless it is a Zarr array."""
+    """Tell whether a table may replace what is at a path: no folder but a Zarr array."""
     if not out.is_dir():
         return True
     try:

@@ -137,7 +137,7 @@ def test_a_key_that_cannot_be_sent_is_refused_and_not_shown(
     monkeypatch.setenv("GEODESIC_SERVICE_KEY", key)
     ran = run("matrix", plane, "--points", "all", "--out", "m.npy", *SERVICE)
     assert ran.code == 1
-    assert "GEODESIC_SERVICE_KEY is no key" in error_line(ran)
+    assert "GEODESIC_SERVICE_KEY is not a valid key" in error_line(ran)
     assert key not in ran.err
 
 

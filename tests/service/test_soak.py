@@ -14,7 +14,7 @@ from tests.support.processes import Server
 
 FEW_REQUESTS = 200
 MANY_REQUESTS = 60_000
-"""Ten minutes' worth. Not minutes: on a busy machine, caches would still be filling up"""
+"""About ten minutes of traffic. After a fixed time, a busy machine would still fill its caches"""
 MOST_GROWTH = 1.05
 
 OUTCOMES = {

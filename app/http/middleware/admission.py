@@ -15,8 +15,8 @@ from app.state import Allowances
 
 _OPEN = PROBES | {"/", "/docs", "/openapi.json"}
 _OPEN_FOLDERS = ("/problems/", f"{ASSETS}/")
-_OF_EACH_REPLICA = "/metrics"
-"""The path that each replica counts by itself: it is needed while their database is away"""
+_COUNTED_LOCALLY = "/metrics"
+"""Each replica counts requests for it by itself, so that metrics need no database"""
 _BEARER = re.compile(rb"bearer +([A-Za-z0-9._~+/-]+=*)", re.IGNORECASE)
 
 WRONG_KEYS_A_MINUTE = 10
@@ -51,7 +51,7 @@ class AdmissionMiddleware:
             await self.app(scope, receive, send)
             return
         scope["state"]["caller"] = caller = await self._admit(scope)
-        if self.allowances is None or scope["path"] == _OF_EACH_REPLICA:
+        if self.allowances is None or scope["path"] == _COUNTED_LOCALLY:
             with self.rate_limits.counting(caller):
                 await self.app(scope, receive, send)
         else:

@@ -128,7 +128,7 @@ with ray_node._running([], Path(sys.argv[1]), settings, {}) as processes:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems cannot do that")
-def test_what_was_started_of_ray_ends_with_a_command_that_is_killed(tmp_path: Path) -> None:
+def test_processes_of_ray_end_with_a_command_that_is_killed(tmp_path: Path) -> None:
     ray = tmp_path / "ray"
     ray.write_text("#!/bin/sh\necho Ray runtime started\nexec sleep 1000\n")
     ray.chmod(0o755)

@@ -241,8 +241,8 @@ def test_a_job_that_is_removed_twice_leaves_the_answer_to_another_one(
     asyncio.run(main())
 
 
-class LostWord(JobRepository):
-    """Makes the first change, but cannot say so: the connection has ended."""
+class LostConfirmation(JobRepository):
+    """Loses the connection after the first change, before that is confirmed."""
 
     fails = True
 
@@ -254,14 +254,14 @@ class LostWord(JobRepository):
         return is_changed
 
 
-def test_a_job_is_run_by_who_took_it_over_without_a_word_of_that(
+def test_a_job_is_run_although_its_takeover_was_not_confirmed(
     database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.jobs.manager.BEAT_S", 0.01)
 
     async def main() -> None:
         async with asyncio.timeout(LONG_S), opened(database):
-            repository = LostWord(database)
+            repository = LostConfirmation(database)
             replicas = cast(Any, LivingReplica())
             jobs = JobManager(repository, cast(Any, "not used"), HOUR_S, None, replicas)
             async with jobs.running(fail):
