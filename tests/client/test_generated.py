@@ -64,9 +64,11 @@ def generator(tmp_path_factory: pytest.TempPathFactory, testrun_uid: str) -> Pat
     done = ENVIRONMENT / GENERATOR
     with alone("generator", tmp_path_factory, testrun_uid):
         if not done.is_file():
-            subprocess.run([sys.executable, "-m", "venv", "--clear", ENVIRONMENT], check=True)  # noqa: S603
+            venv = ("venv", "--clear", "--without-pip", ENVIRONMENT)
+            pip = ("pip", "--python", programs / "python", "install", "--quiet", "--no-compile")
+            subprocess.run([sys.executable, "-m", *venv], check=True)  # noqa: S603
             installed = subprocess.run(  # noqa: S603
-                [programs / "pip", "install", "--quiet", GENERATOR], check=False
+                [sys.executable, "-m", *pip, GENERATOR], check=False
             )
             if installed.returncode:
                 miss(f"{GENERATOR} could not be installed")

@@ -77,6 +77,7 @@ def test_a_field_is_what_its_arrays_say(sources: str, kind: str, rest: dict[str,
     assert again.nbytes == field.nbytes
 
 
+@pytest.mark.jit
 def test_it_needs_no_sweep_for_what_the_first_one_knew(monkeypatch: pytest.MonkeyPatch) -> None:
     fields = [
         gc.exact_distance(MESH, 3, targets=[POINTS[1]], retain="windows"),

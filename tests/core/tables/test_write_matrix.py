@@ -202,6 +202,7 @@ def test_files_do_not_depend_on_the_number_of_threads(mesh, tmp_path):
     assert len(digests) == 1
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("method", ["exact", "fast"])
 def test_threads_are_as_many_as_memory_allows(mesh, tmp_path, monkeypatch, method):
     counts = []
