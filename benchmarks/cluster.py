@@ -3,12 +3,14 @@
 import json
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import ExitStack
 from itertools import count
+from multiprocessing import get_context
 from statistics import median, quantiles
 from typing import Any
 
+import geodesic_core as gc
 from benchmarks.inputs import Inputs
 from benchmarks.scaling.nodes import Caller, Nodes, cluster, one_machine
 from benchmarks.tables import Section, rated
@@ -24,9 +26,14 @@ MATRIX_FACES = 10_000
 
 
 def run(_inputs: Inputs, _runs: int) -> Section:
-    """Keep one node and two busy with long questions; ask small ones of both engines by turns."""
-    rates, matrices = [], []
+    """Keep one node and two busy with long questions; ask small ones of both engines by turns.
+
+    Processes that share no more than the machine solve the same meanwhile: two of them seldom reach
+    twice the rate of one, as cores share memory, and virtual ones more than that.
+    """
+    rates, matrices, bare = [], [], []
     for nodes in (1, 2):
+        bare.append(_bare_rate(nodes))
         with cluster(nodes) as running:
             rates.append(_long_rate(running, clients=2 * nodes))
             matrices.append(_matrix_s(running))
@@ -36,6 +43,10 @@ def run(_inputs: Inputs, _runs: int) -> Section:
     rows = [
         [f"distances, nodes: {nodes}", f"{rate:.2f}", "", ""]
         for nodes, rate in enumerate(rates, start=1)
+    ]
+    rows += [
+        [f"distances, processes without a service: {number}", f"{rate:.2f}", "", ""]
+        for number, rate in enumerate(bare, start=1)
     ]
     rows += [
         [f"all distances of {MATRIX_FACES:,} faces, nodes: {nodes}", f"1 in {each:.1f} s", "", ""]
@@ -54,12 +65,30 @@ def run(_inputs: Inputs, _runs: int) -> Section:
         f"Head, replica and nodes of one worker each on this machine, which has as many cores as "
         f"there are nodes: exact distances on a sphere of {LONG_FACES:,} faces, asked for "
         f"{SECONDS:g} s by two clients a node. Two nodes answer {ratio} times as many questions as "
-        f"one, and compute a matrix {faster} times as fast. Paths on a sphere of 20,000 faces, one "
-        f"after the other, the same {PATHS} to both engines by turns: by the cluster they take "
-        f"{more} ms more at the median of the differences.",
+        f"one, and compute a matrix {faster} times as fast; two processes without a service solve "
+        f"{bare[1] / bare[0]:.2f} times as much as one, in the same minutes. Paths on a "
+        f"sphere of 20,000 faces, one after the other, the same {PATHS} to both engines by turns: "
+        f"by the cluster they take {more} ms more at the median of the differences.",
         ["questions", "a second", "p50, ms", "p75, ms"],
         rows,
     )
+
+
+def _bare_rate(processes: int) -> float:
+    """Return how many of the long questions processes of their own solve a second."""
+    with ProcessPoolExecutor(processes, get_context("spawn")) as pool:
+        return sum(pool.map(_solve_for, [SECONDS] * processes))
+
+
+def _solve_for(seconds: float) -> float:
+    """Return the solves a second of this process."""
+    solver, solved = gc.Solver(gc.samples.sphere(LONG_FACES)), 0
+    solver.exact_distance(0, targets=[1], retain="distances")
+    begin = time.perf_counter()
+    while (taken := time.perf_counter() - begin) < seconds:
+        solver.exact_distance(0, targets=[1], retain="distances")
+        solved += 1
+    return solved / taken
 
 
 def _long_rate(nodes: Nodes, clients: int) -> float:
