@@ -95,6 +95,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     if not config.option.full:
         _deselect(config, items, FULL_ONLY)
         _deselect_beyond_slices(config, items)
+        if _runs_all(config):
+            _deselect_beyond_suites(config, items)
     if config.option.quick:
         _deselect(config, items, NOT_QUICK)
 
@@ -128,13 +130,35 @@ def _deselect_beyond_slices(config: pytest.Config, items: list[pytest.Item]) -> 
     """Keep a seeded sample of the cases of each test that has a slice."""
     cases: dict[str, list[pytest.Item]] = defaultdict(list)
     for item in items:
-        cases[item.nodeid.partition("[")[0]].append(item)
+        cases[_test_of(item)].append(item)
     beyond: set[pytest.Item] = set()
     for name, each in cases.items():
         size = min(len(each), _size_of_slice(config, each[0]))
         chosen = random.Random(name).sample(range(len(each)), size)
         beyond.update(item for number, item in enumerate(each) if number not in chosen)
     _keep(config, items, lambda item: item not in beyond)
+
+
+def _deselect_beyond_suites(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Keep a seeded sample of the tests of each file that has one."""
+    tests: dict[tuple[Path, int], dict[str, None]] = defaultdict(dict)
+    for item in items:
+        if marker := item.get_closest_marker("suite"):
+            tests[item.path, int(marker.args[0])][_test_of(item)] = None
+    chosen = {
+        name
+        for (path, size), names in tests.items()
+        for name in random.Random(path.name).sample(list(names), size)
+    }
+    _keep(
+        config,
+        items,
+        lambda item: item.get_closest_marker("suite") is None or _test_of(item) in chosen,
+    )
+
+
+def _test_of(item: pytest.Item) -> str:
+    return item.nodeid.partition("[")[0]
 
 
 def _size_of_slice(config: pytest.Config, item: pytest.Item) -> int:

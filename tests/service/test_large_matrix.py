@@ -22,6 +22,8 @@ from tests.support.service import (
 )
 from tests.support.waiting import wait_until
 
+pytestmark = pytest.mark.suite(8)
+
 ASYNC = {"Prefer": "respond-async"}
 ALL = {"sources": "all", "targets": "all"}
 FACES = 1280

@@ -31,6 +31,8 @@ from tests.support.service import (
 )
 from tests.support.waiting import LONG_S, wait_until
 
+pytestmark = pytest.mark.suite(7)
+
 IDENTITY = {"Accept-Encoding": "identity"}
 LONG = {**NPY, **IDENTITY}
 both_providers = pytest.mark.parametrize("provider", ["s3", "gcs"], indirect=True)

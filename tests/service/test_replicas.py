@@ -19,6 +19,8 @@ from tests.support.processes import COMMAND_LINE, Server, stopped
 from tests.support.service import SLOW_FACES, check_problem, upload_sample
 from tests.support.waiting import wait_until
 
+pytestmark = pytest.mark.suite(6)
+
 ASYNC = {"Prefer": "respond-async"}
 
 Pair = tuple[Server, Server]
