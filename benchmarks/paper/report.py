@@ -1,5 +1,6 @@
 """Reports of experiments: a text in Markdown, and a picture beside it."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,6 +39,6 @@ def write_report(report: Report, command: str, folder: Path = RESULTS) -> str:
 
 
 def beside(value: float, published: float | None, digits: int) -> str:
-    """Return a number, and the paper's in parentheses."""
-    ours = f"{value:.{digits}f}"
+    """Return a number, or a dash where there is none, and the paper's in parentheses."""
+    ours = "–" if math.isnan(value) else f"{value:.{digits}f}"
     return ours if published is None else f"{ours} ({published:.{digits}f})"

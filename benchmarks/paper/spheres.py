@@ -77,7 +77,7 @@ def figure_12(found: SphereErrors) -> Report:
             for _, errors, theirs in series:
                 row.append(beside(getattr(errors[level], name), theirs[level][part], 5))
                 rate = rates(errors).get(level)
-                row.append("" if rate is None else f"{rate[part]:.2f}")
+                row.append("" if rate is None else beside(rate[part], None, 2))
         rows.append(row)
     heads = [f"{kind}, {name}" for kind in ("largest", "mean") for name, *_ in series]
     return Report(
@@ -87,7 +87,8 @@ def figure_12(found: SphereErrors) -> Report:
         "that Loop's scheme subdivides and whose vertices are projected at the end; the paper's "
         "numbers in parentheses. Largest errors are absolute, mean ones relative. R is the "
         "convergence rate. The error bound of the approximate solver is found by bisection, so "
-        "that it keeps 1.5 windows per edge on average.",
+        f"that it keeps {SHOWN} windows per edge on average, and may exceed WIDEST_ERROR for that. "
+        "A dash: it keeps more, whatever the bound.",
         ["level", *(each for head in heads for each in (head, "R"))],
         rows,
         _plot(series),
@@ -124,10 +125,7 @@ def table_2(found: SphereErrors) -> Report:
                 theirs = published.RATES[windows].get(level, (None, None))[part]
                 is_exact = found.merged[windows][level] == found.exact[level]
                 ours = by_windows[windows][level][part]
-                if is_exact:
-                    row.append("as exact")
-                else:
-                    row.append("–" if math.isnan(ours) else beside(ours, theirs, 2))
+                row.append("as exact" if is_exact else beside(ours, theirs, 2))
             row.append(beside(exact[level][part], published.EXACT_RATES[level][part], 2))
         rows.append(row)
     heads = [
@@ -140,7 +138,7 @@ def table_2(found: SphereErrors) -> Report:
         "Table 2: convergence rates on a sphere",
         "Convergence rates of the largest absolute and of the mean relative error, from the level "
         "before, by windows per edge; the paper's numbers in parentheses. The spheres are those of "
-        "[Figure 12](figure12.md). A dash: whatever the error, more windows than that are kept.",
+        "[Figure 12](figure12.md), and so are the dashes.",
         ["level", *heads],
         rows,
     )
