@@ -40,7 +40,8 @@ def run(inputs: Inputs, runs: int) -> Report:
         f"and triangulation. Exact and approximate (0.1 % relative) on a prepared mesh; fast "
         f"marching is potpourri3d's, its solver made anew each time. WPE: windows per edge, "
         f"created, and kept by the approximate sweep, which is exact on rough meshes "
-        f"(docs/accuracy.md). Largest errors are shares of the bounding box's diagonal, mean ones of each distance.",
+        f"(docs/accuracy.md). Largest errors are shares of the bounding box's diagonal, mean ones "
+        f"of each distance.",
         [
             "mesh",
             "model",
