@@ -28,8 +28,8 @@ MATRIX_FACES = 10_000
 def run(_inputs: Inputs, _runs: int) -> Section:
     """Keep one node and two busy with long questions; ask small ones of both engines by turns.
 
-    Processes that share no more than the machine solve the same meanwhile: two of them seldom reach
-    twice the rate of one, as cores share memory, and virtual ones more than that.
+    Before each, processes without a service solve the same questions. They show what the machine
+    allows: its cores share memory, so that two processes seldom reach twice the rate of one.
     """
     rates, matrices, bare = [], [], []
     for nodes in (1, 2):

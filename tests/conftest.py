@@ -148,7 +148,7 @@ def _deselect_beyond_suites(config: pytest.Config, items: list[pytest.Item]) -> 
     chosen = {
         name
         for (path, size), names in tests.items()
-        for name in random.Random(path.name).sample(list(names), size)
+        for name in random.Random(path.name).sample(list(names), min(size, len(names)))
     }
     _keep(
         config,
