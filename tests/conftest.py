@@ -78,8 +78,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 
 def pytest_collection_finish() -> None:
-    gc.collect()
-    gc.freeze()
+    gc.freeze()  # tests and imports are for ever: to look through them takes a second
     gc.enable()
 
 
@@ -96,7 +95,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         _deselect(config, items, FULL_ONLY)
         _deselect_beyond_slices(config, items)
         if _runs_all(config):
-            _deselect_beyond_suites(config, items)
+            _deselect_beyond_file_slices(config, items)
     if config.option.quick:
         _deselect(config, items, NOT_QUICK)
 
@@ -139,11 +138,11 @@ def _deselect_beyond_slices(config: pytest.Config, items: list[pytest.Item]) -> 
     _keep(config, items, lambda item: item not in beyond)
 
 
-def _deselect_beyond_suites(config: pytest.Config, items: list[pytest.Item]) -> None:
+def _deselect_beyond_file_slices(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Keep a seeded sample of the tests of each file that has one."""
     tests: dict[tuple[Path, int], dict[str, None]] = defaultdict(dict)
     for item in items:
-        if marker := item.get_closest_marker("suite"):
+        if marker := item.get_closest_marker("file_slice"):
             tests[item.path, int(marker.args[0])][_test_of(item)] = None
     chosen = {
         name
@@ -153,7 +152,7 @@ def _deselect_beyond_suites(config: pytest.Config, items: list[pytest.Item]) -> 
     _keep(
         config,
         items,
-        lambda item: item.get_closest_marker("suite") is None or _test_of(item) in chosen,
+        lambda item: item.get_closest_marker("file_slice") is None or _test_of(item) in chosen,
     )
 
 

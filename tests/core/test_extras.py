@@ -63,6 +63,7 @@ def test_what_is_missing_is_named(name: str, call: str, message: str) -> None:
     assert told == f"{message} {name}\n"
 
 
+@pytest.mark.jit
 def test_all_else_needs_no_extras() -> None:
     assert told_by(WITHOUT + ANSWERED) == "answered\n"
 

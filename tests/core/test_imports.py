@@ -27,5 +27,6 @@ def test_nothing_slow_is_loaded_for_an_exact_answer(work: str) -> None:
     assert loaded_by(work) == set()
 
 
+@pytest.mark.jit
 def test_the_nearest_point_of_a_position_loads_what_finds_it() -> None:
     assert "igl" in loaded_by(MESH + "mesh.locate([0.5, 0.5, 1.0])")

@@ -217,6 +217,7 @@ def test_saddle_excess_divides_saddles_from_flat_vertices(share, is_saddle):
     assert bool(topology.flags[topology.inner_vertex[0]] & SADDLE) == is_saddle
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("share", [0.1, 0.9])
 def test_saddle_excess_bounds_the_error_behind_a_flatter_saddle(share):
     vertices, faces, polar, total = saddle_of(share * SADDLE_EXCESS, splits=2)

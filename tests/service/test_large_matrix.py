@@ -22,7 +22,7 @@ from tests.support.service import (
 )
 from tests.support.waiting import wait_until
 
-pytestmark = pytest.mark.suite(8)
+pytestmark = pytest.mark.file_slice(6)
 
 ASYNC = {"Prefer": "respond-async"}
 ALL = {"sources": "all", "targets": "all"}

@@ -64,6 +64,7 @@ def test_two_points_of_the_plane(seed, start):
     check_crossings(mesh, gc.exact_distance(mesh, sources), [line])
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("seed", range(3))
 def test_three_points_of_the_plane_meet_in_the_centre_of_their_circle(seed):
     mesh, turn = square(seed)
@@ -79,6 +80,7 @@ def test_three_points_of_the_plane_meet_in_the_centre_of_their_circle(seed):
     check_ends(mesh, borders)
 
 
+@pytest.mark.jit
 def test_a_point_and_a_curve():
     """A parabola, and arcs of hyperbolas around the ends of the curve."""
     mesh, turn = square(4)
@@ -137,6 +139,7 @@ def test_what_is_retained_and_the_method_change_no_border(case):
         assert sorted(line.sources for line in found) == sorted(line.sources for line in expected)
 
 
+@pytest.mark.jit
 def test_chord_error_is_how_far_chords_stray():
     mesh = mesh_of(zoo.SMALL["hills"])
     sources = random_points(mesh, 4, seed=53)

@@ -248,6 +248,7 @@ def test_distances_are_least_over_the_points_of_the_curve(case, error):
             assert least * (1 - EXACT) <= path.length <= least * (1 + error) + 1e-14
 
 
+@pytest.mark.jit
 @given(st.sampled_from(KINDS), st.integers(0, 2**31 - 1))
 @example(thin_terrain, 56)  # of two windows that were not told apart one went to one side only
 def test_a_curve_is_as_good_as_its_pieces_cut_and_turned_round(kind, seed):

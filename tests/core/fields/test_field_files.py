@@ -11,7 +11,7 @@ import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidMesh
 from geodesic_core.fields import field_file
 
-MESH = gc.samples.terrain(800)
+MESH = gc.samples.terrain(200)
 INSIDE = gc.SurfacePoint.face(40, (0.2, 0.3, 0.5))
 FIELDS = {
     "exact": lambda: gc.exact_distance(MESH, [3, gc.Source(90, 0.5)], max_distance=6.0),
@@ -52,6 +52,7 @@ def test_any_reader_of_numpy_gets_the_distances(tmp_path: Path) -> None:
         assert file["barriers"].tolist() == list(range(100, 130))
 
 
+@pytest.mark.jit
 def test_a_file_that_is_there_is_replaced_as_a_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,6 +136,7 @@ def test_what_is_no_field_is_refused(file: Path, tmp_path: Path) -> None:
         gc.load_field(file, None)  # type: ignore[arg-type]
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize(
     ("offset", "bits"),
     [(6, 0xFF), (8, 1), (10, 8), (10, 0xFF)],

@@ -63,6 +63,7 @@ def test_points_lie_at_the_level_on_slivers_too(case):
         check_all(mesh, source, field, some_levels(field, 42, 2), crossings=False)
 
 
+@pytest.mark.jit
 @pytest.mark.slice(6)
 @zoo.each(zoo.SMALL)
 def test_levels_of_vertices(case):
@@ -152,6 +153,7 @@ def test_the_farthest_vertex_is_within_its_own_level(share, lines):
     assert len(gc.exact_distance(mesh, 0).isolines([level])[0]) == lines
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("seed", range(3))
 def test_circles_in_the_plane(seed):
     points, faces = zoo.grid(8, 8, seed=seed, jitter=0.2)

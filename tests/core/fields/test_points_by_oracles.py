@@ -92,6 +92,7 @@ def test_convex_planar_domains(name):
     check_table(mesh, points, [closed_forms.plane(places, i) for i in range(len(points))])
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [(1, 1, 1), (2, 4, 3), (1, 2, 6)])
 def test_boxes(size):

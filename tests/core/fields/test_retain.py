@@ -35,6 +35,7 @@ def test_the_default_is_as_documented(solve, default):
     assert getattr(gc.Solver(MESH), solve.__name__)(0).nbytes == solve(MESH, 0).nbytes
 
 
+@pytest.mark.jit
 def test_a_field_of_distances_sweeps_again_for_its_first_path():
     """Under the control of that call; the second path needs no sweep."""
     field = gc.exact_distance(MESH, 0, retain="distances")
@@ -45,6 +46,7 @@ def test_a_field_of_distances_sweeps_again_for_its_first_path():
     assert length == pytest.approx(field.distances[200], rel=1e-12)
 
 
+@pytest.mark.jit
 def test_a_field_of_distances_comes_back_from_its_arrays():
     field = gc.exact_distance(MESH, 0, retain="distances")
     assert "winner" not in field.arrays()

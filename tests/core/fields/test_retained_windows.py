@@ -108,6 +108,7 @@ def test_kept_windows_count_against_the_memory_limit(solve):
     solve(mesh, 0, memory_limit=needed, retain="windows")
 
 
+@pytest.mark.jit
 def test_points_of_an_approximate_field_mean_the_same_whether_it_kept_windows_or_not():
     mesh = gc.samples.knot(500)
     source, *targets = random_points(mesh, 8, seed=25)

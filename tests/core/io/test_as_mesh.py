@@ -148,6 +148,7 @@ def test_a_mesh_that_is_no_surface_is_refused(thing: Any, message: str) -> None:
         gc.as_mesh(thing)
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 def test_no_library_is_imported_to_know_its_meshes() -> None:
     work = (

@@ -62,6 +62,7 @@ def test_mostly_it_is_the_distance_already():
         assert check_shortened(mesh, random_pairs(mesh, 60)) < 2e-3
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("name", ["strip", "flat_grid", "jittered_grid", "comb"])
 def test_straight_where_there_is_one_way_only(name):
     """In a plane without holes, what cannot be shortened is shortest."""

@@ -74,6 +74,7 @@ def test_every_step_on_the_plane(name):
         watch(case, exact_by_euclid, [source], [0.0])
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("aspect", ["1e-03", "1e-04", "1e-05"])
 def test_every_step_on_slivers(aspect):
     points, faces = zoo.grid(6, 6, seed=2, jitter=0.22)
@@ -129,6 +130,7 @@ def state_of(wave):
     ]
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("name", ["sphere", "crags_with_holes", "double_frame"])
 def test_slices_change_nothing(name):
     topology = topology_of(CASES[name])
@@ -138,6 +140,7 @@ def test_slices_change_nothing(name):
         assert state_of(sliced) == state_of(whole)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("name", ["sphere", "crags_with_holes", "torus"])
 def test_growing_changes_nothing(name):
     """From a pool and a scratch of one row each."""

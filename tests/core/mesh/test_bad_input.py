@@ -363,6 +363,7 @@ def test_every_refusal_is_a_geodesic_error():
         assert issubclass(error, gc.errors.GeodesicError)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("exponent", [-300, -150, -100, -80, -60, -40, 40, 60, 80, 100, 150, 300])
 def test_extreme_coordinates_are_right_or_refused(exponent):
     case, scale = zoo.SMALL["crumpled_sphere"], 10.0**exponent

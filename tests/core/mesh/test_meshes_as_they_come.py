@@ -60,6 +60,7 @@ def test_mixed_winding(name, edges):
     assert f"inconsistent; the first joins the vertices {edges[0]}" in mesh.warnings[-1]
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("repeats", [(1, 1, 2), (1, 2, 1), (2, 1, 1), (3, 3, 3)])
 @pytest.mark.parametrize("at", [0, 40, -1])
 def test_a_face_that_repeats_a_vertex(repeats, at):
@@ -81,6 +82,7 @@ def test_a_face_that_repeats_a_vertex(repeats, at):
     assert all(at not in step.faces for step in found.steps)
 
 
+@pytest.mark.jit
 def test_a_face_that_repeats_a_vertex_holds_no_points():
     faces = np.insert(SEAMLESS.faces, 3, (1, 1, 2), axis=0)
     mesh = gc.TriangleMesh(SEAMLESS.vertices, faces)
@@ -338,6 +340,7 @@ WINDING = (
 """Three copies of an edge, and more faces around vertex 2: many wrong ways about it."""
 
 
+@pytest.mark.jit
 def test_a_path_is_found_among_many_faces_that_are_wound_about():
     flat, faces = WINDING
     mesh = gc.TriangleMesh(np.pad(flat, ((0, 0), (0, 1))), faces)
@@ -463,6 +466,7 @@ def test_points_inside_three_sheets_upon_each_other():
                 assert path.length == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.jit
 def test_a_path_that_ends_on_the_edge_of_a_face_of_no_area():
     """Behind an edge of several faces, where the end may lie in another one."""
     vertices = np.array(

@@ -151,6 +151,7 @@ def test_all_spellings_of_a_place_are_one(case):
     assert mesh.inner_face[[p.face_index for p in places(mesh, 9)]].min() >= 0
 
 
+@pytest.mark.jit
 @pytest.mark.slice(10)
 @zoo.each(ALL)
 def test_points_in_needles_are_those_of_the_edge_that_is_left(case):

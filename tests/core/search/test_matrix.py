@@ -174,6 +174,7 @@ def test_what_is_beyond_max_distance_is_infinite_or_left_out():
     np.testing.assert_array_equal(only, np.where(full == 0.0, 0.0, math.inf))
 
 
+@pytest.mark.jit
 def test_pairs_with_a_point_in_common_are_swept(monkeypatch):
     """Whichever side it is on; and the answer is that of searches."""
     mesh = mesh_of(zoo.SMALL["saddle"])
@@ -270,6 +271,7 @@ def test_progress_grows_from_zero_to_one_in_the_callers_thread(mesh, layout):
     assert where == {threading.get_ident()}
 
 
+@pytest.mark.jit
 @pytest.mark.slow
 @LAYOUTS
 @pytest.mark.parametrize(

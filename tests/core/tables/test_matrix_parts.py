@@ -87,6 +87,7 @@ def test_parts_are_the_file_to_the_bit(
     assert reached == finite_in(out) > 0
 
 
+@pytest.mark.jit
 @pytest.mark.usefixtures("small_parts")
 def test_a_sparse_file_is_numpy_s(tmp_path: Path) -> None:
     out = tmp_path / "whole.npz"
