@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from xdist.remote import Producer
+from xdist.scheduler import LoadFileScheduling
 
 import geodesic_core
 
@@ -75,6 +77,18 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     is_controller = not hasattr(session.config, "workerinput")
     if is_controller and not WITHOUT_JIT and _runs_all(session.config):
         geodesic_core.compile_kernels()
+
+
+class OnePageScheduling(LoadFileScheduling):
+    """The tests of a file run in one process, and so do all of the page: they share a browser."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        return "page" if nodeid.startswith("tests/page/") else super()._split_scope(nodeid)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> OnePageScheduling:
+    return OnePageScheduling(config, log)
 
 
 def pytest_collection_finish() -> None:

@@ -30,9 +30,9 @@ def _built(tmp_path_factory: pytest.TempPathFactory, testrun_uid: str) -> None:
         build_page()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser(_built: None) -> Iterator[Browser]:
-    """A browser of the module: its event loop would be in the way of other tests."""
+    """A browser of this folder: its event loop would be in the way of other tests."""
     executable = next(filter(None, map(shutil.which, BROWSERS)), None)
     if executable is None:
         miss(f"install one of these browsers to run this: {', '.join(BROWSERS)}")
@@ -43,7 +43,7 @@ def browser(_built: None) -> Iterator[Browser]:
         browser.close()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def server(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:  # noqa: ARG001
     """A service of its own; only where there is a browser to go there."""
     with closing(Server(tmp_path_factory.mktemp("store"))) as server:
