@@ -84,7 +84,8 @@ def _about_validation() -> str:
         f"and, shuffled among {validation.NEAR} that followed each other, what they took of a "
         "worker and beside it; not how long they waited. For how long a worker is kept beside its "
         "work, to be handed a question and to hand back its answer, is taken from the metrics of "
-        "the service. Medians of the turns; in parentheses what it predicts."
+        "the service. Rates are medians of the turns, latencies those of all turns together; in "
+        "parentheses what it predicts."
     )
 
 

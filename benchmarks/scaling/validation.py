@@ -18,7 +18,7 @@ from benchmarks.scaling.nodes import Exchange, Nodes, cluster, one_machine
 
 NODES = 2
 """Of the cluster"""
-TURNS, TURN_S = 6, 8.0
+TURNS, TURN_S = 8, 8.0
 LOADS = (0.4, 0.6)
 """Questions a second, as shares of what the nodes answer when they are kept busy"""
 CLIENTS = 6
@@ -46,9 +46,12 @@ class Seen:
         return median(self.measured_rates), median(self.predicted_rates)
 
     def percentiles(self, percent: float) -> tuple[float, float]:
-        """Seconds that a share of the questions takes at most, the median of the turns."""
+        """Seconds that a share of the questions takes at most: measured, predicted.
+
+        Of all turns together: in one turn only four questions in 400 are slower than p99.
+        """
         measured, predicted = (
-            median(float(np.percentile(turn, percent)) for turn in turns)
+            float(np.percentile(np.concatenate(turns), percent))
             for turns in (self.measured, self.predicted)
         )
         return measured, predicted
