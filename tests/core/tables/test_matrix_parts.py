@@ -38,7 +38,6 @@ def finite_in(path: Path) -> int:
     return int(np.isfinite(np.load(path)).sum())
 
 
-@pytest.mark.jit
 @pytest.mark.usefixtures("small_parts")
 @pytest.mark.parametrize("ends", ["symmetric", "wide", "tall"])
 @pytest.mark.parametrize("layout", ["dense", "sparse"])
