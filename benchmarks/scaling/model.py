@@ -5,6 +5,7 @@ It is a simulation of events by SimPy. Where a question goes is decided by the s
 those of one caller.
 """
 
+import itertools
 import random
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -188,6 +189,13 @@ class Model:
             for replica in self.replicas:
                 for host in range(shape.hosts):
                     env.process(self._attend(replica, host))
+
+    def meshes_of(self, host: int) -> Iterator[int]:
+        """Yield the meshes whose questions go to a host while that is not busy."""
+        idle = dict.fromkeys(self._names, Occupancy(0, self.shape.workers))
+        for mesh in itertools.count():
+            if choose(str(mesh), idle, is_small=True) == f"host {host}":
+                yield mesh
 
     def answer_all(self, questions: Iterable[Question]) -> Sequence[Answer]:
         """Let questions arrive, in order; return the answers."""

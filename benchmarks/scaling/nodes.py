@@ -56,6 +56,8 @@ class Exchange(NamedTuple):
     queue_s: float
     worker_s: float
     """Of a worker, as the answer states: loading, computing and encoding"""
+    mesh: int
+    """The number of the mesh in `MIX`"""
 
     @property
     def outside_s(self) -> float:
@@ -74,6 +76,8 @@ class Nodes:
     meshes: Sequence[str]
     """Their addresses"""
     shape: Shape
+    hosts: Sequence[int] = ()
+    """Ids of the processes of the nodes of a cluster"""
 
     def spent_s(self) -> float:
         """Return the processor seconds that the process of the API has taken."""
@@ -91,13 +95,30 @@ class Nodes:
     def stored_s(self, count: int = 500) -> float:
         """Ask the same question again and again; return what each takes of the process."""
         client = Caller(self.port)
-        path, body = self._question(random.Random(0))  # noqa: S311 - as below
+        _, path, body = self._question(random.Random(0))  # noqa: S311 - as below
         client.get(path, body)
         before = self.spent_s()
         for _ in range(count):
             client.get(path, body)
         client.close()
         return (self.spent_s() - before) / count
+
+    def homes(self, count: int = 20) -> Sequence[int]:
+        """Return for each mesh the host that its questions go to while that is not busy."""
+        if len(self.hosts) < 2:
+            return [0] * len(self.meshes)
+        client, draw = Caller(self.port), random.Random(1)  # noqa: S311 - as below
+        found = []
+        for mesh in range(len(self.meshes)):
+            before = [_seconds_of(host) for host in self.hosts]
+            for _ in range(count):
+                client.get(*self._question_to(mesh, draw))
+            spent = [
+                _seconds_of(host) - then for host, then in zip(self.hosts, before, strict=True)
+            ]
+            found.append(spent.index(max(spent)))
+        client.close()
+        return found
 
     def load_openly(self, rate: float, seconds: float, seed: int) -> Sequence[Exchange]:
         """Ask at random times, so many a second, whether or not earlier answers are there."""
@@ -130,9 +151,12 @@ class Nodes:
             found = list(pool.map(ask_on, range(clients)))
         return sorted(itertools.chain.from_iterable(found))
 
-    def _question(self, draw: random.Random) -> tuple[str, dict[str, Any]]:
-        """Return the address and the body of a question that was never asked before."""
+    def _question(self, draw: random.Random) -> tuple[int, str, dict[str, Any]]:
+        """Return the mesh, the address and the body of a question that was never asked before."""
         (mesh,) = draw.choices(range(len(MIX)), [share for share, _, _ in MIX])
+        return mesh, *self._question_to(mesh, draw)
+
+    def _question_to(self, mesh: int, draw: random.Random) -> tuple[str, dict[str, Any]]:
         _, kind, faces = MIX[mesh]
         source, target = draw.sample(range(2 * faces // 5), 2)  # there are some more
         if kind == "path":
@@ -146,7 +170,7 @@ class Nodes:
     def _clients(self) -> Iterator[tuple[ThreadPoolExecutor, Callable[..., Exchange]]]:
         kept, made = threading.local(), []
 
-        def ask(begin: float, due: float, path: str, body: dict[str, Any]) -> Exchange:
+        def ask(begin: float, due: float, mesh: int, path: str, body: dict[str, Any]) -> Exchange:
             if not hasattr(kept, "client"):
                 kept.client = Caller(self.port)
                 made.append(kept.client)
@@ -156,7 +180,7 @@ class Nodes:
                 raise RuntimeError(f"{path} answered {response.status}: {answer[:300]!r}")
             phases = phases_of(response)
             queue = phases.pop("queue", 0.0)
-            return Exchange(due, end - due, queue, sum(phases.values()))
+            return Exchange(due, end - due, queue, sum(phases.values()), mesh)
 
         with ThreadPoolExecutor(CLIENTS) as pool:
             yield pool, ask
@@ -190,8 +214,11 @@ def cluster(nodes: int) -> Iterator[Nodes]:
         }
         Path(folder, "store").mkdir()
 
-        def start(*command: str) -> None:
-            """Start a command, and wait until it says that it is ready: a replica would give up."""
+        def start(*command: str) -> int:
+            """Start a command, and wait until it says that it is ready: a replica would give up.
+
+            Returns the id of its process.
+            """
             process = subprocess.Popen(
                 [sys.executable, "-c", SERVE, *command],
                 env=os.environ | settings,
@@ -202,20 +229,27 @@ def cluster(nodes: int) -> Iterator[Nodes]:
             stack.callback(process.terminate)
             if process.stdout is None or not process.stdout.readline():
                 raise RuntimeError(f"{command[0]} ended before it was ready")
+            return process.pid
 
         start("head", "--host", HOST, "--port", port, "--dir", f"{folder}/h")
-        for node in range(nodes):
-            start("node", "--dir", f"{folder}/n{node}")
+        hosts = [start("node", "--dir", f"{folder}/n{node}") for node in range(nodes)]
         served = stack.enter_context(serving_process(**settings, GEODESIC_ENGINE="ray"))
-        yield _ready(f"a replica and nodes of one worker: {nodes}", *served, Shape(nodes, 1))
+        yield _ready(f"a replica and nodes of one worker: {nodes}", *served, Shape(nodes, 1), hosts)
 
 
-def _ready(name: str, port: int, process: int, shape: Shape) -> Nodes:
+def _ready(name: str, port: int, process: int, shape: Shape, hosts: Sequence[int] = ()) -> Nodes:
     client = Caller(port)
     meshes = [client.upload_sample("sphere", faces) for _, _, faces in MIX]
     client.close()
-    nodes = Nodes(name, port, process, meshes, shape)
+    nodes = Nodes(name, port, process, meshes, shape, hosts)
     nodes.keep_busy(
         4 * shape.hosts * shape.workers, 5.0, seed=0
     )  # brings the meshes into each worker
     return nodes
+
+
+def _seconds_of(process: int) -> float:
+    """Return the processor seconds of a process and of all below it."""
+    top = psutil.Process(process)
+    times = [each.cpu_times() for each in (top, *top.children(recursive=True))]
+    return sum(each.user + each.system for each in times)

@@ -82,10 +82,10 @@ def _about_validation() -> str:
         f"not earlier ones are answered. {validation.TURNS} turns of {validation.TURN_S:g} s each, "
         "all nodes by turns, on the same cores. The model gets the times at which questions come, "
         f"and, shuffled among {validation.NEAR} that followed each other, what they took of a "
-        "worker and beside it; not how long they waited. For how long a worker is kept beside its "
-        "work, to be handed a question and to hand back its answer, is taken from the metrics of "
-        "the service. Rates are medians of the turns, latencies those of all turns together; in "
-        "parentheses what it predicts."
+        "worker and beside it, and which node prefers which mesh; not how long they waited. For "
+        "how long a worker is kept beside its work, to be handed a question and to hand back its "
+        "answer, is taken from the metrics of the service. Rates are medians of the turns, "
+        "latencies those of all turns together; in parentheses what it predicts."
     )
 
 

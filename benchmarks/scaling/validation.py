@@ -1,9 +1,10 @@
 """The model held against nodes that run here: it has to predict how many questions, how fast.
 
-It is told when questions come, and what those near them take of a worker and beside it. It is not
-told how long they wait.
+It is told when questions come, what those near them take of a worker and beside it, and which mesh
+is at home at which host. It is not told how long they wait.
 """
 
+import itertools
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -109,7 +110,7 @@ def _load(
     nodes: Nodes, found: Validation, name: str, turn: int, ask: Callable[[], Sequence[Exchange]]
 ) -> Sequence[Exchange]:
     """Load nodes; add what was seen to what is found, and what the model predicts."""
-    before = nodes.occupied_s()
+    homes, before = nodes.homes(), nodes.occupied_s()
     exchanges = sorted(ask())
     if nodes.shape.hosts == 1:  # the metrics of a replica count the way to its hosts as well
         worked_s = sum(each.worker_s for each in exchanges)
@@ -120,7 +121,11 @@ def _load(
     seconds = 0.0
     for run in range(RUNS):
         model = Model(nodes.shape, seed=run)
-        questions = _shuffled(exchanges, found.handing[name], RUNS * turn + run)
+        meshes = [
+            next(itertools.islice(model.meshes_of(home), number, None))
+            for number, home in enumerate(homes)
+        ]
+        questions = _shuffled(exchanges, meshes, found.handing[name], RUNS * turn + run)
         if name == "kept busy":
             model.keep_busy(CLIENTS, questions)
         else:
@@ -135,11 +140,13 @@ def _load(
     return exchanges
 
 
-def _shuffled(exchanges: Sequence[Exchange], handing: float, seed: int) -> Sequence[Question]:
-    """Return questions at the same times, which take what those near them took.
+def _shuffled(
+    exchanges: Sequence[Exchange], meshes: Sequence[int], handing: float, seed: int
+) -> Sequence[Question]:
+    """Return questions at the same times, which are what those near them were.
 
-    To be handed a question, and to hand its answer back, keeps a worker for a share ``handing`` of
-    what is beside its work.
+    ``meshes`` has their meshes in the model. To be handed a question, and to hand its answer back,
+    keeps a worker for a share ``handing`` of what is beside its work.
     """
     moved = np.random.default_rng(seed).uniform(0, NEAR, len(exchanges))
     order = np.argsort(np.arange(len(exchanges)) + moved)
@@ -147,7 +154,7 @@ def _shuffled(exchanges: Sequence[Exchange], handing: float, seed: int) -> Seque
         Question(
             each.at,
             like.worker_s + handing * like.outside_s,
-            mesh=i,
+            mesh=meshes[like.mesh],
             is_small=True,
             outside_s=(1.0 - handing) * like.outside_s,
         )

@@ -48,6 +48,16 @@ def test_small_work_passes_long_work_but_takes_no_more_slots_than_workers() -> N
     np.testing.assert_allclose(ends, [(0.0, 10.0), (0.1, 20.0), (1.0, 2.0), (1.1, 3.0)])
 
 
+@pytest.mark.parametrize("host", [0, 1])
+def test_a_mesh_is_at_home_at_one_host_until_that_is_busy(host: int) -> None:
+    mesh = next(Model(Shape(2, 1)).meshes_of(host))
+    alone, crowded = Model(Shape(2, 1)), Model(Shape(2, 1))
+    alone.answer_all([Question(10.0 * i, 1.0, mesh=mesh) for i in range(3)])
+    assert alone.hosts[host].busy_s == 3.0
+    crowded.answer_all([Question(i / 10, 10.0, mesh=mesh) for i in range(2)])
+    assert crowded.hosts[host].busy_s == crowded.hosts[1 - host].busy_s == 10.0
+
+
 def test_a_mesh_is_pulled_once_by_each_host_that_needs_it() -> None:
     questions = [Question(i / 10, 1.0, mesh=7, pull_s=5.0) for i in range(3)]
     model = Model(Shape(1, 3), has_mesh=lambda _: False)
