@@ -74,7 +74,7 @@ class Validation:
 
     seen: dict[tuple[str, str], Seen] = field(default_factory=lambda: defaultdict(Seen))
     handing: dict[str, float] = field(default_factory=dict)
-    """By load: of what is beside the work, the share that keeps a worker of one service waiting"""
+    """By load: seconds beside the work that a question keeps a worker of one service waiting"""
     replicas: list[ReplicaSeconds] = field(default_factory=list)
     """Of one service, of one with two workers, of a replica of a cluster"""
 
@@ -114,9 +114,8 @@ def _load(
     exchanges = sorted(ask())
     if nodes.shape.hosts == 1:  # the metrics of a replica count the way to its hosts as well
         worked_s = sum(each.worker_s for each in exchanges)
-        outside_s = sum(each.outside_s for each in exchanges)
         handing_s = nodes.occupied_s() - before - worked_s
-        found.handing[name] = min(1.0, max(0.0, handing_s / outside_s))
+        found.handing[name] = max(0.0, handing_s / len(exchanges))
     predicted: list[float] = []
     seconds = 0.0
     for run in range(RUNS):
@@ -141,22 +140,22 @@ def _load(
 
 
 def _shuffled(
-    exchanges: Sequence[Exchange], meshes: Sequence[int], handing: float, seed: int
+    exchanges: Sequence[Exchange], meshes: Sequence[int], handing_s: float, seed: int
 ) -> Sequence[Question]:
     """Return questions at the same times, which are what those near them were.
 
     ``meshes`` has their meshes in the model. To be handed a question, and to hand its answer back,
-    keeps a worker for a share ``handing`` of what is beside its work.
+    keeps a worker for ``handing_s`` beside its work.
     """
     moved = np.random.default_rng(seed).uniform(0, NEAR, len(exchanges))
     order = np.argsort(np.arange(len(exchanges)) + moved)
     return [
         Question(
             each.at,
-            like.worker_s + handing * like.outside_s,
+            like.worker_s + min(handing_s, like.outside_s),
             mesh=meshes[like.mesh],
             is_small=True,
-            outside_s=(1.0 - handing) * like.outside_s,
+            outside_s=max(0.0, like.outside_s - handing_s),
         )
         for each, i in zip(exchanges, order.tolist(), strict=True)
         for like in [exchanges[i]]
