@@ -85,11 +85,12 @@ def validate() -> Validation:
     with ExitStack() as stack:
         all_nodes = (one_machine(1), one_machine(2), cluster(NODES))
         some = [stack.enter_context(each) for each in all_nodes]
+        homes = [nodes.homes() for nodes in some]
         spent = [defaultdict[str, float](float) for _ in some]
         for turn in range(TURNS):
-            for nodes, its in zip(some, spent, strict=True):
+            for nodes, its_homes, its in zip(some, homes, spent, strict=True):
                 before = nodes.spent_s()
-                its["questions"] += _take_turn(nodes, found, turn)
+                its["questions"] += _take_turn(nodes, its_homes, found, turn)
                 its["seconds"] += nodes.spent_s() - before
         for nodes, its in zip(some, spent, strict=True):
             question_s = its["seconds"] / its["questions"]
@@ -97,20 +98,27 @@ def validate() -> Validation:
     return found
 
 
-def _take_turn(nodes: Nodes, found: Validation, turn: int) -> int:
-    busy = _load(nodes, found, "kept busy", turn, lambda: nodes.keep_busy(CLIENTS, TURN_S, turn))
+def _take_turn(nodes: Nodes, homes: Sequence[int], found: Validation, turn: int) -> int:
+    busy = _load(
+        nodes, homes, found, "kept busy", turn, lambda: nodes.keep_busy(CLIENTS, TURN_S, turn)
+    )
     count, rate = len(busy), len(busy) / TURN_S
     for load in LOADS:
         ask = partial(nodes.load_openly, load * rate, TURN_S, turn)
-        count += len(_load(nodes, found, f"{load:.0%}", turn, ask))
+        count += len(_load(nodes, homes, found, f"{load:.0%}", turn, ask))
     return count
 
 
 def _load(
-    nodes: Nodes, found: Validation, name: str, turn: int, ask: Callable[[], Sequence[Exchange]]
+    nodes: Nodes,
+    homes: Sequence[int],
+    found: Validation,
+    name: str,
+    turn: int,
+    ask: Callable[[], Sequence[Exchange]],
 ) -> Sequence[Exchange]:
     """Load nodes; add what was seen to what is found, and what the model predicts."""
-    homes, before = nodes.homes(), nodes.occupied_s()
+    before = nodes.occupied_s()
     exchanges = sorted(ask())
     if nodes.shape.hosts == 1:  # the metrics of a replica count the way to its hosts as well
         worked_s = sum(each.worker_s for each in exchanges)
