@@ -96,6 +96,19 @@ def capture_logging() -> Iterator[list[str]]:
 
 def check_work(data: bytes, kind: str) -> None:
     """Check that memory and calls are bounded by the size of the file."""
+    most_bytes = LEAST_BYTES + BYTES_OF_ONE * len(data)
+    most_calls = LEAST_CALLS + CALLS_OF_BYTE * len(data)
+    # Memory is counted for the whole process, and another test's threads may just allocate.
+    for _ in range(3):
+        peak, calls = work_of(data, kind)
+        if peak <= most_bytes:
+            break
+    assert peak <= most_bytes, f"{peak} bytes of memory"
+    assert calls <= most_calls, f"{calls} calls"
+
+
+def work_of(data: bytes, kind: str) -> tuple[int, int]:
+    """Read a file; return the most bytes allocated at a time, and the calls of functions."""
     calls = 0
 
     def count(_frame: FrameType, event: str, _argument: Any) -> None:
@@ -110,8 +123,7 @@ def check_work(data: bytes, kind: str) -> None:
         sys.setprofile(None)
         _, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
-    assert peak <= LEAST_BYTES + BYTES_OF_ONE * len(data), f"{peak} bytes of memory"
-    assert calls <= LEAST_CALLS + CALLS_OF_BYTE * len(data), f"{calls} calls"
+    return peak, calls
 
 
 def check_mesh(mesh: TriangleMesh) -> None:
