@@ -12,6 +12,8 @@ from pyvista import PolyData, registered_accessors
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 
+pytestmark = pytest.mark.file_slice(6)
+
 MESH = gc.samples.sphere(320)
 FIELD = gc.exact_distance(MESH, [0, 3], max_distance=1.5)
 PATH = gc.shortest_path(MESH, 0, 9)

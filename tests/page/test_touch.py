@@ -6,6 +6,8 @@ import pytest
 
 from tests.support.viewing import PLAIN, View, angle_at, length_of, query_of
 
+pytestmark = pytest.mark.file_slice(4)
+
 
 def test_a_tap(view: View, sphere: str) -> None:
     view.page.set_viewport_size({"width": 390, "height": 780})

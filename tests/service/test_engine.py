@@ -43,6 +43,8 @@ from tests.support.service import (
 from tests.support.waiting import LONG_S, wait_until
 from tests.support.workers import distances_query, run_query, worker_config
 
+pytestmark = pytest.mark.file_slice(14)
+
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServiceClient]:

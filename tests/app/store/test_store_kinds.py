@@ -24,6 +24,8 @@ from app.store.objects import Objects
 from app.store.results import SMALL, Result, write_result
 from tests.support.waiting import LONG_S
 
+pytestmark = pytest.mark.file_slice(8)
+
 MESH = gc.samples.plane(20)
 NOWHERE = "0" * 32
 

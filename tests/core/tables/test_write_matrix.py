@@ -28,6 +28,8 @@ from tests.support.oracles import unfolding
 from tests.support.splitting import split_at
 from tests.support.waiting import wait_until
 
+pytestmark = pytest.mark.file_slice(8)
+
 SUFFIXES = (".npy", ".zarr", ".npz", ".parquet")
 
 
