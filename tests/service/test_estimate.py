@@ -94,7 +94,7 @@ def ids(client: TestClient) -> dict[str, str]:
     return {name: upload_sample(client, name, faces) for name, faces in MESHES.items()}
 
 
-@pytest.mark.slice(9)
+@pytest.mark.slice(5)
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("name", QUERIES)
 def test_bytes_of_the_response(
@@ -161,7 +161,7 @@ def allocated_by(query: Query[Any], opened: OpenMesh) -> int:
         tracemalloc.stop()
 
 
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @pytest.mark.parametrize("mesh", MESHES)
 @pytest.mark.parametrize("name", ALLOCATED)
 def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mesh: str) -> None:
@@ -175,7 +175,7 @@ def test_bytes_of_memory(client: TestClient, ids: dict[str, str], name: str, mes
     assert 1 / 3 <= estimated.memory_bytes / peak <= 3
 
 
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @pytest.mark.parametrize("name", STATEFUL)
 def test_memory_that_suffices(
     client: TestClient, ids: dict[str, str], name: str, monkeypatch: pytest.MonkeyPatch

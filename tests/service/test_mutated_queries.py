@@ -223,7 +223,7 @@ def undisturbed(client: ServiceClient, plane: str, mesh: gc.TriangleMesh) -> Ite
     np.testing.assert_array_equal(np.load(BytesIO(answer)), expected)
 
 
-@pytest.mark.slice(14)
+@pytest.mark.slice(7)
 @pytest.mark.usefixtures("undisturbed")
 @pytest.mark.parametrize(
     ("operation_id", "batch"), [(name, batch) for name in QUERIES for batch in range(BATCHES)]

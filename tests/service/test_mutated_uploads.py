@@ -112,7 +112,7 @@ def ids(client: ServiceClient) -> set[str]:
     return {mesh["id"] for mesh in listed["meshes"]}
 
 
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @pytest.mark.usefixtures("undisturbed")
 @pytest.mark.parametrize("compressed", [False, True])
 @pytest.mark.parametrize(

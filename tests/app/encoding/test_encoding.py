@@ -137,7 +137,7 @@ LARGE = Answer(
 )
 
 
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @pytest.mark.parametrize(
     ("form", "most"),
     [

@@ -439,7 +439,7 @@ def mutated(dice: random.Random) -> bytes:
     return bytes(data)
 
 
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @pytest.mark.parametrize("seed", range(100))
 def test_any_bytes_are_answered_or_refused(listener: Listener, seed: int) -> None:
     dice = random.Random(seed)

@@ -78,7 +78,7 @@ def test_blocked_triangles_of_a_grid(seed):
         np.testing.assert_allclose(found, matrix[source], rtol=EXACT, atol=0)
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @pytest.mark.jit
 @pytest.mark.parametrize("share", [0.05, 0.3])
 @zoo.each(BLOCKABLE)
@@ -93,7 +93,7 @@ def test_distances_are_those_of_the_unfolded_free_faces(case, share):
 
 
 @pytest.mark.jit
-@pytest.mark.slice(8)
+@pytest.mark.slice(4)
 @zoo.each(BLOCKABLE)
 def test_all_is_as_on_a_mesh_of_the_free_faces(case):
     """To the bit, but for the numbers of the faces."""
@@ -134,7 +134,7 @@ def same_path(path: gc.GeodesicPath, other: gc.GeodesicPath, kept: np.ndarray) -
         assert (here.barycentric, here.vertex_index) == (there.barycentric, there.vertex_index)
 
 
-@pytest.mark.slice(8)
+@pytest.mark.slice(4)
 @zoo.each(BLOCKABLE)
 def test_paths_never_cross_a_blocked_face(case):
     mesh, _, kept = pair_of_meshes(case, some_barriers(case, 0.2, seed=3))

@@ -109,7 +109,7 @@ def test_two_curves():
 
 
 @pytest.mark.parametrize("seed", range(2))
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_all_borders_are_found(case, seed):
@@ -120,7 +120,7 @@ def test_all_borders_are_found(case, seed):
     check_all(mesh, sources, field, field.borders())
 
 
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL)
 def test_what_is_retained_and_the_method_change_no_border(case):

@@ -199,7 +199,7 @@ def test_all_of_each_level_is_found(case):
         check_all(mesh, sources, field, some_levels(field, 51, 2))
 
 
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL)
 def test_levels_of_vertices(case):

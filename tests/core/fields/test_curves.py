@@ -210,7 +210,7 @@ def test_distances_on_a_box_are_least_over_the_curve(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @pytest.mark.parametrize("error", [None, 1e-3])
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 @pytest.mark.jit

@@ -56,7 +56,7 @@ def reached_by(field: gc.DistanceField, count: int) -> list[int]:
     return np.random.default_rng(1).permutation(reached)[:count].tolist()
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 @pytest.mark.jit
 def test_never_below_the_oracle_and_paths_are_as_short(case):
@@ -71,7 +71,7 @@ def test_never_below_the_oracle_and_paths_are_as_short(case):
 
 
 @pytest.mark.jit
-@pytest.mark.slice(8)
+@pytest.mark.slice(4)
 @zoo.each(zoo.KNOWN)
 def test_never_below_closed_forms(case):
     """Slivers among them."""

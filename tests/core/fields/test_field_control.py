@@ -116,7 +116,7 @@ def test_cancel_stops_wherever_it_is_asked(mesh, name, call):
     assert flat(CALLS[call](field)) == expected
 
 
-@pytest.mark.slice(15)
+@pytest.mark.slice(8)
 @pytest.mark.parametrize(
     ("watch", "error"),
     [({"deadline_s": 1e-9}, DeadlineExceeded), ({"memory_limit": 1000}, MemoryLimitExceeded)],

@@ -19,7 +19,7 @@ GENERIC = ("hills", "crags", "crags_with_holes", "crumpled_sphere", "crumpled_to
 ONE_SHEET = {name: case for name, case in zoo.IRREGULAR.items() if name != "face_twice"}
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @zoo.each(zoo.SMALL | ONE_SHEET)
 def test_distance_falls_by_as_much_as_one_walks_against_it(case):
     mesh = mesh_of(case)

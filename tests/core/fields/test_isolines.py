@@ -53,7 +53,7 @@ def test_all_of_each_level_is_found(case):
         check_all(mesh, source, field, some_levels(field, 41, 2))
 
 
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_points_lie_at_the_level_on_slivers_too(case):
@@ -64,7 +64,7 @@ def test_points_lie_at_the_level_on_slivers_too(case):
 
 
 @pytest.mark.jit
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @zoo.each(zoo.SMALL)
 def test_levels_of_vertices(case):
     """A level passes through its vertex, or has all around it within."""
@@ -252,7 +252,7 @@ def test_max_distance_and_what_is_kept_change_no_line_within(case):
             assert sorted(line.closed for line in ours) == sorted(line.closed for line in theirs)
 
 
-@pytest.mark.slice(8)
+@pytest.mark.slice(4)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_windows_kept_or_found_again_draw_the_same_lines(case):
@@ -262,7 +262,7 @@ def test_windows_kept_or_found_again_draw_the_same_lines(case):
         check_found_again(mesh, sources, seed=46)
 
 
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL)
 def test_approximate_lines_keep_to_the_error(case):

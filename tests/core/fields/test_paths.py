@@ -28,7 +28,7 @@ def check_paths(mesh, source, exact, error, at_most=10**9):
             check_approximate_path(field, target, exact[target], error)
 
 
-@pytest.mark.slice(8)
+@pytest.mark.slice(4)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 @pytest.mark.jit
 def test_paths_on_small_meshes(case):

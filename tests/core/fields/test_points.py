@@ -45,7 +45,7 @@ ORACLE = zoo.SMALL | {
 }
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @pytest.mark.jit
 @zoo.each(ORACLE)
 def test_distances_are_those_of_a_mesh_with_vertices_there(case):
@@ -65,7 +65,7 @@ def test_distances_are_those_of_a_mesh_with_vertices_there(case):
 
 @pytest.mark.jit
 @pytest.mark.slow
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_all_ways_to_a_distance_agree(case):
     """Swept forth and back, on the way and afterwards, between two points, as a path."""
@@ -92,7 +92,7 @@ def test_all_ways_to_a_distance_agree(case):
             check_path(mesh, path, source, target, distance)
 
 
-@pytest.mark.slice(10)
+@pytest.mark.slice(5)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_approximate_distances_of_points_keep_to_the_bound(case):
     mesh = mesh_of(case)
@@ -327,7 +327,7 @@ def test_edges_and_shares_that_there_are_not(ends, t, message):
         mesh.point_on_edge(*ends, t)
 
 
-@pytest.mark.slice(15)
+@pytest.mark.slice(8)
 @zoo.each(zoo.SMALL)
 @pytest.mark.parametrize("approximate", [False, True])
 @pytest.mark.jit
@@ -374,7 +374,7 @@ def test_points_hard_by_an_irregular_edge_are_found_again(weight):
     check_path(mesh, back.path_to(start), beside, start, distance)
 
 
-@pytest.mark.slice(15)
+@pytest.mark.slice(8)
 @pytest.mark.parametrize(
     "seed", [*range(3), *(pytest.param(i, marks=pytest.mark.full) for i in range(3, 20))]
 )

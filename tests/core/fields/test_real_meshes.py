@@ -106,7 +106,7 @@ def test_paths_are_at_most_longer_by_the_error(name, errors, sources, targets):
     assert longest > ROUNDING or errors == (0,), "else nothing was merged"
 
 
-@pytest.mark.slice(5)
+@pytest.mark.slice(3)
 @exact_or_not
 @pytest.mark.parametrize("name", ["rough_scan", "thin_cad", "blade.ply", "cow.obj", "turbine.ply"])
 def test_distances_are_symmetric(name, error):

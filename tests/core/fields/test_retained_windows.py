@@ -19,7 +19,7 @@ def kept_field(mesh, sources, **options):
     return gc.exact_distance(mesh, sources, retain="windows", **options)
 
 
-@pytest.mark.slice(8)
+@pytest.mark.slice(4)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_windows_find_what_a_sweep_to_the_point_finds(case):
     mesh = mesh_of(case)
@@ -38,7 +38,7 @@ def test_windows_find_what_a_sweep_to_the_point_finds(case):
                 check_path(mesh, kept.path_to(target), source, target, distance)
 
 
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_windows_on_meshes_of_closed_forms(case):

@@ -46,7 +46,7 @@ def check_source(mesh, source, error, exact):
     np.testing.assert_array_equal(field.nearest_source, np.where(np.isfinite(exact), 0, -1))
 
 
-@pytest.mark.slice(10)
+@pytest.mark.slice(5)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_from_every_vertex(case):
     matrix = expected.matrix(case)

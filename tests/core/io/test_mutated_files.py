@@ -163,7 +163,7 @@ def check_same(one: TriangleMesh | InvalidMesh, other: TriangleMesh | InvalidMes
     assert one.warnings == other.warnings
 
 
-@pytest.mark.slice(14)
+@pytest.mark.slice(7)
 @pytest.mark.parametrize(
     ("name", "batch"), [(name, batch) for name in SEEDS for batch in range(BATCHES)]
 )

@@ -74,7 +74,7 @@ def test_a_file_that_was_cut_is_damaged(name: str, tmp_path: Path) -> None:
             gc.load_mesh(path)
 
 
-@pytest.mark.slice(20)
+@pytest.mark.slice(10)
 @pytest.mark.parametrize("seed", range(120))
 @pytest.mark.parametrize("name", FILES)
 def test_a_mutated_file_is_read_or_refused(name: str, seed: int, tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def test_a_path_along_edges_of_the_length_told(case):
         assert sum(pieces) == pytest.approx(length, rel=1e-12, abs=0)
 
 
-@pytest.mark.slice(10)
+@pytest.mark.slice(5)
 @zoo.each(zoo.SMALL)
 def test_no_longer_than_the_shortest_by_the_weight(case):
     for start, end, _, length in edge_paths(mesh_of(case), all_pairs(case)):

@@ -113,7 +113,7 @@ def test_the_steepest_bound_exceeds_any_other_by_the_way_between(case):
             assert least[q] <= (steepest + matrix[v, q]) * (1 + ROUNDING)
 
 
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(MERGING)
 @pytest.mark.parametrize("count", [0, 3])

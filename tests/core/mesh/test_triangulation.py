@@ -57,7 +57,7 @@ def check_cover(points, faces):
     assert areas.sum() == pytest.approx(whole, rel=1e-12)
 
 
-@pytest.mark.slice(15)
+@pytest.mark.slice(8)
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES)
 @pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9, 1e45])
 def test_flat_polygons_are_covered_from_any_corner_and_either_way_round(shape, scale):

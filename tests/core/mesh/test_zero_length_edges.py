@@ -52,7 +52,7 @@ def test_distances_are_those_without_them_to_the_bit(case):
 
 
 @pytest.mark.jit
-@pytest.mark.slice(5)
+@pytest.mark.slice(3)
 @zoo.each(ALL)
 def test_paths_are_those_without_them(case):
     both = Needled(case, seed=2)
@@ -122,7 +122,7 @@ def test_the_report_is_that_without_them_and_names_them(case):
     np.testing.assert_array_equal(mesh.components, both.clean.components[both.copy_of])
 
 
-@pytest.mark.slice(10)
+@pytest.mark.slice(5)
 @zoo.each(ALL)
 def test_all_spellings_of_a_place_are_one(case):
     mesh, copy_of = Needled(case, seed=4).mesh, Needled(case, seed=4).copy_of
@@ -152,7 +152,7 @@ def test_all_spellings_of_a_place_are_one(case):
 
 
 @pytest.mark.jit
-@pytest.mark.slice(10)
+@pytest.mark.slice(5)
 @zoo.each(ALL)
 def test_points_in_needles_are_those_of_the_edge_that_is_left(case):
     both = Needled(case, seed=6)
@@ -184,7 +184,7 @@ def test_landmarks_lie_at_places_that_can_be_reached():
     assert (known.max(axis=0) > 0).all()
 
 
-@pytest.mark.slice(12)
+@pytest.mark.slice(6)
 @zoo.each(zoo.SMALL)
 @pytest.mark.jit
 def test_tables_and_candidates_by_any_copy(case):

@@ -118,7 +118,7 @@ def test_unfolding_says_where_it_does_not_know():
         unfolding.distance_matrix(LINE, sheets)
 
 
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_unfolding_is_a_metric_between_its_bounds(case):
     matrix = unfolding.distance_matrix(case.vertices, case.faces)

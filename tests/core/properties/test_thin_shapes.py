@@ -48,7 +48,7 @@ def check(mesh: gc.TriangleMesh, source: int, error: float) -> tuple[gc.Distance
     return found, exact
 
 
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @pytest.mark.jit
 @pytest.mark.parametrize("error", ERRORS)
 @pytest.mark.parametrize(("level", "factor"), [(3, 10), (3, 70), (3, 1000), (2, 70), (1, 1000)])

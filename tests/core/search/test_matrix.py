@@ -48,7 +48,7 @@ def check_layouts(mesh, sources, targets, expected, rtol, **options):
         np.testing.assert_allclose(pairs, expected.reshape(-1)[some], rtol=rtol, atol=atol)
 
 
-@pytest.mark.slice(5)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL)
 def test_distances_are_those_of_the_oracle(case):
@@ -72,7 +72,7 @@ def test_distances_are_those_of_fields(case):
     check_layouts(mesh, points[:2], points, expected[:2], SAME)
 
 
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)
 def test_distances_are_those_of_closed_forms(case):

@@ -26,7 +26,7 @@ def check_nearest(found, distances, k, rtol=SAME, limit=math.inf):
     np.testing.assert_allclose(found.distances, np.sort(distances)[:count], rtol, 1e-12)
 
 
-@pytest.mark.slice(5)
+@pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.SMALL)
 def test_the_nearest_are_those_of_the_oracle(case):

@@ -16,7 +16,7 @@ NEAR = 1e-9
 """Relative distance from the limit at which the answer is no longer a matter of rounding."""
 
 
-@pytest.mark.slice(8)
+@pytest.mark.slice(4)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_the_limit_divides_paths_as_the_full_sweep_does(case):
     """At the very limit a path is found; beyond it none."""
@@ -33,7 +33,7 @@ def test_the_limit_divides_paths_as_the_full_sweep_does(case):
             assert caught.value.reason == "beyond_max_distance"
 
 
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 @pytest.mark.jit
 def test_all_questions_agree_on_what_is_within_a_limit(case):

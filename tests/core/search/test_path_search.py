@@ -23,7 +23,7 @@ EXACT = 1e-9
 """Relative error allowed against an oracle, as of exact fields."""
 
 
-@pytest.mark.slice(5)
+@pytest.mark.slice(3)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 @pytest.mark.jit
 def test_small_meshes_between_vertices_everywhere(case):
@@ -33,7 +33,7 @@ def test_small_meshes_between_vertices_everywhere(case):
     assert landmark_count(solver) > 0, "else only searches without landmarks were tried"
 
 
-@pytest.mark.slice(6)
+@pytest.mark.slice(3)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 def test_small_meshes_against_unfolding(case):
     solver = solver_of(case)

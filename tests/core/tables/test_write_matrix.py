@@ -60,7 +60,7 @@ def mesh() -> gc.TriangleMesh:
     return gc.samples.sphere(320)
 
 
-@pytest.mark.slice(4)
+@pytest.mark.slice(2)
 @pytest.mark.usefixtures("small_blocks")
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @zoo.each(zoo.SMALL)
