@@ -103,7 +103,7 @@ class Nodes:
         client.close()
         return (self.spent_s() - before) / count
 
-    def homes(self, count: int = 20) -> Sequence[int]:
+    def preferred_hosts(self, count: int = 20) -> Sequence[int]:
         """Return for each mesh the host that its questions go to while that is not busy."""
         if len(self.hosts) < 2:
             return [0] * len(self.meshes)

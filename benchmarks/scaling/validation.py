@@ -1,7 +1,7 @@
 """The model held against nodes that run here: it has to predict how many questions, how fast.
 
-It is told when questions come, what those near them take of a worker and beside it, and which mesh
-is at home at which host. It is not told how long they wait.
+It is told when questions come, what those near them take of a worker and beside it, and which host
+prefers which mesh. It is not told how long they wait.
 """
 
 import itertools
@@ -85,12 +85,12 @@ def validate() -> Validation:
     with ExitStack() as stack:
         all_nodes = (one_machine(1), one_machine(2), cluster(NODES))
         some = [stack.enter_context(each) for each in all_nodes]
-        homes = [nodes.homes() for nodes in some]
+        preferred = [nodes.preferred_hosts() for nodes in some]
         spent = [defaultdict[str, float](float) for _ in some]
         for turn in range(TURNS):
-            for nodes, its_homes, its in zip(some, homes, spent, strict=True):
+            for nodes, its_hosts, its in zip(some, preferred, spent, strict=True):
                 before = nodes.spent_s()
-                its["questions"] += _take_turn(nodes, its_homes, found, turn)
+                its["questions"] += _take_turn(nodes, its_hosts, found, turn)
                 its["seconds"] += nodes.spent_s() - before
         for nodes, its in zip(some, spent, strict=True):
             question_s = its["seconds"] / its["questions"]
@@ -98,20 +98,20 @@ def validate() -> Validation:
     return found
 
 
-def _take_turn(nodes: Nodes, homes: Sequence[int], found: Validation, turn: int) -> int:
+def _take_turn(nodes: Nodes, preferred: Sequence[int], found: Validation, turn: int) -> int:
     busy = _load(
-        nodes, homes, found, "kept busy", turn, lambda: nodes.keep_busy(CLIENTS, TURN_S, turn)
+        nodes, preferred, found, "kept busy", turn, lambda: nodes.keep_busy(CLIENTS, TURN_S, turn)
     )
     count, rate = len(busy), len(busy) / TURN_S
     for load in LOADS:
         ask = partial(nodes.load_openly, load * rate, TURN_S, turn)
-        count += len(_load(nodes, homes, found, f"{load:.0%}", turn, ask))
+        count += len(_load(nodes, preferred, found, f"{load:.0%}", turn, ask))
     return count
 
 
 def _load(
     nodes: Nodes,
-    homes: Sequence[int],
+    preferred: Sequence[int],
     found: Validation,
     name: str,
     turn: int,
@@ -129,8 +129,8 @@ def _load(
     for run in range(RUNS):
         model = Model(nodes.shape, seed=run)
         meshes = [
-            next(itertools.islice(model.meshes_of(home), number, None))
-            for number, home in enumerate(homes)
+            next(itertools.islice(model.meshes_of(host), number, None))
+            for number, host in enumerate(preferred)
         ]
         questions = _shuffled(exchanges, meshes, found.handing[name], RUNS * turn + run)
         if name == "kept busy":
