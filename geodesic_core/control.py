@@ -173,7 +173,7 @@ class Control:
         0.75
         """
         progress = self.progress
-        if progress is None:
+        if progress is None or count == parts:
             return self
         return replace(self, progress=lambda share: progress((part + count * share) / parts))
 

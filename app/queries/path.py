@@ -122,7 +122,7 @@ class PathQuery(Query[PathRequest]):
         if path.steps is not None:
             found["steps"] = path.steps
             values += sum(step.faces.size for step in path.steps)
-        return replace(self._answer(opened, points, found), values=values)
+        return self._answer(opened, points, found, values)
 
     def forecast(self, opened: OpenMesh, points: SurfacePoints) -> Forecast:
         """Return the cost of searches or of a sweep, and a path straight from stop to stop."""
@@ -142,7 +142,9 @@ class PathQuery(Query[PathRequest]):
         seconds = cost.seconds + PER_PATH + PER_POINT * len(points)
         return Forecast(Cost(seconds, cost.memory_bytes), self._answer(opened, points, found))
 
-    def _answer(self, opened: OpenMesh, points: SurfacePoints, found: dict[str, Any]) -> Answer:
+    def _answer(
+        self, opened: OpenMesh, points: SurfacePoints, found: dict[str, Any], values: int = 0
+    ) -> Answer:
         source, target, *waypoints = (describe_point(opened.mesh, point) for point in points)
         members = {
             "kind": self.kind,
@@ -153,7 +155,7 @@ class PathQuery(Query[PathRequest]):
             "waypoints": waypoints,
             "warnings": opened.warnings,
         }
-        return Answer(members | found, ("points",), SHOWN, lines=lambda: [line_of(found)])
+        return Answer(members | found, ("points",), SHOWN, values, lines=lambda: [line_of(found)])
 
 
 # As a GET

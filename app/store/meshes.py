@@ -34,7 +34,7 @@ from app.errors import ProblemError, problem
 from app.store.last_use import note_use, order_of_use
 from app.store.layout import MESHES
 from app.store.manifests import MANIFEST, encode_manifest, manifest_of, read_manifest
-from app.store.verified import FileVersion, checksum_of, has_version, read_checksum, version_of
+from app.store.verified import FileVersion, changed_files, checksum_of, read_checksum, version_of
 from geodesic_core import Solver, TriangleMesh
 
 PUBLIC_ARRAYS = {
@@ -173,17 +173,15 @@ class MeshStore:
 
     def is_current(self, opened: OpenMesh) -> bool:
         """Tell whether the files of an open mesh are still those that were verified."""
-        return all(has_version(path, version) for path, version in opened.files.items())
+        return not changed_files(opened.files)
 
     def verify_mapped(self, opened: OpenMesh) -> None:
         """Raise ``ProblemError`` where a mapped array of an open mesh is damaged by now.
 
         A file that was replaced or removed is still mapped as it was.
         """
-        for path, version in opened.files.items():
-            if has_version(path, version):
-                continue
-            now = version_of(path)
+        for path in changed_files(opened.files):
+            version, now = opened.files[path], version_of(path)
             if now and version and now.inode == version.inode:
                 self._verified(opened.name[0], Path(path).stem)
 

@@ -8,6 +8,7 @@ import errno
 import os
 import time
 import zlib
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -36,17 +37,22 @@ def version_of(path: str) -> FileVersion | None:
     return FileVersion(status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns)
 
 
-def has_version(path: str, version: FileVersion | None) -> bool:
-    """Tell whether a file is still as it was; None for one that was not there.
+def changed_files(versions: Mapping[str, FileVersion | None]) -> list[str]:
+    """Return the paths of the files that no longer have these versions; None for no file.
 
-    Each query asks this twice of every array: `version_of` would take twice as long.
+    Each query asks this twice, of every array: `version_of` would take twice as long.
     """
-    try:
-        status = os.stat(path)  # noqa: PTH116 - as above
-    except FileNotFoundError:
-        return version is None
-    now = status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
-    return now == version
+    changed = []
+    for path, version in versions.items():
+        try:
+            status = os.stat(path)  # noqa: PTH116 - as above
+        except FileNotFoundError:
+            now = None
+        else:
+            now = status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns
+        if now != version:
+            changed.append(path)
+    return changed
 
 
 def checksum_of(path: str) -> int | None:

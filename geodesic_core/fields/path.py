@@ -296,11 +296,10 @@ def located_path(
             points[i] = mesh.position_from_origin(point)
         faces[i], weights[i] = point.face_index, point.barycentric
         vertices[i] = -1 if point.vertex_index is None else point.vertex_index
-    is_new = np.empty(count, np.uint8)
-    locations.flag_new(faces, weights, is_new)
-    where = np.flatnonzero(is_new)
-    between = mesh.topology.outer_face[crossed[::-1][where[1:] - 1]]
-    return Locations(faces[where], weights[where], vertices[where], points[where]), between
+    between = np.empty(count - 1, np.int32)
+    count = locations.drop_repeats(mesh.topology.outer_face, crossed, located, between)
+    located = Locations(faces[:count], weights[:count], vertices[:count], points[:count])
+    return located, between[: count - 1]
 
 
 def rounding_of(mesh: TriangleMesh, distance: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
-from geodesic_core.kernels.sweep.state import NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
+from geodesic_core.kernels.sweep.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.mesh.canonical import half_edges_around
 from geodesic_core.mesh.curve import (
     Curve,
@@ -212,7 +212,9 @@ def nodes_of(
         sources=np.array([node for node, _ in starts], np.int32),
         source_indices=np.array([source for _, source in starts], np.int32),
         targets=np.array(ends, np.int32),
-        sites=Sites(
+        sites=NO_SITES
+        if not faces
+        else Sites(
             nodes=len(sited) + len(segments),
             ints=np.array(rows, np.int32).reshape(-1, SITE),
             weights=np.array(weights).reshape(-1, 3),

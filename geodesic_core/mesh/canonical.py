@@ -29,8 +29,8 @@ def at_vertex(topology: Topology, faces: Ints, vertex: int) -> SurfacePoint:
     corners = topology.corners[topology.first_corner[node] : topology.first_corner[node + 1]]
     if len(corners) == 0:
         return SurfacePoint.vertex(vertex)
-    face = int(topology.outer_face[corners // 3].min())
-    u, v, w = (float(v == node) for v in topology.inner_vertex[faces[face]])
+    face = min(topology.outer_face[corners // 3].tolist())
+    u, v, w = (float(v == node) for v in topology.inner_vertex[faces[face]].tolist())
     return SurfacePoint(face, (u, v, w), vertex)
 
 

@@ -18,7 +18,7 @@ from geodesic_core.kernels.sweep.bounds import (
     merging_bounds,
     pruning_toward,
 )
-from geodesic_core.kernels.sweep.pruning import LEAST, MOST
+from geodesic_core.kernels.sweep.pruning import bound_landmarks
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import LANDMARK_ERROR
 
@@ -44,9 +44,7 @@ class Landmarks:
         """Return the bounds of paths through a point, ``reaches`` away from its ``corners``."""
         least, most = np.zeros(LANDMARKS), np.zeros(LANDMARKS)
         if self.count > 0:
-            known = self.distances[corners, : self.count].astype(np.float64)
-            least[: self.count] = (LEAST * known - reaches[:, None]).max(axis=0)
-            most[: self.count] = (MOST * known + reaches[:, None]).min(axis=0)
+            bound_landmarks(self.distances, self.count, corners, reaches, least, most)
         return pruning_toward(position, limit)._replace(
             landmarks=self.distances, landmark_count=self.count, least=least, most=most
         )

@@ -33,6 +33,8 @@ from geodesic_core.fields.path import (
     GeodesicPath,
     SearchStep,
     StepName,
+    length_of,
+    located_path,
     rounding_of,
     traced_path,
 )
@@ -159,7 +161,7 @@ class PathSearch:
             self._forget()
         if path.length > leg.longest:
             raise leg.beyond()
-        return replace(path, steps=leg.log.steps)
+        return path if leg.log.steps is None else replace(path, steps=leg.log.steps)
 
     def add_landmark_if_due(self, beside: SurfacePoint, control: Control) -> None:
         """Add a landmark in the component of a point, once searches touched as many vertices.
@@ -182,7 +184,7 @@ class PathSearch:
         topology, wave = self.mesh.topology, self._outward
         first, last = leg.start.nearest_corner, leg.end.nearest_corner
         beside = float(leg.start.reaches.min() + leg.end.reaches.min())
-        corner = topology.positions[first].copy(), np.array([first]), np.zeros(1)
+        corner = topology.positions[first].copy(), np.array([first], np.int32), np.zeros(1)
         bounds = exact_bounds(math.inf, self._landmarks.pruning_through(*corner, math.inf))
         edge_dijkstra.search_edges(topology, wave, bounds, last, first)
         self._touched += int(wave.counters[TOUCHED])
@@ -217,8 +219,8 @@ class PathSearch:
             raise leg.missed("by the merging sweep", upper)
         self._touched += int(wave.counters[TOUCHED])
         leg.log.add("approximate", upper, wave)
-        guide = traced_path(self.mesh, winners_of(wave, self._nearest), nodes, node, EXACT)
-        upper = min(upper, guide.length)
+        guide, _ = located_path(self.mesh, winners_of(wave, self._nearest), nodes, node)
+        upper = min(upper, length_of(guide.points))
         leg.log.add("backtrace", upper)
         tighter = leg.loosened(leg.bound(upper))
         return upper, pruning_bounds._replace(

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, next_around
 
@@ -82,13 +82,27 @@ def corner_of(topology: Any, faces: Ints, face: int, v: int) -> int:
 
 
 @kernel
-def flag_new(faces: Ints, weights: Floats, is_new: Flags) -> None:
-    """Fill ``is_new``: whether each location differs from the one before.
+def drop_repeats(outer_face: Ints, crossed: Ints, locations: Any, between: Ints) -> int:
+    """Move the locations that differ from the one before to the front; return how many they are.
 
-    A path through a vertex meets several edges at the same point.
+    A path through a vertex meets several edges at the same point. ``crossed`` holds the inner faces
+    between the N locations, the last first, as `backtracing.trace_path` has them.
+
+    Modifies ``locations``, and ``between`` (N - 1,): the caller's faces between those that are
+    left.
     """
+    faces, weights, vertices, points = locations
+    count = 0
     for i in range(len(faces)):
-        same = i > 0 and faces[i] == faces[i - 1]
+        same = count > 0 and faces[i] == faces[count - 1]
         for k in range(3):
-            same = same and weights[i, k] == weights[i - 1, k]
-        is_new[i] = not same
+            same = same and weights[i, k] == weights[count - 1, k]
+        if same:
+            continue
+        faces[count], vertices[count] = faces[i], vertices[i]
+        for k in range(3):
+            weights[count, k], points[count, k] = weights[i, k], points[i, k]
+        if count > 0:
+            between[count - 1] = outer_face[crossed[len(crossed) - i]]
+        count += 1
+    return count

@@ -10,7 +10,7 @@ all that it finds.
 import math
 from typing import Any
 
-from geodesic_core.arrays import Flags, Floats, Ints
+from geodesic_core.arrays import Flags, Floats, Ints, Singles
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL
 from geodesic_core.kernels.sweep.bounds import LANDMARKS
@@ -114,6 +114,22 @@ def steepest_to_start(wave: Any, v: int, straight: float) -> float:
         if bound > steepest:
             steepest = bound
     return steepest
+
+
+@kernel
+def bound_landmarks(
+    landmarks: Singles, count: int, corners: Ints, reaches: Floats, least: Floats, most: Floats
+) -> None:
+    """Bound the distances of a point from landmarks; it is ``reaches`` away from its ``corners``.
+
+    Modifies ``least`` and ``most``, the first ``count`` of each.
+    """
+    for i in range(count):
+        least[i], most[i] = -math.inf, math.inf
+        for k in range(len(corners)):
+            here = landmarks[corners[k], i]
+            least[i] = max(least[i], LEAST * here - reaches[k])
+            most[i] = min(most[i], MOST * here + reaches[k])
 
 
 @inlined

@@ -5,7 +5,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL
-from geodesic_core.kernels.paths.locations import Locations, flag_new, locate_nodes
+from geodesic_core.kernels.paths.locations import Locations, drop_repeats, locate_nodes
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 
@@ -79,12 +79,19 @@ def test_ends_of_edges_are_vertices(t, at_tail):
     np.testing.assert_array_equal(weights.max(axis=1), 1.0)
 
 
-def test_repeated_locations_are_not_new():
+def test_repeated_locations_are_dropped_with_the_faces_between_them():
     faces = np.array([3, 3, 3, 4, 4, 3, 3], np.int32)
     weights = np.array(
         [(1, 0, 0), (1, 0, 0), (0, 1, 0), (0, 1, 0), (0, 0.5, 0.5), (1, 0, 0), (1, 0, 0)],
         dtype=float,
     )
-    is_new = np.empty(7, np.uint8)
-    flag_new(faces, weights, is_new)
-    assert is_new.tolist() == [1, 0, 1, 1, 1, 1, 0]
+    vertices, points = np.arange(7), np.arange(21.0).reshape(7, 3)
+    located = Locations(faces.copy(), weights.copy(), vertices.copy(), points.copy())
+    crossed = np.array([5, 4, 3, 2, 1, 0], np.int32)  # from the last to the first
+    outer_face, between = np.arange(10, 16, dtype=np.int32), np.empty(6, np.int32)
+    count = drop_repeats(outer_face, crossed, located, between)
+    left = [0, 2, 3, 4, 5]
+    assert count == len(left)
+    for array, before in zip(located, (faces, weights, vertices, points), strict=True):
+        np.testing.assert_array_equal(array[:count], before[left])
+    assert between[: count - 1].tolist() == [11, 12, 13, 14]
