@@ -43,8 +43,7 @@ class Landmarks:
     ) -> PruningBounds:
         """Return the bounds of paths through a point, ``reaches`` away from its ``corners``."""
         least, most = np.zeros(LANDMARKS), np.zeros(LANDMARKS)
-        if self.count > 0:
-            bound_landmarks(self.distances, self.count, corners, reaches, least, most)
+        bound_landmarks(self.distances, self.count, corners, reaches, least, most)
         return pruning_toward(position, limit)._replace(
             landmarks=self.distances, landmark_count=self.count, least=least, most=most
         )

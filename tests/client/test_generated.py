@@ -12,7 +12,7 @@ from tests.support.node import PACKAGES, alone, build_page, miss, node_runner
 from tests.support.paths import ROOT
 from tests.support.processes import Server
 
-pytestmark = [pytest.mark.slow, pytest.mark.file_slice(2)]
+pytestmark = [pytest.mark.slow, pytest.mark.file_slice(1)]
 
 DOCUMENT = ROOT / "openapi" / "openapi.json"
 TYPES = ROOT / "client" / "typescript"

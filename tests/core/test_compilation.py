@@ -14,7 +14,7 @@ from tests.support import each_kind
 from tests.support.paths import ROOT
 from tests.support.waiting import wait_until
 
-pytestmark = [pytest.mark.jit, pytest.mark.slow, pytest.mark.file_slice(6)]
+pytestmark = [pytest.mark.jit, pytest.mark.slow, pytest.mark.file_slice(4)]
 
 
 def run(*arguments: str, **environment: str) -> "subprocess.CompletedProcess[str]":

@@ -12,7 +12,7 @@ from pyvista import PolyData, registered_accessors
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
 
-pytestmark = pytest.mark.file_slice(6)
+pytestmark = pytest.mark.file_slice(4)
 
 MESH = gc.samples.sphere(320)
 FIELD = gc.exact_distance(MESH, [0, 3], max_distance=1.5)
@@ -66,6 +66,7 @@ def test_pictures_are_drawn_without_a_window(thing: Any, tmp_path: Path) -> None
 
 
 @pytest.mark.slow
+@pytest.mark.jit
 def test_a_path_that_lost_its_surface_is_drawn_alone(tmp_path: Path) -> None:
     copy.copy(PATH).plot(tmp_path / "path.png")
     assert colours(tmp_path / "path.png") > 1

@@ -115,6 +115,8 @@ from tests.support.oracles import closed_forms, graph
 from tests.support.searches import edge_paths, goal_at_vertex, random_pairs, spread
 from tests.support.stepping import started, steps, topology_of, view_of_arrays, window
 
+pytestmark = pytest.mark.file_slice(40)
+
 SCALES = pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
 
 

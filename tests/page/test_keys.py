@@ -11,7 +11,7 @@ from tests.page.conftest import sample
 from tests.support.processes import Server
 from tests.support.viewing import PLAIN, View
 
-pytestmark = pytest.mark.file_slice(3)
+pytestmark = pytest.mark.file_slice(2)
 
 KEY = "of-a-page-0123456789"
 BEARER = {"Authorization": f"Bearer {KEY}"}

@@ -20,7 +20,7 @@ from tests.support.processes import Server, slowed
 from tests.support.viewing import PLAIN, View, angle_at, length_of, query_of
 from tests.support.waiting import wait_until
 
-pytestmark = pytest.mark.file_slice(8)
+pytestmark = pytest.mark.file_slice(5)
 
 PATH = np.array([230, 0, 92])
 BARRIER = np.array([30, 33, 40])

@@ -1,8 +1,11 @@
 """The reference of the interface at ``/docs``, in a browser."""
 
+import pytest
 from playwright.sync_api import expect
 
 from tests.support.viewing import View
+
+pytestmark = pytest.mark.file_slice(1)
 
 
 def test_the_reference_shows_every_operation_and_loads_nothing_from_elsewhere(

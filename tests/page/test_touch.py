@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.viewing import PLAIN, View, angle_at, length_of, query_of
 
-pytestmark = pytest.mark.file_slice(4)
+pytestmark = pytest.mark.file_slice(2)
 
 
 def test_a_tap(view: View, sphere: str) -> None:

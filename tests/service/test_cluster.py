@@ -24,7 +24,7 @@ from tests.support.service import check_problem, upload_sample
 from tests.support.waiting import wait_until
 
 pytestmark = [
-    pytest.mark.file_slice(6),
+    pytest.mark.file_slice(4),
     pytest.mark.slow,
     pytest.mark.skipif(find_spec("ray") is None, reason="needs the extra cluster"),
 ]

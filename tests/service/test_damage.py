@@ -21,7 +21,7 @@ from tests.support.faults import FAULTS, MANIFEST_FAULTS, Fault, flip_bytes
 from tests.support.service import check_problem, distances, serving, upload_sample
 from tests.support.waiting import wait_until
 
-pytestmark = pytest.mark.file_slice(4)
+pytestmark = pytest.mark.file_slice(3)
 
 FACES = 200
 NPY = {"Accept": "application/x-npy"}

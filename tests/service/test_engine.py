@@ -43,7 +43,7 @@ from tests.support.service import (
 from tests.support.waiting import LONG_S, wait_until
 from tests.support.workers import distances_query, run_query, worker_config
 
-pytestmark = pytest.mark.file_slice(14)
+pytestmark = pytest.mark.file_slice(10)
 
 
 @pytest.fixture(scope="module")

@@ -63,7 +63,7 @@ def test_the_service_does_what_its_interface_document_says(
     jobs = [submit(server, meshes[0], vertex) for vertex in (0, 1)]
     names = {"MESH_ID": meshes[0], "DOOMED_MESH_ID": meshes[1]}
     names |= {"JOB_ID": jobs[0], "DOOMED_JOB_ID": jobs[1]}
-    slice_only = ("--phases", "examples,fuzzing", "--max-examples", "3", "--no-shrink")
+    slice_only = ("--phases", "examples,fuzzing", "--max-examples", "2", "--no-shrink")
     options = ("--max-examples", "100") if pytestconfig.option.full else slice_only
 
     report = make_up_requests(names, server.url, tmp_path, *options)

@@ -22,7 +22,7 @@ from tests.support.service import (
 )
 from tests.support.waiting import wait_until
 
-pytestmark = pytest.mark.file_slice(4)
+pytestmark = pytest.mark.file_slice(2)
 
 ASYNC = {"Prefer": "respond-async"}
 ALL = {"sources": "all", "targets": "all"}

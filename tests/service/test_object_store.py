@@ -31,7 +31,7 @@ from tests.support.service import (
 )
 from tests.support.waiting import LONG_S, wait_until
 
-pytestmark = pytest.mark.file_slice(5)
+pytestmark = pytest.mark.file_slice(3)
 
 IDENTITY = {"Accept-Encoding": "identity"}
 LONG = {**NPY, **IDENTITY}

@@ -33,7 +33,7 @@ from tests.support.processes import (
 from tests.support.service import SLOW_FACES, upload_sample
 from tests.support.waiting import LONG_S, wait_until
 
-pytestmark = pytest.mark.file_slice(6)
+pytestmark = pytest.mark.file_slice(4)
 
 PATIENT = {"GEODESIC_DRAIN_S": str(10 * LONG_S), "GEODESIC_CANCEL_GRACE_S": str(10 * LONG_S)}
 """What runs at the end, and what is to stop, has longer than any test waits."""

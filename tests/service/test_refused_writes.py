@@ -8,11 +8,15 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from app.jobs import read_jobs
 from tests.support.disks import run_on_own_disk
 from tests.support.processes import Server, stopped
 from tests.support.service import check_problem, upload_sample
 from tests.support.waiting import LONG_S, wait_until
+
+pytestmark = pytest.mark.file_slice(1)
 
 ASYNC = {"Prefer": "respond-async"}
 

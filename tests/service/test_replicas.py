@@ -19,7 +19,7 @@ from tests.support.processes import COMMAND_LINE, Server, stopped
 from tests.support.service import SLOW_FACES, check_problem, upload_sample
 from tests.support.waiting import wait_until
 
-pytestmark = pytest.mark.file_slice(5)
+pytestmark = pytest.mark.file_slice(3)
 
 ASYNC = {"Prefer": "respond-async"}
 

@@ -18,7 +18,7 @@ from tests.support.processes import Server, total_time
 from tests.support.service import SLOW_FACES, distances, upload_sample
 from tests.support.waiting import wait_until
 
-pytestmark = pytest.mark.file_slice(5)
+pytestmark = pytest.mark.file_slice(4)
 
 DISTANCES = "POST /v1/meshes/{mesh_id}/distances"
 KEY = "alice/0123456789+abcdef"

@@ -12,6 +12,8 @@ from tests.support.fresh import told_by
 from tests.support.paths import ROOT
 from tests.support.syntax import syntax_tree
 
+pytestmark = [pytest.mark.slow, pytest.mark.file_slice(2)]
+
 WORK = [ROOT / "geodesic_core", ROOT / "app/encoding", ROOT / "app/queries"]
 NOT_FOR_WORKERS = {"nibabel", "meshio", "zarr", "pyarrow", "pyvista", "PIL", "trimesh"}
 """Packages for formats and pictures that the service does not offer"""
@@ -25,7 +27,6 @@ def late_imports(path: Path) -> set[str]:
     return plain | {node.module or "" for node in inner if isinstance(node, ast.ImportFrom)}
 
 
-@pytest.mark.slow
 def test_workers_find_loaded_what_is_imported_late() -> None:
     wanted = {name for room in WORK for path in room.rglob("*.py") for name in late_imports(path)}
     wanted = {name for name in wanted if name.partition(".")[0] not in NOT_FOR_WORKERS}
@@ -46,13 +47,11 @@ print(len(loaded))
 """
 
 
-@pytest.mark.slow
 def test_workers_find_their_first_kernels_loaded() -> None:
     gc.compile_kernels(FIRST_KERNELS)
     assert told_by(COUNT_LOADED) == "True\n0\n"
 
 
-@pytest.mark.slow
 def test_workers_leave_alone_what_they_share() -> None:
     """A collector that looked at it would write to each of its pages, and so copy them."""
     told = told_by(

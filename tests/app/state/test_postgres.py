@@ -23,7 +23,7 @@ import psycopg
 
 from app.state.postgres import PostgresDatabase
 
-pytestmark = [pytest.mark.service, pytest.mark.file_slice(6)]
+pytestmark = [pytest.mark.service, pytest.mark.file_slice(4)]
 
 
 def refusal(url: str) -> str:

@@ -24,7 +24,7 @@ from app.store.objects import Objects
 from app.store.results import SMALL, Result, write_result
 from tests.support.waiting import LONG_S
 
-pytestmark = pytest.mark.file_slice(8)
+pytestmark = pytest.mark.file_slice(5)
 
 MESH = gc.samples.plane(20)
 NOWHERE = "0" * 32

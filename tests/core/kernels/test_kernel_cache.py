@@ -17,7 +17,7 @@ from geodesic_core.kernels.jit.cache import sources_digest
 from tests.support.paths import ROOT
 from tests.support.waiting import wait_until
 
-pytestmark = pytest.mark.file_slice(8)
+pytestmark = pytest.mark.file_slice(5)
 
 KERNELS = Path(jit.__file__).parents[1]
 

@@ -71,6 +71,7 @@ def test_a_call_that_waits_can_be_stopped(solver, working, waiting):
 
 
 @pytest.mark.parametrize("call", CALLS.values(), ids=CALLS)
+@pytest.mark.jit
 def test_a_callback_cannot_call_the_solver_that_calls_it(solver, call):
     with pytest.raises(gc.errors.InvalidArgument, match="use another Solver"):
         call(solver, progress=lambda _: solver.shortest_path(1, 2))
@@ -82,6 +83,7 @@ def pickled(solver: gc.Solver) -> Any:
 
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, pickled])
+@pytest.mark.jit
 def test_a_copy_has_memory_of_its_own(solver, copied):
     length = solver.shortest_path(0, 80).length
     other = copied(solver)

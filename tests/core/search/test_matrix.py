@@ -256,6 +256,7 @@ def points_of(mesh, layout):
 
 
 @LAYOUTS
+@pytest.mark.jit
 def test_progress_grows_from_zero_to_one_in_the_callers_thread(mesh, layout):
     seen, where = [], set()
 

@@ -28,7 +28,7 @@ from tests.support.oracles import unfolding
 from tests.support.splitting import split_at
 from tests.support.waiting import wait_until
 
-pytestmark = pytest.mark.file_slice(8)
+pytestmark = pytest.mark.file_slice(5)
 
 SUFFIXES = (".npy", ".zarr", ".npz", ".parquet")
 
@@ -111,6 +111,7 @@ def test_each_row_is_that_of_a_field(mesh, suffix, options, tmp_path):
     assert written.error_bound == fields[0].error_bound
 
 
+@pytest.mark.jit
 @pytest.mark.usefixtures("small_blocks")
 def test_the_file_tells_what_was_asked(mesh, tmp_path):
     facts = {}
@@ -230,6 +231,7 @@ def test_threads_are_as_many_as_memory_allows(mesh, tmp_path, monkeypatch, metho
         gc.write_matrix(mesh, out, points, method=method, memory_limit=int(0.4 * needed))
 
 
+@pytest.mark.jit
 def test_part_of_another_table_is_not_mixed_in(mesh, tmp_path):
     out = tmp_path / "table.npy"
     with pytest.raises(gc.errors.Cancelled):
