@@ -48,7 +48,7 @@ def machine() -> str:
     today = dt.datetime.now(dt.UTC).date().isoformat()
     parts = [
         today,
-        f"{_processor()}, {os.cpu_count()} cores",
+        f"{processor()}, {os.cpu_count()} cores",
         f"Python {platform.python_version()}",
         *packages,
     ]
@@ -78,7 +78,8 @@ def _version(package: str) -> str:
         return "absent"
 
 
-def _processor() -> str:
+def processor() -> str:
+    """Return the name of the processor."""
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.exists():
         for line in cpuinfo.read_text(encoding="utf-8").splitlines():

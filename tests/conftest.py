@@ -42,7 +42,7 @@ LONGEST = (
 )
 NOT_QUICK = ("service", "page", "slow")
 FULL_ONLY = ("full",)
-EXAMPLES = {"quick": 4, "slice": 10, "full": 2000, "interpreted": 4}
+EXAMPLES = {"quick": 4, "slice": 6, "full": 2000, "interpreted": 4}
 """Random examples of a property, by tier; kernels as plain Python take a hundred times as long."""
 
 QUICK_SLICE = 2
