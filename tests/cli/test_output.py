@@ -106,6 +106,7 @@ def test_info_as_json(run: Run) -> None:
     assert "--merge exact joins them" in run("info", "cut.obj").out
 
 
+@pytest.mark.slow
 def test_a_sample_can_be_piped() -> None:
     piped = subprocess.run(
         [sys.executable, "-c", "from app.cli import main; main()", "sample", "plane", "-"],
@@ -122,6 +123,7 @@ def test_a_sample_says_in_json_what_it_is(run: Run) -> None:
     assert run("sample", "plane", "-", "--json").code == 2
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_enough_is_no_error(tmp_path: Path) -> None:
     mesh = gc.samples.plane(20_000)
     (tmp_path / "plane.obj").write_text(

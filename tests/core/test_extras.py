@@ -56,6 +56,7 @@ print("answered")
 pytestmark = pytest.mark.slow  # a process each
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "call", "message"), REFUSED, ids=[call for _, call, _ in REFUSED])
 def test_what_is_missing_is_named(name: str, call: str, message: str) -> None:
     catch = "except gc.errors.MissingExtra as error: print(error, error.extra)"

@@ -20,6 +20,7 @@ def loaded_by(work: str) -> set[str]:
     return SLOW & set(told.split())
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("work", ["", EXACT], ids=["import", "exact answer"])
 def test_nothing_slow_is_loaded_for_an_exact_answer(work: str) -> None:

@@ -258,6 +258,7 @@ def angles(rows) -> np.ndarray:
 # Windows on an edge -----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @SCALES
 @pytest.mark.parametrize(("share", "trimmed"), [(0.5, False), (2.0, True)])
 def test_overlap_is_the_least_that_is_trimmed(scale, share, trimmed):
@@ -376,6 +377,7 @@ def test_slack_keeps_windows_that_tie_with_a_vertex(scale, detour, kept, from_ta
     assert trim_list(view, h) == kept
 
 
+@pytest.mark.slow
 @SCALES
 def test_bend_is_all_that_a_bent_path_is_surcharged(scale):
     view, wave, h = flat_view(scale)
@@ -515,6 +517,7 @@ def test_grazing_is_the_least_angle_of_a_merged_pseudosource(reach):
             assert (directionality(along * reach, reach) > 0.0) == taken
 
 
+@pytest.mark.slow
 @settings(suppress_health_check=[HealthCheck.filter_too_much])  # most cannot be merged
 @given(
     st.floats(-2, 3), st.floats(-3, -0.01), st.floats(-2, 3), st.floats(-3, -0.01), st.floats(0, 1)
@@ -671,6 +674,7 @@ def test_most_at_large_bounds_the_windows_without_a_place():
 # Searches between two points --------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @SCALES
 @pytest.mark.parametrize(("share", "passes"), [(0.5, False), (2.0, True)])
 @pytest.mark.parametrize("side", [LEFT, RIGHT])
@@ -949,6 +953,7 @@ def test_slant_is_the_flattest_ray_that_a_piece_sends_over_an_edge(scale, slope,
     np.testing.assert_allclose(found, expected, rtol=1e-14, atol=0)
 
 
+@pytest.mark.slow
 @SCALES
 @pytest.mark.parametrize("share", [-3.0, -0.5, 0.5, 3.0])
 def test_level_is_how_near_two_circles_count_as_one(scale, share):

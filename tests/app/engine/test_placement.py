@@ -16,6 +16,7 @@ names = st.lists(
 occupancies = st.builds(Occupancy, st.integers(0, 9), st.integers(1, 4))
 
 
+@pytest.mark.slow
 @given(names, st.text(max_size=8))
 def test_a_host_that_leaves_changes_nothing_among_the_others(hosts: list[str], key: str) -> None:
     order = preference(key, dict.fromkeys(hosts, FREE))

@@ -146,6 +146,7 @@ def test_processes_of_ray_end_with_a_command_that_is_killed(tmp_path: Path) -> N
                 os.kill(started, signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_one_machine_imports_nothing_for_several(tmp_path: Path) -> None:
     text = (
         "import sys\n"

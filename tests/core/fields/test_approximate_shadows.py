@@ -18,6 +18,8 @@ from tests.support import zoo
 from tests.support.invariants import windows_of
 from tests.support.stepping import topology_of, view_of_arrays
 
+pytestmark = pytest.mark.slow
+
 ANGLES = 1e-6
 """Radians: some widenings by SECTOR_MARGIN."""
 SADDLE = zoo.Case("saddle", *zoo.cone(8, 0.9, zigzag=True, splits=1)[:2])

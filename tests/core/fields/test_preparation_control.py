@@ -89,6 +89,7 @@ def check_questions(call):
         assert stop.work[-1] < 20
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("name", CALLS)
 def test_many_points_are_prepared_between_questions(name):

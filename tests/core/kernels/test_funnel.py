@@ -110,6 +110,7 @@ def inner(mesh, vertices):
     return mesh.topology.inner_vertex[list(vertices)].astype(np.int32)
 
 
+@pytest.mark.slow
 def test_the_side_of_the_lesser_angle():
     """Along x, up is on the left."""
     for rise, side in ((0.2, RIGHT), (-0.2, LEFT)):
