@@ -1,6 +1,6 @@
 """The gate: ratios of times that were measured by turns, against those that are committed.
 
-Processors differ in them by half: each has its own.
+Ratios differ between processors by up to a factor of two, so each processor has its own.
 """
 
 import json
@@ -27,7 +27,8 @@ RUNS = 15
 def run(*, is_new: bool) -> tuple[str, bool]:
     """Measure the ratios; return them as a table, and whether all are as good as committed.
 
-    They are not where none are committed for this processor. New ones take the place of the old.
+    Without committed ratios for this processor, the second value is False. With ``is_new``, the
+    measured ratios replace the committed ones.
     """
     gc.warm_up()
     measured = {
