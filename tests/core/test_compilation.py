@@ -33,6 +33,7 @@ def test_no_call_needs_a_kernel_that_was_not_compiled_ahead():
     assert asked.returncode == 0, asked.stderr
 
 
+@pytest.mark.file_slice(1)  # in each run
 def test_the_reported_number_of_kernels_is_the_true_one():
     gc.compile_kernels()
     if machine.best_target() == machine.target():

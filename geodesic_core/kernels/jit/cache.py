@@ -3,13 +3,16 @@
 A file is found by the digest of all kernel sources, the version of Python, the machine, the
 kernel's name and the types of its arguments. It is written in one step. While a process compiles a
 kernel it holds a lock, and others that need the same kernel wait for it.
+
+A mark beside them says that all kernels of a workload are there. Which those are, any source of the
+library decides: the mark's name has the digest of all.
 """
 
 import hashlib
 import os
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
@@ -40,8 +43,12 @@ def sources_digest() -> str:
     A compiled kernel holds the code of all that it calls, from any file: an edit of one makes all
     of them stale.
     """
+    return _digest_of([*sorted(KERNELS.rglob("*.py")), KERNELS.parent / "tolerances.py"])
+
+
+def _digest_of(sources: Iterable[Path]) -> str:
     digest = hashlib.sha256(f"numba {numba.__version__}".encode())
-    for path in [*sorted(KERNELS.rglob("*.py")), KERNELS.parent / "tolerances.py"]:
+    for path in sources:
         digest.update(path.relative_to(KERNELS.parent).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -49,6 +56,13 @@ def sources_digest() -> str:
 @cache
 def _digest() -> str:
     return sources_digest()
+
+
+@cache
+def _library_digest() -> str:
+    """Return a hash of all sources of the library, which decide what kernels a workload calls."""
+    sources = sorted(KERNELS.parent.rglob("*.py"))
+    return _digest_of(path for path in sources if path.name != "hatch_build.py")  # not installed
 
 
 def users_folder() -> Path:
@@ -178,9 +192,13 @@ def claim(workload: str, timeout: float) -> "FileLock":
 def mark_complete(workload: str) -> None:
     """Record that all kernels of a workload are on disk."""
     if not is_complete(workload) and is_in_use():
-        (folder() / f"{workload}.all").touch()
+        (folder() / _mark_of(workload)).touch()
 
 
 def is_complete(workload: str) -> bool:
     """Return whether all kernels of a workload are on disk."""
-    return any((place / f"{workload}.all").exists() for place in _folders())
+    return any((place / _mark_of(workload)).exists() for place in _folders())
+
+
+def _mark_of(workload: str) -> str:
+    return f"{workload}-{_library_digest()}.all"

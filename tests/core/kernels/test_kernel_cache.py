@@ -90,6 +90,24 @@ def test_another_numba_changes_the_digest(monkeypatch):
     assert sources_digest() != before
 
 
+@pytest.mark.parametrize(
+    ("name", "is_stale"), [("planar.py", True), ("../solvers.py", True), ("../notes.txt", False)]
+)
+def test_an_edit_of_the_library_makes_marks_of_workloads_stale(
+    copied, name, is_stale, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(cache, "folder", lambda: tmp_path)
+    monkeypatch.setattr(cache, "_folders", lambda: [tmp_path])
+    monkeypatch.setattr(cache, "is_in_use", lambda: True)
+    monkeypatch.setattr(cache, "_library_digest", cache._library_digest.__wrapped__)
+    assert not cache.is_complete("exact")
+    cache.mark_complete("exact")
+    assert cache.is_complete("exact")
+    with (copied / name).open("a") as file:
+        file.write("# edited\n")
+    assert cache.is_complete("exact") is not is_stale
+
+
 def test_the_cache_is_where_numba_or_the_desktop_keeps_caches(monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", "/n")
     monkeypatch.setenv("XDG_CACHE_HOME", "/x")
