@@ -86,6 +86,7 @@ def test_selectors_of_kubernetes_find_their_pods() -> None:
         assert app is None or app in labels
 
 
+@pytest.mark.slow
 def test_the_image_is_built_of_what_it_copies(tmp_path: Path) -> None:
     """The steps of the Dockerfile that copy and build, in a folder that has nothing else."""
     lines = (DOCKER / "Dockerfile").read_text().partition("FROM python")[2].splitlines()

@@ -22,6 +22,7 @@ def mean_wait(model: Model, questions: list[Question]) -> float:
     return float(np.mean([each.waited_s for each in answers]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("workers", "load"), [(1, 0.5), (2, 0.7), (4, 0.8)])
 def test_long_work_waits_as_erlang_s_formula_says(workers: int, load: float) -> None:
     times, work = arrivals(load * workers), np.random.default_rng(2).exponential(1.0, COUNT)
@@ -33,6 +34,7 @@ def test_long_work_waits_as_erlang_s_formula_says(workers: int, load: float) -> 
     assert mean_wait(Model(Shape(1, workers)), questions) == pytest.approx(expected, rel=0.12)
 
 
+@pytest.mark.slow
 def test_a_replica_s_core_is_a_queue_of_its_own() -> None:
     """Work of one length waits half as long as work of random length: Pollaczek and Khinchine."""
     questions = [Question(at, 0.0, is_stored=True) for at in arrivals(0.6).tolist()]

@@ -111,6 +111,7 @@ def dying(questions: Questions, file: Path) -> list[Row]:
     return ask(questions, file)
 
 
+@pytest.mark.slow
 def test_a_process_that_dies_costs_its_own_mesh_alone(
     run: Run, meshes: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -115,6 +115,7 @@ def test_distances_on_the_mesh(run: Run, plane: Path) -> None:
     assert [float(row["distance"]) for row in rows if row["distance"]] == expected[reached].tolist()
 
 
+@pytest.mark.slow
 def test_lines_in_each_format(run: Run, knot: Path) -> None:
     """What the formats hold is checked over HTTP: the encoders are the same."""
     commands = {
@@ -351,6 +352,7 @@ def test_paths_between_points_that_are_no_vertices(run: Run, knot: Path, method:
     assert json.loads(Path("p.json").read_text())["points"] == expected.points.tolist()
 
 
+@pytest.mark.slow
 def test_all_spellings_of_a_point_give_one_answer(run: Run, knot: Path) -> None:
     mesh = gc.load_mesh(knot)
     start, end = mesh.faces[900, :2].tolist()
@@ -1017,6 +1019,7 @@ def loaded_by(*arguments: str) -> set[str]:
     return set(told.splitlines()[-1].split())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "arguments", [["--help"], ["--version"], ["matrix", "--help"], ["store", "--help"]]
 )

@@ -144,6 +144,7 @@ def test_a_reader_that_has_enough_is_no_error(tmp_path: Path) -> None:
     assert "Traceback" not in ran.stderr
 
 
+@pytest.mark.slow
 def test_batch_prints_rows_or_json(run: Run, plane: Path) -> None:
     ask = ["batch", plane, "--source", 0, "--target", 3, "--processes", 1]
     rows, told = run(*ask, "--out", "-"), run(*ask, "--json")

@@ -76,6 +76,7 @@ def test_a_label_of_a_brain_is_a_barrier(run: Run, sphere: Path) -> None:
     assert "cannot read a.gii" in error_line(ran)
 
 
+@pytest.mark.slow
 def test_all_vertices_by_each_method(run: Run, sphere: Path) -> None:
     mesh = gc.load_mesh(sphere)
     for options, bound in (

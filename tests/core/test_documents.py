@@ -148,6 +148,7 @@ def test_docstrings_of_modules_begin_with_a_noun_or_a_verb(folder: str) -> None:
     assert not openings & {"What", "Who", "Which", "Where", "How"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "least"),
     [

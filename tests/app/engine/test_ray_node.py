@@ -127,6 +127,7 @@ with ray_node._running([], Path(sys.argv[1]), settings, {}) as processes:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems cannot do that")
 def test_processes_of_ray_end_with_a_command_that_is_killed(tmp_path: Path) -> None:
     ray = tmp_path / "ray"

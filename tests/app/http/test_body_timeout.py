@@ -96,6 +96,7 @@ class Stalling(Dripping):
         return await super().receive()
 
 
+@pytest.mark.slow
 def test_the_connection_closes_whichever_deadline_was_noticed_first(tmp_path: Path) -> None:
     client = Stalling(app_in(tmp_path, deadline_s=LIMIT_S), "/v1/meshes", content_type=b"model/obj")
 

@@ -317,6 +317,7 @@ def read(connection: socket.socket) -> str:
     return connection.recv(length, socket.MSG_WAITALL).decode()
 
 
+@pytest.mark.slow
 def test_connections_are_limited_altogether_and_for_each_caller(tmp_path: Path) -> None:
     few = Settings(store=tmp_path, max_connections=3, max_caller_connections=2)
     with listening(few) as listener:

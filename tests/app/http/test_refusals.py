@@ -87,6 +87,7 @@ def with_sources(count: int) -> bytes:
     return b'{"sources":[' + b"1," * (count - 1) + b"1]}"
 
 
+@pytest.mark.slow
 def test_a_body_of_half_a_million_values_is_refused_with_one_fault() -> None:
     with pytest.raises(RequestValidationError) as refused:
         read(DISTANCES, {}, with_sources(MOST_VALUES).replace(b"sources", b"targets"), SETTINGS)

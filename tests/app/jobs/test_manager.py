@@ -139,6 +139,7 @@ class LivingReplica:
         pass
 
 
+@pytest.mark.slow
 def test_all_replicas_tell_the_same_progress(database: Database) -> None:
     async def main() -> None:
         told: list[Callable[[float], None]] = []

@@ -64,6 +64,7 @@ def test_a_store_belongs_to_one_at_a_time(tmp_path: Path) -> None:
         pass
 
 
+@pytest.mark.slow
 def test_the_lock_goes_with_its_process_however_that_ends(tmp_path: Path) -> None:
     script = "import sys; from pathlib import Path; from app.store.ownership import owned\n"
     script += "with owned(Path(sys.argv[1])): print('owned', flush=True); sys.stdin.read()"
@@ -670,6 +671,7 @@ def test_a_crash_at_any_step_leaves_a_mesh_whole_or_not_there(tmp_path: Path) ->
     assert seen == {(True, False), (True, True), (False, True)}
 
 
+@pytest.mark.slow
 def test_a_crash_while_a_mesh_is_healed_leaves_it_damaged_or_whole(tmp_path: Path) -> None:
     mesh_id = store_mesh(tmp_path / "before", plane(), "alice")
     folder = Path("meshes", mesh_id)

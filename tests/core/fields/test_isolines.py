@@ -297,6 +297,7 @@ def test_chord_error_is_how_far_chords_stray(chord_error):
     assert (1.7 - np.linalg.norm(middles - points[12], axis=1)).max() < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("share", [1e-3, 1e-2, 0.1])
 def test_few_points_are_enough_for_a_chord_error(share):

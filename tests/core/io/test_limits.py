@@ -125,6 +125,7 @@ def test_glb_parts_that_share_their_numbers_count_each(mode: int | None, faces: 
             load_mesh(data, "glb", max_faces=10)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_a_small_glb_that_shows_billions_of_faces_is_refused_at_once() -> None:
     tree, binary = glb_tree(VERTICES[:4], FACES[:2])
@@ -189,6 +190,7 @@ COUNTED: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COUNTED)
 def test_glb_scenes_are_counted_before_they_are_walked(
     monkeypatch: pytest.MonkeyPatch, name: str

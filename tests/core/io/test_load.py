@@ -403,6 +403,7 @@ def test_a_glb_node_with_a_camera_places_what_is_below_it() -> None:
     np.testing.assert_array_equal(mesh.vertices, VERTICES[:4] + np.array([5, 0, 0]))
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_no_glb_part_is_lost_among_many() -> None:
     tree, binary = glb_tree(VERTICES[:4], FACES[:2])

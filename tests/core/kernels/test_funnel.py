@@ -44,6 +44,7 @@ def test_between_the_distance_and_the_path_along_edges(case):
     check_shortened(mesh, random_pairs(mesh, 6 if WITHOUT_JIT else 60))
 
 
+@pytest.mark.slow
 @pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)

@@ -51,6 +51,7 @@ def test_distances_are_those_without_them_to_the_bit(case):
             assert found.nearest_source.tobytes() == nearest.tobytes()
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.slice(3)
 @zoo.each(ALL)

@@ -119,6 +119,7 @@ def test_fields_of_curves(step, offset, solve):
     check_same_fields(*(solve(mesh, curve) for mesh in (near, far)), points, offset)
 
 
+@pytest.mark.slow
 @EACH_PLACE
 @EACH_MESH
 def test_searches(step, offset):

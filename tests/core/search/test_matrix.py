@@ -330,6 +330,7 @@ def test_an_exception_in_a_thread_comes_out_as_it_is(mesh, monkeypatch):
         gc.distance_matrix(mesh, [0, 1, 2], [3, 4, 5], threads=2)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_threads_are_as_many_as_memory_allows(mesh, monkeypatch):
     points = random_points(mesh, 9, seed=30)
