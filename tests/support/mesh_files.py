@@ -36,11 +36,10 @@ def ply(vertices: Any, polygons: Any) -> bytes:
 
 
 def ply_binary(vertices: Any, polygons: Any, order: str = "<") -> bytes:
-    body = b"".join(struct.pack(order + "3d", *vertex) for vertex in vertices)
-    for polygon in polygons:
-        body += struct.pack(f"{order}B{len(polygon)}i", len(polygon), *polygon)
+    rows = [struct.pack(order + "3d", *vertex) for vertex in vertices]
+    rows += [struct.pack(f"{order}B{len(each)}i", len(each), *each) for each in polygons]
     name = "binary_little_endian" if order == "<" else "binary_big_endian"
-    return ply_header(name, len(vertices), len(polygons)) + body
+    return ply_header(name, len(vertices), len(polygons)) + b"".join(rows)
 
 
 def ply_big_endian(vertices: Any, polygons: Any) -> bytes:
