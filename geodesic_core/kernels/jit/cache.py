@@ -4,8 +4,8 @@ A file is found by the digest of all kernel sources, the version of Python, the 
 kernel's name and the types of its arguments. It is written in one step. While a process compiles a
 kernel it holds a lock, and others that need the same kernel wait for it.
 
-A mark beside them says that all kernels of a workload are there. Which those are, any source of the
-library decides: the mark's name has the digest of all.
+An empty file marks that all kernels of a workload are there. Its name holds a digest of the whole
+library: an edited caller may call another kernel.
 """
 
 import hashlib
@@ -60,7 +60,7 @@ def _digest() -> str:
 
 @cache
 def _library_digest() -> str:
-    """Return a hash of all sources of the library, which decide what kernels a workload calls."""
+    """Return a hash of all sources of the library: any of them may call a kernel."""
     sources = sorted(KERNELS.parent.rglob("*.py"))
     return _digest_of(path for path in sources if path.name != "hatch_build.py")  # not installed
 
