@@ -42,6 +42,7 @@ def containers(document: dict[str, Any]) -> list[dict[str, Any]]:
     return found
 
 
+@pytest.mark.slow
 def test_compose_is_valid_by_its_schema() -> None:
     checker = [sys.executable, "-m", "check_jsonschema", "--builtin-schema", "vendor.compose-spec"]
     ran = subprocess.run(  # noqa: S603 - a tool of ours

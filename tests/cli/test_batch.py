@@ -31,6 +31,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+@pytest.mark.slow
 def test_each_mesh_has_a_row_for_each_source(run: Run, meshes: list[Path]) -> None:
     ran = run("batch", *meshes, "--source", 0, "--source", "f3:0.2,0.3,0.5", "--out", "t.csv")
     assert (ran.code, ran.err) == (0, "")

@@ -439,6 +439,7 @@ def test_approximate_paths_report_their_own_bounds(run: Run, knot: Path) -> None
         assert found["error_bound"] == asdict(field.path_to(target).error_bound)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limit", [None, 4.0])
 def test_matrices_are_the_library_s(run: Run, knot: Path, limit: float | None) -> None:
     mesh = gc.load_mesh(knot)
@@ -1077,6 +1078,7 @@ def test_serve_refuses_wrong_settings(run: Run, monkeypatch: pytest.MonkeyPatch)
     assert "GEODESIC_WORKER" in error_line(ran)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("host", ["0.0.0.0", "::", "10.0.0.7", "example.org", "", "127.0.0.1.x"])  # noqa: S104
 def test_serve_on_other_addresses_asks_for_keys(
     run: Run, served: list[uvicorn.Config], monkeypatch: pytest.MonkeyPatch, host: str

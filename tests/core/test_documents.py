@@ -139,6 +139,7 @@ def test_tolerances_that_documents_name_are_there(name: str) -> None:
     assert name.startswith(VARIABLES) or name in COLUMNS or hasattr(tolerances, name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("folder", ["geodesic_core", "app", "tests", "benchmarks"])
 def test_docstrings_of_modules_begin_with_a_noun_or_a_verb(folder: str) -> None:
     sources = [path for path in (ROOT / folder).rglob("*.py") if "node_modules" not in path.parts]

@@ -57,6 +57,7 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> bytes:
     return answer(new_worker(root), store_mesh(root, plane()))
 
 
+@pytest.mark.slow
 @each_fault
 @pytest.mark.parametrize("name", ARRAYS)
 def test_damage_of_an_open_mesh_is_noticed_and_healed_by_writing_it_again(
@@ -182,6 +183,7 @@ def damage_during(patch: pytest.MonkeyPatch, when: str, path: Path, fault: Fault
         patch.setattr("app.engine.worker.encode", encode)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("every_field_is_slow")
 @pytest.mark.parametrize("when", ["before", "after", "failing", "encoding"])
 @pytest.mark.parametrize("name", ARRAYS)

@@ -64,6 +64,7 @@ def app_in(store: Path, **settings: Any) -> Any:
     return app
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("path", "head", "media_type"),
     [

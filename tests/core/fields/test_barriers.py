@@ -443,6 +443,7 @@ def test_what_may_not_take_the_memory_does_not(monkeypatch):
 # Calls that take barriers -----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @zoo.each({name: BLOCKABLE[name] for name in ("crags", "crumpled_torus", "octahedron")})
 def test_every_call_takes_barriers_as_the_mesh_does(case):

@@ -246,6 +246,7 @@ def test_a_call_that_is_stopped_leaves_the_field_as_it_was(retain, monkeypatch):
         np.testing.assert_array_equal(line.points, other.points)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("share", [1e-4, 1e-2])
 def test_few_points_are_enough_for_a_chord_error(share):

@@ -44,6 +44,7 @@ def sources_on(mesh, count) -> list[int]:
     return np.random.default_rng(len(used)).choice(used, count, replace=False).tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.slice(len(BY_PEER))
 @pytest.mark.parametrize(
     ("name", "seed"),
@@ -69,6 +70,7 @@ def test_agrees_with_pygeodesic_at_every_vertex(name, seed):
         check_path(mesh, field.path_to(vertex), source, vertex, field.distances[vertex])
 
 
+@pytest.mark.slow
 @pytest.mark.slice(len(SLICE))
 @pytest.mark.parametrize(
     ("name", "count"), [(name, 3) for name in SLICE] + [full(name, 50) for name in SLICE + REST]

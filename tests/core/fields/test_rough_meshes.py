@@ -19,6 +19,7 @@ def rough() -> gc.TriangleMesh:
     return gc.TriangleMesh(zoo.crumpled(vertices, 0.02, seed=1), faces)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("errors", [{}, {"relative_error": 0.05}, {"absolute_error": 0.1}])
 @pytest.mark.parametrize("retain", ["distances", "paths", "windows"])
 def test_approximate_fields_are_exact_to_the_bit_and_state_no_error(rough, errors, retain):

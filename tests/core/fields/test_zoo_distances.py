@@ -105,6 +105,7 @@ def test_distances_scale_with_the_mesh_and_stay_after_rigid_motion(case):
                 check_within(solve(moved, source, error).distances, exact, error)
 
 
+@pytest.mark.slow
 @zoo.each(MERGING)
 @pytest.mark.jit
 def test_meshes_on_which_much_is_merged(case):

@@ -109,6 +109,7 @@ def test_approximate_fields(step, offset):
     check_same_fields(*fields, points, offset)
 
 
+@pytest.mark.slow
 @EACH_PLACE
 @EACH_MESH
 @pytest.mark.parametrize("solve", [gc.exact_distance, gc.approximate_distance])
@@ -132,6 +133,7 @@ def test_searches(step, offset):
             check_same_path(*paths, offset, spacing(far))
 
 
+@pytest.mark.slow
 @EACH_PLACE
 @EACH_MESH
 @pytest.mark.parametrize("layout", ["dense", "sparse", "pairs"])
@@ -209,6 +211,7 @@ def test_a_large_mesh_may_have_small_faces():
         assert path.length == pytest.approx(exact[i, end], rel=1e-12, abs=1e-14 * large.diagonal)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("apart", [1e-5, 1e-7, 1e-9])
 def test_two_points_may_be_near_each_other(apart):
     """Then their distance has lost digits, but no more of it than rounding of the mesh."""

@@ -46,6 +46,7 @@ def test_threads_get_the_answers_of_one_alone(solver):
     np.testing.assert_allclose(together, alone, rtol=1e-13, atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("waiting", CALLS.values(), ids=CALLS)
 @pytest.mark.parametrize("working", CALLS.values(), ids=CALLS)

@@ -113,6 +113,7 @@ def test_neither_landmarks_nor_memory_grow_without_end(name):
     assert landmark_count(solver) == LANDMARKS
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_memory_is_that_of_landmarks_and_scratch():
     """64 bytes a vertex for all landmarks, at once; two thirds of the mesh for all the rest."""

@@ -74,6 +74,7 @@ def is_within_limit(solver, source, target, limit):
     }
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 @pytest.mark.parametrize("name", ["flat", "cone_saddle", "slivers_1e-05", "pleats_slivers"])
 def test_larger_meshes_and_slivers(name):

@@ -38,6 +38,7 @@ def finite_in(path: Path) -> int:
     return int(np.isfinite(np.load(path)).sum())
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_parts")
 @pytest.mark.parametrize("ends", ["symmetric", "wide", "tall"])
 @pytest.mark.parametrize("layout", ["dense", "sparse"])
@@ -119,6 +120,7 @@ def test_what_is_computed_in_memory_is_the_file_to_the_bit(
                 np.testing.assert_array_equal(getattr(table, name), getattr(whole, name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("layout", ["dense", "sparse", "pairs"])
 @pytest.mark.parametrize("method", METHODS[1:], ids=str)
 @pytest.mark.jit

@@ -82,6 +82,7 @@ def test_distances_are_those_of_the_oracle(case, suffix, tmp_path):
         assert sorted(path.name for path in tmp_path.iterdir()) == [out.name, f"{out.name}.json"]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("small_blocks")
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @pytest.mark.parametrize(
