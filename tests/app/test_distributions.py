@@ -81,6 +81,7 @@ def test_all_extras_of_the_library_are_in_one() -> None:
     assert extras.pop("all") == [f"geodesic-core[{','.join(extras)}]"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("folder", "package"),
     [(LIBRARY, "geodesic_core"), (SERVICE, "app"), (CLIENT, "geodesic_client")],

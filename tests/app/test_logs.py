@@ -35,6 +35,7 @@ def objects_in(text: str) -> list[dict[str, Any]]:
     return [orjson.loads(line) for line in text.splitlines()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log_format", ["json", None])
 def test_a_line_is_an_object_where_nobody_reads_along(log_format: str | None) -> None:
     (line,) = objects_in(written_by("log.warning('worker lost', pid=7, why='a\\nb')", log_format))
@@ -74,6 +75,7 @@ def test_text_obeys_no_client_and_leaves_out_what_is_not_there() -> None:
     assert "mesh_id" not in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log_format", ["json", "text"])
 def test_tracebacks_do_not_show_the_values_of_variables(log_format: str) -> None:
     script = """
@@ -118,6 +120,7 @@ def test_what_is_no_text_does_not_break_the_line() -> None:
     assert (line["path"], line["name"], line["error"], line["pid"]) == ("a?", "a?", "no", 7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("log_format", ["json", "text"])
 def test_a_log_that_cannot_be_written_stops_nothing(log_format: str) -> None:
     script = f"""

@@ -92,6 +92,7 @@ def test_a_store_that_is_no_folder_here_stops_the_start(
         Settings()
 
 
+@pytest.mark.slow
 def test_every_setting_is_put_to_use_in_a_test() -> None:
     unused = set(Settings.model_fields) - USED_BELOW
     for path in TESTS.rglob("*.py"):

@@ -135,6 +135,7 @@ def interrupting(command: int, _questions: Questions, _file: Path) -> list[Row]:
     return []
 
 
+@pytest.mark.slow
 def test_ctrl_c_does_not_wait_for_the_meshes_under_way(
     run: Run, meshes: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -17,6 +17,7 @@ def test_there_are_examples() -> None:
     assert len(EXAMPLES) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_the_examples_run(
     example: str, client: TestClient, monkeypatch: pytest.MonkeyPatch

@@ -96,6 +96,7 @@ def test_a_result_is_sent(play: Play) -> None:
     play(scene)
 
 
+@pytest.mark.slow
 def test_a_result_that_comes_too_late_is_removed(play: Play) -> None:
     async def scene(machine: Machine) -> None:
         await machine.end_for_nobody()
@@ -104,6 +105,7 @@ def test_a_result_that_comes_too_late_is_removed(play: Play) -> None:
     play(scene)
 
 
+@pytest.mark.slow
 def test_a_result_that_comes_too_late_is_left_to_a_task_that_writes_the_same(play: Play) -> None:
     async def scene(machine: Machine) -> None:
         begun, go_on = asyncio.Event(), asyncio.Event()
@@ -118,6 +120,7 @@ def test_a_result_that_comes_too_late_is_left_to_a_task_that_writes_the_same(pla
     play(scene)
 
 
+@pytest.mark.slow
 def test_a_result_counts_where_its_request_ends_while_it_is_sent(
     play: Play, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -149,6 +152,7 @@ def test_a_result_counts_where_its_request_ends_while_it_is_sent(
     play(scene)
 
 
+@pytest.mark.slow
 def test_a_result_that_cannot_be_sent_is_removed(
     play: Play, monkeypatch: pytest.MonkeyPatch
 ) -> None:

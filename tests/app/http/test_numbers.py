@@ -68,6 +68,7 @@ def quoted(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
         yield place, str(value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_numbers_in_quotes_are_refused(kind: str) -> None:
     assert is_accepted(kind, BODIES[kind])

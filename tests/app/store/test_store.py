@@ -638,6 +638,7 @@ def count_down(
         monkeypatch.setattr(owner, name, failing(getattr(owner, name)))
 
 
+@pytest.mark.slow
 def test_a_crash_at_any_step_leaves_a_mesh_whole_or_not_there(tmp_path: Path) -> None:
     kept = store_mesh(tmp_path / "before", plane(18))
     seen = set()

@@ -39,6 +39,7 @@ def test_paths_on_small_meshes(case):
         check_paths(mesh, source, exact, 1e-2, at_most=30)
 
 
+@pytest.mark.slow
 @pytest.mark.slice(3)
 @pytest.mark.jit
 @zoo.each(zoo.KNOWN)

@@ -119,6 +119,7 @@ def test_distances_are_symmetric(name, error):
     assert (table * (1 - error) <= table.T * (1 + EXACT)).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*MADE_HERE, "turbine.ply", *map(full, REST)])
 def test_absolute_errors(name):
     mesh = named_mesh(name)

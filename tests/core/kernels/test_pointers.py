@@ -56,6 +56,7 @@ def test_a_borrowed_group_is_the_same_arrays():
     assert _interpreted_borrowed(group) is group
 
 
+@pytest.mark.slow
 def test_the_owner_of_a_borrowed_array_keeps_it():
     @numba.njit
     def fill(row, value):

@@ -65,6 +65,7 @@ def test_every_step_on_curved_meshes(name):
         watch(case, exact_by_unfolding, [source], [0.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLANAR)
 @pytest.mark.jit
 def test_every_step_on_the_plane(name):

@@ -27,6 +27,7 @@ def solver() -> gc.Solver:
     return gc.Solver(gc.TriangleMesh(*zoo.icosphere(3)))
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_threads_get_the_answers_of_one_alone(solver):
     vertices = len(solver.mesh.vertices)

@@ -71,6 +71,7 @@ def test_landmarks_lie_far_apart():
         assert nearest[places[k]] == nearest.max()
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:invalid value:RuntimeWarning")  # inf - inf, in plain Python
 @pytest.mark.jit
 def test_landmarks_of_several_components():
@@ -94,6 +95,7 @@ def test_an_isolated_vertex_may_be_a_landmark():
     check_searches(solver, 1, [2, 4, 6])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["square", "crags", "crumpled_torus"])
 @pytest.mark.jit
 def test_neither_landmarks_nor_memory_grow_without_end(name):

@@ -111,6 +111,7 @@ def test_the_memory_limit_is_what_the_search_needs(mesh, answers):
     assert answer(path) == answers[FAR]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stop", ["progress", "cancel"])
 def test_an_exception_in_a_callback_comes_out_as_it_is(mesh, answers, stop):
     def fail():

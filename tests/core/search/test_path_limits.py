@@ -33,6 +33,7 @@ def test_the_limit_divides_paths_as_the_full_sweep_does(case):
             assert caught.value.reason == "beyond_max_distance"
 
 
+@pytest.mark.slow
 @pytest.mark.slice(2)
 @zoo.each(zoo.SMALL | zoo.IRREGULAR)
 @pytest.mark.jit
@@ -88,6 +89,7 @@ def test_larger_meshes_and_slivers(name):
                 solver.shortest_path(source, target, max_distance=distance * (1 - NEAR))
 
 
+@pytest.mark.slow
 @pytest.mark.jit
 def test_slivers_that_no_slack_covers():
     points, faces = zoo.grid(20, 20, seed=4, jitter=0.22)
