@@ -4,7 +4,8 @@ They form a tree::
 
     GeodesicError
     ├── InvalidMesh             the vertices, the faces or the file cannot be used
-    │   └── TooManyFaces        more than the caller allows
+    │   ├── TooManyFaces        more than the caller allows
+    │   └── FileTooLarge        more bytes than the caller allows
     ├── InvalidPoint            a source or target that is not on the mesh
     ├── InvalidArgument         any other argument out of its domain
     ├── NoPath                  not connected, or farther than a limit (``reason``)
@@ -96,6 +97,28 @@ class TooManyFaces(InvalidMesh):
         super().__init__(f"{faces} faces; at most {max_faces} are allowed", kind="face")
         self.faces = faces
         self.max_faces = max_faces
+
+
+class FileTooLarge(InvalidMesh):
+    """A packed file that has more than ``max_bytes`` once unpacked.
+
+    Parameters
+    ----------
+    max_bytes
+        Number allowed.
+
+    Examples
+    --------
+    >>> import gzip
+    >>> gc.load_mesh(gzip.compress(b"OFF " + bytes(1000)), "off", max_bytes=100)
+    Traceback (most recent call last):
+        ...
+    geodesic_core.errors.FileTooLarge: the file has more than 100 bytes when unpacked
+    """
+
+    def __init__(self, max_bytes: int) -> None:
+        super().__init__(f"the file has more than {max_bytes} bytes when unpacked")
+        self.max_bytes = max_bytes
 
 
 class InvalidPoint(GeodesicError):  # noqa: N818

@@ -1,17 +1,19 @@
-"""Meshes as callers hold them: arrays, paths, and the objects of other libraries.
+"""Meshes as callers hold them: arrays, files, and the objects of other libraries.
 
 None of these libraries is imported: an object is known by its attributes.
 """
 
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geodesic_core.errors import InvalidMesh
+from geodesic_core.io.brain import surface_arrays
 from geodesic_core.io.load import load_mesh
+from geodesic_core.io.unpacking import FileLike, is_file
+from geodesic_core.io.vtk_polygons import polygons_of
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 
@@ -22,11 +24,8 @@ class _Trimesh(Protocol):
     def faces(self) -> Any: ...
 
 
-class _PolyData(Protocol):
-    @property
-    def points(self) -> Any: ...
-    @property
-    def faces(self) -> Any: ...
+class _VtkObject(Protocol):
+    def IsA(self, name: str) -> bool: ...  # noqa: N802 - VTK's name
 
 
 class _Meshio(Protocol):
@@ -43,17 +42,26 @@ class _Open3D(Protocol):
     def triangles(self) -> Any: ...
 
 
+class _Nilearn(Protocol):
+    @property
+    def coordinates(self) -> Any: ...
+    @property
+    def faces(self) -> Any: ...
+
+
 MeshLike = (
     TriangleMesh
-    | tuple[ArrayLike, ArrayLike]
-    | str
-    | Path
+    | tuple[Any, ...]
+    | list[ArrayLike]
+    | Mapping[str, ArrayLike]
+    | FileLike
     | _Trimesh
-    | _PolyData
+    | _VtkObject
     | _Meshio
     | _Open3D
+    | _Nilearn
 )
-"""All that `as_mesh` takes."""
+"""All that `as_mesh` takes, as far as types can say it."""
 
 
 def as_mesh(mesh: MeshLike) -> TriangleMesh:
@@ -65,9 +73,11 @@ def as_mesh(mesh: MeshLike) -> TriangleMesh:
     Parameters
     ----------
     mesh
-        A `TriangleMesh`, which is returned as it is; the arrays ``(vertices, faces)``; the path of
-        a file, as for `load_mesh`; or a mesh of trimesh, of meshio, of PyVista (``PolyData``) or of
-        Open3D (``open3d.geometry.TriangleMesh``).
+        A `TriangleMesh`, which is returned as it is; a tuple that begins with vertices and faces; a
+        file, as for `load_mesh`; a dictionary of arrays, as MNE has them; or a mesh of trimesh (a
+        scene's parts are placed and joined), meshio, VTK or PyVista (data sets, and composite ones
+        joined), Open3D, nibabel (``GiftiImage``), nilearn, PyMeshLab, vedo, COMPAS or SciPy
+        (``ConvexHull``, ``Delaunay`` of points in a plane).
 
     Returns
     -------
@@ -94,46 +104,37 @@ def as_mesh(mesh: MeshLike) -> TriangleMesh:
     """
     if isinstance(mesh, TriangleMesh):
         return mesh
-    if isinstance(mesh, str | Path):
-        return load_mesh(mesh)
-    if isinstance(mesh, tuple | list) and len(mesh) == 2:
-        return TriangleMesh(*mesh)
+    if (isinstance(mesh, tuple) and len(mesh) > 1) or (isinstance(mesh, list) and len(mesh) == 2):
+        return TriangleMesh(mesh[0], mesh[1])
+    if isinstance(mesh, Mapping):
+        names = next((names for names in _ARRAYS if all(name in mesh for name in names)), None)
+        if names is not None:
+            return TriangleMesh(mesh[names[0]], mesh[names[1]])
     for attributes, read in _READERS:
         if all(hasattr(mesh, name) for name in attributes):
             return read(mesh)
+    if is_file(mesh):
+        return load_mesh(mesh)
     raise InvalidMesh(
         f"a mesh cannot be made from this {type(mesh).__name__}: give a TriangleMesh, (vertices, "
-        "faces), the path of a file, or a mesh of trimesh, meshio, PyVista or Open3D"
+        "faces), a file, or a mesh of trimesh, meshio, VTK, PyVista, Open3D, nibabel, nilearn, "
+        "PyMeshLab, vedo, COMPAS or SciPy"
     )
 
 
-def _from_poly_data(data: Any) -> TriangleMesh:
-    if data.n_strips:
-        raise InvalidMesh("the PolyData has triangle strips: give data.triangulate()")
-    corners, sizes = _split_rows(np.asarray(data.faces))
-    left_out = data.n_cells - len(sizes)
-    notes = [_left_out(left_out, "vertices and lines")] if left_out else []
-    return TriangleMesh.from_polygons(data.points, corners, sizes, notes=notes)
-
-
-def _split_rows(rows: Any) -> tuple[Any, list[int]]:
-    """Return the corners and the sizes of polygons that are rows of a size and its corners."""
-    width = 1 + int(rows[0]) if len(rows) else 1
-    if len(rows) % width == 0 and (rows[::width] == width - 1).all():  # all of one size
-        return rows.reshape(-1, width)[:, 1:].ravel(), [width - 1] * (len(rows) // width)
-    sizes, starts, at = [], [], 0
-    while at < len(rows):
-        size = int(rows[at])
-        sizes.append(size)
-        starts.append(at)
-        at += 1 + size
-    return np.delete(rows, starts), sizes
-
-
-def _from_grid(data: Any) -> TriangleMesh:
-    raise InvalidMesh(
-        f"a {type(data).__name__} of PyVista is not a surface: give data.extract_surface()"
-    )
+def _from_vtk(data: Any) -> TriangleMesh:
+    try:
+        points, corners, sizes, left_out = polygons_of(data)
+    except ValueError as error:
+        raise InvalidMesh(f"the {type(data).__name__} cannot be used: {error}") from None
+    if len(sizes) == 0:
+        cells = ", ".join(f"{count} {name}" for name, count in left_out.items()) or "no cells"
+        raise InvalidMesh(
+            f"the {type(data).__name__} is not a surface: it has {cells}. Extract its surface "
+            "first, which renumbers points (PyVista: data.extract_surface())"
+        )
+    notes = [_left_out(count, name) for name, count in left_out.items()]
+    return TriangleMesh.from_polygons(points, corners, sizes, notes=notes)
 
 
 _POLYGONS = ("triangle", "quad", "polygon")
@@ -141,45 +142,75 @@ _BESIDE = ("vertex", "line")
 
 
 def _from_meshio(mesh: Any) -> TriangleMesh:
-    points = np.asarray(mesh.points)
-    if points.ndim == 2 and points.shape[1] == 2:
-        points = np.pad(points, ((0, 0), (0, 1)))
-    corners: list[Any] = []
-    sizes: list[int] = []
+    rows: list[Any] = []
     beside = 0
     for block in mesh.cells:
         if block.type in _BESIDE:
             beside += len(block.data)
         elif block.type in _POLYGONS:
-            corners += [np.ravel(row) for row in block.data]
-            sizes += map(len, block.data)
+            rows += list(block.data)
         else:
             raise InvalidMesh(
                 f"cells of type {block.type!r} are not polygons: a mesh of meshio may have cells "
                 f"of the types {', '.join(_POLYGONS)}"
             )
     notes = [_left_out(beside, "vertices and lines")] if beside else []
+    return _from_rows(_in_space(mesh.points), rows, notes)
+
+
+def _from_rows(points: Any, rows: Iterable[Any], notes: Iterable[str] = ()) -> TriangleMesh:
+    """Return the mesh of polygons that are rows of corners, of any lengths."""
+    corners = [np.ravel(row) for row in rows]
     flat = np.concatenate(corners) if corners else np.empty(0, np.int64)
-    return TriangleMesh.from_polygons(points, flat, sizes, notes=notes)
+    return TriangleMesh.from_polygons(points, flat, list(map(len, corners)), notes=tuple(notes))
+
+
+def _in_space(points: Any) -> Any:
+    """Return points in the plane as points in space."""
+    array = np.asarray(points)
+    if array.ndim == 2 and array.shape[1] == 2:
+        return np.pad(array, ((0, 0), (0, 1)))
+    return points
 
 
 def _left_out(count: int, kind: str) -> str:
     return f"{count} {kind} of the mesh were left out."
 
 
-def _from_trimesh(mesh: Any) -> TriangleMesh:
-    return TriangleMesh(mesh.vertices, mesh.faces)
+def _from_vedo(mesh: Any) -> TriangleMesh:
+    if hasattr(mesh.dataset, "IsA"):
+        return _from_vtk(mesh.dataset)
+    return _from_rows(mesh.vertices, mesh.cells)
 
 
-def _from_open3d(mesh: Any) -> TriangleMesh:
-    return TriangleMesh(np.asarray(mesh.vertices), np.asarray(mesh.triangles))
+def _from_tensors(mesh: Any) -> TriangleMesh:
+    arrays = mesh.vertex.positions, mesh.triangle.indices
+    return TriangleMesh(*(each.numpy() if hasattr(each, "numpy") else each for each in arrays))
 
 
+def _from_attributes(vertices: str, faces: str) -> Callable[[Any], TriangleMesh]:
+    return lambda mesh: TriangleMesh(
+        _in_space(getattr(mesh, vertices)), np.asanyarray(getattr(mesh, faces))
+    )
+
+
+_ARRAYS = (("vertices", "faces"), ("coordinates", "faces"), ("rr", "tris"))
+"""Names of vertices and faces in dictionaries."""
 _READERS: tuple[tuple[tuple[str, ...], Callable[[Any], TriangleMesh]], ...] = (
-    (("points", "faces", "n_strips"), _from_poly_data),
-    (("points", "extract_surface"), _from_grid),
+    (("IsA", "GetDataObjectType"), _from_vtk),  # and PyVista
     (("points", "cells", "cells_dict"), _from_meshio),
-    (("vertices", "faces"), _from_trimesh),
-    (("vertices", "triangles"), _from_open3d),
+    (("geometry", "to_mesh"), lambda scene: as_mesh(scene.to_mesh())),  # trimesh
+    (("get_arrays_from_intent",), lambda image: TriangleMesh(*surface_arrays(image))),  # nibabel
+    (("vertices", "cells", "dataset"), _from_vedo),
+    (
+        ("vertex_matrix", "face_matrix"),  # PyMeshLab
+        lambda mesh: TriangleMesh(mesh.vertex_matrix(), mesh.face_matrix()),
+    ),
+    (("to_vertices_and_faces",), lambda mesh: _from_rows(*mesh.to_vertices_and_faces())),  # COMPAS
+    (("vertex", "triangle"), _from_tensors),  # Open3D
+    (("vertices", "faces"), _from_attributes("vertices", "faces")),  # trimesh
+    (("vertices", "triangles"), _from_attributes("vertices", "triangles")),  # Open3D
+    (("coordinates", "faces"), _from_attributes("coordinates", "faces")),  # nilearn
+    (("points", "simplices"), _from_attributes("points", "simplices")),  # SciPy
 )
 """Attributes by which an object is known, the more telling ones first, and what reads it."""

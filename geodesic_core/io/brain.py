@@ -10,9 +10,21 @@ from geodesic_core.errors import InvalidMesh
 from geodesic_core.extras import extra
 from geodesic_core.io.contents import FileContents
 from geodesic_core.io.limits import check_face_count
+from geodesic_core.io.text import (
+    INDEX_ROW,
+    VERTEX_ROW,
+    VERTEX_RULE,
+    check_row_count,
+    check_rows,
+    excerpt,
+    index_rows,
+    number_table,
+)
 
-FREESURFER_MAGIC = b"\xff\xff\xfe"
-"""First bytes of a triangle surface; its files have no suffix of their own: ``lh.pial``"""
+_TRIANGLE_FILE, _QUAD_FILE, _NEW_QUAD_FILE = b"\xff\xff\xfe", b"\xff\xff\xff", b"\xff\xff\xfd"
+"""First bytes of FreeSurfer's surfaces, which have no suffix of their own: ``lh.pial``"""
+_HUNDREDTHS = 0.01
+"""Unit of the integers that older quadrangle files have for positions, mm"""
 _POINTS, _TRIANGLES = "NIFTI_INTENT_POINTSET", "NIFTI_INTENT_TRIANGLE"
 
 
@@ -31,16 +43,26 @@ def read_gifti(data: bytes, max_faces: int | None) -> FileContents:
     with extra("brain", "nibabel", "load_mesh of a GIFTI file"):
         from nibabel.gifti.gifti import GiftiImage
 
-    image: Any = GiftiImage.from_bytes(data)
+    return _contents(*surface_arrays(GiftiImage.from_bytes(data)), max_faces)
+
+
+def surface_arrays(image: Any) -> tuple[NDArray[np.generic], NDArray[np.generic]]:
+    """Return the points and the triangles of a GIFTI image of nibabel.
+
+    Raises
+    ------
+    InvalidMesh
+        It holds no surface.
+    """
     arrays = {name: image.get_arrays_from_intent(name) for name in (_POINTS, _TRIANGLES)}
     missing = [name for name, found in arrays.items() if not found]
     if missing:
         raise InvalidMesh(f"the GIFTI file holds no {missing[0]} array: it is not a surface")
-    return _contents(arrays[_POINTS][0].data, arrays[_TRIANGLES][0].data, max_faces)
+    return arrays[_POINTS][0].data, arrays[_TRIANGLES][0].data
 
 
 def read_freesurfer(data: bytes, max_faces: int | None) -> FileContents:
-    """Read a triangle surface of FreeSurfer, in its own coordinates.
+    """Read a surface of FreeSurfer, in its own coordinates: binary, of quadrangles too, or text.
 
     Raises
     ------
@@ -49,29 +71,89 @@ def read_freesurfer(data: bytes, max_faces: int | None) -> FileContents:
     TooManyFaces
         There are more faces than ``max_faces``.
     """
-    if not data.startswith(FREESURFER_MAGIC):
-        raise InvalidMesh(
-            "the file is not a FreeSurfer triangle surface: it begins with other bytes"
-        )
+    magic = data[:3]
+    if magic == _TRIANGLE_FILE:
+        return _read_triangles(data, max_faces)
+    if magic in (_QUAD_FILE, _NEW_QUAD_FILE):
+        return _read_quads(data, max_faces)
+    if data.startswith(b"#!ascii"):
+        return _read_text(data, max_faces)
+    raise InvalidMesh("the file is not a FreeSurfer surface: it begins with other bytes")
+
+
+def _read_triangles(data: bytes, max_faces: int | None) -> FileContents:
     # Two lines of text, two counts, then positions and faces, all big-endian.
     stream = BytesIO(data)
-    stream.seek(len(FREESURFER_MAGIC))
+    stream.seek(len(_TRIANGLE_FILE))
     stream.readline()
     stream.readline()
     counts = stream.read(8)
     if len(counts) < 8:
         raise InvalidMesh("the FreeSurfer file ends before its counts")
     vertex_count, face_count = np.frombuffer(counts, ">i4").tolist()
-    held = (len(data) - stream.tell()) // 12
-    if min(vertex_count, face_count) < 0 or vertex_count + face_count > held:
-        raise InvalidMesh(
-            f"the FreeSurfer file declares {vertex_count} vertices and {face_count} faces, but "
-            f"holds {held} rows"
-        )
-    check_face_count(face_count, max_faces)
+    _check_counts(vertex_count, face_count, 12, 12, len(data) - stream.tell())
     vertices = np.frombuffer(stream.read(12 * vertex_count), ">f4").reshape(-1, 3)
     faces = np.frombuffer(stream.read(12 * face_count), ">i4").reshape(-1, 3)
     return _contents(vertices, faces, max_faces)
+
+
+def _read_quads(data: bytes, max_faces: int | None) -> FileContents:
+    """Read quadrangles, each divided as FreeSurfer does: by whether its first corner is even."""
+    if len(data) < 9:
+        raise InvalidMesh("the FreeSurfer file ends before its counts")
+    vertex_count, quad_count = _three_byte_integers(data[3:9]).tolist()
+    kind, unit = (">i2", _HUNDREDTHS) if data[:3] == _QUAD_FILE else (">f4", 1.0)
+    width = 3 * np.dtype(kind).itemsize
+    _check_counts(vertex_count, quad_count, width, 12, len(data) - 9)
+    middle = 9 + vertex_count * width
+    vertices = np.frombuffer(data[9:middle], kind).reshape(-1, 3) * unit
+    quads = _three_byte_integers(data[middle : middle + 12 * quad_count]).reshape(-1, 4)
+    even = quads[:, [0, 1, 3, 2, 3, 1]]
+    odd = quads[:, [0, 1, 2, 0, 2, 3]]
+    faces = np.where(quads[:, :1] % 2 == 0, even, odd).reshape(-1, 3)
+    return _contents(vertices, faces, max_faces)
+
+
+def _three_byte_integers(data: bytes) -> NDArray[np.int64]:
+    digits = np.frombuffer(data, np.uint8).reshape(-1, 3).astype(np.int64)
+    integers: NDArray[np.int64] = digits @ np.array([1 << 16, 1 << 8, 1])
+    return integers
+
+
+def _read_text(data: bytes, max_faces: int | None) -> FileContents:
+    """Read rows of four numbers, the last of which says what FreeSurfer has cut out."""
+    rows = [row for row in data.splitlines() if row.strip() and not row.startswith(b"#")]
+    counts = rows[0].split() if rows else []
+    if len(counts) != 2 or not all(count.isdigit() and len(count) < 19 for count in counts):
+        raise InvalidMesh("the FreeSurfer file has no row with its counts of vertices and faces")
+    vertex_count, face_count = map(int, counts)
+    check_row_count({"vertex": vertex_count, "face": face_count}, len(rows) - 1)
+    check_face_count(face_count, max_faces)
+    vertex_rows, face_rows = rows[1 : 1 + vertex_count], rows[1 + vertex_count :]
+    check_rows(vertex_rows, VERTEX_ROW, "vertex", VERTEX_RULE)
+    check_rows(face_rows, INDEX_ROW, "face", "its vertices must be integers")
+    corners, sizes = index_rows(face_rows)
+    if (sizes < 3).any():
+        short = int(np.flatnonzero(sizes < 3)[0])
+        raise InvalidMesh(
+            f"face {short} reads {excerpt(face_rows[short])}; it must have three vertices",
+            kind="face",
+            elements=[short],
+        )
+    starts = np.cumsum(sizes) - sizes
+    faces = corners[starts[:, None] + np.arange(3)]
+    return _contents(number_table(vertex_rows, 3), faces, max_faces)
+
+
+def _check_counts(
+    vertex_count: int, face_count: int, vertex_bytes: int, face_bytes: int, held: int
+) -> None:
+    needed = vertex_count * vertex_bytes + face_count * face_bytes
+    if min(vertex_count, face_count) < 0 or needed > held:
+        raise InvalidMesh(
+            f"the FreeSurfer file declares {vertex_count} vertices and {face_count} faces, which "
+            f"take {needed} bytes, but holds {held}"
+        )
 
 
 def _contents(

@@ -1,6 +1,6 @@
 """Contents of a mesh file: vertices and polygons, as every reader returns them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from geodesic_core.arrays import Floats, Longs
@@ -30,3 +30,11 @@ def note_on_ignored(kind: str, ignored: Mapping[str, int]) -> tuple[str, ...]:
     return (
         f"The {kind} file also holds {what}, which are not part of the surface and were left out.",
     )
+
+
+def note_on_rest(kind: str, rest: Sequence[bytes] | bytes) -> tuple[str, ...]:
+    """Return a sentence on rows or bytes behind the last element; none where there are none."""
+    if not rest or (isinstance(rest, bytes) and not rest.strip()):
+        return ()
+    unit = "bytes" if isinstance(rest, bytes) else "rows"
+    return (f"Behind the last element of the {kind} file follow {len(rest)} {unit}, left out.",)

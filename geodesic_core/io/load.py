@@ -1,29 +1,27 @@
 """Loading of mesh files: their bytes become vertices and polygons in the file's own numbering.
 
-OBJ, OFF and PLY have readers of their own: that of trimesh (5.2) splits vertices at texture seams,
-groups faces by material or by their number of corners, refuses binary PLY files that mix these,
-drops what is too short and trusts the counts of a header. trimesh reads binary STL and GLB. What
-such a file says of itself is checked first, so that a refusal names the place, and sparse or
-compressed glTF positions are refused, which it would read as zeros. It never sees a path, nor gets
-a resolver: a file cannot make it read another one.
+OBJ, OFF, PLY, STL and GLB have readers of their own: those of trimesh (5.2) split vertices at
+texture seams, group faces by material or by their number of corners, drop what is too short, trust
+the counts of a header, and read sparse glTF positions as zeros. No file can have another one read.
 """
 
-import codecs
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 
-from geodesic_core.errors import InvalidMesh, MissingExtra
-from geodesic_core.io.brain import FREESURFER_MAGIC, read_freesurfer, read_gifti
+from geodesic_core.errors import InvalidMesh, MissingExtra, TooManyFaces
+from geodesic_core.io.brain import read_freesurfer, read_gifti
 from geodesic_core.io.contents import FileContents
 from geodesic_core.io.glb import read_glb
+from geodesic_core.io.grid import read_grid
 from geodesic_core.io.limits import check_face_count
 from geodesic_core.io.obj import read_obj
 from geodesic_core.io.off import read_off
 from geodesic_core.io.ply import read_ply
+from geodesic_core.io.signatures import signature_of
 from geodesic_core.io.stl import read_stl
-from geodesic_core.io.vtk import read_vtk, read_vtu
+from geodesic_core.io.unpacking import FileLike, NamedBytes, read_unpacked
+from geodesic_core.io.vtk import read_vtk
 from geodesic_core.mesh.triangle_mesh import Merge, TriangleMesh
 
 _Reader = Callable[[bytes, int | None], FileContents]
@@ -35,19 +33,22 @@ _READERS: dict[str, _Reader] = {
     "glb": read_glb,
     "gii": read_gifti,
     "freesurfer": read_freesurfer,
-    "vtk": read_vtk,
-    "vtu": read_vtu,
+    **dict.fromkeys(("vtk", "vtp", "vtu", "vts", "vtr", "vti"), read_vtk),
+    "asc": read_grid,
 }
+_AMBIGUOUS = ("asc",)
+"""Suffixes that several types of files have"""
 
 
 def load_mesh(
-    source: str | Path | bytes | bytearray | memoryview,
+    source: FileLike,
     file_type: str | None = None,
     merge: Merge = "none",
     *,
     max_faces: int | None = None,
+    max_bytes: int | None = None,
 ) -> TriangleMesh:
-    r"""Read a mesh file: OBJ, OFF, PLY, STL or GLB; GIFTI, FreeSurfer or VTK.
+    r"""Read a mesh file: OBJ, OFF, PLY, STL, GLB, GIFTI, FreeSurfer, VTK or an Esri ASCII grid.
 
     Vertices keep the file's numbering and faces its order. Polygons become triangles, in place, and
     ``mesh.face_map`` leads from these to the polygon. Lines, points and curves are left out, and
@@ -58,16 +59,20 @@ def load_mesh(
     Parameters
     ----------
     source
-        A path, or the bytes of a file.
+        A path, the bytes of a file, or a file object. It may be packed by gzip, bzip2 or xz, or be
+        a zip archive that holds one mesh.
     file_type
         ``"obj"``, ``"off"``, ``"ply"``, ``"stl"``, ``"glb"``, ``"gii"``, ``"freesurfer"``,
-        ``"vtk"`` or ``"vtu"``; by default the suffix of the path. A triangle surface of FreeSurfer,
-        such as ``lh.pial``, is known by its first bytes.
+        ``"vtk"`` (or ``"vtp"``, ``"vtu"``, ``"vts"``, ``"vtr"``, ``"vti"``) or ``"asc"``; by
+        default the suffix of the name. Without a known suffix, as FreeSurfer's ``lh.pial``, the
+        first bytes decide where they can.
     merge
         ``"exact"`` merges vertices at equal positions, as `TriangleMesh` does.
     max_faces
         Largest number of triangles. A file with more is refused before its faces are parsed, by the
         count in its header or by counting.
+    max_bytes
+        Largest size of a packed file when it is unpacked.
 
     Returns
     -------
@@ -78,11 +83,13 @@ def load_mesh(
     ------
     TooManyFaces
         There are more than ``max_faces``; an `InvalidMesh` as well.
+    FileTooLarge
+        Unpacked, the file has more than ``max_bytes``; an `InvalidMesh` as well.
     InvalidMesh
         The file cannot be read, is not of this type, is damaged, declares more than it holds, or
         holds a mesh that `TriangleMesh` refuses.
     MissingExtra
-        GIFTI needs nibabel, the extra ``brain``; VTK's files need meshio, the extra ``vtk``.
+        GIFTI needs nibabel, the extra ``brain``; VTK's files need VTK, the extra ``vtk``.
 
     Notes
     -----
@@ -94,29 +101,16 @@ def load_mesh(
     >>> gc.load_mesh(text, "off")
     TriangleMesh(3 vertices, 1 faces)
     """
-    if isinstance(source, str | Path):
-        path = Path(source)
-        if file_type or path.suffix.lower().removeprefix(".") in _READERS:
-            kind = _known_kind(file_type or path.suffix)  # before a large file is read
-            data = _bytes_of(path)
-        else:
-            begins = _bytes_of(path, len(FREESURFER_MAGIC))
-            kind = "freesurfer" if begins == FREESURFER_MAGIC else _known_kind(path.suffix)
-            data = _bytes_of(path)
-    else:
-        kind = _known_kind(file_type or "")
-        data = bytes(source)
-    if not data:
+    file = read_unpacked(source, _READERS, max_bytes)
+    kind = _kind_of(file, file_type)
+    if not file.data:
         raise InvalidMesh(f"the {kind.upper()} file is empty")
     try:
-        read = _READERS[kind](data.removeprefix(codecs.BOM_UTF8), max_faces)
-    except (InvalidMesh, MissingExtra):
-        raise
-    except MemoryError:
+        read = _READERS[kind](file.data, max_faces)
+    except (TooManyFaces, MissingExtra, MemoryError):
         raise
     except Exception as error:  # any failure of a parser
-        what = " ".join(str(error).split())[:200] or type(error).__name__
-        raise InvalidMesh(f"the {kind.upper()} file is damaged: {what}") from error
+        raise _explained(error, kind, file.data) from error
     if len(read.sizes) == 0:
         raise InvalidMesh(f"the {kind.upper()} file holds no faces", kind="face")
     check_face_count(int(np.maximum(read.sizes - 2, 1).sum()), max_faces)
@@ -125,19 +119,28 @@ def load_mesh(
     )
 
 
-def _known_kind(file_type: str) -> str:
-    kind, known = file_type.lower().removeprefix("."), ", ".join(_READERS)
+def _kind_of(file: NamedBytes, file_type: str | None) -> str:
+    known = ", ".join(_READERS)
+    kind = file.suffix if file_type is None else file_type.lower().removeprefix(".")
+    if kind in _READERS and (file_type or kind not in _AMBIGUOUS):
+        return kind
+    signature = None if file_type else signature_of(file.data)
+    if signature is not None and signature.file_type:
+        return signature.file_type
+    if signature is not None:
+        raise InvalidMesh(f"the file is {signature.words}")
     if not kind:
         raise InvalidMesh(f"the file type is missing; it must be one of {known}")
-    if kind not in _READERS:
-        raise InvalidMesh(f"unknown mesh file type {kind!r}; it must be one of {known}")
-    return kind
+    raise InvalidMesh(f"unknown mesh file type {kind!r}; it must be one of {known}")
 
 
-def _bytes_of(path: Path, most: int = -1) -> bytes:
-    try:
-        with path.open("rb") as file:
-            return file.read(most)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InvalidMesh(f"cannot read {path}: {reason}") from error
+def _explained(error: Exception, kind: str, data: bytes) -> InvalidMesh:
+    """Return why a file cannot be read: first of all, that it is of another type."""
+    signature = signature_of(data)
+    if signature is not None and _READERS.get(signature.file_type) is not _READERS[kind]:
+        remedy = f": give file_type={signature.file_type!r}" if signature.file_type else ""
+        return InvalidMesh(f"the {kind.upper()} file is in fact {signature.words}{remedy}")
+    if isinstance(error, InvalidMesh):
+        return error
+    what = " ".join(str(error).split())[:200] or type(error).__name__
+    return InvalidMesh(f"the {kind.upper()} file is damaged: {what}")

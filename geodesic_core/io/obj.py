@@ -19,7 +19,7 @@ from geodesic_core.io.text import (
 )
 
 _CONTINUATION = re.compile(rb"\\[ \t]*\r?\n")
-_ROW = re.compile(rb"^[ \t]*(v|f|l|p|curv2?|surf)[ \t]+([^#\r\n]*)", re.MULTILINE)
+_ROW = re.compile(rb"^[ \t]*(v|f|l|p|curv2?|surf)[ \t]+([^\r\n]*)", re.MULTILINE)
 _FACE_ROW = re.compile(rb"^[ \t]*f[ \t]", re.MULTILINE)
 _CORNER = rb"-?0{0,99}[1-9]\d{0,17}(?:/-?\d*){0,2}"
 _FACE = re.compile(rb"[ \t]*" + _CORNER + rb"(?:[ \t]+" + _CORNER + rb")*[ \t]*")
@@ -39,8 +39,10 @@ def read_obj(data: bytes, max_faces: int | None) -> FileContents:
     """
     if b"\n" not in data:
         data = data.replace(b"\r", b"\n")
-    if b"\\" in data:  # a comment may end in one
-        data = _CONTINUATION.sub(b" ", COMMENT.sub(b"", data))
+    if b"#" in data:  # first, as a comment may end in a backslash
+        data = COMMENT.sub(b"", data)
+    if b"\\" in data:
+        data = _CONTINUATION.sub(b" ", data)
     check_counted_faces(_FACE_ROW, data, max_faces)
     rows = _ROW.findall(data)
     vertex_rows = [row for keyword, row in rows if keyword == b"v"]

@@ -2,6 +2,7 @@
 
 import re
 import struct
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,10 +10,12 @@ from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.io.contents import FileContents, note_on_ignored
+from geodesic_core.io.contents import FileContents, note_on_ignored, note_on_rest
 from geodesic_core.io.limits import check_declared_counts, check_face_count, counts_in_words
 from geodesic_core.io.text import (
+    INDEX_ROW,
     VERTEX_ROW,
+    check_columns,
     check_row_count,
     check_rows,
     counted_polygons,
@@ -20,8 +23,11 @@ from geodesic_core.io.text import (
     index_rows,
     number_table,
 )
+from geodesic_core.mesh.degeneracies import of_three_vertices
 
-_HEADER = re.compile(rb"ply[ \t]*\r?\n(.*?)^end_header[ \t]*\r?\n", re.DOTALL | re.MULTILINE)
+_HEADER = re.compile(
+    rb"ply[ \t]*(\r\n|\n|\r)(.*?[\r\n])end_header[ \t]*(?:\1|\r?\n)", re.DOTALL | re.IGNORECASE
+)
 _ORDERS = {b"ascii": "", b"binary_little_endian": "<", b"binary_big_endian": ">"}
 _TYPES = {
     name: code
@@ -43,6 +49,11 @@ _MOST_HEADER_LINES = 1000
 _MOST_DIGITS = 100
 """Digits of a count; Python refuses to read thousands."""
 _CORNER_NAMES = (b"vertex_indices", b"vertex_index")
+_AXES = (b"x", b"y", b"z")
+_POLYGONS = ("face", "tristrips")
+"""Elements that make the surface"""
+_Found = dict[str, tuple[NDArray[Any], Longs]]
+"""By element: (V, 3) positions of vertices, or the corners of polygons; and the size of each"""
 
 
 class _Property(NamedTuple):
@@ -60,6 +71,26 @@ class _Element(NamedTuple):
     @property
     def has_lists(self) -> bool:
         return any(part.count_type for part in self.properties)
+
+    def wanted(self) -> list[int]:
+        """Return which properties are read: the axes of vertices, the corners of polygons.
+
+        Raises
+        ------
+        InvalidMesh
+            Polygons have no list of corners.
+        """
+        if self.name == "vertex":
+            names = [part.name if not part.count_type else b"" for part in self.properties]
+            return [names.index(axis) for axis in _AXES]
+        if self.name not in _POLYGONS:
+            return []
+        for index, part in enumerate(self.properties):
+            if part.count_type and part.name in _CORNER_NAMES:
+                return [index]
+        raise InvalidMesh(
+            f"the PLY {self.name} elements have no 'list … vertex_indices'", kind="face"
+        )
 
     def least_bytes(self, order: str) -> int:
         """Return the least bytes of one, its lists empty; of text where ``order`` is empty."""
@@ -81,19 +112,26 @@ def read_ply(data: bytes, max_faces: int | None) -> FileContents:
     header = _HEADER.match(data)
     if header is None:
         raise InvalidMesh("the PLY file has no header from 'ply' to 'end_header'")
-    order, elements = _read_header(header[1])
+    order, elements = _read_header(header[2].lower())
     counts = {element.name: element.size for element in elements}
-    for name in ("vertex", "face"):
-        if not counts.get(name):
-            raise InvalidMesh(f"the PLY file holds no {name} elements", kind="face")
+    if not counts.get("vertex"):
+        raise InvalidMesh("the PLY file holds no vertex elements", kind="face")
+    if not any(counts.get(name) for name in _POLYGONS):
+        raise InvalidMesh("the PLY file holds no face elements", kind="face")
     _check_properties(elements)
     body = data[header.end() :]
     least_bytes = {element.name: element.least_bytes(order) for element in elements}
     check_declared_counts(counts, least_bytes, len(body))
-    check_face_count(counts["face"], max_faces)
-    read = _read_binary(elements, body, order) if order else _read_ascii(elements, body)
-    others = {name: n for name, n in counts.items() if n and name not in ("vertex", "face")}
-    return read._replace(notes=note_on_ignored("PLY", others))
+    check_face_count(counts.get("face", 0), max_faces)
+    found, rest = _read_binary(elements, body, order) if order else _read_text(elements, body)
+    polygons = [found[name] for name in _POLYGONS if name in found]
+    others = {name: n for name, n in counts.items() if n and name not in ("vertex", *_POLYGONS)}
+    return FileContents(
+        found["vertex"][0],
+        np.concatenate([corners for corners, _ in polygons]),
+        np.concatenate([sizes for _, sizes in polygons]),
+        note_on_ignored("PLY", others) + note_on_rest("PLY", rest),
+    )
 
 
 def _read_header(header: bytes) -> tuple[str, list[_Element]]:
@@ -133,89 +171,128 @@ def _read_header(header: bytes) -> tuple[str, list[_Element]]:
 
 
 def _check_properties(elements: list[_Element]) -> None:
-    """Refuse vertices without x, y and z, and faces without corners."""
+    """Refuse vertices without x, y and z, and polygons without corners."""
     for element in elements:
-        names = [part.name for part in element.properties if not part.count_type]
-        if element.name == "vertex" and (
-            element.has_lists or [names.count(axis) for axis in (b"x", b"y", b"z")] != [1, 1, 1]
-        ):
-            raise InvalidMesh("the PLY vertices must have x, y and z once each, and no lists")
-        if element.name == "face":
-            _corner_list_index(element)
+        if element.name == "vertex":
+            names = [part.name for part in element.properties if not part.count_type]
+            if [names.count(axis) for axis in _AXES] != [1, 1, 1]:
+                raise InvalidMesh("the PLY vertices must have x, y and z once each")
+        elif element.name in _POLYGONS:
+            element.wanted()
 
 
-def _corner_list_index(face: _Element) -> int:
-    """Return which property holds the corners of faces."""
-    for index, part in enumerate(face.properties):
-        if part.count_type and part.name in _CORNER_NAMES:
-            return index
-    raise InvalidMesh("the PLY faces have no property 'list … vertex_indices'", kind="face")
+def _as_polygons(element: _Element, corners: Longs, sizes: Longs) -> tuple[Longs, Longs]:
+    """Return the polygons of an element; strips of triangles become triangles."""
+    if element.name == "face" or len(corners) < 3:
+        return corners, sizes
+    # A strip ends with its list, or at -1.
+    at = np.arange(len(corners))
+    ends = np.zeros(len(corners), bool)
+    ends[np.cumsum(sizes)[sizes > 0] - 1] = True
+    is_break = corners == -1
+    starts_anew = np.concatenate([[True], (ends | is_break)[:-1]])
+    start = np.maximum.accumulate(np.where(starts_anew, at, 0))
+    first = at[:-2][(start[:-2] == start[2:]) & ~is_break[2:]]
+    odd = (first - start[first]) % 2
+    rows = corners[np.stack([first + odd, first + 1 - odd, first + 2], axis=1)]
+    rows = rows[of_three_vertices(rows)]  # others only lead to where the strip goes on
+    return rows.reshape(-1), np.full(len(rows), 3)
 
 
-def _read_ascii(elements: list[_Element], body: bytes) -> FileContents:
+def _read_text(elements: list[_Element], body: bytes) -> tuple[_Found, list[bytes]]:
+    """Return what the rows hold, and the rows behind the last element."""
     rows = [row for row in body.splitlines() if row.strip()]
     check_row_count({element.name: element.size for element in elements}, len(rows))
+    found: _Found = {}
     start = 0
     for element in elements:
         block = rows[start : start + element.size]
         start += element.size
         if element.name == "vertex":
-            vertices = _read_ascii_positions(element, block)
-        elif element.name == "face":
-            at = _corner_list_index(element)
+            found["vertex"] = _read_text_positions(element, block), np.empty(0, np.int64)
+        elif element.name in _POLYGONS:
+            (at,) = element.wanted()
             if any(part.count_type for part in element.properties[:at]):
-                raise InvalidMesh("the PLY faces have another list before their vertex_indices")
-            corners, sizes = index_rows(counted_polygons(block, skipped=at))
-    return FileContents(vertices, corners, sizes)
+                block = [b" ".join(words[at:]) for words in _words_by_property(element, block)]
+                at = 0
+            flat, sizes = index_rows(counted_polygons(block, skipped=at))
+            found[element.name] = _as_polygons(element, flat, sizes)
+    return found, rows[start:]
 
 
-def _read_ascii_positions(element: _Element, rows: list[bytes]) -> Floats:
-    columns = len(element.properties)
-    check_rows(rows, VERTEX_ROW, "vertex", f"it must have {columns} numbers")
-    short = next((i for i, row in enumerate(rows) if len(row.split()) < columns), None)
-    if short is not None:
-        raise InvalidMesh(
-            f"vertex {short} reads {excerpt(rows[short])}; it must have {columns} numbers",
-            kind="vertex",
-            elements=[short],
-        )
-    table = dict(
-        zip((part.name for part in element.properties), number_table(rows, columns).T, strict=True)
-    )
-    types = {part.name: part.type for part in element.properties}
-    with np.errstate(over="ignore"):  # the mesh refuses what is not finite
-        axes = [table[axis].astype(types[axis]) for axis in (b"x", b"y", b"z")]
-    return np.stack(axes, axis=1).astype(np.float64)
+def _words_by_property(element: _Element, rows: list[bytes]) -> Iterator[list[bytes]]:
+    """Yield the words of each property of each row: of a list, its count and its items.
+
+    Raises
+    ------
+    InvalidMesh
+        A row is too short, or has no count.
+    """
+    for number, row in enumerate(rows):
+        words, by_property, at = row.split(), [], 0
+        for part in element.properties:
+            end = at + 1
+            if part.count_type and at < len(words) and INDEX_ROW.fullmatch(words[at]):
+                end += int(words[at])
+            if not at < end <= len(words):
+                raise InvalidMesh(
+                    f"{element.name} {number} reads {excerpt(row)}; it must have "
+                    f"{len(element.properties)} properties, lists with their counts",
+                    kind="face" if element.name in _POLYGONS else "vertex",
+                    elements=[number],
+                )
+            by_property.append(b" ".join(words[at:end]))
+            at = end
+        yield by_property
 
 
-def _read_binary(elements: list[_Element], body: bytes, order: str) -> FileContents:
-    counts = {element.name: element.size for element in elements}
-    short = InvalidMesh(
-        f"the header declares {counts_in_words(counts)}, but {len(body)} bytes follow"
-    )
+def _read_text_positions(element: _Element, rows: list[bytes]) -> Floats:
+    parts = element.properties
+    if element.has_lists:
+        scalar = [i for i, part in enumerate(parts) if not part.count_type]
+        by_property = _words_by_property(element, rows)
+        rows = [b" ".join(words[i] for i in scalar) for words in by_property]
+        parts = [parts[i] for i in scalar]
+    check_rows(rows, VERTEX_ROW, "vertex", f"it must have {len(parts)} numbers")
+    check_columns(rows, len(parts))
+    table = number_table(rows, len(parts)).T
+    by_name = {
+        part.name: column.astype(part.type) for part, column in zip(parts, table, strict=True)
+    }
+    return np.stack([by_name[axis] for axis in _AXES], axis=1).astype(np.float64)
+
+
+def _read_binary(elements: list[_Element], body: bytes, order: str) -> tuple[_Found, bytes]:
+    """Return what the records hold, and the bytes behind the last element."""
+    found: _Found = {}
     at = 0
     for element in elements:
-        table = _uniform_records(element, body, at, order)
-        if table is None:
-            if not element.has_lists:
-                raise short
-            walked = _walk_lists(element, body, at, order)
-            at = walked[2]
-            if element.name == "face":
-                corners, sizes = walked[:2]
-            continue
-        at += table.nbytes
-        if element.name == "vertex":
-            names = [part.name for part in element.properties]
-            axes = [table[str(names.index(axis))] for axis in (b"x", b"y", b"z")]
-            with np.errstate(invalid="ignore"):  # the mesh refuses what is not finite
-                vertices = np.stack(axes, axis=1).astype(np.float64)
-        elif element.name == "face":
-            rows = table[str(_corner_list_index(element))]
-            corners, sizes = rows.astype(np.int64).reshape(-1), np.full(len(rows), rows.shape[1])
-    if at != len(body):
-        raise short
-    return FileContents(vertices, corners, sizes)
+        values, at = _values_of(element, body, at, order)
+        with np.errstate(invalid="ignore"):  # the mesh refuses what is not finite
+            if element.name == "vertex":
+                axes = [values[i][0].astype(np.float64) for i in element.wanted()]
+                found["vertex"] = np.stack(axes, axis=1), np.empty(0, np.int64)
+            elif element.name in _POLYGONS:
+                corners, sizes = values[element.wanted()[0]]
+                found[element.name] = _as_polygons(element, corners.astype(np.int64), sizes)
+    return found, body[at:]
+
+
+def _values_of(
+    element: _Element, body: bytes, start: int, order: str
+) -> tuple[dict[int, tuple[NDArray[Any], Longs]], int]:
+    """Return the properties of an element that are wanted, and where the next one begins.
+
+    Each by its number: its values, one record after the other, and how many each record has.
+    """
+    table = _uniform_records(element, body, start, order)
+    if table is None:
+        return _walk_lists(element, body, start, order)
+    values = {}
+    for i in element.wanted():
+        rows = table[str(i)].reshape(element.size, -1)
+        values[i] = rows.reshape(-1), np.full(element.size, rows.shape[1])
+    return values, start + table.nbytes
 
 
 def _uniform_records(element: _Element, body: bytes, start: int, order: str) -> NDArray[Any] | None:
@@ -241,12 +318,14 @@ def _uniform_records(element: _Element, body: bytes, start: int, order: str) -> 
     return table if all((count == count[:1]).all() for count in counts) else None
 
 
-def _walk_lists(element: _Element, body: bytes, at: int, order: str) -> tuple[Longs, Longs, int]:
-    """Return the corners of faces of any size, the size of each, and the offset behind them."""
-    corner_list = _corner_list_index(element) if element.name == "face" else -1
+def _walk_lists(
+    element: _Element, body: bytes, at: int, order: str
+) -> tuple[dict[int, tuple[NDArray[Any], Longs]], int]:
+    """Return what `_values_of` does, of records of any lengths."""
     counters = [struct.Struct(order + part.count_type) for part in element.properties]
     widths = [np.dtype(part.type).itemsize for part in element.properties]
-    chunks, sizes = [], []
+    chunks: dict[int, list[bytes]] = {i: [] for i in element.wanted()}
+    sizes: dict[int, list[int]] = {i: [] for i in chunks}
     for number in range(element.size):
         for i, (counter, width) in enumerate(zip(counters, widths, strict=True)):
             if at + counter.size > len(body):
@@ -257,15 +336,17 @@ def _walk_lists(element: _Element, body: bytes, at: int, order: str) -> tuple[Lo
                     f"a list of {element.name} {number} of the PLY file has {count} items"
                 )
             at += counter.size
-            if i == corner_list:
-                chunks.append(body[at : at + count * width])
-                sizes.append(count)
+            if i in chunks:
+                chunks[i].append(body[at : at + count * width])
+                sizes[i].append(count)
             at += count * width
         if at > len(body):
             raise _ends_within(element, number)
-    item = order + element.properties[corner_list].type
-    corners = np.frombuffer(b"".join(chunks), item).astype(np.int64)
-    return corners, np.array(sizes, dtype=np.int64), at
+    values = {}
+    for i, parts in chunks.items():
+        item = order + element.properties[i].type
+        values[i] = np.frombuffer(b"".join(parts), item), np.array(sizes[i], np.int64)
+    return values, at
 
 
 def _ends_within(element: _Element, number: int) -> InvalidMesh:

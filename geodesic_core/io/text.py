@@ -8,7 +8,8 @@ from geodesic_core.arrays import Floats, Longs
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.io.limits import check_face_count, counts_in_words
 
-COMMENT = re.compile(rb"#.*")
+COMMENT = re.compile(rb"(?<!\.)#[^\r\n]*")
+"""But for the end of ``-1.#IND``, as Microsoft's C prints what is no number: it is refused"""
 NUMBER = rb"[-+]?(?:(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][-+]?\d+)?|(?i:nan|inf(?:inity)?))"
 VERTEX_ROW = re.compile(rb"[ \t]*" + NUMBER + rb"(?:[ \t]+" + NUMBER + rb"){2,}[ \t\r]*")
 INDEX_ROW = re.compile(rb"[ \t]*-?\d{1,18}(?:[ \t]+-?\d{1,18})*[ \t\r]*")
@@ -87,12 +88,29 @@ def counted_polygons(rows: list[bytes], skipped: int = 0) -> list[bytes]:
 
 
 def check_row_count(counts: dict[str, int], rows: int) -> None:
-    """Refuse a file with more or fewer rows than its header declares.
+    """Refuse a file with fewer rows than its header declares.
 
     Raises
     ------
     InvalidMesh
-        The numbers differ.
+        Rows are missing.
     """
-    if sum(counts.values()) != rows:
+    if sum(counts.values()) > rows:
         raise InvalidMesh(f"the header declares {counts_in_words(counts)}, but {rows} rows follow")
+
+
+def check_columns(rows: list[bytes], columns: int) -> None:
+    """Refuse rows of vertices with fewer words than ``columns``.
+
+    Raises
+    ------
+    InvalidMesh
+        The first row at fault.
+    """
+    short = next((i for i, row in enumerate(rows) if len(row.split()) < columns), None)
+    if short is not None:
+        raise InvalidMesh(
+            f"vertex {short} reads {excerpt(rows[short])}; it must have {columns} numbers",
+            kind="vertex",
+            elements=[short],
+        )

@@ -1,58 +1,59 @@
-"""VTK's files, legacy and XML, read by meshio."""
+"""VTK's files, legacy and XML, read by VTK itself in a process of its own."""
 
-from tempfile import NamedTemporaryFile
+import importlib.util
+import io
+import json
+import subprocess
+import sys
 
 import numpy as np
 
-from geodesic_core.errors import InvalidMesh
-from geodesic_core.extras import extra
+from geodesic_core.errors import InvalidMesh, MissingExtra
+from geodesic_core.io import vtk_polygons
 from geodesic_core.io.contents import FileContents, note_on_ignored
 from geodesic_core.io.limits import check_face_count
 
-_POLYGONS = ("triangle", "quad", "polygon")
+_SECONDS, _BYTES_A_SECOND = 10, 1_000_000
+"""Processor time that VTK may take: in any case, and for how many bytes a second more"""
+_MEMORY, _MEMORY_OF_BYTE = 2 << 30, 200
+"""Memory that VTK may take: in any case, of which its libraries take half, and for each byte"""
 
 
 def read_vtk(data: bytes, max_faces: int | None) -> FileContents:
-    """Read a legacy VTK file; see `read_vtu`."""
-    return _read(data, "vtk", max_faces)
+    """Read the polygons of a VTK file: a legacy one, or XML of one data set in any number of parts.
 
-
-def read_vtu(data: bytes, max_faces: int | None) -> FileContents:
-    """Read the polygons of an XML file of an unstructured grid.
+    The same reader reads all of them, as their content says what they are.
 
     Raises
     ------
     InvalidMesh
-        The bytes are damaged, or are no such file.
+        The bytes are damaged, are no such file, or hold no polygons.
     TooManyFaces
         There are more faces than ``max_faces``.
     MissingExtra
-        meshio is not installed.
+        VTK is not installed.
     """
-    return _read(data, "vtu", max_faces)
-
-
-def _read(data: bytes, kind: str, max_faces: int | None) -> FileContents:
-    with extra("vtk", "meshio", f"load_mesh of a {kind.upper()} file"):
-        import meshio
-
-    with NamedTemporaryFile(suffix=f".{kind}") as file:  # meshio reads XML from paths only
-        file.write(data)
-        file.flush()
-        mesh = getattr(meshio, kind).read(file.name)
-    polygons = [block.data for block in mesh.cells if block.type.startswith(_POLYGONS)]
-    ignored: dict[str, int] = {}
-    for block in mesh.cells:
-        if not block.type.startswith(_POLYGONS):
-            ignored[f"{block.type} cells"] = ignored.get(f"{block.type} cells", 0) + len(block.data)
-    if not polygons:
-        raise InvalidMesh(f"the {kind.upper()} file holds no polygons", kind="face")
-    sizes = np.concatenate([np.full(len(rows), np.shape(rows)[1]) for rows in polygons])
+    if importlib.util.find_spec("vtkmodules") is None:
+        raise MissingExtra("load_mesh of a VTK file", "vtk", "vtk")
+    limits = _SECONDS + len(data) // _BYTES_A_SECOND, _MEMORY + _MEMORY_OF_BYTE * len(data)
+    command = [sys.executable, "-P", vtk_polygons.__file__, *map(str, limits)]
+    done = subprocess.run(command, input=data, capture_output=True, check=False)  # noqa: S603
+    stream = io.BytesIO(done.stdout)
+    if done.returncode:
+        said = done.stderr.decode("utf-8", "replace").strip().splitlines()
+        reason = said[-1][:200] if said else "it crashed"
+        raise InvalidMesh(
+            f"the VTK file is damaged: VTK cannot read it in {limits[0]} s and "
+            f"{limits[1] >> 20} MiB ({reason})"
+        )
+    answer = json.loads(stream.readline())
+    if "error" in answer:
+        raise InvalidMesh(f"the VTK file cannot be read: {answer['error']}")
+    points, corners, sizes = (np.load(stream) for _ in range(3))
+    if len(sizes) == 0:
+        others = ", ".join(f"{count} {name}" for name, count in answer["left_out"].items())
+        raise InvalidMesh(
+            f"the VTK file holds no polygons, but {others or 'no cells'}", kind="face"
+        )
     check_face_count(int((sizes - 2).sum()), max_faces)
-    corners = np.concatenate([np.asarray(rows, np.int64).reshape(-1) for rows in polygons])
-    return FileContents(
-        np.ascontiguousarray(mesh.points, np.float64),
-        corners,
-        sizes.astype(np.int64),
-        note_on_ignored(kind.upper(), ignored),
-    )
+    return FileContents(points, corners, sizes, note_on_ignored("VTK", answer["left_out"]))

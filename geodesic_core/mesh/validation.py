@@ -18,8 +18,9 @@ def as_vertices(vertices: ArrayLike) -> Floats:
     Raises
     ------
     InvalidMesh
-        They are not rows of three real numbers.
+        They are not rows of three real numbers, or some are masked.
     """
+    _refuse_masked(vertices, "vertex", "vertices")
     try:
         given = np.asarray(vertices)
         array = np.array(given, dtype=np.float64, order="C") if given.dtype.kind in "fiuO" else None
@@ -40,8 +41,9 @@ def as_faces(faces: ArrayLike) -> Longs:
     Raises
     ------
     InvalidMesh
-        There are none, or they are not rows of three integers.
+        There are none, they are not rows of three integers, or some are masked.
     """
+    _refuse_masked(faces, "face", "faces")
     try:
         array = np.asarray(faces)
     except ValueError as error:
@@ -60,14 +62,31 @@ def as_faces(faces: ArrayLike) -> Longs:
     return np.array(array, dtype=np.int64, order="C")
 
 
+def _refuse_masked(rows: ArrayLike, kind: str, name: str) -> None:
+    """Refuse rows of which a masked array says that they do not count."""
+    if not isinstance(rows, np.ma.MaskedArray):
+        return
+    mask = np.ma.getmaskarray(rows)
+    bad = np.flatnonzero(mask.reshape(len(mask), -1).any(axis=1)) if mask.ndim else np.zeros(1, int)
+    if len(bad):
+        raise InvalidMesh(
+            f"{kind} {bad[0]} is masked{_and_more(bad)}: leave masked {name} out first, with the "
+            "faces that have them",
+            kind=kind,
+            elements=bad[:NAMED].tolist(),
+        )
+
+
 def as_polygons(corners: ArrayLike, sizes: ArrayLike) -> tuple[Longs, Longs]:
     """Return int64 copies of the (C,) corners of all polygons and of their (P,) sizes.
 
     Raises
     ------
     InvalidMesh
-        They are not integers, a polygon has no corners, or the sizes do not sum to C.
+        They are not integers, some are masked, a polygon has no corners, or the sizes do not sum to
+        C.
     """
+    _refuse_masked(corners, "face", "corners")
     try:
         flat, counts = np.asarray(corners), np.asarray(sizes)
     except ValueError as error:

@@ -499,8 +499,8 @@ def test_other_types_are_refused_by_name(kind: str) -> None:
 
 def test_bytes_without_a_type_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InvalidMesh, match="type is missing"):
-        load_mesh(b"OFF\n")
-    (tmp_path / "mesh").write_bytes(b"OFF\n")
+        load_mesh(b"v 0 0 0\n")
+    (tmp_path / "mesh").write_bytes(b"v 0 0 0\n")
     with pytest.raises(InvalidMesh, match="type is missing"):
         load_mesh(tmp_path / "mesh")
 
@@ -603,7 +603,7 @@ def test_lying_vertex_counts_are_refused_before_memory_is_taken(
 
 
 @pytest.mark.usefixtures("capped_memory")
-@pytest.mark.parametrize("count", [b"1000000000", b"4", b"99999999999999999999", b"-3", b"2", b"0"])
+@pytest.mark.parametrize("count", [b"1000000000", b"4", b"99999999999999999999", b"-3", b"0"])
 @pytest.mark.parametrize("write", [ply, ply_binary, off], ids=name_of)
 def test_lying_face_counts_are_refused_before_memory_is_taken(write: Writer, count: bytes) -> None:
     data = write(VERTICES, FACES)
@@ -755,7 +755,7 @@ def test_binary_ply_with_uneven_lists_everywhere() -> None:
     assert "2 strip" in mesh.warnings[0]
     for end in range(len(body)):
         refusal(header + body[:end], "ply")
-    refusal(header + body + b"x", "ply")
+    assert "follow 1 bytes" in load_mesh(header + body + b"x", "ply").warnings[1]
 
 
 def test_numbers_are_of_the_type_that_a_ply_header_says() -> None:
@@ -765,12 +765,12 @@ def test_numbers_are_of_the_type_that_a_ply_header_says() -> None:
     assert load_mesh(data, "ply").vertices[0, 0] == 0.1
 
 
-def test_ascii_ply_with_another_list_first_is_refused() -> None:
+def test_ascii_ply_without_another_list_that_it_declares_is_refused() -> None:
     data = ply(VERTICES, FACES).replace(
         b"property list uchar int v",
         b"property list uchar float weights\nproperty list uchar int v",
     )
-    assert "another list" in str(refusal(data, "ply"))
+    assert "lists with their counts" in str(refusal(data, "ply"))
 
 
 def test_an_ascii_stl_that_loses_a_corner_is_refused() -> None:

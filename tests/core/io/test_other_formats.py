@@ -96,7 +96,7 @@ def test_counts_beyond_the_content_are_named(tmp_path: Path) -> None:
     begin = content.index(b"\n\n") + 2
     content[begin : begin + 4] = (2**31 - 1).to_bytes(4, "big")
     path.write_bytes(content)
-    with pytest.raises(gc.errors.InvalidMesh, match=r"declares 2147483647 vertices .* holds 482"):
+    with pytest.raises(gc.errors.InvalidMesh, match=r"declares 2147483647 vertices .* holds 5784"):
         gc.load_mesh(path)
 
 
@@ -115,5 +115,5 @@ def test_an_unknown_file_is_not_taken_for_freesurfer_s(tmp_path: Path) -> None:
     path.write_bytes(b"no surface")
     with pytest.raises(gc.errors.InvalidMesh, match="unknown mesh file type 'pial'"):
         gc.load_mesh(path)
-    with pytest.raises(gc.errors.InvalidMesh, match="not a FreeSurfer triangle surface"):
+    with pytest.raises(gc.errors.InvalidMesh, match="not a FreeSurfer surface"):
         gc.load_mesh(path, "freesurfer")

@@ -1,0 +1,265 @@
+"""Polygons of VTK's data sets; as a program, those of the file on standard input.
+
+A damaged file can crash VTK's readers, or have them run on. So `vtk` runs this module in a process
+of its own, which imports nothing else of the library and starts in half a second.
+"""
+
+import json
+import re
+import sys
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+_PIXEL, _STRIP = 8, 6
+_POLYGONS = (5, 7, 9)
+"""VTK's numbers of triangles, polygons and quadrangles, whose points go around them."""
+_FIRST_QUADRATIC, _BEZIER = 21, (75, 76, 77)
+_HIDDEN_POINT, _DOUBLE_OR_HIDDEN_CELL = 2, 1 | 32
+"""Flags of VTK's ghost arrays."""
+
+
+def polygons_of(
+    data: Any,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], dict[str, int]]:
+    """Return points, corners and sizes of a data set's polygons, and the number of other cells.
+
+    Points keep their numbers, and polygons the order of the cells. Strips become triangles. Cells
+    of higher order are split through their nodes as VTK does. The blocks of a composite data set
+    follow each other.
+
+    Returns
+    -------
+    points
+        (V, 3) float64.
+    corners
+        (C,) points of all polygons, one polygon after the other.
+    sizes
+        (P,) number of corners of each polygon.
+    left_out
+        Number of cells that are no polygons, by the name of their type.
+
+    Raises
+    ------
+    ValueError
+        There are cells whose points do not lie on the surface (Bézier).
+    """
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    grid = _as_unstructured(data)
+    if grid.GetNumberOfCells() == 0:
+        none = np.empty(0, np.int64)
+        return np.empty((0, 3)), none, none, {}
+    points = vtk_to_numpy(grid.GetPoints().GetData()).astype(np.float64)
+    cells = grid.GetCells()
+    starts = vtk_to_numpy(cells.GetOffsetsArray()).astype(np.int64)
+    corners = vtk_to_numpy(cells.GetConnectivityArray()).astype(np.int64)
+    types = vtk_to_numpy(_types_of(grid))
+    shown = _shown_cells(grid, starts, corners)
+    pieces: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]] = []
+    left_out: dict[str, int] = {}
+    for kind in np.unique(types).tolist():
+        chosen = np.flatnonzero((types == kind) & shown)
+        if len(chosen) == 0:
+            continue
+        cell = grid.GetCell(int(chosen[0]))
+        if kind in _BEZIER and cell.GetCellDimension() == 2:
+            raise ValueError(
+                "it has Bézier cells, whose points do not lie on the surface: triangulate it first"
+            )
+        if cell.GetCellDimension() != 2:
+            name = _in_words(cell.GetClassName())
+            left_out[name] = left_out.get(name, 0) + len(chosen)
+        elif kind in _POLYGONS:
+            sizes = starts[chosen + 1] - starts[chosen]
+            pieces.append((chosen, sizes, _rows(starts[chosen], sizes, corners)))
+        elif kind == _PIXEL:
+            rows = corners[starts[chosen][:, None] + [0, 1, 3, 2]]
+            pieces.append((chosen, np.full(len(chosen), 4), rows.ravel()))
+        else:
+            pieces.append(_split(grid, chosen, starts, corners, is_strip=kind == _STRIP))
+    hidden = len(shown) - int(np.count_nonzero(shown))
+    if hidden:
+        left_out["hidden cells"] = hidden
+    return points, *_in_order(pieces), left_out
+
+
+def _as_unstructured(data: Any) -> Any:
+    """Return a data set, or the blocks of a composite one, as one unstructured grid."""
+    from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
+    from vtkmodules.vtkFiltersCore import vtkAppendFilter
+
+    if data.IsA("vtkUnstructuredGrid"):
+        return data
+    append = vtkAppendFilter()
+    append.SetOutputPointsPrecision(1)  # double
+    if isinstance(data, vtkCompositeDataSet):
+        blocks = data.NewIterator()
+        blocks.InitTraversal()
+        while not blocks.IsDoneWithTraversal():
+            append.AddInputData(blocks.GetCurrentDataObject())
+            blocks.GoToNextItem()
+    else:
+        append.AddInputData(data)
+    append.Update()
+    return append.GetOutput()
+
+
+def _types_of(grid: Any) -> Any:
+    try:
+        return grid.GetCellTypes()
+    except TypeError:  # before VTK 9.6, a method of another kind
+        return grid.GetCellTypesArray()
+
+
+def _shown_cells(
+    grid: Any, starts: NDArray[np.int64], corners: NDArray[np.int64]
+) -> NDArray[np.bool_]:
+    """Tell which cells are neither blanked nor repeat one of another piece."""
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    shown = np.ones(len(starts) - 1, bool)
+    flags = grid.GetCellGhostArray()
+    if flags is not None:
+        shown &= vtk_to_numpy(flags) & _DOUBLE_OR_HIDDEN_CELL == 0
+    flags = grid.GetPointGhostArray()
+    if flags is not None:
+        hidden = vtk_to_numpy(flags)[corners] & _HIDDEN_POINT != 0
+        cell = np.repeat(np.arange(len(shown)), np.diff(starts))
+        shown[cell[hidden]] = False
+    return shown
+
+
+def _split(
+    grid: Any,
+    chosen: NDArray[np.int64],
+    starts: NDArray[np.int64],
+    corners: NDArray[np.int64],
+    *,
+    is_strip: bool,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    """Return the triangles of cells: the cell of each, their sizes and corners."""
+    from vtkmodules.vtkCommonCore import vtkIdList
+
+    ids, rows, cells = vtkIdList(), [], []
+    for cell in chosen.tolist():
+        own = corners[starts[cell] : starts[cell + 1]]
+        if is_strip:
+            i = np.arange(len(own) - 2)
+            local = np.stack([i + i % 2, i + 1 - i % 2, i + 2], axis=1)
+        else:
+            grid.GetCell(cell).TriangulateLocalIds(0, ids)
+            local = np.array([ids.GetId(i) for i in range(ids.GetNumberOfIds())], np.int64)
+            local = local.reshape(-1, 3)
+        rows.append(own[local])
+        cells += [cell] * len(local)
+    triangles = np.concatenate(rows)
+    return np.array(cells, np.int64), np.full(len(triangles), 3), triangles.ravel()
+
+
+def _rows(
+    starts: NDArray[np.int64], sizes: NDArray[np.int64], corners: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Return the corners of rows of these sizes, which begin at these places."""
+    ends = np.cumsum(sizes)
+    places: NDArray[np.int64] = np.arange(sizes.sum()) + np.repeat(starts - ends + sizes, sizes)
+    return corners[places]
+
+
+def _in_order(
+    pieces: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]],
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the corners and sizes of polygons of several types, in the order of their cells."""
+    if not pieces:
+        return np.empty(0, np.int64), np.empty(0, np.int64)
+    cells, sizes, corners = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    order = np.argsort(cells, kind="stable")
+    return _rows((np.cumsum(sizes) - sizes)[order], sizes[order], corners), sizes[order]
+
+
+def _in_words(class_name: str) -> str:
+    """Return the name of a type of cells: ``vtkQuadraticEdge`` as ``quadratic edge cells``."""
+    return re.sub(r"(?<=.)([A-Z])", r" \1", class_name.removeprefix("vtk")).lower() + " cells"
+
+
+def read_file(content: bytes) -> Any:
+    """Return the data set in a file: a legacy one, or XML of any type that has no other files.
+
+    Raises
+    ------
+    ValueError
+        VTK reports an error.
+    """
+    reader = _reader_of(content)
+    errors: list[str] = []
+
+    def note_error(_reader: Any, _event: str, text: str) -> None:
+        errors.append(" ".join(text.rpartition("): ")[2].split()))
+
+    note_error.CallDataType = "string0"  # type: ignore[attr-defined]  # VTK then hands on the text
+    reader.AddObserver("ErrorEvent", note_error)
+    reader.GetExecutive().AddObserver("ErrorEvent", note_error)
+    reader.Update()
+    data = reader.GetOutputDataObject(0)
+    if errors or data is None:
+        raise ValueError(errors[0] if errors else "VTK reads nothing from it")
+    return data
+
+
+def _reader_of(content: bytes) -> Any:
+    if content.startswith(b"# vtk DataFile"):
+        from vtkmodules.vtkIOLegacy import vtkDataSetReader
+
+        reader: Any = vtkDataSetReader()
+        reader.SetBinaryInputString(content, len(content))
+        reader.ReadFromInputStringOn()
+        return reader
+    from vtkmodules import vtkIOXML
+    from vtkmodules.vtkIOCore import vtkMemoryResourceStream
+
+    found = re.search(rb"<VTKFile\b[^>]*?\btype\s*=\s*[\"'](\w+)", content)
+    kind = found[1].decode() if found else ""
+    make: Any = getattr(vtkIOXML, f"vtkXML{kind}Reader", None)
+    if kind not in _DATA_SETS or make is None:
+        raise ValueError(
+            f"its type is {kind!r}; it must be one of {', '.join(_DATA_SETS)}, or a legacy file"
+        )
+    stream = vtkMemoryResourceStream()
+    stream.SetBuffer(content, len(content))
+    xml_reader = make()
+    xml_reader.SetStream(stream)
+    xml_reader.ReadFromInputStreamOn()
+    return xml_reader
+
+
+_DATA_SETS = ("PolyData", "UnstructuredGrid", "StructuredGrid", "RectilinearGrid", "ImageData")
+
+
+def _answer(content: bytes, out: BinaryIO) -> None:
+    """Write the polygons of a file: a line of JSON, then arrays in numpy's format."""
+    try:
+        points, corners, sizes, left_out = polygons_of(read_file(content))
+    except ValueError as error:
+        out.write(json.dumps({"error": str(error)}).encode() + b"\n")
+        return
+    out.write(json.dumps({"left_out": left_out}).encode() + b"\n")
+    for array in (points, corners, sizes):
+        np.save(out, array)
+
+
+def _limit(seconds: int, memory: int) -> None:
+    """End this process where it takes more processor time, or memory."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return
+    for kind, most in ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_AS, memory)):
+        _, hard = resource.getrlimit(kind)
+        allowed = most if hard == resource.RLIM_INFINITY else min(most, hard)
+        resource.setrlimit(kind, (allowed, hard))
+
+
+if __name__ == "__main__":
+    _limit(*map(int, sys.argv[1:]))
+    _answer(sys.stdin.buffer.read(), sys.stdout.buffer)
