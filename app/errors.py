@@ -258,6 +258,20 @@ def _too_many_faces(error: core.TooManyFaces) -> Problem:
     return over_limit("limit_exceeded", "faces", error.faces, error.max_faces, "max_faces").problem
 
 
+def _too_large_unpacked(error: core.FileTooLarge) -> Problem:
+    return Problem(
+        "upload_too_large",
+        str(error),
+        limit=error.max_bytes,
+        setting=variable_of("max_upload_bytes"),
+    )
+
+
+def _unknown_file_type(error: core.UnknownFileType) -> Problem:
+    hint = "name the format by ?format=, by Content-Type, or by the suffix of the file's name"
+    return Problem("unsupported_media_type", str(error), hint=hint)
+
+
 def _over_memory(error: core.MemoryLimitExceeded) -> Problem:
     what, limit = "bytes or more are needed", error.memory_limit
     return over_limit("memory_limit", what, error.needed, limit, "query_memory_bytes").problem
@@ -304,6 +318,9 @@ def _internal_error(_error: BaseException) -> Problem:
 EXCEPTIONS: Sequence[tuple[type[BaseException], Callable[[Any], Problem]]] = (
     (ProblemError, lambda error: error.problem),
     (core.TooManyFaces, _too_many_faces),
+    (core.FileTooLarge, _too_large_unpacked),
+    (core.UnknownFileType, _unknown_file_type),
+    (core.MissingExtra, lambda error: Problem("unsupported_media_type", str(error))),
     (core.InvalidMesh, _invalid_mesh),
     (core.InvalidPoint, lambda error: Problem("invalid_point", str(error))),
     (core.InvalidArgument, lambda error: Problem("invalid_request", str(error))),

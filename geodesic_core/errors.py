@@ -4,6 +4,7 @@ They form a tree::
 
     GeodesicError
     ├── InvalidMesh             the vertices, the faces or the file cannot be used
+    │   ├── UnknownFileType     neither name nor content tell how to read a file
     │   ├── TooManyFaces        more than the caller allows
     │   └── FileTooLarge        more bytes than the caller allows
     ├── InvalidPoint            a source or target that is not on the mesh
@@ -97,6 +98,19 @@ class TooManyFaces(InvalidMesh):
         super().__init__(f"{faces} faces; at most {max_faces} are allowed", kind="face")
         self.faces = faces
         self.max_faces = max_faces
+
+
+class UnknownFileType(InvalidMesh):
+    """A file of which neither its name nor its content tells the type.
+
+    Examples
+    --------
+    >>> try:
+    ...     gc.load_mesh(b"0 0 0", "xyz")
+    ... except gc.errors.UnknownFileType as error:
+    ...     print(str(error).split(";")[0])
+    unknown mesh file type 'xyz'
+    """
 
 
 class FileTooLarge(InvalidMesh):

@@ -82,7 +82,7 @@ class _Sample(msgspec.Struct, frozen=True, tag="sample"):
 
 class _File(msgspec.Struct, frozen=True, tag="file"):
     path: str
-    file_type: str
+    file_type: str | None
     merge: Merge
 
 

@@ -19,7 +19,8 @@ class MeshFromFile:
     """An uploaded mesh file."""
 
     path: Path
-    file_type: str
+    file_type: str | None
+    """None where the name of the file, or its content, tells"""
     merge: Merge
 
 

@@ -138,7 +138,7 @@ class Worker:
     def _store(self, work: StoreMesh, clock: "Clock", cancel: Callable[[], bool]) -> TaskResult:
         try:
             with clock.phase("load"):
-                mesh = _make_mesh(work.mesh_input, self.settings.max_faces)
+                mesh = _make_mesh(work.mesh_input, self.settings)
             with clock.phase("store"):
                 written = self.store.write_aside(mesh, work.folder, work.owner, work.name)
         except FileNotFoundError:
@@ -341,7 +341,8 @@ class Clock:
         self.periods[name] = Period(start_ns, time_ns())
 
 
-def _make_mesh(mesh_input: MeshInput, max_faces: int) -> gc.TriangleMesh:
+def _make_mesh(mesh_input: MeshInput, settings: Settings) -> gc.TriangleMesh:
+    max_faces = settings.max_faces
     faces: NDArray[np.int32] | NDArray[np.int64]
     match mesh_input:
         case MeshFromSample():
@@ -354,7 +355,11 @@ def _make_mesh(mesh_input: MeshInput, max_faces: int) -> gc.TriangleMesh:
             vertices, faces = read_json_mesh(mesh_input.path.read_bytes())
         case MeshFromFile():
             return gc.load_mesh(
-                mesh_input.path, mesh_input.file_type, mesh_input.merge, max_faces=max_faces
+                mesh_input.path,
+                mesh_input.file_type,
+                mesh_input.merge,
+                max_faces=max_faces,
+                max_bytes=settings.max_upload_bytes,
             )
     if len(faces) > max_faces:
         raise gc.errors.TooManyFaces(len(faces), max_faces)

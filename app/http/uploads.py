@@ -5,18 +5,18 @@ import re
 import shutil
 import zlib
 from collections.abc import AsyncIterator
+from email.message import EmailMessage
 from pathlib import Path
-from typing import get_args
+from typing import NamedTuple
 
 from anyio import to_thread
 from starlette.datastructures import UploadFile
 from starlette.requests import Request
 
 from app.errors import problem
-from app.schemas.meshes import LONGEST_NAME, MeshFormat
+from app.schemas.meshes import LONGEST_NAME
 from app.settings import variable_of
 
-MESH_FORMATS = get_args(MeshFormat)
 _FORMAT_OF_TYPE = {
     "application/json": "json",
     "model/obj": "obj",
@@ -28,27 +28,40 @@ _FORMAT_OF_TYPE = {
     "model/x.stl-ascii": "stl",
     "application/sla": "stl",
     "model/gltf-binary": "glb",
+    "model/gltf+json": "gltf",
+    "model/vtk": "vtk",
 }
 _BLOCK = 2**20
+_ENDING = re.compile(r"(?:\.[A-Za-z0-9]{1,10}){1,2}$")
+"""Up to two suffixes, as .gii.gz has; others are not for file names"""
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 
 
-async def spool(
-    request: Request, path: Path, file_format: str | None, max_bytes: int
-) -> tuple[str, str | None]:
-    """Write the mesh file of a request to ``path``, and return its format and its name, if any.
+class Upload(NamedTuple):
+    """A mesh file that came with a request."""
+
+    path: Path
+    """Ends as the client's name of the file does"""
+    file_format: str | None
+    """None where the request does not tell: then the library goes by name and content"""
+    name: str | None
+
+
+async def spool(request: Request, folder: Path, file_format: str | None, max_bytes: int) -> Upload:
+    """Write the mesh file of a request into a folder.
 
     Parameters
     ----------
     request
         The request.
-    path
-        The file to write.
+    folder
+        The folder, which is empty.
     file_format
         The format that the client named, if it did.
     max_bytes
         Largest size of a body that comes compressed, once it is not.
     """
+    path = folder / "upload"
     media_type = _media_type(request.headers.get("content-type"))
     coding = request.headers.get("content-encoding", "identity").strip().lower()
     is_form = media_type == "multipart/form-data"
@@ -57,39 +70,39 @@ async def spool(
         hint = "send the file uncompressed, or compressed with gzip"
         headers = {"Accept-Encoding": "gzip, identity"}
         raise problem("unsupported_media_type", detail, hint=hint, headers=headers)
-    name = None
     if is_form:
-        guess, name = await _spool_form(request, path)
+        media_type, name = await _spool_form(request, path)
     else:
         await _write(path, request.stream())
-        guess = _FORMAT_OF_TYPE.get(media_type)
+        name = _named_in(request.headers.get("content-disposition"))
     if coding == "gzip":
         await _decompress(path, max_bytes)
     if path.stat().st_size == 0:
         raise problem("invalid_mesh", "the body is empty: there is no mesh in it")
-    chosen = file_format or guess
-    if chosen is None:
-        hint = (
-            f"add ?format= with one of {', '.join(MESH_FORMATS)}, or send the Content-Type of a "
-            "mesh format"
-        )
-        detail = f"{media_type or 'no Content-Type'} does not tell the format of the mesh"
-        raise problem("unsupported_media_type", detail, hint=hint)
-    return chosen, name
+    name = _CONTROL.sub("", Path(name).name)
+    ending = _ENDING.search(name)
+    if ending is not None:
+        path = path.rename(path.with_name(f"upload{ending[0]}"))
+    by_type = "json" if path.suffix.lower() == ".json" else _FORMAT_OF_TYPE.get(media_type)
+    return Upload(path, file_format or by_type, name[:LONGEST_NAME] or None)
 
 
-async def _spool_form(request: Request, path: Path) -> tuple[str | None, str | None]:
+def _named_in(disposition: str | None) -> str:
+    """Return the file name in a `Content-Disposition`, empty where there is none."""
+    message = EmailMessage()
+    message["Content-Disposition"] = _CONTROL.sub("", disposition or "attachment")
+    return message.get_filename("")
+
+
+async def _spool_form(request: Request, path: Path) -> tuple[str, str]:
+    """Write the file of a form; return its media type and its name."""
     async with request.form(max_files=1, max_fields=0) as form:
         file = next((part for part in form.values() if isinstance(part, UploadFile)), None)
         if file is None:
             raise problem("malformed_body", "the form has no file")
         with path.open("wb") as target:
             await to_thread.run_sync(shutil.copyfileobj, file.file, target, _BLOCK)
-        name = _CONTROL.sub("", Path(file.filename or "").name)
-        suffix = Path(name).suffix.lower().removeprefix(".")
-        by_suffix = suffix if suffix in (*MESH_FORMATS, "json") else None
-        guess = by_suffix or _FORMAT_OF_TYPE.get(_media_type(file.content_type))
-        return guess, name[:LONGEST_NAME] or None
+        return _media_type(file.content_type), file.filename or ""
 
 
 async def _write(path: Path, chunks: AsyncIterator[bytes]) -> None:

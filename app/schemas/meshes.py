@@ -1,13 +1,34 @@
 """Uploads, and the reports of meshes."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, BeforeValidator, Field
 
 from app.schemas.points import LARGEST_COUNT, StrictModel
 
 Merge = Literal["none", "exact"]
-MeshFormat = Literal["obj", "off", "ply", "stl", "glb"]
+_MeshFormat = Literal[
+    "obj",
+    "off",
+    "ply",
+    "stl",
+    "glb",
+    "gltf",
+    "gii",
+    "freesurfer",
+    "vtk",
+    "vtp",
+    "vtu",
+    "vts",
+    "vtr",
+    "vti",
+    "asc",
+]
+MESH_FORMATS: tuple[str, ...] = get_args(_MeshFormat)
+MeshFormat = Annotated[
+    _MeshFormat, BeforeValidator(lambda name: name.lower() if isinstance(name, str) else name)
+]
+"""Types of files that `geodesic_core.load_mesh` reads, in any case"""
 LONGEST_NAME = 255
 """Characters of the name of a mesh: as many as file systems allow for that of a file"""
 MeshName = Annotated[str, Field(max_length=LONGEST_NAME, pattern=r"^[^\x00-\x1f\x7f-\x9f]+$")]
@@ -23,7 +44,11 @@ class UploadParameters(StrictModel):
         description="Name for people; if not given, the file name in a form, or the name of the "
         "sample",
     )
-    format: MeshFormat | None = Field(default=None, description="Overrides `Content-Type`")
+    format: MeshFormat | None = Field(
+        default=None,
+        description="Format of the file. By default, `Content-Type` tells it, else the suffix of "
+        "its name in the form or in `Content-Disposition`, else its first bytes",
+    )
     merge: Merge = Field(default="none", description="`exact` joins vertices at the same position")
     sample: SampleName | None = Field(
         default=None, description="The sample to make, instead of reading a mesh"

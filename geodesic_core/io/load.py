@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from geodesic_core.errors import InvalidMesh, MissingExtra, TooManyFaces
+from geodesic_core.errors import InvalidMesh, MissingExtra, TooManyFaces, UnknownFileType
 from geodesic_core.io.brain import read_freesurfer, read_gifti
 from geodesic_core.io.contents import FileContents
 from geodesic_core.io.glb import read_glb
@@ -83,6 +83,8 @@ def load_mesh(
     ------
     TooManyFaces
         There are more than ``max_faces``; an `InvalidMesh` as well.
+    UnknownFileType
+        Neither name nor content tells the type, or it is none of these; an `InvalidMesh` as well.
     FileTooLarge
         Unpacked, the file has more than ``max_bytes``; an `InvalidMesh` as well.
     InvalidMesh
@@ -128,10 +130,10 @@ def _kind_of(file: NamedBytes, file_type: str | None) -> str:
     if signature is not None and signature.file_type:
         return signature.file_type
     if signature is not None:
-        raise InvalidMesh(f"the file is {signature.words}")
+        raise UnknownFileType(f"the file is {signature.words}")
     if not kind:
-        raise InvalidMesh(f"the file type is missing; it must be one of {known}")
-    raise InvalidMesh(f"unknown mesh file type {kind!r}; it must be one of {known}")
+        raise UnknownFileType(f"the file type is missing; it must be one of {known}")
+    raise UnknownFileType(f"unknown mesh file type {kind!r}; it must be one of {known}")
 
 
 def _explained(error: Exception, kind: str, data: bytes) -> InvalidMesh:

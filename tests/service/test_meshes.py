@@ -1,10 +1,14 @@
+import bz2
 import gzip
+import json
+import zipfile
 from io import BytesIO
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
 import pytest
+from nibabel.gifti import GiftiDataArray, GiftiImage
 from starlette.testclient import TestClient
 
 from app.cli.arguments import SampleName
@@ -12,7 +16,16 @@ from app.schemas import meshes as schemas
 from app.settings import Settings
 from app.store.manifests import MANIFEST, encode_manifest, read_manifest
 from geodesic_core import samples
+from geodesic_core.io.load import _READERS
 from tests.support.service import check_problem, serving, store_mesh, stored_mesh, upload_sample
+
+
+def zipped(name: str, content: str) -> bytes:
+    archive = BytesIO()
+    with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
+        file.writestr(name, content)
+    return archive.getvalue()
+
 
 TETRAHEDRON = {
     "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -25,7 +38,25 @@ OFF = "OFF\n4 4 0\n" + "".join(
     " ".join(map(str, row)) + "\n"
     for row in [*TETRAHEDRON["vertices"], *([3, *face] for face in TETRAHEDRON["faces"])]
 )
+GIFTI = GiftiImage(
+    darrays=[
+        GiftiDataArray(np.array(TETRAHEDRON["vertices"], np.float32), "NIFTI_INTENT_POINTSET"),
+        GiftiDataArray(np.array(TETRAHEDRON["faces"], np.int32), "NIFTI_INTENT_TRIANGLE"),
+    ]
+).to_bytes()
+FREESURFER = (
+    b"\xff\xff\xfeby hand\n\n"
+    + np.array([4, 4], ">i4").tobytes()
+    + np.array(TETRAHEDRON["vertices"], ">f4").tobytes()
+    + np.array(TETRAHEDRON["faces"], ">i4").tobytes()
+)
+VTK = "# vtk DataFile Version 3.0\nby hand\nASCII\nDATASET POLYDATA\nPOINTS 4 double\n" + "".join(
+    [" ".join(map(str, row)) + "\n" for row in TETRAHEDRON["vertices"]]
+    + ["POLYGONS 4 16\n"]
+    + [" ".join(map(str, [3, *face])) + "\n" for face in TETRAHEDRON["faces"]]
+)
 TYPE_OBJ = {"Content-Type": "model/obj"}
+TYPE_BYTES = {"Content-Type": "application/octet-stream"}
 GZIPPED = {**TYPE_OBJ, "Content-Encoding": "gzip"}
 
 
@@ -59,6 +90,26 @@ def test_upload_answers_with_a_report(client: TestClient) -> None:
             "headers": {**TYPE_OBJ, "Content-Encoding": "GZIP"},
         },
         {"content": OBJ, "headers": {**TYPE_OBJ, "Content-Encoding": "identity"}},
+        {"content": OBJ, "params": {"format": "OBJ"}},
+        {"content": OBJ, "headers": {"Content-Disposition": 'attachment; filename="t.obj"'}},
+        {
+            "content": OBJ,
+            "headers": {**TYPE_BYTES, "Content-Disposition": "inline; filename=t.OBJ"},
+        },
+        {"content": OBJ, "headers": {"Content-Disposition": "inline; filename*=UTF-8''%CE%94.obj"}},
+        {"content": OFF},
+        {"content": OFF, "headers": TYPE_BYTES},
+        {"content": gzip.compress(OFF.encode())},
+        {"files": {"file": ("tetrahedron.obj.gz", gzip.compress(OBJ.encode()))}},
+        {"files": {"file": ("tetrahedron", bz2.compress(OFF.encode()))}},
+        {"files": {"file": ("tetrahedron.zip", zipped("tetrahedron.obj", OBJ))}},
+        {"files": {"file": ("tetrahedron.json", json.dumps(TETRAHEDRON))}},
+        {"files": {"file": ("tetrahedron.surf.gii", GIFTI)}},
+        {"content": GIFTI, "params": {"format": "Gii"}},
+        {"files": {"file": ("tetrahedron.surf.gii.gz", gzip.compress(GIFTI))}},
+        {"files": {"file": ("lh.tetrahedron", FREESURFER)}},
+        {"content": VTK, "params": {"format": "vtk"}},
+        {"files": {"file": ("tetrahedron.vtp", VTK)}},
         {"files": {"file": ("tetrahedron.OBJ", OBJ)}},
         {"files": {"mesh": ("tetrahedron", OBJ, "model/obj")}},
         {"files": {"mesh": ("tetrahedron", OBJ)}, "params": {"format": "obj"}},
@@ -77,6 +128,31 @@ def test_new_is_201_and_known_is_200(client: TestClient) -> None:
     mesh = {**TETRAHEDRON, "vertices": [[0, 0, 0], [7, 0, 0], [0, 7, 0], [0, 0, 7]]}
 
     assert [client.post("/v1/meshes", json=mesh).status_code for _ in range(2)] == [201, 200]
+
+
+def test_the_service_reads_what_the_library_reads(client: TestClient) -> None:
+    formats = list(_READERS)
+    assert list(schemas.MESH_FORMATS) == formats
+    assert client.get("/v1").json()["mesh_formats"] == [*formats, "json"]
+
+
+@pytest.mark.parametrize(
+    ("content", "code", "words"),
+    [
+        (b"v 0 0 0\n", "unsupported_media_type", "the file type is missing"),
+        (b"<!DOCTYPE html><p>gone", "unsupported_media_type", "an HTML page"),
+        (b"version https://git-lfs.github.com/spec/v1\n", "unsupported_media_type", "Git LFS"),
+        (gzip.compress(b"not a mesh"), "unsupported_media_type", "the file type is missing"),
+        (gzip.compress(OFF.encode())[:-9], "invalid_mesh", "gzip cannot unpack"),
+        (zipped("readme.txt", "no mesh"), "invalid_mesh", "must hold one mesh"),
+    ],
+)
+def test_a_body_that_tells_no_type_is_refused_with_what_it_is(
+    client: TestClient, content: bytes, code: str, words: str
+) -> None:
+    status = 415 if code == "unsupported_media_type" else 422
+    response = client.post("/v1/meshes", content=content)
+    assert words in check_problem(response, status, code)["detail"]
 
 
 def test_samples_have_the_same_names_everywhere(client: TestClient) -> None:
@@ -555,3 +631,10 @@ def test_meshes_and_results_survive_a_restart(tmp_path: Path) -> None:
 
     assert again.content == first.content
     assert again.headers["server-timing"] == "kept"
+
+
+@pytest.mark.parametrize("packed", [gzip.compress(bytes(10**6)), zipped("a.off", " " * 10**6)])
+def test_a_packed_file_counts_by_its_size_when_unpacked(tmp_path: Path, packed: bytes) -> None:
+    with serving(tmp_path, max_upload_bytes=10**5, max_query_bytes=100) as client:
+        response = client.post("/v1/meshes", content=packed)
+        assert check_problem(response, 413, "upload_too_large")["limit"] == 10**5

@@ -12,8 +12,7 @@ from app.http import page
 from app.http.dependencies import ServiceDep
 from app.http.metrics import Metrics
 from app.http.responses import UNSTORED, documented, problems
-from app.http.uploads import MESH_FORMATS
-from app.schemas.meshes import SampleName
+from app.schemas.meshes import MESH_FORMATS, SampleName
 from app.schemas.requests import Method
 from app.schemas.service import About, Health, Index, ProblemCode
 from app.settings import Settings, variable_of

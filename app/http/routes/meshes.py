@@ -115,8 +115,8 @@ async def create_mesh(
 ) -> Mapping[str, object]:
     """Read, check and store a mesh; the id is a hash of its content.
 
-    The body is the file itself (with its format in `Content-Type` or `?format=`), a form with one
-    file, or JSON. Except in a form, it may be compressed (`Content-Encoding: gzip`). Vertices and
+    The body is the file itself, a form with one file, or JSON. The file may be packed by gzip,
+    bzip2, xz or zip; the body, except a form, may also have `Content-Encoding: gzip`. Vertices and
     triangles keep the order they have in the file; polygons become triangles in their place, and
     `face_map` leads back to them.
     """
@@ -235,11 +235,10 @@ async def _add_upload(
         service.mesh_catalog.scratch_folder() as folder,
         time_limit(service.settings, context.deadline_s),
     ):
-        path = folder / "upload"
         limit = service.settings.max_upload_bytes
-        file_format, file_name = await spool(request, path, parameters.format, limit)
-        mesh_input = MeshFromFile(path, file_format, parameters.merge)
-        name = parameters.name or file_name
+        upload = await spool(request, folder, parameters.format, limit)
+        mesh_input = MeshFromFile(upload.path, upload.file_format, parameters.merge)
+        name = parameters.name or upload.name
         return await while_connected(request, service.add_mesh(mesh_input, name, context))
 
 
