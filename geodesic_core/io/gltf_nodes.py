@@ -141,11 +141,12 @@ def _transform(node: Mapping[str, Any]) -> Floats:
     if "matrix" in node:
         columns: Floats = np.array(node["matrix"], np.float64).reshape(4, 4)
         return columns.T
-    return _matrices(
+    matrix: Floats = _matrices(
         np.array([node.get("translation", (0, 0, 0))], np.float64),
         np.array([node.get("rotation", (0, 0, 0, 1))], np.float64),
         np.array([node.get("scale", (1, 1, 1))], np.float64),
     )[0]
+    return matrix
 
 
 def _matrices(translation: Floats, rotation: Floats, scale: Floats) -> Floats:

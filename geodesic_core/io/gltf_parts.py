@@ -197,16 +197,18 @@ def triangles(primitive: Mapping[str, Any], accessors: Accessors) -> NDArray[np.
         Corners do not form triangles, or are no unsigned integers.
     """
     number = primitive.get("indices", primitive["attributes"]["POSITION"])
-    corners: NDArray[np.integer[Any]] = np.arange(accessors.count(number))
+    corners: NDArray[np.integer[Any]]
     if "indices" in primitive:
         corners = accessors.integers(number, "SCALAR", "indices")[:, 0]
+    else:
+        corners = np.arange(accessors.count(number))
     first = np.arange(max(0, len(corners) - 2))
-    match primitive.get("mode", _TRIANGLES):
-        case 5:  # a strip: every other triangle is turned round
-            odd = first % 2
-            return corners[np.stack([first, first + 1 + odd, first + 2 - odd], axis=1)]
-        case 6:  # a fan
-            return corners[np.stack([first + 1, first + 2, np.zeros_like(first)], axis=1)]
+    mode = primitive.get("mode", _TRIANGLES)
+    if mode == _TRIANGLE_STRIP:
+        odd = first % 2  # every other triangle is turned round
+        return corners[np.stack([first, first + 1 + odd, first + 2 - odd], axis=1)]
+    if mode == _TRIANGLE_FAN:
+        return corners[np.stack([first + 1, first + 2, np.zeros_like(first)], axis=1)]
     if len(corners) % 3:
         raise InvalidMesh(
             f"accessor {number} of the glTF document has {len(corners)} corners, which do not form "
