@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
+from trimesh import transformations
 
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.io.load import load_mesh
@@ -430,8 +432,6 @@ def test_instances_of_a_node_are_shown_one_after_the_other(*, is_required: bool)
 
 @pytest.mark.parametrize("kind", ["<f4", "<i2", "i1"])
 def test_instances_are_turned_scaled_and_mirrored(kind: str) -> None:
-    from trimesh.transformations import quaternion_matrix
-
     one = 1.0 if kind == "<f4" else np.iinfo(kind).max
     turns = np.array([[0, 0, 0, 1], [0, 0, 0.6, 0.8]]) * one
     file = instanced(
@@ -441,7 +441,7 @@ def test_instances_are_turned_scaled_and_mirrored(kind: str) -> None:
     )
     mesh = load_mesh(file.glb(), "glb")
     stored = turns.astype(kind) / one
-    turn = quaternion_matrix([stored[1, 3], *stored[1, :3]])[:3, :3]
+    turn = transformations.quaternion_matrix([stored[1, 3], *stored[1, :3]])[:3, :3]
     expected = [SQUARE * [1, 2, 1], SQUARE * [1, 1, -3] @ turn.T]
     np.testing.assert_allclose(mesh.vertices, np.vstack(expected), atol=1e-12)
     np.testing.assert_array_equal(mesh.faces, np.vstack([HALVES, HALVES[:, ::-1] + 4]))
@@ -544,13 +544,13 @@ def weights_as(kind: str, shares: Any) -> tuple[Any, dict[str, Any]]:
 def test_skinned_vertices_are_means_of_where_their_joints_move_them(
     sets: int, joint_kind: str, weight_kind: str
 ) -> None:
-    from trimesh.transformations import compose_matrix, quaternion_matrix, translation_matrix
-
     random = np.random.default_rng(7)
     joints = random.integers(0, 3, (sets, 4, 4))
     shares = random.random((sets, 4, 4))
     shares /= shares.sum(axis=(0, 2))[None, :, None]
-    bound = np.array([compose_matrix(translate=random.random(3)) for _ in range(3)], "<f4")
+    bound = np.array(
+        [transformations.compose_matrix(translate=random.random(3)) for _ in range(3)], "<f4"
+    )
 
     file = square(skin=0, translation=[50, 0, 0])
     attributes = file.tree["meshes"][0]["primitives"][0]["attributes"]
@@ -569,8 +569,8 @@ def test_skinned_vertices_are_means_of_where_their_joints_move_them(
     inverse = file.accessor(bound.transpose(0, 2, 1).reshape(-1, 16))
     file.tree["skins"] = [{"joints": [3, 2, 1], "inverseBindMatrices": inverse}]
 
-    moved = translation_matrix([1, 2, 3])
-    turned = moved @ quaternion_matrix([0.8, 0, 0, 0.6]) @ np.diag([2.0, 1, 1, 1])
+    moved = transformations.translation_matrix([1, 2, 3])
+    turned = moved @ transformations.quaternion_matrix([0.8, 0, 0, 0.6]) @ np.diag([2.0, 1, 1, 1])
     worlds = [np.diag([1.0, 3.0, 1.0, 1.0]), turned, moved]
     expected = np.zeros((4, 3))
     for vertex in range(4):
@@ -595,10 +595,12 @@ def skinned(joints: Any, weights: Any) -> GlbFile:
 def test_skins_that_lack_something_are_refused() -> None:
     joints, weights = np.zeros((4, 4), "u1"), np.full((4, 4), 0.25, "<f4")
     assert distances(skinned(joints, weights)) == pytest.approx([0, 1, ROOT_2, 1])
-    unused = weights * np.float32([1, 1, 2, 0])
-    assert distances(skinned(joints + np.uint8([0, 0, 0, 9]), unused))[1] == pytest.approx(1)
+    unused = weights * np.array([1, 1, 2, 0], np.float32)
+    assert distances(skinned(joints + np.array([0, 0, 0, 9], np.uint8), unused))[
+        1
+    ] == pytest.approx(1)
 
-    loose = weights * np.float32([[1], [1], [0], [1]])
+    loose = weights * np.array([[1], [1], [0], [1]], np.float32)
     for file, says in (
         (skinned(joints + np.uint8(1), weights), "names joint 1 of a skin of 1"),
         (skinned(joints, loose), "the weights of element 2 are 0"),
@@ -709,13 +711,11 @@ def test_buffers_that_no_part_needs_may_lie_anywhere() -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_plain_scenes_are_what_trimesh_reads(seed: int) -> None:
-    import trimesh
-
     random = np.random.default_rng(seed)
     scene = trimesh.Scene()
     for number in range(4):
         shape = trimesh.creation.icosphere(subdivisions=1)
-        place = trimesh.transformations.random_rotation_matrix(random.random(3))
+        place = transformations.random_rotation_matrix(random.random(3))
         place[:3, :3] *= random.uniform(0.5, 2.0)
         place[:3, 3] = random.normal(size=3)
         scene.add_geometry(shape, geom_name=f"part {number}", transform=place)
