@@ -1,12 +1,32 @@
-"""Members of a glTF document that are read: each has its type, and points to what there is."""
+"""glTF documents: each member that is read has its type, and points to what there is."""
 
+import json
+import re
 from collections.abc import Mapping
 from typing import Any, NamedTuple, NoReturn
 
 from geodesic_core.errors import InvalidMesh
 
+_LARGEST_DOCUMENT = 32 * 2**20
 _MOST_VALUES = 1_000_000
 """Values of a document that are looked at; as many take a second"""
+
+JOINT_SETS = range(4)
+"""Numbers of the attributes ``JOINTS_n`` and ``WEIGHTS_n``: sixteen joints move a vertex"""
+
+_READ = frozenset({"EXT_mesh_gpu_instancing", "KHR_mesh_quantization", "KHR_node_visibility"})
+_COMPRESSIONS = frozenset(
+    {"EXT_meshopt_compression", "KHR_draco_mesh_compression", "KHR_meshopt_compression"}
+)
+_NO_GEOMETRY = re.compile(
+    r"[A-Z0-9]+_"
+    r"(materials|texture|techniques|packing|lights|primitive_outline|"  # looks
+    r"animation|articulations|interactivity|node_hoverability|node_selectability|audio|"  # motion
+    r"xmp|structural_metadata|geometry_metadata|mesh_features|instance_features|"  # data about it
+    r"lod)"  # coarser levels, which no scene shows
+    r"(_|$)"
+)
+"""Extensions that say nothing of where a surface is at rest"""
 
 
 class _Index(NamedTuple):
@@ -16,81 +36,130 @@ class _Index(NamedTuple):
 
 
 class _Numbers(NamedTuple):
-    """A list of so many numbers."""
+    """A list of numbers, of so many if a length is given."""
 
-    length: int
+    length: int | None = None
 
 
 class _Integer(NamedTuple):
-    least: int
+    least: int = 0
+    most: int = 2**53
 
 
+class _Required(NamedTuple):
+    """A member that is there wherever its object is."""
+
+    kind: Any
+
+
+_ACCESSOR, _NODE = _Index("accessors"), _Index("nodes")
+_ELEMENTS = {"bufferView": _Required(_Index("bufferViews")), "byteOffset": _Integer()}
+_KIND = {"componentType": _Required(_Integer())}
 _MEMBERS: Mapping[str, Any] = {
-    "buffers": [{"byteLength": _Integer(0), "uri": str}],
+    "extensionsUsed": [str],
+    "extensionsRequired": [str],
+    "buffers": [{"byteLength": _Required(_Integer()), "uri": str}],
     "bufferViews": [
         {
-            "buffer": _Index("buffers"),
-            "byteOffset": _Integer(0),
-            "byteLength": _Integer(0),
-            "byteStride": _Integer(0),
-            "extensions": {},
+            "buffer": _Required(_Index("buffers")),
+            "byteOffset": _Integer(),
+            "byteLength": _Required(_Integer()),
+            "byteStride": _Integer(),
         }
     ],
     "accessors": [
         {
             "bufferView": _Index("bufferViews"),
-            "byteOffset": _Integer(0),
-            "componentType": _Integer(0),
-            "count": _Integer(0),
-            "type": str,
+            "byteOffset": _Integer(),
+            **_KIND,
+            "normalized": bool,
+            "count": _Required(_Integer(1)),
+            "type": _Required(str),
+            "sparse": {
+                "count": _Required(_Integer(1)),
+                "indices": _Required(_ELEMENTS | _KIND),
+                "values": _Required(_ELEMENTS),
+            },
         }
     ],
     "meshes": [
         {
-            "primitives": [
-                {
-                    "attributes": {"POSITION": _Index("accessors")},
-                    "indices": _Index("accessors"),
-                    "mode": _Integer(0),
-                }
-            ]
+            "primitives": _Required(
+                [
+                    {
+                        "attributes": _Required(
+                            {"POSITION": _ACCESSOR}
+                            | {f"JOINTS_{number}": _ACCESSOR for number in JOINT_SETS}
+                            | {f"WEIGHTS_{number}": _ACCESSOR for number in JOINT_SETS}
+                        ),
+                        "indices": _ACCESSOR,
+                        "mode": _Integer(0, 6),
+                        "targets": [{"POSITION": _ACCESSOR}],
+                    }
+                ]
+            ),
+            "weights": _Numbers(),
         }
     ],
     "nodes": [
         {
             "mesh": _Index("meshes"),
-            "children": [_Index("nodes")],
+            "skin": _Index("skins"),
+            "weights": _Numbers(),
+            "children": [_NODE],
             "matrix": _Numbers(16),
             "translation": _Numbers(3),
             "rotation": _Numbers(4),
             "scale": _Numbers(3),
+            "extensions": {
+                "EXT_mesh_gpu_instancing": {
+                    "attributes": _Required(
+                        {"TRANSLATION": _ACCESSOR, "ROTATION": _ACCESSOR, "SCALE": _ACCESSOR}
+                    )
+                },
+                "KHR_node_visibility": {"visible": bool},
+            },
         }
     ],
-    "scenes": [{"nodes": [_Index("nodes")]}],
+    "skins": [{"joints": _Required([_NODE]), "inverseBindMatrices": _ACCESSOR}],
+    "scenes": [{"nodes": [_NODE]}],
     "scene": _Index("scenes"),
 }
-"""Each list comes before what points into it."""
-_REQUIRED = frozenset(
-    {"attributes", "buffer", "byteLength", "componentType", "count"}
-    | {"POSITION", "primitives", "type"}
-)
-"""Members that are there wherever they may be"""
+_IN_WORDS = {str: "a string", bool: "true or false"}
 
 
-def check_document(document: Any) -> None:
-    """Refuse a glTF document whose members are not of their types, or name what is not there.
+def read_document(text: memoryview) -> dict[str, Any]:
+    """Return a glTF document whose members are of their types, and name only what is there.
 
     Parameters
     ----------
-    document
-        The document; members that are not read are not looked at.
+    text
+        The document in JSON; members that are not read are not looked at.
 
     Raises
     ------
     InvalidMesh
-        Naming the member, or the document has more than a million values.
+        Naming the member, or an extension that the document requires and that is not read. Or the
+        document is no JSON, has more than 32 MiB, or more than a million values.
     """
-    _Checker(document).check(document, _MEMBERS, "")
+    if len(text) > _LARGEST_DOCUMENT:
+        raise InvalidMesh(
+            f"the glTF document has {len(text)} bytes; at most {_LARGEST_DOCUMENT} can be read: "
+            "put its data into the binary chunk of a GLB file"
+        )
+    try:
+        tree: dict[str, Any] = json.loads(bytes(text))
+    except (ValueError, RecursionError) as error:  # a number of too many digits is no JSON error
+        raise InvalidMesh(f"the glTF document cannot be read: {error}") from error
+    _Checker(tree).check(tree, _MEMBERS, "")
+    for name in tree.get("extensionsRequired", []):
+        if name not in _READ and not _NO_GEOMETRY.match(name):
+            remedy = "uncompressed" if name in _COMPRESSIONS else "without it"
+            raise InvalidMesh(
+                f"the glTF document requires the extension {name[:60]!r}, which is not read; save "
+                f"it {remedy}"
+            )
+    return tree
 
 
 class _Checker:
@@ -102,21 +171,25 @@ class _Checker:
         self._values += 1
         if self._values > _MOST_VALUES:
             raise InvalidMesh(
-                f"the GLB file's glTF document has too many values; at most {_MOST_VALUES} can be "
-                "read: put its data into the binary chunk"
+                f"the glTF document has too many values; at most {_MOST_VALUES} can be read: put "
+                "its data into the binary chunk"
             )
         match expected:
+            case _Required(kind):
+                self.check(value, kind, place)
             case {}:
                 self._check_members(value, expected, place)
             case _Index(of):
                 count = len(self._document.get(of, ()))
-                if not _is_integer(value, 0) or value >= count:
+                if not _is_integer(value, 0, count - 1):
                     _refuse(value, place, f"the number of one of {count} {of}")
-            case _Integer(least):
-                if not _is_integer(value, least):
-                    _refuse(value, place, f"an integer, {least} or more")
+            case _Integer(least, most):
+                if not _is_integer(value, least, most):
+                    _refuse(value, place, f"an integer, {least} to {most}")
             case _Numbers(length):
-                if not isinstance(value, list) or len(value) != length or not _are_numbers(value):
+                if not isinstance(value, list) or not all(map(_is_number, value)):
+                    _refuse(value, place, "a list of numbers")
+                if length is not None and len(value) != length:
                     _refuse(value, place, f"a list of {length} numbers")
             case [item]:
                 if not isinstance(value, list):
@@ -125,7 +198,7 @@ class _Checker:
                     self.check(each, item, f"{place}[{number}]")
             case _:
                 if not isinstance(value, expected):
-                    _refuse(value, place, "a string")
+                    _refuse(value, place, _IN_WORDS[expected])
 
     def _check_members(self, value: Any, expected: Mapping[str, Any], place: str) -> None:
         if not isinstance(value, dict):
@@ -134,19 +207,19 @@ class _Checker:
             inside = f"{place}.{name}" if place else name
             if name in value:
                 self.check(value[name], inner, inside)
-            elif name in _REQUIRED:
-                raise InvalidMesh(f"{inside} is missing in the GLB file's glTF document")
+            elif isinstance(inner, _Required):
+                raise InvalidMesh(f"{inside} is missing in the glTF document")
 
 
-def _is_integer(value: Any, least: int) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool) and value >= least
+def _is_integer(value: Any, least: int, most: int) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and least <= value <= most
 
 
-def _are_numbers(values: list[Any]) -> bool:
-    return all(isinstance(value, int | float) and not isinstance(value, bool) for value in values)
+def _is_number(value: Any) -> bool:
+    return isinstance(value, float) or _is_integer(value, -(2**1023), 2**1023)
 
 
 def _refuse(value: Any, place: str, expected: str) -> NoReturn:
     kind = type(value).__name__ if isinstance(value, dict | list) else repr(value)[:40]
     where = place or "the whole"
-    raise InvalidMesh(f"{where} is {kind} in the GLB file's glTF document; it must be {expected}")
+    raise InvalidMesh(f"{where} is {kind} in the glTF document; it must be {expected}")

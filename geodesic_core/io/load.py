@@ -12,7 +12,7 @@ import numpy as np
 from geodesic_core.errors import InvalidMesh, MissingExtra, TooManyFaces, UnknownFileType
 from geodesic_core.io.brain import read_freesurfer, read_gifti
 from geodesic_core.io.contents import FileContents
-from geodesic_core.io.glb import read_glb
+from geodesic_core.io.glb import read_glb, read_gltf
 from geodesic_core.io.grid import read_grid
 from geodesic_core.io.limits import check_face_count
 from geodesic_core.io.obj import read_obj
@@ -31,6 +31,7 @@ _READERS: dict[str, _Reader] = {
     "ply": read_ply,
     "stl": read_stl,
     "glb": read_glb,
+    "gltf": read_gltf,
     "gii": read_gifti,
     "freesurfer": read_freesurfer,
     **dict.fromkeys(("vtk", "vtp", "vtu", "vts", "vtr", "vti"), read_vtk),

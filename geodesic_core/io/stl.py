@@ -1,17 +1,21 @@
 """STL files: triangles without numbering, in text or binary."""
 
-import io
 import re
 
 import numpy as np
 
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.io.contents import FileContents
+from geodesic_core.io.contents import FileContents, note_on_ignored
 from geodesic_core.io.limits import check_face_count
 from geodesic_core.io.text import VERTEX_ROW, VERTEX_RULE, check_rows, number_table
 
-_HEADER, _TRIANGLE = 84, 50
+_HEADER = 84
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+_UNCOUNTED = (0, 2**32 - 1)
+"""Counts of writers that did not know how many triangles were to come"""
+
+_TEXT = re.compile(rb"\s*solid", re.IGNORECASE)
 _FACET = re.compile(rb"^[ \t]*facet\b", re.MULTILINE | re.IGNORECASE)
 _KEYWORD = re.compile(rb"^[ \t]*(facet|vertex|endfacet|endsolid)\b", re.MULTILINE | re.IGNORECASE)
 _VERTEX = re.compile(rb"^[ \t]*vertex\b[ \t]*([^\r\n]*)", re.MULTILINE | re.IGNORECASE)
@@ -22,6 +26,9 @@ _KEYWORDS = (b"facet", b"vertex", b"vertex", b"vertex", b"endfacet")
 def read_stl(data: bytes, max_faces: int | None) -> FileContents:
     """Read an STL file; each triangle has three vertices of its own.
 
+    Bytes behind the triangles that a binary file declares are left out, with a note. Where it
+    declares none, or the largest number there is, all are read that it holds.
+
     Raises
     ------
     InvalidMesh
@@ -29,37 +36,43 @@ def read_stl(data: bytes, max_faces: int | None) -> FileContents:
     TooManyFaces
         There are more faces than ``max_faces``.
     """
-    triangles = int.from_bytes(data[_HEADER - 4 : _HEADER], "little")
-    expected = _HEADER + triangles * _TRIANGLE
-    if len(data) == expected:
+    declared = int.from_bytes(data[_HEADER - 4 : _HEADER], "little")
+    whole, behind = divmod(len(data) - _HEADER, _TRIANGLE.itemsize)
+    triangles = declared
+    notes: tuple[str, ...] = ()
+    if declared in _UNCOUNTED and whole > 0 and not behind:
+        triangles = whole
+        notes = (
+            f"The STL file declares {declared} triangles; all {whole} that it holds were read.",
+        )
+    # A text cannot pass for a binary file: its bytes would declare 150 million triangles or more.
+    if triangles <= whole and (triangles > 0 or not behind):
         check_face_count(triangles, max_faces)
-        vertices = _read_binary(data)
+        vertices = _read_binary(data, triangles)
+        behind = len(data) - _HEADER - triangles * _TRIANGLE.itemsize
+        ignored = {"bytes behind its last triangle": behind} if behind else {}
+        notes += note_on_ignored("STL", ignored)
     else:
+        data = data.replace(b"\r", b"\n")
         triangles = sum(1 for _ in _FACET.finditer(data))
-        if not triangles or data.lstrip()[:5].lower() != b"solid":
+        if not triangles or not _TEXT.match(data):
             raise InvalidMesh(
-                f"the STL file is neither ASCII nor binary: its header declares "
-                f"{(expected - _HEADER) // _TRIANGLE} triangles, which take {expected} bytes, but "
-                f"it has {len(data)}"
+                f"the STL file is neither ASCII nor binary: its header declares {declared} "
+                f"triangles, which take {_HEADER + declared * _TRIANGLE.itemsize} bytes, but it "
+                f"has {len(data)}"
             )
         check_face_count(triangles, max_faces)
         vertices = _read_ascii(data)
-    return FileContents(vertices, np.arange(len(vertices)), np.full(triangles, 3))
+    return FileContents(vertices, np.arange(len(vertices)), np.full(triangles, 3), notes)
 
 
-def _read_binary(data: bytes) -> Floats:
-    from trimesh.exchange.stl import load_stl_binary
-
+def _read_binary(data: bytes, triangles: int) -> Floats:
+    corners = np.frombuffer(data, _TRIANGLE, triangles, _HEADER)["corners"].reshape(-1, 3)
     with np.errstate(invalid="ignore"):  # the mesh refuses what is not finite
-        return np.asarray(load_stl_binary(io.BytesIO(data))["vertices"], np.float64)
+        return corners.astype(np.float64)
 
 
 def _read_ascii(data: bytes) -> Floats:
-    """Return the corners of all facets.
-
-    trimesh (5.2) takes megabytes for a kilobyte of long numbers, and logs tracebacks for normals
-    that it cannot read.
-    """
     keywords = [keyword.lower() for keyword in _KEYWORD.findall(data)]
     if keywords[-1] != b"endsolid":
         raise InvalidMesh("the STL file is cut short: its last solid has no end")

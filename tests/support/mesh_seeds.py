@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from tests.support.mesh_files import (
+    GlbFile,
     glb,
     glb_of,
     glb_tree,
@@ -170,15 +171,83 @@ def glb_with_data_uri() -> bytes:
     return glb_of(tree)
 
 
-def glb_sparse() -> bytes:
-    """Return a file with a sparse accessor, which is refused."""
-    tree, binary = glb_tree(VERTICES, TRIANGLES)
-    tree["accessors"][0]["sparse"] = {
-        "count": 1,
-        "indices": {"bufferView": 1, "componentType": 5125},
-        "values": {"bufferView": 0},
+def glb_with_sparse_accessors() -> bytes:
+    """Return positions of which some are replaced, and others that stand over zeros."""
+    file = GlbFile()
+    part = file.part(VERTICES, TRIANGLES)
+    part["indices"] = file.accessor(
+        TRIANGLES.astype("u1").ravel(),
+        sparse=file.sparse(np.array([2, 5], "u1"), TRIANGLES[0, :2].astype("u1")),
+    )
+    single = VERTICES.astype("<f4")
+    some = np.array([1, 3, 6], "<u2")
+    over_zeros = file.describe(single, sparse=file.sparse(some, single[some]))
+    file.tree["meshes"] = [
+        {"primitives": [part, {**part, "attributes": {"POSITION": over_zeros}}]},
+    ]
+    return file.glb()
+
+
+def glb_of_small_integers() -> bytes:
+    """Return quantized positions, of two kinds, and triangles that share them."""
+    file = GlbFile()
+    file.tree["extensionsRequired"] = file.tree["extensionsUsed"] = ["KHR_mesh_quantization"]
+    scaled = VERTICES * 20
+    shared = {"POSITION": file.accessor(scaled.astype("<i2"))}
+    normalized = {"POSITION": file.accessor(scaled.astype("i1"), normalized=True)}
+    halves = [file.accessor(half.astype("u1").ravel()) for half in (TRIANGLES[:2], TRIANGLES[2:])]
+    file.tree["meshes"] = [
+        {"primitives": [{"attributes": shared, "indices": half} for half in halves]},
+        {"primitives": [{"attributes": normalized, "mode": 6}]},
+    ]
+    file.tree["nodes"] = [{"mesh": 0, "scale": [0.05] * 3, "children": [1]}, {"mesh": 1}]
+    return file.glb()
+
+
+def glb_of_instances() -> bytes:
+    """Return a mesh that is shown three times, by every kind of place."""
+    file = GlbFile()
+    name = "EXT_mesh_gpu_instancing"
+    file.tree["extensionsRequired"] = file.tree["extensionsUsed"] = [name]
+    turns = np.array([[0, 0, 0, 127], [0, 0, 76, 102], [127, 0, 0, 0]], "i1")
+    attributes = {
+        "TRANSLATION": file.accessor(np.arange(9, dtype="<f4").reshape(3, 3)),
+        "ROTATION": file.accessor(turns, normalized=True),
+        "SCALE": file.accessor(np.array([[1, 1, 1], [2, 2, 2], [1, 1, -1]], "<f4")),
     }
-    return glb_of(tree, binary)
+    file.tree["meshes"] = [{"primitives": [file.part(VERTICES, TRIANGLES)]}]
+    visible = {"KHR_node_visibility": {"visible": True}}
+    file.tree["nodes"] = [{"mesh": 0, "extensions": visible | {name: {"attributes": attributes}}}]
+    return file.glb()
+
+
+def posed() -> GlbFile:
+    """Return a file of a skin of two joints and of morph targets."""
+    file = GlbFile()
+    part = file.part(VERTICES, TRIANGLES)
+    joints = np.tile(np.array([0, 1, 0, 0], "u1"), (len(VERTICES), 1))
+    shares = np.linspace(0, 1, len(VERTICES))
+    weights = np.stack([shares, 1 - shares, 0 * shares, 0 * shares], axis=1)
+    part["attributes"] |= {
+        "JOINTS_0": file.accessor(joints),
+        "WEIGHTS_0": file.accessor(np.round(weights * 255).astype("u1"), normalized=True),
+    }
+    moves = VERTICES[::-1].astype("<f4")
+    some = np.array([2, 7], "u1")
+    part["targets"] = [
+        {"POSITION": file.accessor(moves)},
+        {"POSITION": file.describe(moves, sparse=file.sparse(some, moves[some]))},
+    ]
+    file.tree["meshes"] = [{"primitives": [part], "weights": [0.25, 0.5]}]
+    file.tree["nodes"] = [
+        {"mesh": 0, "skin": 0, "weights": [0.5, 0.125]},
+        {"translation": [1, 0, 0], "children": [2]},
+        {"rotation": [0, 0.6, 0, 0.8]},
+    ]
+    file.tree["scenes"] = [{"nodes": [0, 1]}]
+    bound = file.accessor(np.tile(np.eye(4, dtype="<f4").ravel(), (2, 1)))
+    file.tree["skins"] = [{"joints": [1, 2], "inverseBindMatrices": bound}]
+    return file
 
 
 def windows(data: bytes) -> bytes:
@@ -211,22 +280,27 @@ SEEDS: Mapping[str, tuple[bytes, ...]] = {
         stl(VERTICES, TRIANGLES),
         windows(stl(VERTICES, TRIANGLES) + stl(VERTICES + 9, TRIANGLES)),
         stl(VERTICES, TRIANGLES).upper(),
+        stl(VERTICES, TRIANGLES).replace(b"\n", b"\r"),
     ),
     "binary stl": (
         stl_binary(VERTICES, TRIANGLES),
         b"solid" + stl_binary(VERTICES, TRIANGLES)[5:],
+        stl_binary(VERTICES, TRIANGLES)[:80] + bytes(4) + stl_binary(VERTICES, TRIANGLES)[84:],
+        stl_binary(VERTICES, TRIANGLES) + bytes(60),
     ),
     "glb": (
         glb(VERTICES, TRIANGLES),
         glb_with_nodes(),
         glb_with_attributes(),
         glb_with_data_uri(),
-        glb_sparse(),
+        glb_with_sparse_accessors(),
+        glb_of_small_integers(),
+        glb_of_instances(),
+        posed().glb(),
     ),
+    "gltf": (posed().gltf(),),
 }
 """Files by format, text and binary ones apart"""
-REFUSED = (glb_sparse(),)
-"""Those of them that are refused as they are"""
 
 
 def type_of(name: str) -> str:

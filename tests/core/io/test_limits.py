@@ -10,6 +10,7 @@ import pytest
 from geodesic_core.errors import InvalidMesh, TooManyFaces
 from geodesic_core.io.load import load_mesh
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from tests.core.io.test_glb import glb_scene
 from tests.core.io.test_load import (
     FACES,
     FANS,
@@ -19,7 +20,6 @@ from tests.core.io.test_load import (
     VERTICES,
     Writer,
     every_writer,
-    glb_scene,
     name_of,
     refusal,
 )
@@ -109,13 +109,18 @@ def test_glb_nodes_that_show_a_mesh_often_count_as_often() -> None:
     assert len(load_mesh(data, "glb", max_faces=2000).faces) == 2000
 
 
-@pytest.mark.parametrize(("mode", "faces"), [(None, 2), (4, 2), (5, 4), (1, 0), (0, 0)])
+@pytest.mark.parametrize(("mode", "faces"), [(None, 2), (4, 2), (5, 4), (6, 4), (1, 0), (0, 0)])
 def test_glb_parts_that_share_their_numbers_count_each(mode: int | None, faces: int) -> None:
     tree, binary = glb_tree(VERTICES[:4], FACES[:2])
     part: dict[str, Any] = tree["meshes"][0]["primitives"][0]
     if mode is not None:
         part = part | {"mode": mode}
     tree["meshes"] = [{"primitives": [part] * 300}, {"primitives": [part]}]
+    tree["nodes"] = [
+        {"mesh": 0, "children": [1]},
+        {"mesh": 1},
+        {"mesh": 0},
+    ]  # the last is not shown
     data = glb_of(tree, binary)
 
     if faces:
@@ -183,8 +188,11 @@ COUNTED: dict[str, dict[str, Any]] = {
     "a chain of nodes": {"nodes": [*({"children": [i + 1]} for i in range(100_000)), {"mesh": 0}]},
     "children": {"nodes": [{"mesh": 0, "children": [1] * 100_001}, {}]},
     "roots": {"scenes": [{"nodes": [0] * 100_001}]},
-    "parts of a mesh": {"meshes": [{"primitives": [PART] * 10_001}]},
-    "parts of meshes": {"meshes": [{"primitives": [LINE]}] * 10_001},
+    "parts of a mesh": {"meshes": [{"primitives": [PART] * 100_001}]},
+    "parts of nodes": {
+        "meshes": [{"primitives": [LINE] * 101}],
+        "nodes": [{"children": list(range(1, 1001))}, *[{"mesh": 0}] * 1000],
+    },
     "values of a document": {"scenes": [{"nodes": []}] * 500_000},
     "a long document": {"extras": " " * 2**25},
 }
@@ -196,8 +204,8 @@ def test_glb_scenes_are_counted_before_they_are_walked(
     monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     walked: list[int] = []
-    monkeypatch.setattr("trimesh.load_scene", lambda *_, **__: walked.append(1))
-    monkeypatch.setattr("geodesic_core.io.glb_nodes._transform", lambda _: walked.append(1))
+    monkeypatch.setattr("geodesic_core.io.glb.triangles", lambda *_: walked.append(1))
+    monkeypatch.setattr("geodesic_core.io.gltf_nodes._transform", lambda _: walked.append(1))
     with pytest.raises(InvalidMesh, match="at most"):
         load_mesh(glb_with(**COUNTED[name]), "glb")
     assert not walked
@@ -207,7 +215,7 @@ def test_glb_vertices_that_parts_share_are_counted_before_they_are_copied(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     copied: list[int] = []
-    monkeypatch.setattr("trimesh.load_scene", lambda *_, **__: copied.append(1))
+    monkeypatch.setattr("geodesic_core.io.glb.placed_positions", lambda *_: copied.append(1))
     often = glb_with(nodes=[{"mesh": 0}] * 100, scenes=[{"nodes": list(range(100))}])
     with pytest.raises(InvalidMesh, match="4000 vertices, but 200 faces have at most 600"):
         load_mesh(often, "glb", max_faces=200)

@@ -1,0 +1,171 @@
+"""Nodes of a glTF scene: the tree that places its meshes, their instances and their joints."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from geodesic_core.arrays import Floats
+from geodesic_core.errors import InvalidMesh
+from geodesic_core.io.gltf_accessors import Accessors
+
+_MOST_NODES = 100_000
+"""Nodes of a scene; beyond, walking them takes longer than reading any mesh."""
+_TRANSFORMS = ("matrix", "translation", "rotation", "scale")
+_INSTANCING = "EXT_mesh_gpu_instancing"
+
+
+class Nodes:
+    """Nodes of a checked document.
+
+    Parameters
+    ----------
+    tree
+        The document.
+    accessors
+        Its accessors, of which instances and skins are read.
+
+    Raises
+    ------
+    InvalidMesh
+        The nodes form no tree, or are too many.
+    """
+
+    def __init__(self, tree: Mapping[str, Any], accessors: Accessors) -> None:
+        self._tree = tree
+        self._nodes = tree.get("nodes", [])
+        self._accessors = accessors
+        scenes = tree.get("scenes", [])
+        self._roots = list(scenes[tree.get("scene", 0)].get("nodes", [])) if scenes else []
+        self._children = {child for node in self._nodes for child in node.get("children", ())}
+        pointed_to = len(self._roots) + sum(len(node.get("children", ())) for node in self._nodes)
+        most = max(len(self._nodes), pointed_to)
+        if most > _MOST_NODES:
+            raise InvalidMesh(
+                f"the glTF document has {most} nodes; at most {_MOST_NODES} can be read: join its "
+                "parts"
+            )
+        if len(self._children.union(self._roots)) < pointed_to:
+            raise InvalidMesh(
+                "the glTF document's nodes do not form a tree: a node has two parents"
+            )
+
+    def __getitem__(self, node: int) -> Mapping[str, Any]:
+        content: Mapping[str, Any] = self._nodes[node]
+        return content
+
+    @cached_property
+    def shown(self) -> list[int]:
+        """Nodes by which the scene shows meshes, in its order; children come before parents."""
+        walked, waiting = [], list(self._roots)
+        while waiting:
+            number = waiting.pop()
+            extensions = self[number].get("extensions", {})
+            if extensions.get("KHR_node_visibility", {}).get("visible", True):
+                walked.append(number)
+                waiting += self[number].get("children", ())
+        return [number for number in reversed(walked) if "mesh" in self[number]]
+
+    def instances(self, node: int) -> int:
+        """Return how often a node shows its mesh.
+
+        Raises
+        ------
+        InvalidMesh
+            Attributes of its instances differ in number, or are none.
+        """
+        if _INSTANCING not in self[node].get("extensions", {}):
+            return 1
+        attributes = self[node]["extensions"][_INSTANCING]["attributes"]
+        kinds = attributes.keys() & {"TRANSLATION", "ROTATION", "SCALE"}
+        counts = {self._accessors.count(attributes[kind]) for kind in kinds}
+        if len(counts) != 1 or "skin" in self[node]:
+            raise InvalidMesh(
+                f"the instances of node {node} of the glTF document must have places, as many of "
+                "each kind, and no skin"
+            )
+        return counts.pop()
+
+    def places(self, node: int) -> Floats:
+        """Return the matrices that place a node's mesh in the scene, (instances, 4, 4)."""
+        place = self._places[node][None]
+        if _INSTANCING not in self[node].get("extensions", {}):
+            return place
+        attributes = self[node]["extensions"][_INSTANCING]["attributes"]
+        parts = {
+            kind: self._accessors.floats(attributes[kind], shape, f"{kind} of instances")
+            for kind, shape in (("TRANSLATION", "VEC3"), ("ROTATION", "VEC4"), ("SCALE", "VEC3"))
+            if kind in attributes
+        }
+        return place @ _matrices(
+            parts.get("TRANSLATION", np.zeros((1, 3))),
+            parts.get("ROTATION", np.zeros((1, 4))),
+            parts.get("SCALE", np.ones((1, 3))),
+        )
+
+    def joints(self, skin: int) -> Floats:
+        """Return the matrices by which the joints of a skin move positions, (joints, 4, 4)."""
+        content = self._tree["skins"][skin]
+        joints = np.array([self._places[joint] for joint in content["joints"]]).reshape(-1, 4, 4)
+        if "inverseBindMatrices" not in content:
+            return joints
+        number = content["inverseBindMatrices"]
+        columns = self._accessors.floats(number, "MAT4", "inverseBindMatrices")
+        if len(columns) < len(joints):
+            raise InvalidMesh(
+                f"skin {skin} of the glTF document has {len(joints)} joints, but {len(columns)} "
+                "inverseBindMatrices"
+            )
+        bound = columns[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+        return joints @ bound
+
+    @cached_property
+    def _places(self) -> Mapping[int, Floats]:
+        """The (4, 4) matrix of each node, from its coordinates to the scene's."""
+        places: dict[int, Floats] = {}
+        tops = [number for number in range(len(self._nodes)) if number not in self._children]
+        waiting = [(number, np.eye(4)) for number in tops]
+        while waiting:
+            number, parent = waiting.pop()
+            is_moved = not self[number].keys().isdisjoint(_TRANSFORMS)
+            places[number] = parent @ _transform(self[number]) if is_moved else parent
+            waiting += [(child, places[number]) for child in self[number].get("children", ())]
+        if len(places) < len(self._nodes):
+            raise InvalidMesh("the glTF document's nodes do not form a tree: some go in circles")
+        return places
+
+
+def _transform(node: Mapping[str, Any]) -> Floats:
+    """Return the (4, 4) matrix from a node's coordinates to its parent's."""
+    if "matrix" in node:
+        columns: Floats = np.array(node["matrix"], np.float64).reshape(4, 4)
+        return columns.T
+    matrix: Floats = _matrices(
+        np.array([node.get("translation", (0, 0, 0))], np.float64),
+        np.array([node.get("rotation", (0, 0, 0, 1))], np.float64),
+        np.array([node.get("scale", (1, 1, 1))], np.float64),
+    )[0]
+    return matrix
+
+
+def _matrices(translation: Floats, rotation: Floats, scale: Floats) -> Floats:
+    """Return the matrices (n, 4, 4) that scale, then rotate by unit quaternions, then translate.
+
+    Each argument has n rows, or one. A quaternion of zeros does not rotate, as in most programs.
+    """
+    x, y, z, w = rotation.T
+    length = x * x + y * y + z * z + w * w
+    s = np.divide(2.0, length, out=np.zeros_like(length), where=length != 0.0)
+    turn = np.array(
+        [
+            [1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)],
+            [s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)],
+            [s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)],
+        ]
+    ).transpose(2, 0, 1)
+    count = max(len(translation), len(rotation), len(scale))
+    matrices = np.tile(np.eye(4), (count, 1, 1))
+    matrices[:, :3, :3] = turn * scale[:, None, :]
+    matrices[:, :3, 3] = translation
+    return matrices
