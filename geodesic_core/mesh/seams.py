@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints, Longs
+from geodesic_core.arrays import Floats, Longs
 from geodesic_core.kernels.mesh.half_edges import (
     COS_RIGHT,
     HEAD,
@@ -31,67 +31,69 @@ class Seams(NamedTuple):
     on_edge: Longs
     """(J,): vertices that lie on an edge"""
     edges: Longs
-    """(J, 2): the edge of each"""
+    """(J, 2): the edge of each, the lower vertex first"""
 
 
 def seams_of(topology: Topology, used: Longs, first: Longs) -> Seams:
     """Return the open seams of a mesh; O(B log B) for B border vertices in practice.
 
     ``used`` are the vertices of the surface, ascending, and ``first`` the first one at the position
-    of each. Vertices at one position count as one here: they are told as duplicates.
+    of each. Those at one position count as one here: they are told as duplicates.
     """
     links = topology.links
     border = np.flatnonzero(links[:, OPPOSITE] == NO_FACE)
-    ends = topology.outer_vertex[links[border][:, [TAIL, HEAD]]]
     if len(border) == 0:
         none = np.empty((0, 2), np.int64)
         return Seams(none, np.empty(0), none[:, 0], none)
-    vertices = np.unique(ends)
-    # Of the border vertices at one position, the lowest stands for all.
-    _, lowest, place = np.unique(
-        first[np.searchsorted(used, vertices)], return_index=True, return_inverse=True
-    )
-    names = vertices[lowest].astype(np.int64)
-    tree = tree_of(topology.positions[topology.inner_vertex[names]])
-    leaf = np.empty(len(names), np.int32)
-    leaf[tree.order] = np.arange(len(names), dtype=np.int32)
-    names = names[tree.order]
+    ends = np.stack([links[border, TAIL], links[border, HEAD]], axis=1)
+    outer_ends: Longs = topology.outer_vertex[ends].astype(np.int64)
 
-    at_vertex = np.full(len(topology.positions), -1, np.int32)
-    at_vertex[topology.inner_vertex[vertices]] = leaf[place]
-    corners = np.flatnonzero(at_vertex[links[:, TAIL]] >= 0)
-    reach = np.full(len(names), np.inf)
-    np.minimum.at(reach, at_vertex[links[corners, TAIL]], _heights(topology.geometry, corners))
-    reach *= NEARLY_JOINED
+    # Of the border vertices at one position, the lowest stands for all: a place of the tree.
+    is_border = np.zeros(len(topology.positions), bool)
+    is_border[outer_ends] = True
+    vertices, at = used[is_border[used]], first[is_border[used]]
+    lowest = np.empty_like(is_border, np.int64)
+    lowest[at[::-1]] = vertices[::-1]
+    places = vertices[lowest[at] == vertices]
+    tree = tree_of(topology.positions[topology.inner_vertex[places]])
+    places = places[tree.order]
+    place_of = np.full_like(lowest, -1)
+    place_of[places] = np.arange(len(places))
+    place_at = np.full_like(lowest, -1)  # by inner vertex
+    place_at[topology.inner_vertex[vertices]] = place_of[lowest[at]]
+
+    corners = np.flatnonzero(place_at[links[:, TAIL]] >= 0)
+    reach = np.full(len(places), np.inf)
+    np.minimum.at(reach, place_at[links[corners, TAIL]], _heights(topology, corners))
     following = border - border % 3 + (border + 1) % 3
-    heights = [_heights(topology.geometry, at) for at in (border, following)]
-    widths = NEARLY_JOINED / 2.0 * np.minimum(*heights)
-    edges = at_vertex[links[border][:, [TAIL, HEAD]]]
+    widths = np.minimum(_heights(topology, border), _heights(topology, following)) / 2.0
+    reach, widths = NEARLY_JOINED * reach, NEARLY_JOINED * widths
 
-    nearest, distances = np.empty(len(names), np.int32), np.empty(len(names))
+    nearest, distances = np.empty(len(places), np.int64), np.empty(len(places))
     find_nearest(tree, reach, nearest, distances)
-    on = np.empty(len(names), np.int32)
-    find_on_edges(tree, reach, edges, widths, on)
-    has_near, on_edge = np.flatnonzero(nearest >= 0), np.flatnonzero(on >= 0)
-    pairs = np.sort(np.stack([names[has_near], names[nearest[has_near]]], axis=1), axis=1)
-    near, which = np.unique(pairs, axis=0, return_index=True)
-    on_edge = on_edge[np.argsort(names[on_edge])]
+    edge = np.empty(len(places), np.int64)
+    find_on_edges(tree, reach, place_at[ends], widths, edge)
+
+    is_told_by_other = (nearest[nearest] == np.arange(len(places))) & (places[nearest] < places)
+    told = np.flatnonzero((nearest >= 0) & ~is_told_by_other)
+    pairs = np.sort(np.stack([places[told], places[nearest[told]]], axis=1), axis=1)
+    by_vertex = np.lexsort(pairs.T[::-1])
+    on_edge = np.flatnonzero(edge >= 0)
+    on_edge = on_edge[np.argsort(places[on_edge])]
     return Seams(
-        near,
-        distances[has_near][which],
-        names[on_edge],
-        np.sort(ends[on[on_edge]].astype(np.int64), axis=1),
+        pairs[by_vertex],
+        distances[told][by_vertex],
+        places[on_edge],
+        np.sort(outer_ends[edge[on_edge]], axis=1),
     )
 
 
-def _heights(geometry: Floats, corners: Longs) -> Floats:
+def _heights(topology: Topology, corners: Longs) -> Floats:
     """Return the distance of each half-edge's tail from the opposite edge of its face."""
-    rows = geometry[corners]
-    foot = rows[:, LENGTH] * rows[:, COS_RIGHT]
-    is_inside = (foot >= 0.0) & (foot <= rows[:, LENGTH_RIGHT])
-    heights: Floats = np.where(
-        is_inside,
-        rows[:, LENGTH] * rows[:, SIN_RIGHT],
-        np.minimum(rows[:, LENGTH], rows[:, LENGTH_LEFT]),
-    )
+    geometry = topology.geometry
+    length = geometry[corners, LENGTH]
+    foot = length * geometry[corners, COS_RIGHT]
+    is_inside = (foot >= 0.0) & (foot <= geometry[corners, LENGTH_RIGHT])
+    to_ends = np.minimum(length, geometry[corners, LENGTH_LEFT])
+    heights: Floats = np.where(is_inside, length * geometry[corners, SIN_RIGHT], to_ends)
     return heights

@@ -17,6 +17,8 @@ _LEAF = 8
 """Points of a node that is not halved, at most."""
 _DEPTH = 64
 """Nodes that are yet to be visited, at most: one for each level of the tree, and one more."""
+_NO_STEP = 1e-200
+"""Mesh units between two coordinates up to which they count as equal: its inverse is a number."""
 
 
 class PointTree(NamedTuple):
@@ -106,12 +108,10 @@ def from_box(boxes: Floats, node: int, points: Floats, i: int) -> float:
 @kernel
 def apart(points: Floats, i: int, j: int) -> float:
     """Distance of two points."""
-    x, y, z = (
-        points[j, 0] - points[i, 0],
-        points[j, 1] - points[i, 1],
-        points[j, 2] - points[i, 2],
-    )
-    return math.sqrt(x * x + y * y + z * z)
+    squared = 0.0
+    for axis in range(3):
+        squared += (points[j, axis] - points[i, axis]) ** 2
+    return math.sqrt(squared)
 
 
 # Points that steps of a limited length join ------------------------------------------------------
@@ -201,7 +201,7 @@ def update_reach(reach: Floats, widest: Floats, node: int) -> None:
 
 
 @kernel
-def find_nearest(tree: Any, reach: Floats, nearest: Ints, distance: Floats) -> None:
+def find_nearest(tree: Any, reach: Floats, nearest: Longs, distance: Floats) -> None:
     """Fill each point's nearest other one that is within the reach of both, or -1; its distance.
 
     All in the tree's order. Halves are visited nearest first.
@@ -231,7 +231,7 @@ def find_nearest(tree: Any, reach: Floats, nearest: Ints, distance: Floats) -> N
 
 
 @kernel
-def find_on_edges(tree: Any, reach: Floats, edges: Ints, widths: Floats, found: Ints) -> None:
+def find_on_edges(tree: Any, reach: Floats, edges: Longs, widths: Floats, found: Longs) -> None:
     """Fill the edge that each point lies on, within its reach and the edge's width, or -1.
 
     ``edges`` are (E, 2) places in the tree's order. A point is on none of which it is an end, nor
@@ -240,16 +240,20 @@ def find_on_edges(tree: Any, reach: Floats, edges: Ints, widths: Floats, found: 
     """
     points, boxes = tree.points, tree.boxes
     widest, stack = widest_reach(reach, boxes), np.empty(_DEPTH, np.int64)
+    inverse = np.empty(3)
     for i in range(len(points)):
         found[i] = -1
     for e in range(len(edges)):
         a, b = edges[e, 0], edges[e, 1]
+        for axis in range(3):
+            step = points[b, axis] - points[a, axis]
+            inverse[axis] = 1.0 / step if abs(step) > _NO_STEP else 1.0 / _NO_STEP
         stack[0], size = 1, 1
         while size > 0:
             size -= 1
             node = stack[size]
             limit = min(widths[e], widest[node])
-            if limit < 0.0 or not meets_box(points, a, b, boxes, node, limit):
+            if limit < 0.0 or not meets_box(points, a, inverse, boxes, node, limit):
                 continue
             if 2 * node < len(boxes):
                 stack[size], stack[size + 1] = 2 * node, 2 * node + 1
@@ -259,33 +263,41 @@ def find_on_edges(tree: Any, reach: Floats, edges: Ints, widths: Floats, found: 
             for i in range(start, end):
                 if i not in (a, b) and from_inside(points, a, b, i) <= min(widths[e], reach[i]):
                     found[i], reach[i] = e, -1.0
-            while node > 0:
-                update_reach(reach, widest, node)
+            update_reach(reach, widest, node)
+            while node > 1 and widest[node >> 1] > max(widest[node], widest[node ^ 1]):
                 node >>= 1
+                update_reach(reach, widest, node)
 
 
 @kernel
-def meets_box(points: Floats, a: int, b: int, boxes: Floats, node: int, limit: float) -> bool:
-    """Whether the inside of an edge meets the box of a node, which is wider by the limit."""
+def meets_box(
+    points: Floats, a: int, inverse: Floats, boxes: Floats, node: int, limit: float
+) -> bool:
+    """Whether the inside of an edge from a meets the box of a node, which is wider by the limit.
+
+    ``inverse`` is 1 / (b - a) on each axis.
+    """
     low, high = NEARLY_JOINED, 1.0 - NEARLY_JOINED
     for axis in range(3):
-        start, step = points[a, axis], points[b, axis] - points[a, axis]
-        bottom, top = boxes[node, axis] - limit - start, boxes[node, 3 + axis] + limit - start
-        if step != 0.0:
-            low = max(low, min(bottom / step, top / step))
-            high = min(high, max(bottom / step, top / step))
-        elif bottom > 0.0 or top < 0.0:
-            return False
+        enter = (boxes[node, axis] - limit - points[a, axis]) * inverse[axis]
+        leave = (boxes[node, 3 + axis] + limit - points[a, axis]) * inverse[axis]
+        low, high = max(low, min(enter, leave)), min(high, max(enter, leave))
     return low <= high
 
 
 @kernel
 def from_inside(points: Floats, a: int, b: int, i: int) -> float:
-    """Distance of a point from the inside of an edge; infinite beside the parts next to its ends."""
-    ux, uy, uz = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1], points[b, 2] - points[a, 2]
-    wx, wy, wz = points[i, 0] - points[a, 0], points[i, 1] - points[a, 1], points[i, 2] - points[a, 2]
-    t = (ux * wx + uy * wy + uz * wz) / (ux * ux + uy * uy + uz * uz)
+    """Distance of a point from the inside of an edge; infinite next to its ends."""
+    along, squared = 0.0, 0.0
+    for axis in range(3):
+        step = points[b, axis] - points[a, axis]
+        along += step * (points[i, axis] - points[a, axis])
+        squared += step * step
+    t = along / squared
     if not NEARLY_JOINED <= t <= 1.0 - NEARLY_JOINED:
         return math.inf
-    x, y, z = wx - t * ux, wy - t * uy, wz - t * uz
-    return math.sqrt(x * x + y * y + z * z)
+    beside = 0.0
+    for axis in range(3):
+        foot = points[a, axis] + t * (points[b, axis] - points[a, axis])
+        beside += (points[i, axis] - foot) ** 2
+    return math.sqrt(beside)
