@@ -236,7 +236,7 @@ The positions of a georeferenced mesh round by more than `SNAP`: at 5e6 from the
 """
 
 NEARLY_JOINED = 1e-3
-"""Share of its height up to which a border vertex counts as nearly joined to what it is not joined to.
+"""Share of its height up to which a border vertex counts as nearly joined to another border.
 
 The height of a vertex is its distance from the opposite edges of its faces, of which the least
 counts. Every way over the surface to another vertex, or to an edge of which it is no end, is as

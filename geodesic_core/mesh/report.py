@@ -236,8 +236,8 @@ def warnings_of(report: MeshReport) -> Iterator[str]:
     if sample.count:
         pairs = "1 pair" if sample.count == 1 else f"{sample.count} pairs"
         yield (
-            f"{pairs} of border vertices no more than {report.near_distance:g} apart but not "
-            f"joined: no path connects them there; the first are the vertices {sample.ids[0]}. "
+            f"{pairs} of border vertices up to {report.near_distance:g} apart but not joined: no "
+            f"path connects them there; the first are the vertices {sample.ids[0]}. "
             f"merge={_rounded_up(report.near_distance)} joins them."
         )
     sample = report.t_junctions

@@ -96,7 +96,7 @@ def part(points: Floats, axis: int, order: Ints, low: int, high: int, middle: in
 
 @kernel
 def from_box(boxes: Floats, node: int, points: Floats, i: int) -> float:
-    """Distance of a point from the box of a node."""
+    """Return the distance of a point from the box of a node."""
     squared = 0.0
     for axis in range(3):
         low, high = boxes[node, axis] - points[i, axis], points[i, axis] - boxes[node, 3 + axis]
@@ -107,7 +107,7 @@ def from_box(boxes: Floats, node: int, points: Floats, i: int) -> float:
 
 @kernel
 def apart(points: Floats, i: int, j: int) -> float:
-    """Distance of two points."""
+    """Return the distance of two points."""
     squared = 0.0
     for axis in range(3):
         squared += (points[j, axis] - points[i, axis]) ** 2
@@ -119,7 +119,7 @@ def apart(points: Floats, i: int, j: int) -> float:
 
 @kernel
 def root_of(joined: Longs, i: int) -> int:
-    """The lowest number known to be joined to i."""
+    """Return the lowest number known to be joined to i."""
     while joined[i] != i:
         joined[i] = joined[joined[i]]
         i = joined[i]
@@ -287,7 +287,7 @@ def meets_box(
 
 @kernel
 def from_inside(points: Floats, a: int, b: int, i: int) -> float:
-    """Distance of a point from the inside of an edge; infinite next to its ends."""
+    """Return the distance of a point from the inside of an edge; infinite next to its ends."""
     along, squared = 0.0, 0.0
     for axis in range(3):
         step = points[b, axis] - points[a, axis]
