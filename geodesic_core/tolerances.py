@@ -235,6 +235,17 @@ ROUNDED_COORDINATE = 2.0**-50
 The positions of a georeferenced mesh round by more than `SNAP`: at 5e6 from the origin, by 1e-9.
 """
 
+NEARLY_JOINED = 1e-3
+"""Share of its height up to which a border vertex counts as nearly joined to another border.
+
+The height of a vertex is its distance from the opposite edges of its faces, of which the least
+counts. Every way over the surface to another vertex, or to an edge of which it is no end, is as
+long: what is told as nearly joined is a thousand times as far over the surface as it is away.
+Single precision leaves seams 1e-4 wide on a mesh of a million faces; sheets that are thin for their
+faces are 1e-2 apart. An edge's height is half of those of its ends in its face; next to its ends,
+this share of its length, it is not asked for vertices on it.
+"""
+
 FAN = 1e-9
 """Share of a polygon's area that each triangle of a fan must have for the fan to be taken.
 

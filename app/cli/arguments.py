@@ -2,9 +2,11 @@
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import typer
 
@@ -12,11 +14,35 @@ from app.cli.barriers import BlockedFaces
 from app.cli.points import Point, PointOrCurve
 
 
-class Merge(StrEnum):
+@dataclass(frozen=True)
+class Merge:
     """Merging of the vertices of a file."""
 
-    NONE = "none"
-    EXACT = "exact"
+    value: Literal["none", "exact"] | float
+
+    @classmethod
+    def parse(cls, given: "str | Merge") -> "Merge":
+        """Return the merging that an option names; a default is one already."""
+        if isinstance(given, Merge):
+            return given
+        match given:
+            case "none":
+                return cls("none")
+            case "exact":
+                return cls("exact")
+        with suppress(ValueError):
+            if 0.0 <= float(given) < math.inf:
+                return cls(float(given))
+        raise typer.BadParameter(
+            f"{given!r} is neither 'none' nor 'exact', nor a distance, 0 or more"
+        )
+
+    def __str__(self) -> str:
+        """Return it as the option has it."""
+        return str(self.value)
+
+
+NO_MERGE = Merge("none")
 
 
 class Method(StrEnum):
@@ -95,7 +121,14 @@ MeshFile = Annotated[
     ),
 ]
 MergeOption = Annotated[
-    Merge, typer.Option("--merge", help="'exact' joins vertices at the same position.")
+    Merge,
+    typer.Option(
+        "--merge",
+        parser=Merge.parse,
+        metavar="none|exact|DISTANCE",
+        help="'exact' joins vertices at the same position, a distance in mesh units those within "
+        "it.",
+    ),
 ]
 MaxDistance = Annotated[
     float | None,

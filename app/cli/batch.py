@@ -10,10 +10,10 @@ from typing import Annotated
 import typer
 
 from app.cli.arguments import (
+    NO_MERGE,
     STANDARD_OUTPUT,
     EffortOption,
     MaxDistance,
-    Merge,
     MergeOption,
     Method,
     MethodOption,
@@ -58,7 +58,7 @@ def batch(
             min=1, help="How many meshes to work on at a time; by default one for each core."
         ),
     ] = None,
-    merge: MergeOption = Merge.NONE,
+    merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
     """Answer the same queries for many meshes; a mesh that fails does not stop the others.

@@ -49,7 +49,7 @@ class Questions:
     targets: Sequence[Point]
     options: dict[str, Any]
     """Of the solver, its method among them"""
-    merge: Literal["none", "exact"]
+    merge: Literal["none", "exact"] | float
 
 
 def ask(questions: Questions, file: Path) -> list[Row]:

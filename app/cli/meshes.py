@@ -7,8 +7,8 @@ import typer
 
 from app.cli import files
 from app.cli.arguments import (
+    NO_MERGE,
     STANDARD_OUTPUT,
-    Merge,
     MergeOption,
     MeshFile,
     SampleName,
@@ -20,7 +20,7 @@ from app.cli.summary import print_size
 from app.cli.words import with_options
 
 
-def info(mesh_file: MeshFile, merge: MergeOption = Merge.NONE, as_json: AsJson = False) -> None:
+def info(mesh_file: MeshFile, merge: MergeOption = NO_MERGE, as_json: AsJson = False) -> None:
     """Check a mesh, and print a report."""
     opened, seconds = read(mesh_file, merge)
     mesh = opened.mesh

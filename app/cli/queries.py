@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli.arguments import (
+    NO_MERGE,
     AbsoluteError,
     Barriers,
     BoundedMethod,
     BoundedMethodOption,
     EffortOption,
     MaxDistance,
-    Merge,
     MergeOption,
     MeshFile,
     Method,
@@ -88,7 +88,7 @@ def distance(
     absolute_error: AbsoluteError = None,
     effort: EffortOption = None,
     barriers: Barriers = None,
-    merge: MergeOption = Merge.NONE,
+    merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
     """Compute the distance of every vertex from the nearest source."""
@@ -149,7 +149,7 @@ def path(
     absolute_error: AbsoluteError = None,
     effort: EffortOption = None,
     barriers: Barriers = None,
-    merge: MergeOption = Merge.NONE,
+    merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
     """Compute a shortest path over the surface between two points."""
@@ -192,7 +192,7 @@ def paths(
     absolute_error: AbsoluteError = None,
     effort: EffortOption = None,
     barriers: Barriers = None,
-    merge: MergeOption = Merge.NONE,
+    merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
     """Compute shortest paths from one point to several others, in one sweep."""
@@ -230,7 +230,7 @@ def isolines(
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
     barriers: Barriers = None,
-    merge: MergeOption = Merge.NONE,
+    merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
     """Draw lines of equal distance from the nearest source."""
@@ -263,7 +263,7 @@ def borders(
     chord_error: ChordError = None,
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
-    merge: MergeOption = Merge.NONE,
+    merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
     """Draw the borders between the parts of the surface that are nearest to each source."""
@@ -293,7 +293,7 @@ def nearest(
     out: PointsOut = None,
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
-    merge: MergeOption = Merge.NONE,
+    merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
     """Find the candidates that are nearest to a point along the surface."""
@@ -319,7 +319,7 @@ def locate(
         typer.Option(parser=Position.parse, metavar="X,Y,Z", help="The position, mesh units."),
     ],
     out: PointsOut = None,
-    merge: MergeOption = Merge.NONE,
+    merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
     """Find the point of the surface that is nearest to a position."""

@@ -9,6 +9,7 @@ import typer
 
 from app.cli import files, local_matrix, remote_matrix
 from app.cli.arguments import (
+    NO_MERGE,
     AbsoluteError,
     Barriers,
     EffortOption,
@@ -126,7 +127,7 @@ def matrix(
     service: Service = None,
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
-    merge: MergeOption = Merge.NONE,
+    merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
     """Compute distances from several points to several others, or between all points of a file."""

@@ -32,8 +32,9 @@ def words_of(fault: Mapping[str, Any]) -> str:
 
 def with_options(message: str) -> str:
     """Return a message of the library with options in the place of its arguments."""
-    message = message.replace("merge='exact'", "--merge exact")
+    message = _MERGE.sub(r"--merge \1", message)
     return _ARGUMENTS.sub(lambda found: "--" + found[0].replace("_", "-"), message)
 
 
+_MERGE = re.compile(r"\bmerge='?([\w.+-]+)'?")
 _ARGUMENTS = re.compile(r"\b(max_distance|relative_error|absolute_error|chord_error)\b")

@@ -20,7 +20,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path, PurePosixPath
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import msgspec
 
@@ -41,12 +41,11 @@ from app.engine.work import (
 )
 from app.errors import CODES, Problem
 from app.queries import KINDS, Estimate, MatrixQuery, Query
-from app.schemas.meshes import Merge
 from app.store.meshes import WrittenMesh
 from app.store.results import Result, ResultManifest
 from app.tracing import Period
 
-VERSION = 7
+VERSION = 8
 """To be raised with every change of the types below, and of what they mean"""
 
 _MAGIC = b"GEOD"
@@ -77,13 +76,13 @@ class VersionError(WireError):
 class _Sample(msgspec.Struct, frozen=True, tag="sample"):
     sample: str
     faces: int
-    merge: Merge
+    merge: Literal["none", "exact"] | float
 
 
 class _File(msgspec.Struct, frozen=True, tag="file"):
     path: str
     file_type: str | None
-    merge: Merge
+    merge: Literal["none", "exact"] | float
 
 
 class _Store(msgspec.Struct, frozen=True, tag="store"):

@@ -6,7 +6,7 @@ from pydantic import BaseModel, BeforeValidator, Field
 
 from app.schemas.points import LARGEST_COUNT, StrictModel
 
-Merge = Literal["none", "exact"]
+Merge = Literal["none", "exact"] | Annotated[float, Field(ge=0, allow_inf_nan=False)]
 _MeshFormat = Literal[
     "obj",
     "off",
@@ -49,7 +49,12 @@ class UploadParameters(StrictModel):
         description="Format of the file. By default, `Content-Type` tells it, else the suffix of "
         "its name in the form or in `Content-Disposition`, else its first bytes",
     )
-    merge: Merge = Field(default="none", description="`exact` joins vertices at the same position")
+    merge: Merge = Field(
+        default="none",
+        description="`exact` joins vertices at the same position; a distance in mesh units joins "
+        "those no farther apart, and so all that steps of this length lead to, from vertex to "
+        "vertex",
+    )
     sample: SampleName | None = Field(
         default=None, description="The sample to make, instead of reading a mesh"
     )
@@ -98,6 +103,23 @@ class MeshDocument(BaseModel):
     isolated_vertices: Sample = Field(description="Vertices that belong to no face of the surface")
     duplicate_vertices: Sample = Field(
         description="Vertices at the position of an earlier vertex; `merge=exact` joins them"
+    )
+    near_vertices: Sample | None = Field(
+        default=None,
+        description="Pairs of border vertices that are nearly joined: a thousand times as far "
+        "apart over the surface; `merge` takes a distance, which joins them. Null, as the next "
+        "three, for a mesh that was stored by a release without them",
+    )
+    near_distance: float | None = Field(
+        default=None,
+        description="Largest distance between the vertices of such a pair; 0 without any",
+    )
+    t_junctions: Sample | None = Field(
+        default=None,
+        description="Border vertices that lie on a border edge of which they are no end",
+    )
+    t_junction_edges: Sample | None = Field(
+        default=None, description="The edge that each of them lies on, in the same order"
     )
     repeated_vertex_faces: Sample = Field(
         description="Faces with fewer than three different vertices; they are not part of the "

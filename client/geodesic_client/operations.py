@@ -75,7 +75,7 @@ def upload(
     mesh: uploads.Source,
     *,
     format: str | None = None,  # noqa: A002 - the service's name for it
-    merge: Literal["none", "exact"] = "none",
+    merge: Literal["none", "exact"] | float = "none",
     name: str | None = None,
     progress: Progress = ignore_progress,
 ) -> Flow[Mesh]:
@@ -89,7 +89,8 @@ def upload(
     format
         The format, if the suffix of the file name does not tell it.
     merge
-        ``exact`` joins vertices at the same position.
+        ``exact`` joins vertices at the same position; a distance in mesh units joins those no
+        farther apart, and so all that steps of this length lead to, from vertex to vertex.
     name
         Name of the mesh for people; by default the name of the file. A mesh that is in the store
         already keeps its name.
@@ -97,7 +98,7 @@ def upload(
         Called with the share that has been sent.
     """
     size, read = uploads.body_of(mesh, progress)
-    parameters = {"format": uploads.format_of(mesh, format), "merge": merge}
+    parameters = {"format": uploads.format_of(mesh, format), "merge": str(merge)}
     called = uploads.name_of(mesh, name)
     if called is not None:
         parameters["name"] = called

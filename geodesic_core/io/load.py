@@ -68,7 +68,8 @@ def load_mesh(
         default the suffix of the name. Without a known suffix, as FreeSurfer's ``lh.pial``, the
         first bytes decide where they can.
     merge
-        ``"exact"`` merges vertices at equal positions, as `TriangleMesh` does.
+        ``"exact"`` merges vertices at equal positions, a distance those within it, as
+        `TriangleMesh` does.
     max_faces
         Largest number of triangles. A file with more is refused before its faces are parsed, by the
         count in its header or by counting.
@@ -91,6 +92,8 @@ def load_mesh(
     InvalidMesh
         The file cannot be read, is not of this type, is damaged, declares more than it holds, or
         holds a mesh that `TriangleMesh` refuses.
+    InvalidArgument
+        ``merge`` is no way of merging.
     MissingExtra
         GIFTI needs nibabel, the extra ``brain``; VTK's files need VTK, the extra ``vtk``.
 
@@ -117,9 +120,9 @@ def load_mesh(
     if len(read.sizes) == 0:
         raise InvalidMesh(f"the {kind.upper()} file holds no faces", kind="face")
     check_face_count(int(np.maximum(read.sizes - 2, 1).sum()), max_faces)
-    return TriangleMesh.from_polygons(
-        read.vertices, read.corners, read.sizes, "exact" if kind == "stl" else merge, read.notes
-    )
+    if kind == "stl" and merge == "none":
+        merge = "exact"
+    return TriangleMesh.from_polygons(read.vertices, read.corners, read.sizes, merge, read.notes)
 
 
 def _kind_of(file: NamedBytes, file_type: str | None) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
+from geodesic_core.kernels.mesh.point_tree import join_within, tree_of
 
 
 def of_three_vertices(faces: NDArray[np.integer]) -> NDArray[np.bool_]:
@@ -64,8 +65,23 @@ def repeated_rows(rows: NDArray[Any]) -> Longs:
     return np.flatnonzero(first_equal(rows) != np.arange(len(rows)))
 
 
-def merge_equal(vertices: Floats) -> tuple[Floats, Longs]:
-    """Return distinct positions in order of first appearance, and the new index of each vertex."""
-    first = first_equal(vertices)
+def first_within(vertices: Floats, distance: float) -> Longs:
+    """Return for each vertex the first of those that steps of at most a distance lead it to.
+
+    Each step leads from a vertex to another one. O(V log V) in practice, however many are near.
+    """
+    if distance == 0.0:
+        return first_equal(vertices)
+    joined: Longs = np.arange(len(vertices))
+    join_within(tree_of(vertices), distance, joined)
+    return joined
+
+
+def merged(vertices: Floats, distance: float) -> tuple[Floats, Longs]:
+    """Return the positions that merging leaves, and the new index of each vertex.
+
+    Of vertices that become one, the first keeps its position; those left are in its order.
+    """
+    first = first_within(vertices, distance)
     is_first = first == np.arange(len(vertices))
     return vertices[is_first], (np.cumsum(is_first) - 1)[first]

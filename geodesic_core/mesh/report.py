@@ -1,5 +1,6 @@
 """Reports on meshes: counts and defects with the ids at fault, and their remedies."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -17,7 +18,13 @@ from geodesic_core.kernels.mesh.half_edges import (
     SIN_LEFT,
     Topology,
 )
-from geodesic_core.mesh.degeneracies import edges_of_no_length, of_three_vertices, repeated_rows
+from geodesic_core.mesh.degeneracies import (
+    edges_of_no_length,
+    first_equal,
+    of_three_vertices,
+    repeated_rows,
+)
+from geodesic_core.mesh.seams import seams_of
 
 NAMED = 10
 """Ids named in a message or a report, at most."""
@@ -96,6 +103,15 @@ class MeshReport:
     """Vertices of no face of the surface."""
     duplicate_vertices: Sample
     """Vertices of the surface at the position of an earlier one."""
+    near_vertices: Sample
+    """Pairs of border vertices at different positions that are nearly joined: they are a thousand
+    times as far apart over the surface, or farther. Each vertex is paired with its nearest."""
+    near_distance: float
+    """Largest distance between the two vertices of such a pair, mesh units; 0 without any."""
+    t_junctions: Sample
+    """Border vertices that lie on a border edge of which they are no end."""
+    t_junction_edges: Sample
+    """The edge that each of them lies on, in the same order."""
     repeated_vertex_faces: Sample
     """Faces that repeat a vertex: they have a number, but are no part of the surface."""
     zero_length_edges: Sample
@@ -166,6 +182,8 @@ def report_of(
     collapsed = outside[is_collapsed]
     edges, edge_faces, same_way = edges_of(corners)
     lengths = np.linalg.norm(vertices[edges[:, 1]] - vertices[edges[:, 0]], axis=1)
+    first_used = used[first_equal(vertices[used])]
+    seams = seams_of(topology, used, first_used)
     lowest = used[np.unique(topology.component[used], return_index=True)[1]]
     polygons = np.zeros(0) if face_map is None else np.bincount(face_map)
     return MeshReport(
@@ -181,7 +199,11 @@ def report_of(
         boundary_vertices=int(np.count_nonzero(flags & BOUNDARY)),
         bow_tie_vertices=Sample.of(np.flatnonzero(flags & (FANS | SEAM) == FANS)),
         isolated_vertices=Sample.of(np.flatnonzero(~is_used)),
-        duplicate_vertices=Sample.of(used[repeated_rows(vertices[used])]),
+        duplicate_vertices=Sample.of(used[first_used != used]),
+        near_vertices=Sample.of(seams.near),
+        near_distance=float(seams.distances.max(initial=0.0)),
+        t_junctions=Sample.of(seams.on_edge),
+        t_junction_edges=Sample.of(seams.edges),
         repeated_vertex_faces=Sample.of(outside[~of_three_vertices(faces[outside])]),
         zero_length_edges=Sample.of(edges_of_no_length(vertices, faces[collapsed])),
         collapsed_faces=Sample.of(collapsed),
@@ -209,6 +231,22 @@ def warnings_of(report: MeshReport) -> Iterator[str]:
             f"{_vertices(sample.count)} at the position of an earlier vertex but not joined to it: "
             f"no path connects the two there; the first is vertex {sample.ids[0]}. merge='exact' "
             "joins them."
+        )
+    sample = report.near_vertices
+    if sample.count:
+        pairs = "1 pair" if sample.count == 1 else f"{sample.count} pairs"
+        yield (
+            f"{pairs} of border vertices up to {report.near_distance:g} apart but not joined: no "
+            f"path connects them there; the first are the vertices {sample.ids[0]}. "
+            f"merge={_rounded_up(report.near_distance)} joins them."
+        )
+    sample = report.t_junctions
+    if sample.count:
+        yield (
+            f"{_vertices(sample.count)} on a border edge without being its end (T-junction): no "
+            f"path crosses there; the first is vertex {sample.ids[0]}, on the edge between the "
+            f"vertices {report.t_junction_edges.ids[0]}. To join them, split the face of the edge "
+            "at the vertex."
         )
     sample = report.isolated_vertices
     if sample.count:
@@ -270,6 +308,12 @@ def _faces(count: int) -> str:
 
 def _edges(count: int) -> str:
     return "1 edge is" if count == 1 else f"{count} edges are"
+
+
+def _rounded_up(distance: float) -> str:
+    """Return a distance that is larger, of one digit, or of two."""
+    unit = 10.0 ** math.floor(math.log10(distance))
+    return f"{(math.floor(distance / unit) + 1) * unit:g}"
 
 
 def _list(sample: Sample) -> str:

@@ -20,7 +20,7 @@ from geodesic_core.mesh.closest_point import NearestFace
 from geodesic_core.mesh.degeneracies import (
     edges_of_no_length,
     lowest_joined,
-    merge_equal,
+    merged,
     of_three_vertices,
 )
 from geodesic_core.mesh.report import NAMED, MeshReport, report_of, warnings_of
@@ -45,7 +45,8 @@ from geodesic_core.tolerances import (
 )
 from geodesic_core.validation import as_barriers, as_limit, is_number, unboxed
 
-Merge = Literal["none", "exact"]
+Merge = Literal["none", "exact"] | float
+"""Which vertices become one: none, those at one position, or those within a distance."""
 
 
 class TriangleMesh:
@@ -60,13 +61,18 @@ class TriangleMesh:
         any number of faces.
     merge
         ``"exact"`` merges vertices at equal positions, in order of first appearance;
-        `vertex_map` then leads from given to merged vertices. ``"none"`` keeps them apart.
+        `vertex_map` then leads from given to merged vertices. ``"none"`` keeps them apart. A
+        distance, mesh units, merges vertices that are no farther apart, and so all those that steps
+        of this length lead to, from vertex to vertex: the first of them keeps its position. Give
+        less than the shortest edge, since edges that are no longer than the distance collapse.
 
     Raises
     ------
     InvalidMesh
         Naming the elements at fault: wrong shape or type, NaN or infinity, an index out of range,
         no face with three vertices at different positions, an edge shorter than 1e-50.
+    InvalidArgument
+        ``merge`` is neither ``"none"`` nor ``"exact"``, nor a finite number, 0 or more.
 
     Notes
     -----
@@ -134,7 +140,7 @@ class TriangleMesh:
 
         Raises
         ------
-        InvalidMesh
+        InvalidMesh, InvalidArgument
             As for `TriangleMesh`.
 
         Examples
@@ -166,11 +172,9 @@ class TriangleMesh:
             check_vertices(points)
             check_corners(triangles.reshape(-1), np.full(len(triangles), 3), len(points))
         vertex_map: Longs | None = None
-        if merge == "exact":
-            points, vertex_map = merge_equal(points)
+        if merge != "none":
+            points, vertex_map = merged(points, _merging_distance(merge))
             triangles = vertex_map[triangles]
-        elif merge != "none":
-            raise InvalidArgument(f"merge is {merge!r}; it must be 'none' or 'exact'")
         faces = triangles.astype(np.int32)
         topology = _prepare(points - build.origin_of(points, faces), faces, np.arange(len(faces)))
         self._hold(points, faces, vertex_map, face_map, topology, notes)
@@ -650,6 +654,22 @@ class TriangleMesh:
         if len(self.barriers):
             facts["blocked faces"] = len(self.barriers)
         return as_table("TriangleMesh", facts | {"memory": f"{self.nbytes / 1e6:.1f} MB"})
+
+
+def _merging_distance(merge: Merge) -> float:
+    """Return the distance within which vertices are merged.
+
+    Raises
+    ------
+    InvalidArgument
+        It is no way of merging.
+    """
+    distance = 0.0 if isinstance(merge, str) and merge == "exact" else unboxed(merge)
+    if not is_number(distance) or not 0.0 <= distance < math.inf:
+        raise InvalidArgument(
+            f"merge is {merge!r}; it must be 'none', 'exact' or a distance, 0 or more"
+        )
+    return float(distance)
 
 
 def _frozen(array: NDArray[Any]) -> NDArray[Any]:
