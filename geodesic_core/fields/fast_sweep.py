@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from geodesic_core.control import SLICE_SECONDS, Control
+from geodesic_core.errors import InternalError
 from geodesic_core.fields.path import ErrorBound
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep, SweepResult, SweepStats
 from geodesic_core.kernels.fast import emission, state, sweep
@@ -15,6 +16,7 @@ from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources
 from geodesic_core.kernels.sweep.state import MERGE, MERGE_INTS
+from geodesic_core.tolerances import MOST_CROSSINGS
 
 ESTIMATES = {1: 0.03, 2: 0.01, 4: 0.005, 8: 0.002}
 """Estimated relative errors by effort, the number of places of a half-edge.
@@ -43,6 +45,8 @@ class FastSweep:
         ------
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As the control says.
+        InternalError
+            If it crosses more than `MOST_CROSSINGS` windows per half-edge: else it might never end.
         """
         mesh, nodes, starts = self.exact.mesh, self.exact.nodes, self.exact.start_distances
         topology, bounds = mesh.topology, self._bounds()
@@ -53,12 +57,18 @@ class FastSweep:
         control.checkpoint(0.0)
         sweep.start_sweep(topology, front, nodes.sources, nodes.source_indices, starts, bounds)
         reachable = max(int(np.isin(mesh.components, nodes.components).sum()), 1)
-        budget, outcome = _FIRST_BUDGET, Outcome.RUNNING
+        budget, outcome, left = _FIRST_BUDGET, Outcome.RUNNING, MOST_CROSSINGS * len(topology.links)
         while outcome != Outcome.FINISHED:
             control.checkpoint(min(float(front.counters[state.REACHED]) / reachable, 1.0))
             began = time.perf_counter()
             outcome = sweep.advance(topology, front, bounds, budget)
             took = time.perf_counter() - began
+            left -= int(front.counters[state.WORK])
+            if outcome != Outcome.FINISHED and left < 0:
+                raise InternalError(
+                    "the sweep does not end: its windows go in circles; please report this mesh, "
+                    "and use exact_distance for it"
+                )
             if outcome == Outcome.POOL_FULL:
                 front = state.with_larger_pool(front)
                 control.check_memory(state.bytes_of(front))

@@ -8,11 +8,13 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import SLICE_SECONDS, Control
+from geodesic_core.errors import InternalError
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep import continuous_dijkstra, pruning, state, surface_points
 from geodesic_core.kernels.sweep.bounds import Bounds, without_merging
+from geodesic_core.kernels.sweep.queues import RING_HEAD
 from geodesic_core.kernels.sweep.state import PREDECESSOR, Wavefront
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
@@ -46,13 +48,14 @@ def sweep_nodes(
     """Start a sweep at the sources of ``nodes``, run it to its end, and reach its targets.
 
     A merging sweep in which a list comes up more than `RUNS` times begins anew and merges nothing:
-    exact distances are within every error, and an exact sweep ends, but for a few meshes of nothing
-    but needles (docs/accuracy.md).
+    exact distances are within every error.
 
     Raises
     ------
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `run_sweep`.
+    InternalError
+        If a list of an exact sweep comes up more than `MOST_RUNS` times: else it would never end.
     """
     topology, shown = mesh.topology, 0.0
 
@@ -73,10 +76,17 @@ def sweep_nodes(
         return wave, outcome
 
     wave, outcome = sweep(wave, bounds)
-    if outcome == Outcome.RUNAWAY:
+    if outcome == Outcome.RUNAWAY and bounds.merging:
         pruning.forget(topology, wave)
-        wave, _ = sweep(wave, without_merging(bounds))
+        wave, outcome = sweep(wave, without_merging(bounds))
         wave.vertices.reference[:] = -1 - wave.vertices.winner_ints[:, PREDECESSOR]
+    if outcome == Outcome.RUNAWAY:
+        half_edge = wave.queues.ring[wave.counters[RING_HEAD]]
+        raise InternalError(
+            f"the sweep does not end: its windows go in circles through face "
+            f"{topology.outer_face[half_edge // 3]}; please report this mesh, and use "
+            f"fast_distance for it"
+        )
     return wave
 
 
@@ -90,7 +100,7 @@ def run_sweep(
 ) -> tuple[Wavefront, Outcome]:
     """Run a sweep that has started to its end; return its state, which may have grown.
 
-    Return also whether it FINISHED or is a RUNAWAY, as only a merging sweep can be.
+    Return also whether it FINISHED or is a RUNAWAY.
 
     ``share_done`` tells how much of the call is done. ``limit_of`` tells, from what is known so
     far, how far the sweep still has to look: never farther than ``bounds``. It is asked after fixed

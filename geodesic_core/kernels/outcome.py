@@ -21,7 +21,7 @@ class Outcome(IntEnum):
     MERGES_FULL = 5
     """There is no room to record what may be merged next"""
     RUNAWAY = 6
-    """A list of a merging sweep came up again and again"""
+    """A list came up again and again: RUNS times in a merging sweep, MOST_RUNS in an exact one"""
 
     # A traced path
     PATH_FULL = 7

@@ -29,6 +29,9 @@ from geodesic_core.kernels.sweep.trimming import trim, wins_throughout, without
 from geodesic_core.kernels.sweep.window import (
     INTS,
     NEXT,
+    REFERENCE,
+    WIDTH,
+    XI,
     Window,
     at_sigma,
     between,
@@ -39,6 +42,8 @@ from geodesic_core.kernels.sweep.window import (
     store_window,
 )
 from geodesic_core.tolerances import GAP, SLACK
+
+DEPTH = XI  # column
 
 
 @kernel
@@ -74,6 +79,8 @@ def nearest_part(wave: Any, g: int, window: Window, surely: bool) -> tuple[bool,
         window = cut_by(wave, cut_by(wave, window, at_head), at_tail)
         other = pool.crossings[name]
         while other >= 0:
+            if not merging(wave) and has_crossed(wave, window, other):
+                return False, window
             earlier = load_window(wave, pool.windows, other)
             if tail < head:
                 earlier = reversed_window(earlier, length)
@@ -95,8 +102,29 @@ def record_crossing(wave: Any, g: int, slot: int, window: Window) -> None:
     if mesh.links[ROW * g + TAIL] < mesh.links[ROW * g + HEAD]:
         window = reversed_window(window, mesh.geometry[ROW * g + LENGTH])
     store_window(wave, pool.windows, slot, window)
+    if not merging(wave):
+        pool.windows[WIDTH * slot + DEPTH] = depth_of(wave, window.reference) + 1.0
     as_ints(pool.windows)[INTS * slot + NEXT] = pool.crossings[name]
     pool.crossings[name] = slot
+
+
+@kernel
+def has_crossed(wave: Any, window: Window, crossing: int) -> bool:
+    """Whether a crossing is one of those that led to a window. O(edges between them)."""
+    rows, depth = as_ints(wave.pool.windows), depth_of(wave, crossing)
+    last = window.reference
+    while depth_of(wave, last) > depth:
+        last = rows[INTS * last + REFERENCE]
+    return last == crossing
+
+
+@kernel
+def depth_of(wave: Any, crossing: int) -> float:
+    """Return how many crossings led to one, itself included; 0 of none (< 0)."""
+    if crossing < 0:
+        return 0.0
+    depth: float = wave.pool.windows[WIDTH * crossing + DEPTH]
+    return depth
 
 
 @kernel

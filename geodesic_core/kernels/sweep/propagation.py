@@ -37,7 +37,7 @@ from geodesic_core.kernels.sweep.window_lists import (
     free_windows,
     release_list,
 )
-from geodesic_core.tolerances import RUNS
+from geodesic_core.tolerances import MOST_RUNS, RUNS
 
 # Units of work, of about 10 ns
 WORK_OF_LIST = 20
@@ -60,10 +60,9 @@ def propagate_list(wave: Any, h: int) -> Outcome:
     outcome = room_to_propagate(wave, h, size)
     if outcome != Outcome.FINISHED:
         return outcome
-    if merging(wave):
-        if wave.pool.runs[h] >= RUNS:
-            return Outcome.RUNAWAY
-        wave.pool.runs[h] += 1
+    if wave.pool.runs[h] >= (RUNS if merging(wave) else MOST_RUNS):
+        return Outcome.RUNAWAY
+    wave.pool.runs[h] += 1
     count = trim_list(wave, h)
     release_list(wave, h)
     if marks & RETAINED:

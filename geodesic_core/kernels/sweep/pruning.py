@@ -172,8 +172,7 @@ def forget(topology: Any, wavefront: Any) -> None:
                 pool.lists[h, MARKS] &= RETAINED
                 if topology.flags[v] & (SEAM | PINCHED):
                     pool.crossings[h] = -1
-                if merges:
-                    pool.runs[h] = 0
+                pool.runs[h] = 0
     for k in range(len(sites.ints)):
         node, face = sites.ints[k, NODE], sites.ints[k, FACE]
         vertices.distance[node] = math.inf

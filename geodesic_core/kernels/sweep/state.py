@@ -142,7 +142,7 @@ class Pool(NamedTuple):
     """(3F,): crossing history: slot of the last window over an irregular edge, by its lowest
     half-edge; -1 at the end; empty where there are none"""
     runs: Counts
-    """(3F,): how often the half-edge's list was propagated; empty unless the sweep merges"""
+    """(3F,): how often the half-edge's list was propagated"""
     merges: Floats
     """(M, 7): SPLIT, LEFT, RIGHT; empty unless the sweep merges and paths are wanted"""
     merge_ints: Ints
@@ -315,7 +315,7 @@ def _new_pool(
         scratch=aligned_rows(256, WIDTH, np.float64),
         retained=aligned_rows(0 if windows is None else 4096, WIDTH, np.float64),
         crossings=np.full(half_edges if irregular else 0, -1, np.int32),
-        runs=np.zeros(half_edges if merges else 0, np.uint16),
+        runs=np.zeros(half_edges, np.uint16),
         merges=np.empty((1024 if paths else 0, MERGE)),
         merge_ints=np.empty((1024 if paths else 0, MERGE_INTS), np.int32),
     )

@@ -79,9 +79,10 @@ def load_window(wave: Any, rows: Any, i: int) -> Window:
     """Return the window of row i of the pool, or of scratch."""
     w, ints = WIDTH * i, as_ints(rows)
     root: Any = np.int64(ints[INTS * i + ROOT])  # one type, so that kernels are compiled once
-    xi, reference = 0.0, -1
+    reference: Any = np.int64(ints[INTS * i + REFERENCE])
+    xi = 0.0
     if merging(wave):
-        xi, reference = rows[w + XI], ints[INTS * i + REFERENCE]
+        xi = rows[w + XI]
     return Window(
         rows[w + B0],
         rows[w + B1],
@@ -103,9 +104,9 @@ def store_window(wave: Any, rows: Any, i: int, window: Window) -> None:
     rows[w + SX], rows[w + SY] = window.sx, window.sy
     rows[w + SIGMA] = window.sigma
     ints[INTS * i + ROOT] = window.root
+    ints[INTS * i + REFERENCE] = window.reference
     if merging(wave):
         rows[w + XI] = window.xi
-        ints[INTS * i + REFERENCE] = window.reference
 
 
 @inlined
@@ -146,6 +147,22 @@ def at_sigma(window: Window, sigma: float) -> Window:
         window.root,
         window.xi,
         window.reference,
+    )
+
+
+@inlined
+def after_crossing(window: Window, crossing: int) -> Window:
+    """Return the window as it goes on from an irregular edge, in an exact sweep."""
+    return Window(
+        window.b0,
+        window.b1,
+        window.sx,
+        window.sy,
+        window.sigma,
+        window.weight,
+        window.root,
+        window.xi,
+        crossing,
     )
 
 

@@ -14,6 +14,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     TAIL,
     following,
 )
+from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.irregular_edges import (
     record_crossing,
     trim_against_crossings,
@@ -38,6 +39,7 @@ from geodesic_core.kernels.sweep.window import (
     NEXT,
     WIDTH,
     Window,
+    after_crossing,
     load_window,
     reversed_window,
     store_window,
@@ -131,11 +133,12 @@ def send_across(wave: Any, g: int, slot: int) -> None:
     if not passes:
         free_window(wave, slot)
         return
+    onward = window if merging(wave) else after_crossing(window, slot)
     h = mesh.links[ROW * g + AROUND] >> 1
     while h != g:
-        copy = window
+        copy = onward
         if mesh.links[ROW * h + TAIL] == mesh.links[ROW * g + TAIL]:
-            copy = reversed_window(window, mesh.geometry[ROW * g + LENGTH])
+            copy = reversed_window(onward, mesh.geometry[ROW * g + LENGTH])
         insert_sorted(wave, h, put_window(wave, copy))
         wave.counters[CREATED] += 1
         queue_if_due(wave, h, mesh.links[ROW * h + TAIL], mesh.links[ROW * h + HEAD])
