@@ -146,6 +146,7 @@ def test_the_service_reads_what_the_library_reads(client: TestClient) -> None:
         (gzip.compress(OFF.encode())[:-9], "invalid_mesh", "gzip cannot unpack"),
         (zipped("readme.txt", "no mesh"), "invalid_mesh", "must hold one mesh"),
     ],
+    ids=["text", "page", "pointer", "packed text", "cut", "archive"],
 )
 def test_a_body_that_tells_no_type_is_refused_with_what_it_is(
     client: TestClient, content: bytes, code: str, words: str
@@ -633,7 +634,9 @@ def test_meshes_and_results_survive_a_restart(tmp_path: Path) -> None:
     assert again.headers["server-timing"] == "kept"
 
 
-@pytest.mark.parametrize("packed", [gzip.compress(bytes(10**6)), zipped("a.off", " " * 10**6)])
+@pytest.mark.parametrize(
+    "packed", [gzip.compress(bytes(10**6)), zipped("a.off", " " * 10**6)], ids=["gzip", "zip"]
+)
 def test_a_packed_file_counts_by_its_size_when_unpacked(tmp_path: Path, packed: bytes) -> None:
     with serving(tmp_path, max_upload_bytes=10**5, max_query_bytes=100) as client:
         response = client.post("/v1/meshes", content=packed)
