@@ -16,7 +16,6 @@ LATE = (
     "manifold3d",
     "scipy.sparse",
     "scipy.spatial",
-    "trimesh.exchange.stl",
 )
 
 

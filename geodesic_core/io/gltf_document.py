@@ -180,9 +180,11 @@ class _Checker:
             case {}:
                 self._check_members(value, expected, place)
             case _Index(of):
-                count = len(self._document.get(of, ()))
-                if not _is_integer(value, 0, count - 1):
-                    _refuse(value, place, f"the number of one of {count} {of}")
+                elements = self._document.get(of, [])
+                if not isinstance(elements, list):
+                    _refuse(elements, of, "a list")
+                if not _is_integer(value, 0, len(elements) - 1):
+                    _refuse(value, place, f"the number of one of {len(elements)} {of}")
             case _Integer(least, most):
                 if not _is_integer(value, least, most):
                     _refuse(value, place, f"an integer, {least} to {most}")

@@ -1,6 +1,6 @@
 """Nodes of a glTF scene: the tree that places its meshes, their instances and their joints."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,7 @@ from geodesic_core.io.gltf_accessors import Accessors
 
 _MOST_NODES = 100_000
 """Nodes of a scene; beyond, walking them takes longer than reading any mesh."""
-_TRANSFORMS = ("matrix", "translation", "rotation", "scale")
+_AT_REST = {"translation": (0, 0, 0), "rotation": (0, 0, 0, 1), "scale": (1, 1, 1)}
 _INSTANCING = "EXT_mesh_gpu_instancing"
 
 
@@ -123,30 +123,34 @@ class Nodes:
     @cached_property
     def _places(self) -> Mapping[int, Floats]:
         """The (4, 4) matrix of each node, from its coordinates to the scene's."""
+        moved = [i for i, node in enumerate(self._nodes) if node.keys() & {"matrix", *_AT_REST}]
+        transforms = dict(zip(moved, _transforms([self[i] for i in moved]), strict=True))
         places: dict[int, Floats] = {}
         tops = [number for number in range(len(self._nodes)) if number not in self._children]
         waiting = [(number, np.eye(4)) for number in tops]
         while waiting:
-            number, parent = waiting.pop()
-            is_moved = not self[number].keys().isdisjoint(_TRANSFORMS)
-            places[number] = parent @ _transform(self[number]) if is_moved else parent
-            waiting += [(child, places[number]) for child in self[number].get("children", ())]
+            number, place = waiting.pop()
+            if number in transforms:
+                place = place @ transforms[number]
+            places[number] = place
+            waiting += [(child, place) for child in self[number].get("children", ())]
         if len(places) < len(self._nodes):
             raise InvalidMesh("the glTF document's nodes do not form a tree: some go in circles")
         return places
 
 
-def _transform(node: Mapping[str, Any]) -> Floats:
-    """Return the (4, 4) matrix from a node's coordinates to its parent's."""
-    if "matrix" in node:
-        columns: Floats = np.array(node["matrix"], np.float64).reshape(4, 4)
-        return columns.T
-    matrix: Floats = _matrices(
-        np.array([node.get("translation", (0, 0, 0))], np.float64),
-        np.array([node.get("rotation", (0, 0, 0, 1))], np.float64),
-        np.array([node.get("scale", (1, 1, 1))], np.float64),
-    )[0]
-    return matrix
+def _transforms(nodes: Sequence[Mapping[str, Any]]) -> Floats:
+    """Return the matrices from the coordinates of nodes to those of their parents, (n, 4, 4)."""
+    matrices = _matrices(
+        *(
+            np.array([node.get(name, rest) for node in nodes], np.float64).reshape(-1, len(rest))
+            for name, rest in _AT_REST.items()
+        )
+    )
+    for matrix, node in zip(matrices, nodes, strict=True):
+        if "matrix" in node:
+            matrix[:] = np.reshape(node["matrix"], (4, 4)).T
+    return matrices
 
 
 def _matrices(translation: Floats, rotation: Floats, scale: Floats) -> Floats:

@@ -205,7 +205,7 @@ def test_glb_scenes_are_counted_before_they_are_walked(
 ) -> None:
     walked: list[int] = []
     monkeypatch.setattr("geodesic_core.io.glb.triangles", lambda *_: walked.append(1))
-    monkeypatch.setattr("geodesic_core.io.gltf_nodes._transform", lambda _: walked.append(1))
+    monkeypatch.setattr("geodesic_core.io.gltf_nodes._transforms", lambda _: walked.append(1))
     with pytest.raises(InvalidMesh, match="at most"):
         load_mesh(glb_with(**COUNTED[name]), "glb")
     assert not walked
