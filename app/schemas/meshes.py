@@ -1,12 +1,34 @@
 """Uploads, and the reports of meshes."""
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, BeforeValidator, Field
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    Field,
+    ValidationError,
+    ValidatorFunctionWrapHandler,
+    WrapValidator,
+)
+from pydantic_core import PydanticCustomError
 
 from app.schemas.points import LARGEST_COUNT, StrictModel
 
-Merge = Literal["none", "exact"] | Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+def _way_of_merging(value: Any, check: ValidatorFunctionWrapHandler) -> Any:
+    """Tell of one fault where pydantic finds one for each kind of value."""
+    try:
+        return check(value)
+    except ValidationError:
+        raise PydanticCustomError(
+            "merge", "Input should be 'none', 'exact' or a distance, 0 or more"
+        ) from None
+
+
+Merge = Annotated[
+    Literal["none", "exact"] | Annotated[float, Field(ge=0, allow_inf_nan=False)],
+    WrapValidator(_way_of_merging),
+]
 _MeshFormat = Literal[
     "obj",
     "off",

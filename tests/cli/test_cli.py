@@ -588,6 +588,16 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
     assert joined.code == 0
 
 
+def test_merge_takes_a_distance(run: Run) -> None:
+    rows = ["v 0 0 0", "v 1 0 0", "v 1 1 0", "v 0 0 1e-7", "v 1 1 1e-7", "v 0 1 0"]
+    Path("open.obj").write_text("\n".join([*rows, "f 1 2 3", "f 4 5 6"]))
+    apart = run("info", "open.obj")
+    assert "--merge 2e-07 joins them" in apart.out
+    assert apart.figure("components") == "2"
+    assert run("info", "open.obj", "--merge", "2e-07").figure("components") == "1"
+    assert run("info", "open.obj", "--merge", "0").figure("components") == "2"
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -702,6 +712,9 @@ def test_what_fails_says_why_in_one_line(
         ("info", "MESH"),
         ("info plane.ply --quick", "--quick"),
         ("info plane.ply --merge some", "some"),
+        ("info plane.ply --merge nan", "'nan' is neither 'none' nor 'exact', nor a distance"),
+        ("info plane.ply --merge -1e-6", "'-1e-6' is neither"),
+        ("info plane.ply --merge inf", "'inf' is neither"),
         ("distance plane.ply --out d.npy", "--source"),
         ("distance plane.ply --source x --out d.npy", "'--source': 'x' is not a point: write a"),
         ("distance plane.ply --source f0:1,0 --out d.npy", "'f0:1,0' is not a point"),

@@ -78,6 +78,7 @@ from geodesic_core.tolerances import (
     LOOSE_OVERLAP,
     LOWER_BOUND,
     MOST_AT_LARGE,
+    NEARLY_JOINED,
     NO_AREA,
     ON_PATH,
     OVERLAP,
@@ -185,6 +186,39 @@ def test_sharp_tips_end_what_winds_about_them(share, scale):
 
 
 # Polygons ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize(("share", "is_told"), [(0.99, True), (1.01, False)])
+def test_nearly_joined_is_a_share_of_the_height_of_both_vertices(share, is_told, scale):
+    """Of each pair along two squares, one is the corner of a face 1/√2 high."""
+    gap = share * NEARLY_JOINED * math.sqrt(0.5)
+    corners = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
+    faces = [(0, 1, 2), (0, 2, 3), (4, 5, 6), (4, 6, 7)]
+    both = scale * np.vstack([corners, corners + np.array([1.0 + gap, 0.0, 0.0])])
+    told = gc.TriangleMesh(both, faces).report.near_vertices
+    assert told.ids == (((1, 4), (2, 7)) if is_told else ())
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize(("share", "is_told"), [(0.99, True), (1.01, False)])
+def test_nearly_joined_is_a_share_of_the_height_of_an_edge(share, is_told, scale):
+    """Half the height of its ends, for a vertex that is far higher."""
+    edge = np.array([(0, 0, 0), (0, 1, 0), (1, 0.5, 0)])
+    height = np.linalg.norm(np.cross(edge[1], edge[2])) / np.linalg.norm(edge[2])
+    beside = share * NEARLY_JOINED * height / 2.0
+    large = np.array([(-beside, 0.5, 0), (-9, 9, 0), (-9, -9, 0)])
+    mesh = gc.TriangleMesh(scale * np.vstack([edge, large]), [(0, 2, 1), (3, 4, 5)])
+    assert mesh.report.t_junctions.ids == ((3,) if is_told else ())
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.99, False), (1.01, True)])
+def test_nearly_joined_is_a_share_of_an_edge_at_its_ends(share, is_told):
+    """Nearer to an end, no vertex counts as on the edge."""
+    edge = [(0, 0, 0), (0, 1, 0), (1, 0.5, 0)]
+    other = [(0, share * NEARLY_JOINED, 0), (-1.0, 0.1, 0), (-1.0, 0.0, 0)]
+    report = gc.TriangleMesh(edge + other, [(0, 2, 1), (3, 4, 5)]).report
+    assert (3 in report.t_junctions.ids) == is_told
 
 
 @pytest.mark.parametrize(("bulge", "is_kept"), [(0.1, False), (10.0, True)])

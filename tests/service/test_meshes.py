@@ -245,6 +245,44 @@ def test_merging_gives_a_vertex_map(client: TestClient) -> None:
     check_problem(missing, 404, "not_found")
 
 
+APART = {
+    "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1e-7, 0], [1, 1, 0], [0, 1, 1e-7]],
+    "faces": [[0, 1, 2], [3, 4, 5]],
+}
+
+
+def test_merging_within_a_distance(client: TestClient) -> None:
+    apart = client.post("/v1/meshes", json=APART).json()
+    joined = client.post("/v1/meshes", params={"merge": "2e-7"}, json=APART).json()
+
+    assert (apart["components"], joined["components"]) == (2, 1)
+    assert apart["near_vertices"] == {"count": 2, "ids": [[1, 3], [2, 5]]}
+    assert apart["near_distance"] == pytest.approx(1e-7)
+    assert joined["near_vertices"] == joined["t_junctions"] == {"count": 0, "ids": []}
+    assert any("merge=2e-07 joins them" in warning for warning in apart["warnings"])
+    vertex_map = np.load(BytesIO(client.get(joined["arrays"]["vertex_map"]).content))
+    np.testing.assert_array_equal(vertex_map, [0, 1, 2, 1, 3, 2])
+
+
+@pytest.mark.parametrize("merge", ["near", "-1", "nan", "inf", ""])
+def test_what_is_no_way_of_merging(client: TestClient, merge: str) -> None:
+    response = client.post("/v1/meshes", params={"merge": merge}, json=APART)
+    problem = check_problem(response, 422, "invalid_request")
+    assert {error["pointer"] for error in problem["errors"]} == {"/query/merge"}
+
+
+def test_a_mesh_of_an_earlier_release_has_no_report_of_seams(tmp_path: Path) -> None:
+    mesh_id = store_mesh(tmp_path, samples.plane(2))
+    path = tmp_path / "meshes" / mesh_id / MANIFEST
+    manifest = dict(read_manifest(str(path)))
+    new = ["near_vertices", "near_distance", "t_junctions", "t_junction_edges"]
+    manifest["report"] = {k: v for k, v in manifest["report"].items() if k not in new}
+    path.write_bytes(encode_manifest(manifest))
+    with serving(tmp_path) as client:
+        document = client.get(f"/v1/meshes/{mesh_id}").json()
+    assert [document[name] for name in new] == [None] * 4
+
+
 QUADS = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 1 9 0\nf 1 2 3 4\nf 1 1 2\nf 4 3 5\nl 1 2"
 
 

@@ -92,10 +92,10 @@ def test_uploads_arrive_under_the_paths_of_the_other_machine(where: type) -> Non
     def task(store: Path) -> Task:
         work: Work
         if where is MeshFromFile:
-            given = MeshFromFile(store / "tmp/x/upload", "obj", "exact")
+            given = MeshFromFile(store / "tmp/x/upload", "obj", 1e-6)
             work = StoreMesh(given, store / "tmp/x/mesh", "alice", "a bunny")
         else:
-            work = StoreMesh(MeshFromSample("knot", 100, "none"), store / "tmp/x/mesh")
+            work = StoreMesh(MeshFromSample("knot", 100, "exact"), store / "tmp/x/mesh")
         return Task(work, "alice")
 
     assert sent(task(HERE)) == task(THERE)
