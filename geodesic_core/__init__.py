@@ -25,7 +25,7 @@ from geodesic_core.fields.repeatable_sweep import SweepStats
 from geodesic_core.fields.sources import Source
 from geodesic_core.fields.stored_field import load_field
 from geodesic_core.io.as_mesh import as_mesh
-from geodesic_core.io.label import load_label
+from geodesic_core.io.label import load_label, load_label_vertices
 from geodesic_core.io.load import load_mesh
 from geodesic_core.mesh.curve import Curve, share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
@@ -80,6 +80,7 @@ __all__ = [
     "kernel_digest",
     "load_field",
     "load_label",
+    "load_label_vertices",
     "load_mesh",
     "nearest",
     "resolve_chord_error",

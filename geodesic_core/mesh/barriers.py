@@ -1,8 +1,11 @@
 """Barriers of a call: faces that act as holes for it alone."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+
+import numpy as np
 
 from geodesic_core.control import Control
+from geodesic_core.mesh.surface_point import UNPLACED, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.validation import as_barriers
 
@@ -26,3 +29,14 @@ def with_barriers(
     control.check_memory(0)
     control.checkpoint(0.0)
     return mesh.with_barriers(faces), control
+
+
+def walled_in(mesh: TriangleMesh, points: Sequence[SurfacePoint]) -> list[int]:
+    """Return which canonical points are vertices all of whose faces are blocked."""
+    alone = [i for i, point in enumerate(points) if point.face_index == UNPLACED]
+    if not alone:
+        return []
+    inner = mesh.topology.inner_vertex
+    nodes = inner[[points[i].vertex_index for i in alone]]
+    is_blocked = np.isin(nodes, inner[mesh.faces[mesh.barriers]])
+    return [i for i, blocked in zip(alone, is_blocked.tolist(), strict=True) if blocked]
