@@ -82,8 +82,8 @@ def load_label(
     if len(faces) == 0:
         where = "outside of the label" if outside else "in the label"
         message = (
-            f"{source}: {np.count_nonzero(chosen)} vertices are {where}, but no face has all of its "
-            "corners there: as a barrier it blocks nothing"
+            f"{source}: {np.count_nonzero(chosen)} vertices are {where}, but no face has all of "
+            "its corners there: as a barrier it blocks nothing"
         )
         warnings.warn(message, EmptyBarrier, stacklevel=2)
     return faces
@@ -129,9 +129,7 @@ def load_label_vertices(
     return np.flatnonzero(_vertices_of(Path(source), as_mesh(mesh), label, outside))
 
 
-def _vertices_of(
-    path: Path, mesh: TriangleMesh, label: _Label, outside: bool
-) -> NDArray[np.bool_]:
+def _vertices_of(path: Path, mesh: TriangleMesh, label: _Label, outside: bool) -> NDArray[np.bool_]:
     """Return which vertices of a mesh are in the label of a file, or outside; at least one is."""
     kind = _SUFFIX.search(path.name.lower())
     if kind is None:
@@ -145,10 +143,7 @@ def _vertices_of(
     except OSError as error:
         raise InvalidArgument(f"cannot read {path}: {error.strerror}") from error
     try:
-        data = gzip.decompress(data) if data.startswith(_GZIP) else data
-        inside = _READERS[kind[1]](data, count, label)
-        if not inside.any():
-            raise InvalidArgument(_nowhere(label))
+        inside = _inside(data, kind[1], count, label)
     except InvalidArgument as error:
         raise InvalidArgument(f"{path} is not a label of this surface: {error}") from None
     except GeodesicError:
@@ -166,8 +161,14 @@ def _vertices_of(
     return chosen
 
 
-def _nowhere(label: _Label) -> str:
-    return "no vertex is in it" if label is None else f"no vertex has its label {label!r}"
+def _inside(data: bytes, kind: str, count: int, label: _Label) -> NDArray[np.bool_]:
+    """Return which of ``count`` vertices are in a label; at least one is."""
+    data = gzip.decompress(data) if data.startswith(_GZIP) else data
+    inside: NDArray[np.bool_] = _READERS[kind](data, count, label)
+    if not inside.any():
+        named = "no vertex is in it" if label is None else f"no vertex has the label {label!r}"
+        raise InvalidArgument(named)
+    return inside
 
 
 def _freesurfer(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:

@@ -37,6 +37,6 @@ def walled_in(mesh: TriangleMesh, points: Sequence[SurfacePoint]) -> list[int]:
     if not alone:
         return []
     inner = mesh.topology.inner_vertex
-    nodes = inner[[points[i].vertex_index for i in alone]]
+    nodes = inner[np.array([points[i].vertex_index for i in alone], np.int64)]
     is_blocked = np.isin(nodes, inner[mesh.faces[mesh.barriers]])
     return [i for i, blocked in zip(alone, is_blocked.tolist(), strict=True) if blocked]
