@@ -153,7 +153,7 @@ def _vertices_of(path: Path, mesh: TriangleMesh, label: _Label, outside: bool) -
         raise InvalidArgument(f"{path} is damaged: {what}") from error
     if outside and inside.all():
         raise InvalidArgument(f"no vertex is outside of the label of {path}: all are in it")
-    chosen = inside != outside
+    chosen: NDArray[np.bool_] = inside != outside
     if mesh.vertex_map is not None:
         merged = np.zeros(len(mesh.vertices), bool)
         merged[mesh.vertex_map[chosen]] = True
