@@ -20,7 +20,6 @@ from app.schemas.points import (
     Source,
     VertexPoint,
 )
-from geodesic_core.mesh.barriers import walled_in
 
 SurfacePoints = Sequence[gc.SurfacePoint]
 
@@ -106,7 +105,7 @@ def notes_on(
     sentence begins with what ``name_of`` makes of the text that comes with a written point.
     """
     pairs = list(zip(written, points, strict=False))
-    blocked = set(walled_in(mesh, points[: len(pairs)]))
+    blocked = set(gc.walled_in(mesh, points[: len(pairs)]))
     far = FAR_SHARE * mesh.diagonal
     notes = []
     for i, ((text, point), found) in enumerate(pairs):

@@ -32,7 +32,30 @@ def with_barriers(
 
 
 def walled_in(mesh: TriangleMesh, points: Sequence[SurfacePoint]) -> list[int]:
-    """Return which canonical points are vertices all of whose faces are blocked."""
+    """Return which points are vertices all of whose faces are blocked: no path leads there.
+
+    Parameters
+    ----------
+    mesh
+        The surface, with its barriers; see `TriangleMesh.with_barriers`.
+    points
+        Of this mesh, as `TriangleMesh.point` returns them.
+
+    Returns
+    -------
+    list of int
+        Indices into the points, in order.
+
+    Notes
+    -----
+    O(points), and O(barriers) where there is such a vertex.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2).with_barriers([0])  # the unit square, in two triangles
+    >>> gc.walled_in(mesh, [mesh.point(vertex) for vertex in range(4)])
+    [1]
+    """
     alone = [i for i, point in enumerate(points) if point.face_index == UNPLACED]
     if not alone:
         return []
