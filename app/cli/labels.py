@@ -40,11 +40,13 @@ class Label:
     def faces(self, mesh: "TriangleMesh") -> Sequence[int]:
         """Return the faces of a mesh that lie in the label; warn where there is none."""
         from geodesic_core import load_label
+        from geodesic_core.errors import EmptyBarrier
 
         with warnings.catch_warnings(record=True, action="always") as told:
             faces = load_label(self.file, mesh, self.name, outside=self.outside)
         for warning in told:
-            say_warning(str(warning.message))
+            if issubclass(warning.category, EmptyBarrier):
+                say_warning(str(warning.message))
         return list(map(int, faces))
 
     def vertices(self, mesh: "TriangleMesh") -> Sequence[int]:

@@ -147,12 +147,12 @@ def matrix(
     out = _checked_file(out, next(iter(given)), service, threads)
     check("matrix", sources="all", targets="all", max_distance=max_distance, **options)
     opened, read_seconds = read(mesh_input)
-    mesh, output = opened.mesh, Output(None, as_json)
+    output = Output(None, as_json)
     for warning in opened.warnings:
         say_warning(warning)
-    blocked = () if barriers is None else barriers.of(mesh)
-    walled = mesh.with_barriers(blocked)
-    starts, *stops = (points_of(walled, file) for file in given.values())
+    blocked = () if barriers is None else barriers.of(opened.mesh)
+    mesh = opened.mesh.with_barriers(blocked)
+    starts, *stops = (points_of(mesh, file) for file in given.values())
     wanted = MatrixToWrite(
         out,
         mesh,

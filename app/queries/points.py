@@ -106,7 +106,6 @@ def notes_on(
     """
     pairs = list(zip(written, points, strict=False))
     blocked = set(gc.walled_in(mesh, points[: len(pairs)]))
-    far = FAR_SHARE * mesh.diagonal
     notes = []
     for i, ((text, point), found) in enumerate(pairs):
         if i in blocked:
@@ -115,7 +114,7 @@ def notes_on(
             )
         elif isinstance(point, PositionPoint) and point.max_distance is None:  # else it is allowed
             distance = float(np.linalg.norm(mesh.position(found) - point.position))
-            if distance > far:
+            if distance > FAR_SHARE * mesh.diagonal:
                 notes.append(
                     f"{name_of(text)} is {distance:.7g} away from the surface, at "
                     f"{list(point.position)}; the nearest point of the surface was taken."
