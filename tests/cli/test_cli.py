@@ -580,10 +580,11 @@ def test_merge_joins_a_cut_mesh(run: Run) -> None:
     assert run("info", "cut.obj", "--merge", "exact").figure("components") == "1"
     apart = run("path", "cut.obj", "--source", 1, "--target", 5, "--out", "p.obj")
     assert apart.code == 1
-    warning, error = apart.err.splitlines()
-    assert warning.startswith("warning: ")
-    assert "2 connected components" in warning
+    *warnings, error = apart.err.splitlines()
+    assert len(warnings) == len(gc.load_mesh("cut.obj").warnings) > 0
+    assert all(warning.startswith("warning: ") for warning in warnings)
     assert error.startswith("error: there is no path")
+    assert "component" in error
     assert apart.out == ""
     assert not Path("p.obj").exists()
     joined = run(
