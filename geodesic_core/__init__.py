@@ -25,8 +25,9 @@ from geodesic_core.fields.repeatable_sweep import SweepStats
 from geodesic_core.fields.sources import Source
 from geodesic_core.fields.stored_field import load_field
 from geodesic_core.io.as_mesh import as_mesh
-from geodesic_core.io.label import load_label
+from geodesic_core.io.label import load_label, load_label_vertices
 from geodesic_core.io.load import load_mesh
+from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.curve import Curve, share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
 from geodesic_core.mesh.surface_point import SurfacePoint
@@ -80,6 +81,7 @@ __all__ = [
     "kernel_digest",
     "load_field",
     "load_label",
+    "load_label_vertices",
     "load_mesh",
     "nearest",
     "resolve_chord_error",
@@ -87,6 +89,7 @@ __all__ = [
     "share_a_face",
     "shortest_path",
     "spaced_levels",
+    "walled_in",
     "warm_up",
     "write_matrix",
 ]

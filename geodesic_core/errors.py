@@ -15,6 +15,12 @@ They form a tree::
     ├── MemoryLimitExceeded     the memory the caller granted does not suffice
     ├── MissingExtra            a package is not installed that few calls need; an ImportError too
     └── InternalError           a broken invariant: a defect of this library, please report it
+
+What is valid, but hardly meant, is a warning of Python's, see `warnings`::
+
+    GeodesicWarning
+    ├── EmptyBarrier            a label that blocks no face
+    └── BlockedSource           a source that no path leaves, since all of its faces are blocked
 """
 
 from collections.abc import Mapping, Sequence
@@ -267,4 +273,38 @@ class InternalError(GeodesicError):
     --------
     >>> issubclass(gc.errors.InternalError, gc.GeodesicError)
     True
+    """
+
+
+class GeodesicWarning(UserWarning):
+    """Base of all warnings of this library.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> warnings.simplefilter("ignore", gc.errors.GeodesicWarning)
+    """
+
+
+class EmptyBarrier(GeodesicWarning):
+    """A label that is to be a barrier, and blocks no face.
+
+    Examples
+    --------
+    >>> issubclass(gc.errors.EmptyBarrier, UserWarning)
+    True
+    """
+
+
+class BlockedSource(GeodesicWarning):
+    """A source all of whose faces are blocked: no path leaves it.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
+    >>> with warnings.catch_warnings(record=True, action="always") as told:
+    ...     field = gc.exact_distance(mesh, 1, barriers=[0])
+    >>> print(told[0].message)
+    source 0, vertex 1, lies in blocked faces only: no path leaves it
     """

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, get_args
 import typer
 
 from app.cli.barriers import BlockedFaces
-from app.cli.points import Point, PointOrCurve
+from app.cli.points import Point, PointOrCurve, PointOrLabel
 
 
 @dataclass(frozen=True)
@@ -92,14 +92,15 @@ def effort(text: str) -> int:
     return int(text)
 
 
-STANDARD_OUTPUT = Path("-")
+STANDARD_STREAM = Path("-")
+"""Standard input, or standard output"""
 
 
 def writable(*suffixes: str) -> Callable[[Path | None], Path | None]:
     """Return a check of an output path that is made before any work begins."""
 
     def check(path: Path | None) -> Path | None:
-        if path is None or path == STANDARD_OUTPUT:
+        if path is None or path == STANDARD_STREAM:
             return path
         if path.suffix.lower() not in suffixes:
             *others, last = suffixes
@@ -117,7 +118,16 @@ SPELLINGS = "as 12 (a vertex), e12-13:0.3 (edge), f7:0.2,0.3,0.5 (face) or p1,2,
 MeshFile = Annotated[
     Path,
     typer.Argument(
-        metavar="MESH", help="An OBJ, OFF, PLY, STL, GLB, GIFTI, FreeSurfer or VTK file."
+        metavar="MESH",
+        help="An OBJ, OFF, PLY, STL, GLB, GIFTI, FreeSurfer or VTK file; - for standard input.",
+    ),
+]
+FormatOption = Annotated[
+    str | None,
+    typer.Option(
+        "--format",
+        metavar="NAME",
+        help="Format of MESH, such as obj; by default the suffix of its name.",
     ),
 ]
 MergeOption = Annotated[
@@ -156,6 +166,16 @@ PointOrCurveSources = Annotated[
         help=f"A source, {SPELLINGS}, {CURVES}; may be repeated.",
     ),
 ]
+PointOrLabelSources = Annotated[
+    list[PointOrLabel],
+    typer.Option(
+        "--source",
+        parser=PointOrLabel.parse,
+        metavar="POINT",
+        help=f"A source, {SPELLINGS}, {CURVES}; or the vertices of a label, as @FILE.label; may be "
+        "repeated.",
+    ),
+]
 PointOrCurveSource = Annotated[
     PointOrCurve,
     typer.Option(
@@ -185,8 +205,8 @@ Barriers = Annotated[
         parser=BlockedFaces.parse,
         metavar="FACES",
         help="Blocked faces, which act as holes: 3,7,40-59, or @FILE to read them from a file. For "
-        "a brain surface, @FILE.label or @FILE.gii blocks a label; @FILE.gii=NAME blocks one of "
-        "several.",
+        "a brain surface, @FILE.label, .annot or .gii blocks a label; @FILE.annot=NAME blocks one "
+        "of several; outside@FILE.label blocks all but the label.",
     ),
 ]
 MethodOption = Annotated[

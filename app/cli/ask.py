@@ -1,15 +1,13 @@
 """Queries asked in this process: the same answers as the service's, without its limits."""
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from app.cli.arguments import Merge
 from app.cli.barriers import BlockedFaces
-from app.cli.points import Point, PointOrCurve, Position
-from app.cli.steps import Failure, read, showing
-from app.cli.words import words_of
+from app.cli.points import Point, PointOrCurve, PointOrLabel, Position
+from app.cli.steps import Failure, MeshInput, read, showing
+from app.cli.words import say_warning, words_of
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -19,7 +17,7 @@ if TYPE_CHECKING:
     from geodesic_core import TriangleMesh
 
 Written = Point | PointOrCurve | Position
-WrittenMembers = Mapping[str, Written | Sequence[Written]]
+WrittenMembers = Mapping[str, Written | Sequence[Written] | Sequence[PointOrLabel]]
 """Points by the member of the request that they become."""
 
 _OPTIONS = {
@@ -44,18 +42,17 @@ class Answered(NamedTuple):
 
 def ask(
     kind: str,
-    mesh_file: Path,
-    merge: Merge,
+    mesh: MeshInput,
     label: str,
     points: WrittenMembers,
     members: Mapping[str, Any],
 ) -> Answered:
     """Return the answer to a query of a kind, whose request has these points and other members.
 
-    Shows a bar with the ``label`` while solving. Raises `Failure` where the service would refuse
-    the query, and as the solver does.
+    Shows a bar with the ``label`` while solving, and prints the warnings of the answer. Raises
+    `Failure` where the service would refuse the query, and as the solver does.
     """
-    opened, read_seconds = read(mesh_file, merge)
+    opened, read_seconds = read(mesh)
     from pydantic import ValidationError
 
     from app.errors import ProblemError
@@ -64,7 +61,8 @@ def ask(
     report = opened.mesh.report
     size = MeshSize(report.vertices, report.faces, report.mean_edge_length)
     query_class = KINDS[kind]
-    body = {name: _as_json(value) for name, value in points.items()} | dict(members)
+    written = {name: _on_mesh(value, opened.mesh) for name, value in points.items()}
+    body = {name: _as_json(value) for name, value in written.items()} | dict(members)
     if isinstance(blocked := body.get("barriers"), BlockedFaces):
         body["barriers"] = blocked.of(opened.mesh)
     try:
@@ -79,8 +77,34 @@ def ask(
     except ValidationError as error:
         raise Failure(_first_fault(error)) from None
     except ProblemError as error:
-        raise Failure(_message(error.problem, points)) from None
+        raise Failure(_message(error.problem, written)) from None
+    for warning in answer.members["warnings"]:
+        say_warning(warning)
     return Answered(answer, opened.mesh, read_seconds, solve_seconds)
+
+
+def check(kind: str, **members: Any) -> None:
+    """Refuse members of a request that queries of a kind refuse, whatever their points are."""
+    from pydantic import ValidationError
+
+    from app.queries import KINDS
+
+    try:
+        KINDS[kind].model.model_validate(members)
+    except ValidationError as error:
+        raise Failure(_first_fault(error)) from None
+
+
+def _on_mesh(
+    written: Written | Sequence[Written] | Sequence[PointOrLabel], mesh: "TriangleMesh"
+) -> Written | Sequence[Written]:
+    """Return points that are named by themselves, those of labels one by one."""
+    if isinstance(written, Written):
+        return written
+    found: list[Written] = []
+    for each in written:
+        found += each.on(mesh) if isinstance(each, PointOrLabel) else [each]
+    return found
 
 
 def _as_json(written: Written | Sequence[Written]) -> Any:
@@ -99,7 +123,7 @@ def _option_of(member: str) -> str:
     return _OPTIONS.get(member, "--" + member.replace("_", "-"))
 
 
-def _message(problem: "Problem", points: WrittenMembers) -> str:
+def _message(problem: "Problem", points: Mapping[str, Written | Sequence[Written]]) -> str:
     """Return the message for a problem, which names the option at fault as it was written."""
     if not problem.errors:
         return problem.detail

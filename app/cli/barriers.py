@@ -9,7 +9,8 @@ from typing import Any
 
 import typer
 
-from app.cli.text_file import lines_of
+from app.cli.labels import Label
+from app.cli.text_file import NUMBER, at, columns_in, lines_of, whole
 
 
 @dataclass(frozen=True)
@@ -18,25 +19,17 @@ class BlockedFaces:
 
     runs: Sequence[range] = ()
     """Ranges of faces, not listed one by one: a range may be longer than any mesh"""
-    file: Path | None = None
-    """Of the label"""
-    label: str | None = None
-    """The one of several in a file"""
+    label: Label | None = None
 
     @classmethod
     def parse(cls, text: str) -> "BlockedFaces":
         """Return the faces that an option lists, those of ``@FILE``, or those in a label there."""
-        label = _LABEL.fullmatch(text)
-        return cls(_runs(text)) if label is None else cls((), Path(label[1]), label[2])
+        label = Label.parse(text)
+        return cls(_runs(text)) if label is None else cls((), label)
 
     def of(self, mesh: Any) -> Sequence[int]:
         """Return the faces of a mesh that are blocked."""
-        if self.file is None:
-            return self._listed(len(mesh.faces))
-        from geodesic_core import load_label
-
-        found: Sequence[int] = load_label(self.file, mesh, self.label).tolist()
-        return found
+        return self._listed(len(mesh.faces)) if self.label is None else self.label.faces(mesh)
 
     def _listed(self, count: int) -> Sequence[int]:
         """Return the faces, each once, of a mesh with ``count`` faces."""
@@ -51,21 +44,26 @@ class BlockedFaces:
         return sorted(set(chain.from_iterable(self.runs)))
 
 
-_LABEL = re.compile(r"@(.+(?:\.label|\.gii))(?:=(.+))?")
-
-
 def _runs(text: str) -> Sequence[range]:
     """Return the faces that an option lists, or those of ``@FILE``, one or more a line."""
+    if text.startswith("outside@"):
+        raise typer.BadParameter(f"{text!r} names no label: outside@ goes with labels only")
     if not text.startswith("@"):
-        return _runs_of_line(text)
-    lines = map(str.strip, lines_of(Path(text[1:])))
-    return [run for line in lines if line for run in _runs_of_line(line)]
+        return _runs_of(text, text.split(","))
+    lines = lines_of(Path(text[1:]))
+    column = None
+    if lines and not NUMBER.match(lines[0].text):
+        column = columns_in(lines[0], _FACE)
+    if column is None:
+        return [run for line in lines for run in _runs_of(line.text, _PART.findall(line.text))]
+    return [run for line in lines[1:] for run in _runs_of(line.text, at(line, column))]
 
 
-def _runs_of_line(text: str) -> Sequence[range]:
-    if not _FACES.fullmatch(text):
+def _runs_of(text: str, parts: Sequence[str]) -> Sequence[range]:
+    parts = list(map(whole, parts))
+    if not all(map(_RUN.fullmatch, parts)):
         raise typer.BadParameter(f"{text!r} is not a list of faces: write it as 3,7,40-59")
-    return [_run(part) for part in text.split(",")]
+    return [_run(part) for part in parts]
 
 
 def _run(text: str) -> range:
@@ -76,4 +74,7 @@ def _run(text: str) -> range:
     return run
 
 
-_FACES = re.compile(r"[0-9]{1,9}(-[0-9]{1,9})?(,[0-9]{1,9}(-[0-9]{1,9})?)*")
+_PART = re.compile(r"[^\s;,]+")
+_RUN = re.compile(r"[0-9]{1,9}(-[0-9]{1,9})?")
+_FACE = {"face", "faces", "face_id", "faceid", "index", "id", "triangle"}
+"""Names of the column of faces in a header"""

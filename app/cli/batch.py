@@ -11,8 +11,9 @@ import typer
 
 from app.cli.arguments import (
     NO_MERGE,
-    STANDARD_OUTPUT,
+    STANDARD_STREAM,
     EffortOption,
+    FormatOption,
     MaxDistance,
     MergeOption,
     Method,
@@ -23,6 +24,7 @@ from app.cli.arguments import (
     accuracy,
     writable,
 )
+from app.cli.ask import check
 from app.cli.batch_rows import Questions, Row, ask, seconds_of
 from app.cli.batch_table import csv_of, write_table
 from app.cli.output import AsJson, Output, print_json, print_parts
@@ -58,6 +60,7 @@ def batch(
             min=1, help="How many meshes to work on at a time; by default one for each core."
         ),
     ] = None,
+    file_format: FormatOption = None,
     merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
@@ -71,7 +74,8 @@ def batch(
     if out is None and not as_json:
         raise typer.BadParameter("give --out with a file, or --json")
     options = accuracy(method, relative_error, None, effort) | {"max_distance": max_distance}
-    questions = Questions(source, target or [], options, merge.value)
+    check("distances", sources=[0], **options)
+    questions = Questions(source, target or [], options, merge.value, file_format)
     from app.settings import available_cores
 
     meshes = list(dict.fromkeys(meshes))  # once each, as patterns of a shell may overlap
@@ -80,7 +84,7 @@ def batch(
     ordered = [row for mesh in meshes for row in rows[mesh]]
     if as_json:
         print_json([asdict(row) for row in ordered])
-    if out == STANDARD_OUTPUT:
+    if out == STANDARD_STREAM:
         print_parts([csv_of(ordered)])
     elif out is not None:
         write_table(out, ordered)
@@ -90,6 +94,9 @@ def batch(
     output.say(f"rows        {len(ordered)}")
     output.say(f"took        {seconds:.3f} s, {count} processes, busy {busy:.0%} of the time")
     output.say_written()
+    for row in ordered:
+        if row.warning is not None:
+            typer.echo(f"{row.mesh}: warning: {row.warning}", err=True)
     for name, error in failed.items():
         typer.echo(f"{name}: {error}", err=True)
     if failed:

@@ -39,6 +39,8 @@ class Row:
     solve_s: float | None = None
     error: str | None = None
     """Why the mesh, or the question, has no answer"""
+    warning: str | None = None
+    """What is hardly meant with the points of the question"""
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,7 @@ class Questions:
     options: dict[str, Any]
     """Of the solver, its method among them"""
     merge: Literal["none", "exact"] | float
+    file_format: str | None = None
 
 
 def ask(questions: Questions, file: Path) -> list[Row]:
@@ -58,7 +61,7 @@ def ask(questions: Questions, file: Path) -> list[Row]:
 
     start = perf_counter()
     try:
-        mesh = gc.load_mesh(file, merge=questions.merge)
+        mesh = gc.load_mesh(file, questions.file_format, questions.merge)
     except Exception as error:  # noqa: BLE001 - above
         return [Row(str(file), error=_reason(error))]
     read = Row(str(file), len(mesh.vertices), len(mesh.faces), read_s=perf_counter() - start)
@@ -75,7 +78,7 @@ def seconds_of(rows: Sequence[Row]) -> float:
 def _rows_from(questions: Questions, source: Point, mesh: "TriangleMesh", read: Row) -> list[Row]:
     """Return the rows of a source."""
     import geodesic_core as gc
-    from app.queries.points import resolve_point
+    from app.queries.points import notes_on, resolve_point
 
     solvers: dict[str, Callable[..., DistanceField]] = {
         "exact": gc.exact_distance,
@@ -88,6 +91,8 @@ def _rows_from(questions: Questions, source: Point, mesh: "TriangleMesh", read: 
     try:
         targets = [resolve_point(mesh, target.point) for target in questions.targets]
         point = resolve_point(mesh, source.point)
+        written = [(each.text, each.point) for each in (source, *questions.targets)]
+        notes = notes_on(mesh, written, [point, *targets])
         field = solve(mesh, point, targets=targets, retain="distances", **options)
         answers = _of_targets(questions, targets, field) if targets else [_of_all_vertices(field)]
     except Exception as error:  # noqa: BLE001 - see `ask`
@@ -96,6 +101,7 @@ def _rows_from(questions: Questions, source: Point, mesh: "TriangleMesh", read: 
         read,
         error_bound=json.dumps(asdict(field.error_bound)),
         solve_s=(perf_counter() - start) / len(answers),
+        warning=" ".join(notes) or None,
     )
     return [replace(found, **answer) for answer in answers]
 

@@ -8,21 +8,27 @@ import typer
 from app.cli import files
 from app.cli.arguments import (
     NO_MERGE,
-    STANDARD_OUTPUT,
+    STANDARD_STREAM,
+    FormatOption,
     MergeOption,
     MeshFile,
     SampleName,
     writable,
 )
 from app.cli.output import AsJson, Output, print_json, print_parts
-from app.cli.steps import read
+from app.cli.steps import MeshInput, read
 from app.cli.summary import print_size
 from app.cli.words import with_options
 
 
-def info(mesh_file: MeshFile, merge: MergeOption = NO_MERGE, as_json: AsJson = False) -> None:
+def info(
+    mesh_file: MeshFile,
+    file_format: FormatOption = None,
+    merge: MergeOption = NO_MERGE,
+    as_json: AsJson = False,
+) -> None:
     """Check a mesh, and print a report."""
-    opened, seconds = read(mesh_file, merge)
+    opened, seconds = read(MeshInput(mesh_file, file_format, merge))
     mesh = opened.mesh
     warnings = [with_options(warning) for warning in mesh.warnings]
     if as_json:
@@ -56,7 +62,7 @@ def sample(
 
     mesh = gc.samples.SAMPLES[name](faces)
     parts = ply_of(Surface(mesh.vertices, mesh.faces))
-    if out == STANDARD_OUTPUT:
+    if out == STANDARD_STREAM:
         print_parts(parts)
     else:
         files.write_file(out, parts)

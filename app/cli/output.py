@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from app.cli import files
-from app.cli.arguments import STANDARD_OUTPUT
+from app.cli.arguments import STANDARD_STREAM
 
 if TYPE_CHECKING:
     from app.encoding import Answer
@@ -28,12 +28,12 @@ class Output:
     as_json: bool
 
     def __post_init__(self) -> None:
-        if self.out == STANDARD_OUTPUT and self.as_json:
+        if self.out == STANDARD_STREAM and self.as_json:
             raise typer.BadParameter("--json and - both go to standard output: give one of them")
 
     def write(self, answer: "Answer", in_file: "Answer | None" = None) -> None:
         """Write an answer to its places; into a file ``in_file``, where that is another."""
-        if self.out == STANDARD_OUTPUT:
+        if self.out == STANDARD_STREAM:
             print_parts(files.encoded(answer, "csv"))
         elif self.out is not None:
             files.write_answer(self.out, in_file or answer)
@@ -42,11 +42,11 @@ class Output:
 
     def say(self, line: str) -> None:
         """Print a line of the summary."""
-        typer.echo(line, err=self.as_json or self.out == STANDARD_OUTPUT)
+        typer.echo(line, err=self.as_json or self.out == STANDARD_STREAM)
 
     def say_written(self) -> None:
         """Print where the answer is, if that is a file."""
-        if self.out is not None and self.out != STANDARD_OUTPUT:
+        if self.out is not None and self.out != STANDARD_STREAM:
             self.say(f"written     {self.out}")
 
 

@@ -2,9 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
+
+from app.cli.labels import Label
+
+if TYPE_CHECKING:
+    from geodesic_core import TriangleMesh
 
 
 @dataclass(frozen=True)
@@ -19,6 +24,7 @@ class Point:
         """Return the point that an option names."""
         from app.queries.point_text import parse
 
+        _refuse_label(text)
         try:
             return cls(text, parse(text))
         except ValueError as error:
@@ -38,12 +44,31 @@ class PointOrCurve:
     @classmethod
     def parse(cls, text: str) -> "PointOrCurve":
         """Return the point or the curve that an option names."""
+        _refuse_label(text)
         return cls([Point.parse(part) for part in text.split("/")])
 
     def as_json(self) -> dict[str, Any]:
         """Return the point or the curve as a member of a request."""
         parts = [point.as_json() for point in self.points]
         return parts[0] if len(parts) == 1 else {"polyline": parts}
+
+
+@dataclass(frozen=True)
+class PointOrLabel:
+    """A point or a curve, or all vertices of a label."""
+
+    written: PointOrCurve | Label
+
+    @classmethod
+    def parse(cls, text: str) -> "PointOrLabel":
+        """Return the point, the curve or the label that an option names."""
+        return cls(Label.parse(text) or PointOrCurve.parse(text))
+
+    def on(self, mesh: "TriangleMesh") -> Sequence[PointOrCurve]:
+        """Return the point or the curve itself, or the vertices of a mesh that are in the label."""
+        if isinstance(self.written, PointOrCurve):
+            return [self.written]
+        return [PointOrCurve.parse(str(vertex)) for vertex in self.written.vertices(mesh)]
 
 
 @dataclass(frozen=True)
@@ -64,3 +89,10 @@ class Position:
     def as_json(self) -> tuple[float, float, float]:
         """Return the position as a member of a request."""
         return self.coordinates
+
+
+def _refuse_label(text: str) -> None:
+    if Label.parse(text) is not None:
+        raise typer.BadParameter(
+            f"{text!r} is a label; only the sources of distance and isolines may be labels"
+        )

@@ -10,7 +10,7 @@ from app import __version__
 from app.cli import batch, cluster, cluster_status, compilation, meshes, queries, serve, tables
 from app.cli.steps import Failure, show_help_without_command
 from app.cli.store import store
-from app.cli.words import with_options
+from app.cli.words import refusal_of, with_options
 
 FAILED, INTERRUPTED = 1, 130
 """Exit codes: the work failed, Ctrl-C; typer's own for a wrong command line is 2."""
@@ -27,7 +27,7 @@ def main() -> None:
     try:
         code = cli(prog_name="geodesic", standalone_mode=False)
     except TyperException as error:
-        code = _say_error(f"{error.format_message()} (geodesic --help tells more)", error.exit_code)
+        code = _say_error(f"{_in_words(error)} (geodesic --help tells more)", error.exit_code)
     except Exception as error:
         from geodesic_core.errors import GeodesicError, InternalError
 
@@ -42,6 +42,16 @@ def main() -> None:
 def _say_error(message: str, code: int) -> int:
     typer.echo("error: " + " ".join(message.split()), err=True)
     return code
+
+
+def _in_words(error: TyperException) -> str:
+    """Return what is wrong with a command line, where typer quotes pydantic."""
+    from pydantic import ValidationError
+
+    is_of_option = getattr(error, "param", None) is not None
+    if is_of_option and isinstance(error.__cause__, ValidationError):
+        error.message = refusal_of(error.__cause__.errors(include_url=False)[0])
+    return error.format_message()
 
 
 def _show_version(wanted: bool) -> None:

@@ -15,6 +15,7 @@ from app.cli.arguments import (
     BoundedMethod,
     BoundedMethodOption,
     EffortOption,
+    FormatOption,
     MaxDistance,
     MergeOption,
     MeshFile,
@@ -22,6 +23,7 @@ from app.cli.arguments import (
     MethodOption,
     PointOrCurveSource,
     PointOrCurveSources,
+    PointOrLabelSources,
     RelativeError,
     Source,
     Targets,
@@ -32,7 +34,7 @@ from app.cli.arguments import (
 from app.cli.ask import WrittenMembers, ask
 from app.cli.output import AsJson, Output
 from app.cli.points import Point, Position
-from app.cli.steps import Failure
+from app.cli.steps import Failure, MeshInput
 from app.cli.summary import bound_in_words, print_bound, print_end, print_seconds, print_size
 
 if TYPE_CHECKING:
@@ -65,7 +67,7 @@ ChordError = Annotated[
 
 def distance(
     mesh_file: MeshFile,
-    source: PointOrCurveSources,
+    source: PointOrLabelSources,
     out: Annotated[
         Path | None,
         typer.Option(
@@ -88,6 +90,7 @@ def distance(
     absolute_error: AbsoluteError = None,
     effort: EffortOption = None,
     barriers: Barriers = None,
+    file_format: FormatOption = None,
     merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
@@ -97,7 +100,13 @@ def distance(
     members["include"] = ["nearest_source", *(["gradient"] if gradient else [])]
     members |= limits(max_distance, barriers)
     points: WrittenMembers = {"sources": source}
-    answered = ask("distances", mesh_file, merge, "Computing distances", points, members)
+    answered = ask(
+        "distances",
+        MeshInput(mesh_file, file_format, merge),
+        "Computing distances",
+        points,
+        members,
+    )
     import numpy as np
 
     found = answered.answer.members
@@ -149,6 +158,7 @@ def path(
     absolute_error: AbsoluteError = None,
     effort: EffortOption = None,
     barriers: Barriers = None,
+    file_format: FormatOption = None,
     merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
@@ -160,7 +170,9 @@ def path(
         raise typer.BadParameter(f"{name} goes with --method exact only")
     members |= {"explain": explain} | limits(max_distance, barriers)
     points: WrittenMembers = {"source": source, "target": target, "waypoints": via or []}
-    answered = ask("path", mesh_file, merge, "Computing the path", points, members)
+    answered = ask(
+        "path", MeshInput(mesh_file, file_format, merge), "Computing the path", points, members
+    )
     found = answered.answer.members
     if found["status"] != "ok":
         raise Failure(_NO_PATH[found["reason"]].format(limit=max_distance))
@@ -192,6 +204,7 @@ def paths(
     absolute_error: AbsoluteError = None,
     effort: EffortOption = None,
     barriers: Barriers = None,
+    file_format: FormatOption = None,
     merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
@@ -200,7 +213,9 @@ def paths(
     members = accuracy(method, relative_error, absolute_error, effort)
     members |= limits(max_distance, barriers)
     points: WrittenMembers = {"source": source, "targets": target}
-    answered = ask("paths", mesh_file, merge, "Computing the paths", points, members)
+    answered = ask(
+        "paths", MeshInput(mesh_file, file_format, merge), "Computing the paths", points, members
+    )
     output.write(answered.answer)
     print_size(output, answered.mesh)
     for written, path in zip(target, answered.answer.members["paths"], strict=True):
@@ -214,7 +229,7 @@ def paths(
 
 def isolines(
     mesh_file: MeshFile,
-    source: PointOrCurveSources,
+    source: PointOrLabelSources,
     out: LinesOut = None,
     level: Annotated[
         list[float] | None,
@@ -230,6 +245,7 @@ def isolines(
     relative_error: RelativeError = None,
     absolute_error: AbsoluteError = None,
     barriers: Barriers = None,
+    file_format: FormatOption = None,
     merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
@@ -241,7 +257,9 @@ def isolines(
     members |= {"levels": level, "count": count, "chord_error": chord_error}
     members |= limits(max_distance, barriers)
     points: WrittenMembers = {"sources": source}
-    answered = ask("isolines", mesh_file, merge, "Drawing isolines", points, members)
+    answered = ask(
+        "isolines", MeshInput(mesh_file, file_format, merge), "Drawing isolines", points, members
+    )
     output.write(answered.answer)
     print_size(output, answered.mesh)
     for each in answered.answer.members["isolines"]:
@@ -263,6 +281,7 @@ def borders(
     chord_error: ChordError = None,
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
+    file_format: FormatOption = None,
     merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
@@ -270,7 +289,9 @@ def borders(
     output = Output(out, as_json)
     members = {"chord_error": chord_error} | limits(max_distance, barriers)
     points: WrittenMembers = {"sources": source}
-    answered = ask("borders", mesh_file, merge, "Drawing borders", points, members)
+    answered = ask(
+        "borders", MeshInput(mesh_file, file_format, merge), "Drawing borders", points, members
+    )
     output.write(answered.answer)
     print_size(output, answered.mesh)
     for line in answered.answer.members["borders"]:
@@ -293,6 +314,7 @@ def nearest(
     out: PointsOut = None,
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
+    file_format: FormatOption = None,
     merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
@@ -302,7 +324,13 @@ def nearest(
         raise typer.BadParameter(f"-k is {k}, but there are only {len(candidate)} candidates")
     members = {"k": k} | limits(max_distance, barriers)
     points: WrittenMembers = {"source": source, "candidates": candidate}
-    answered = ask("nearest", mesh_file, merge, "Looking for the nearest", points, members)
+    answered = ask(
+        "nearest",
+        MeshInput(mesh_file, file_format, merge),
+        "Looking for the nearest",
+        points,
+        members,
+    )
     found = answered.answer.members["nearest"]
     output.write(answered.answer)
     print_size(output, answered.mesh)
@@ -319,12 +347,19 @@ def locate(
         typer.Option(parser=Position.parse, metavar="X,Y,Z", help="The position, mesh units."),
     ],
     out: PointsOut = None,
+    file_format: FormatOption = None,
     merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
     """Find the point of the surface that is nearest to a position."""
     output = Output(out, as_json)
-    answered = ask("locate", mesh_file, merge, "Looking for the point", {"points": [at]}, {})
+    answered = ask(
+        "locate",
+        MeshInput(mesh_file, file_format, merge),
+        "Looking for the point",
+        {"points": [at]},
+        {},
+    )
     (point,) = answered.answer.members["points"]
     output.write(answered.answer)
     output.say(f"point       {_as_option(point)}")

@@ -1,6 +1,7 @@
 """Steps of commands: read a mesh, show progress, end at Ctrl-C."""
 
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
-from app.cli.arguments import Merge
+from app.cli.arguments import STANDARD_STREAM, Merge
 
 if TYPE_CHECKING:
     from app.store.meshes import OpenMesh
@@ -26,16 +27,30 @@ def show_help_without_command(context: typer.Context) -> None:
         typer.echo(context.get_help())
 
 
-def read(mesh_file: Path, merge: Merge) -> "tuple[OpenMesh, float]":
-    """Return the mesh of a file, and the seconds of reading it once the kernels are loaded."""
+class MeshInput(NamedTuple):
+    """A mesh as arguments name it."""
+
+    file: Path
+    """`STANDARD_STREAM` for standard input"""
+    file_format: str | None
+    """None to go by the name of the file"""
+    merge: Merge
+
+
+def read(mesh: MeshInput) -> "tuple[OpenMesh, float]":
+    """Return a mesh, and the seconds of reading it once the kernels are loaded."""
+    is_piped = mesh.file == STANDARD_STREAM
+    if is_piped and mesh.file_format is None:
+        raise typer.BadParameter("- reads standard input: name its format, as --format obj")
     with showing("Loading kernels (compiled on the first run)"):
         from app.store.meshes import OpenMesh
         from geodesic_core import load_mesh, warm_up
 
         warm_up(["exact", "paths"])
-    with showing(f"Reading {mesh_file.name}"):
+    with showing(f"Reading {'standard input' if is_piped else mesh.file.name}"):
         start = perf_counter()
-        opened = OpenMesh.of(load_mesh(mesh_file, merge=merge.value))
+        source = sys.stdin.buffer.read() if is_piped else mesh.file
+        opened = OpenMesh.of(load_mesh(source, mesh.file_format, mesh.merge.value))
         seconds = perf_counter() - start
     return opened, seconds
 

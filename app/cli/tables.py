@@ -13,9 +13,9 @@ from app.cli.arguments import (
     AbsoluteError,
     Barriers,
     EffortOption,
+    FormatOption,
     Layout,
     MaxDistance,
-    Merge,
     MergeOption,
     MeshFile,
     Method,
@@ -28,13 +28,14 @@ from app.cli.arguments import (
     limits,
     writable,
 )
-from app.cli.ask import WrittenMembers, ask
+from app.cli.ask import WrittenMembers, ask, check
 from app.cli.matrix_file import MatrixToWrite, print_written
 from app.cli.output import AsJson, Output
 from app.cli.point_file import points_of
 from app.cli.points import Point
-from app.cli.steps import read
+from app.cli.steps import MeshInput, read
 from app.cli.summary import print_bound, print_end, print_size
+from app.cli.words import say_warning
 
 _OF_ANY_SIZE = (".npy", ".zarr", ".npz", ".parquet")
 _BY_SERVICES = (".npy", ".npz")
@@ -127,6 +128,7 @@ def matrix(
     service: Service = None,
     max_distance: MaxDistance = None,
     barriers: Barriers = None,
+    file_format: FormatOption = None,
     merge: MergeOption = NO_MERGE,
     as_json: AsJson = False,
 ) -> None:
@@ -135,15 +137,21 @@ def matrix(
     source, target = source or [], target or []
     named = {"--points": points, "--sources": sources, "--targets": targets}
     given = {name: file for name, file in named.items() if file is not None}
+    mesh_input = MeshInput(mesh_file, file_format, merge)
     if not given:
         _check_points(source, target, dtype, threads, service)
         members = options | {"layout": layout.value} | limits(max_distance, barriers)
-        _ask_matrix(mesh_file, Output(out, as_json), source, target, layout, members, merge)
+        _ask_matrix(mesh_input, Output(out, as_json), source, target, layout, members)
         return
     _check_files(list(given), source, target, layout)
     out = _checked_file(out, next(iter(given)), service, threads)
-    opened, read_seconds = read(mesh_file, merge)
-    mesh, output = opened.mesh, Output(None, as_json)
+    check("matrix", sources="all", targets="all", max_distance=max_distance, **options)
+    opened, read_seconds = read(mesh_input)
+    output = Output(None, as_json)
+    for warning in opened.warnings:
+        say_warning(warning)
+    blocked = () if barriers is None else barriers.of(opened.mesh)
+    mesh = opened.mesh.with_barriers(blocked)
     starts, *stops = (points_of(mesh, file) for file in given.values())
     wanted = MatrixToWrite(
         out,
@@ -152,7 +160,7 @@ def matrix(
         stops[0] if stops else None,
         options,
         max_distance,
-        () if barriers is None else barriers.of(mesh),
+        blocked,
         dtype.value,
     )
     with files.writing(out):
@@ -201,13 +209,12 @@ def _checked_file(out: Path | None, named: str, service: str | None, threads: in
 
 
 def _ask_matrix(
-    mesh_file: Path,
+    mesh: MeshInput,
     output: Output,
     source: list[Point],
     target: list[Point],
     layout: Layout,
     members: Mapping[str, Any],
-    merge: Merge,
 ) -> None:
     """Ask for a matrix as the service would be asked."""
     wanted = (".npz" if layout is Layout.SPARSE else ".npy", ".csv", ".json", "")
@@ -220,7 +227,7 @@ def _ask_matrix(
             "number of both"
         )
     points: WrittenMembers = {"sources": source, "targets": target}
-    answered = ask("matrix", mesh_file, merge, "Computing the matrix", points, members)
+    answered = ask("matrix", mesh, "Computing the matrix", points, members)
     import numpy as np
 
     output.write(answered.answer)

@@ -1,6 +1,7 @@
 """The base of all queries: a validated request to a mesh, with a stable hash."""
 
 import hashlib
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -17,7 +18,7 @@ from app import __version__
 from app.encoding import JSON, NPY, OCTETS, Answer, Representation
 from app.queries.cost_model import PER_FACE_BLOCKED, Cost
 from app.queries.field_cache import FieldCache
-from app.queries.points import SurfacePoints, resolve_points
+from app.queries.points import SurfacePoints, name_of, notes_on, resolve_points
 from app.queries.validation import (
     MeshSize,
     WrittenPoints,
@@ -231,7 +232,15 @@ class Query(ABC, Generic[R]):
         GeodesicError
             The solver failed, or was stopped: ``Cancelled`` once ``context.cancel`` returns True.
         """
-        return self.solve(opened, self.resolved(opened.mesh, context.cancel), context)
+        points = self.resolved(opened.mesh, context.cancel)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", gc.errors.GeodesicWarning)  # the answer has notes
+            return self.solve(self.noted(opened, points), points, context)
+
+    def noted(self, opened: OpenMesh, points: SurfacePoints) -> OpenMesh:
+        """Return a mesh whose warnings also tell of the resolved points that are hardly meant."""
+        notes = notes_on(opened.mesh, self.written_points(), points, name_of)
+        return replace(opened, warnings=[*opened.warnings, *notes]) if notes else opened
 
     def resolved(self, mesh: gc.TriangleMesh, cancel: Callable[[], bool]) -> SurfacePoints:
         """Return the points of the request on the mesh; raises as `resolve_points`."""

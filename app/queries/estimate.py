@@ -32,7 +32,7 @@ def estimate(
         ``cancel`` returned True.
     """
     points = query.resolved(opened.mesh, cancel)
-    forecast = query.forecast(opened, points)
+    forecast = query.forecast(query.noted(opened, points), points)
     parts = encode(forecast.answer, replace(representation, coding=None)).parts
     size = forecast.times * sum(map(len, parts))
     cost = forecast.cost

@@ -159,10 +159,12 @@ class MatrixQuery(Query[MatrixRequest]):
         ``reached`` of the distances are finite.
         """
         mesh = opened.mesh
-        sources, targets = self._parted(mesh, self.resolved(mesh, cancel))
+        points = self.resolved(mesh, cancel)
+        sources, targets = self._parted(mesh, points)
         ends = components_of(mesh, sources), components_of(mesh, targets)
         unreachable = self._unreachable(*ends, reached)
-        return Answer(self._about(mesh) | {"unreachable": unreachable, "warnings": opened.warnings})
+        warnings = self.noted(opened, points).warnings
+        return Answer(self._about(mesh) | {"unreachable": unreachable, "warnings": warnings})
 
     def value_count(self, size: MeshSize) -> int:
         """Return the number of cells, and of the values of each point."""
@@ -184,6 +186,11 @@ class MatrixQuery(Query[MatrixRequest]):
             return written
         everywhere = [mesh.point(vertex) for vertex in range(len(mesh.vertices))]
         return [*(everywhere if before else ()), *written, *(everywhere if after else ())]
+
+    def noted(self, opened: OpenMesh, points: SurfacePoints) -> OpenMesh:
+        """Return a mesh whose warnings also tell of points that were written one by one."""
+        before = len(opened.mesh.vertices) if self.request.sources == "all" else 0
+        return super().noted(opened, points[before:])
 
     def rough_seconds(self, size: MeshSize) -> float:
         """Return the cost of a sweep to the limit from each point of the smaller side."""

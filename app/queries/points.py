@@ -1,6 +1,6 @@
 """Points of a query: from those that a client wrote to those of the mesh, and back into answers."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import chain, islice, pairwise
 from typing import Any, cast
 
@@ -83,6 +83,53 @@ def resolve_points(
     if faults:
         raise invalid_points(faults)
     return points
+
+
+FAR_SHARE = 0.05
+"""Share of the bounding box's diagonal beyond which a position counts as far from the surface.
+
+Picks on another resolution of a surface, and measured points, lie within some percent of it: the
+cortex is 1.5 % of a hemisphere thick. Other units, another frame or a typing error lie beyond.
+"""
+
+
+def notes_on(
+    mesh: gc.TriangleMesh,
+    written: Iterable[tuple[str, Point]],
+    points: SurfacePoints,
+    name_of: Callable[[str], str] = str,
+) -> Sequence[str]:
+    """Return sentences on points that are hardly meant: far from the surface, or walled in.
+
+    ``points`` are the resolved ones, in the order of the ``written``, and maybe others behind. A
+    sentence begins with what ``name_of`` makes of the text that comes with a written point.
+    """
+    pairs = list(zip(written, points, strict=False))
+    blocked = set(gc.walled_in(mesh, points[: len(pairs)]))
+    notes = []
+    for i, ((text, point), found) in enumerate(pairs):
+        if i in blocked:
+            notes.append(
+                f"{name_of(text)}, {found}, lies in blocked faces only: no path leads there."
+            )
+        elif isinstance(point, PositionPoint) and point.max_distance is None:  # else it is allowed
+            distance = float(np.linalg.norm(mesh.position(found) - point.position))
+            if distance > FAR_SHARE * mesh.diagonal:
+                notes.append(
+                    f"{name_of(text)} is {distance:.7g} away from the surface, at "
+                    f"{list(point.position)}; the nearest point of the surface was taken."
+                )
+    more = len(notes) - FAULTS_SHOWN
+    return [*notes[:FAULTS_SHOWN], f"The same holds for {more} more points."] if more > 0 else notes
+
+
+def name_of(pointer: str) -> str:
+    """Return how sentences call the point at a pointer, such as ``Source 2`` or ``The target``."""
+    name, *numbers = (part for part in pointer.split("/") if part not in ("", "polyline"))
+    named = f"{name[:-1]} {numbers.pop(0)}" if name.endswith("s") else f"the {name}"
+    if not numbers:
+        return named.capitalize()
+    return f"Point {numbers[0]} of {named}"
 
 
 def checkpoint(cancel: Callable[[], bool]) -> None:

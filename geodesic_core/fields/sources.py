@@ -1,6 +1,7 @@
 """Sources, and the nodes of a sweep: vertices, sites, and the segments of curves."""
 
 import math
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,8 +10,9 @@ import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument, InvalidPoint, NoPath
+from geodesic_core.errors import BlockedSource, InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.kernels.sweep.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
+from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.canonical import half_edges_around
 from geodesic_core.mesh.curve import (
     Curve,
@@ -273,7 +275,24 @@ def as_sources(
         checked.append(source)
     if not checked:
         raise InvalidPoint("there are no sources: give at least one")
+    _warn_of_walled_in(mesh, [line[0] for line in polylines])
     return tuple(checked), tuple(polylines)
+
+
+_NAMED = 10
+"""Sources that a warning names, at most"""
+
+
+def _warn_of_walled_in(mesh: TriangleMesh, starts: Sequence[SurfacePoint]) -> None:
+    """Warn of sources in blocked faces only; a curve is never there."""
+    found = walled_in(mesh, starts)
+    if not found:
+        return
+    names = [f"source {i}, {starts[i]}" for i in found[:_NAMED]]
+    names += [f"{len(found) - _NAMED} more"] if len(found) > _NAMED else []
+    verb, them = ("lies", "it") if len(found) == 1 else ("lie", "them")
+    message = f"{'; '.join(names)}, {verb} in blocked faces only: no path leaves {them}"
+    warnings.warn(message, BlockedSource, stacklevel=2)
 
 
 def each_of(points: Points, name: str) -> Iterable[Point]:

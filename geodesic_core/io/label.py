@@ -1,5 +1,8 @@
 """Labels of brain surfaces, such as the medial wall: files that name vertices of a surface."""
 
+import gzip
+import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -7,24 +10,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Longs
-from geodesic_core.errors import GeodesicError, InvalidArgument
+from geodesic_core.errors import EmptyBarrier, GeodesicError, InvalidArgument
 from geodesic_core.extras import extra
+from geodesic_core.io.annotation import read_annotation
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
+
+_Label = str | float | None
+_GZIP = b"\x1f\x8b"
+"""First bytes of compressed data"""
 
 
-def load_label(source: str | Path, mesh: MeshLike, label: str | float | None = None) -> Longs:
+def load_label(
+    source: str | Path, mesh: MeshLike, label: _Label = None, *, outside: bool = False
+) -> Longs:
     r"""Return the faces whose corners all lie in a label: barriers, where it is the medial wall.
 
     Parameters
     ----------
     source
-        The path of a FreeSurfer label (``.label``), which lists vertices, or of a GIFTI file
-        (``.label.gii``, ``.shape.gii``, ``.func.gii``), which has a value for each vertex.
+        The path of a FreeSurfer label (``.label``), which lists vertices, of an annotation
+        (``.annot``), which has several labels, or of a GIFTI file (``.label.gii``,
+        ``.shape.gii``, ``.func.gii``), which has a value for each vertex. Any of them may be
+        compressed (``.gz``).
     mesh
         The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     label
-        For a GIFTI file: the name or the number of a label, or a value. None for all values other
-        than 0.
+        The name or the number of a label. For a GIFTI file also a value, where NaN is ``"nan"``;
+        None for all values but 0 and NaN. A FreeSurfer label has no name.
+    outside
+        Return the faces whose corners are all outside of the label, in place of those inside. So
+        the label may be the cortex, where paths are to stay.
 
     Returns
     -------
@@ -36,10 +52,15 @@ def load_label(source: str | Path, mesh: MeshLike, label: str | float | None = N
     InvalidMesh
         The mesh cannot be used.
     InvalidArgument
-        The file cannot be read, is not a label file, has no such label, or belongs to another
-        surface.
+        The file cannot be read, is not a label file, has no such label, has it at no vertex, or
+        belongs to another surface.
     MissingExtra
         GIFTI needs nibabel, the extra ``brain``.
+
+    Warns
+    -----
+    EmptyBarrier
+        The label has vertices, but no whole face.
 
     Notes
     -----
@@ -55,17 +76,74 @@ def load_label(source: str | Path, mesh: MeshLike, label: str | float | None = N
     ...     gc.load_label(file.name, mesh)
     array([0])
     """
-    path = Path(source)
-    if path.suffix not in _READERS:
-        raise InvalidArgument(f"{path} is not a label file: its name must end in .label or .gii")
-    mesh = as_mesh(mesh)
+    surface = as_mesh(mesh)
+    chosen = _vertices_of(Path(source), surface, label, outside)
+    faces = np.flatnonzero(chosen[surface.faces].all(axis=1))
+    if len(faces) == 0:
+        where = "outside of the label" if outside else "in the label"
+        message = (
+            f"{source}: {np.count_nonzero(chosen)} vertices are {where}, but no face has all of "
+            "its corners there: as a barrier it blocks nothing"
+        )
+        warnings.warn(message, EmptyBarrier, stacklevel=2)
+    return faces
+
+
+def load_label_vertices(
+    source: str | Path, mesh: MeshLike, label: _Label = None, *, outside: bool = False
+) -> Longs:
+    r"""Return the vertices in a label: sources, to measure distances from a region.
+
+    Parameters
+    ----------
+    source, mesh, label
+        As for `load_label`.
+    outside
+        Return the vertices outside of the label, in place of those inside.
+
+    Returns
+    -------
+    (N,) int64
+        Vertex indices of the mesh, in order.
+
+    Raises
+    ------
+    InvalidMesh, InvalidArgument, MissingExtra
+        As for `load_label`.
+
+    Notes
+    -----
+    O(V).
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> mesh = gc.samples.plane(8)
+    >>> with tempfile.NamedTemporaryFile("w", suffix=".label") as file:
+    ...     _ = file.write("#!ascii label\n3\n0 0 0 0 0\n3 0 0.5 0 0\n6 0 1 0 0\n")
+    ...     file.flush()
+    ...     left = gc.load_label_vertices(file.name, mesh)
+    >>> gc.exact_distance(mesh, left).distances.tolist()
+    [0.0, 0.5, 1.0, 0.0, 0.5, 1.0, 0.0, 0.5, 1.0]
+    """
+    return np.flatnonzero(_vertices_of(Path(source), as_mesh(mesh), label, outside))
+
+
+def _vertices_of(path: Path, mesh: TriangleMesh, label: _Label, outside: bool) -> NDArray[np.bool_]:
+    """Return which vertices of a mesh are in the label of a file, or outside; at least one is."""
+    kind = _SUFFIX.search(path.name.lower())
+    if kind is None:
+        raise InvalidArgument(
+            f"{path} is not a label file: its name must end in .label, .annot or .gii, or in one "
+            "of these and .gz"
+        )
     count = len(mesh.vertices if mesh.vertex_map is None else mesh.vertex_map)
     try:
         data = path.read_bytes()
     except OSError as error:
         raise InvalidArgument(f"cannot read {path}: {error.strerror}") from error
     try:
-        inside = _READERS[path.suffix](data, count, label)
+        inside = _inside(data, kind[1], count, label)
     except InvalidArgument as error:
         raise InvalidArgument(f"{path} is not a label of this surface: {error}") from None
     except GeodesicError:
@@ -73,18 +151,31 @@ def load_label(source: str | Path, mesh: MeshLike, label: str | float | None = N
     except Exception as error:  # any failure of a parser
         what = " ".join(str(error).split())[:200] or type(error).__name__
         raise InvalidArgument(f"{path} is damaged: {what}") from error
+    if outside and inside.all():
+        raise InvalidArgument(f"no vertex is outside of the label of {path}: all are in it")
+    chosen: NDArray[np.bool_] = inside != outside
     if mesh.vertex_map is not None:
         merged = np.zeros(len(mesh.vertices), bool)
-        merged[mesh.vertex_map[inside]] = True
-        inside = merged
-    return np.flatnonzero(inside[mesh.faces].all(axis=1))
+        merged[mesh.vertex_map[chosen]] = True
+        chosen = merged
+    return chosen
 
 
-def _freesurfer(data: bytes, count: int, label: str | float | None) -> NDArray[np.bool_]:
+def _inside(data: bytes, kind: str, count: int, label: _Label) -> NDArray[np.bool_]:
+    """Return which of ``count`` vertices are in a label; at least one is."""
+    data = gzip.decompress(data) if data.startswith(_GZIP) else data
+    inside: NDArray[np.bool_] = _READERS[kind](data, count, label)
+    if not inside.any():
+        named = "no vertex is in it" if label is None else f"no vertex has the label {label!r}"
+        raise InvalidArgument(named)
+    return inside
+
+
+def _freesurfer(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:
     """Return which vertices a label lists: a comment, their number, and a line for each."""
     if label is not None:
         raise InvalidArgument("a .label file has one label without a name; leave the label out")
-    _, declared, *lines = data.decode("utf-8").splitlines()
+    _, declared, *lines = data.decode("utf-8", "replace").splitlines()
     vertices = np.array([int(line.split()[0]) for line in lines if line.strip()], np.int64)
     if len(vertices) != int(declared):
         raise InvalidArgument(f"it declares {declared} vertices and lists {len(vertices)}")
@@ -96,7 +187,22 @@ def _freesurfer(data: bytes, count: int, label: str | float | None) -> NDArray[n
     return inside
 
 
-def _gifti(data: bytes, count: int, label: str | float | None) -> NDArray[np.bool_]:
+def _annotation(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:
+    """Return which vertices have a label of an annotation."""
+    codes, table = read_annotation(data, count)
+    known = _known(name for name, _ in table.values())
+    if label is None:
+        raise InvalidArgument(f"it has several labels; name one: its labels are {known}")
+    wanted = [code for name, code in table.values() if name == label]
+    if not wanted:
+        number = _number(label, known)
+        if number not in table:
+            raise InvalidArgument(f"it has no label {label!r}; its labels are {known}")
+        wanted = [table[int(number)][1]]
+    return np.isin(codes, wanted)
+
+
+def _gifti(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:
     """Return which vertices have a label, in the first array of a file."""
     with extra("brain", "nibabel", "load_label of a GIFTI file"):
         from nibabel.gifti.gifti import GiftiImage
@@ -108,14 +214,26 @@ def _gifti(data: bytes, count: int, label: str | float | None) -> NDArray[np.boo
     if values.shape != (count,):
         raise InvalidArgument(f"its values have shape {values.shape}, for {count} vertices")
     if label is None:
-        return np.asarray(values != 0)
-    names = {name: key for key, name in image.labeltable.get_labels_as_dict().items()}
+        return np.asarray((values != 0) & ~np.isnan(values))
+    names = image.labeltable.get_labels_as_dict()
+    wanted = [key for key, name in names.items() if name == label]
+    if wanted:
+        return np.isin(values, wanted)
+    number = _number(label, _known(names.values()))
+    return np.isnan(values) if np.isnan(number) else np.asarray(values == number)
+
+
+def _known(names: Any) -> str:
+    return ", ".join(map(repr, names)) or "none"
+
+
+def _number(label: str | float, known: str) -> float:
+    """Return the number that a label is where it is none of the ``known`` names."""
     try:
-        wanted = names[label] if label in names else float(label)
+        return float(label)
     except ValueError:
-        known = ", ".join(map(repr, names)) or "none"
         raise InvalidArgument(f"it has no label {label!r}; its labels are {known}") from None
-    return np.asarray(values == wanted)
 
 
-_READERS = {".label": _freesurfer, ".gii": _gifti}
+_READERS = {"label": _freesurfer, "annot": _annotation, "gii": _gifti}
+_SUFFIX = re.compile(rf"\.({'|'.join(_READERS)})(\.gz)?$")

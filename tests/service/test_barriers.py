@@ -191,6 +191,7 @@ def test_an_estimate_counts_the_blocked_mesh(client: TestClient, plane: str) -> 
     assert estimated["seconds"] >= free["seconds"] > 0
 
 
+@pytest.mark.filterwarnings("ignore::geodesic_core.errors.BlockedSource")
 def test_blocked_meshes_are_kept_while_they_fit(tmp_path: Path) -> None:
     """The same answers with room for one mesh at a time."""
     walls: list[list[int]] = [[], [0], [0, 1], [7], [0]]

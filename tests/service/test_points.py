@@ -277,7 +277,8 @@ def test_a_position_inside_a_face_agrees_with_its_weights(
 
 
 def test_an_answer_can_be_asked_again_by_its_echo(client: TestClient, knot: str) -> None:
-    first = path(client, knot, source={"position": [4, 0.5, 0.25]}).json()
+    written = {"position": [4, 0.5, 0.25], "max_distance": 1}
+    first = path(client, knot, source=written).json()
     found = {name: first["source"][name] for name in ("face", "barycentric")}
 
     again = path(client, knot, source=found)

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ import geodesic_core as gc
 from tests.support import zoo
 from tests.support.certificates import check_path
 from tests.support.oracles import unfolding, visibility
+
+pytestmark = pytest.mark.filterwarnings("ignore::geodesic_core.errors.BlockedSource")
 
 EXACT = 1e-9
 """Relative error allowed against an oracle."""
@@ -492,3 +495,28 @@ def test_barriers_of_a_call_count_as_its_memory():
         assert caught.value.needed == needed
         with pytest.raises(gc.errors.InvalidArgument, match="barrier 0 is face 800"):
             call(barriers=[800])
+
+
+# What is told ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solve", [gc.exact_distance, gc.approximate_distance, gc.fast_distance])
+def test_sources_in_blocked_faces_only_are_told(solve):
+    mesh = gc.samples.plane(32)
+    wall = np.flatnonzero((mesh.vertices[:, 0] > 0.6)[mesh.faces].all(axis=1))
+    inside = np.setdiff1d(mesh.faces[wall], np.delete(mesh.faces, wall, axis=0)).tolist()
+    with pytest.warns(gc.errors.BlockedSource, match=f"^source 1, vertex {inside[0]}, lies in bl"):
+        field = solve(mesh, [0, inside[0]], barriers=wall)
+    assert np.isfinite(field.distances).sum() == len(mesh.vertices) - len(inside) + 1
+    twelve = [inside[i % len(inside)] for i in range(12)]
+    with pytest.warns(gc.errors.BlockedSource, match="; 2 more, lie in blocked faces only") as told:
+        solve(mesh.with_barriers(wall), twelve)
+    assert len(told) == 1
+    with warnings.catch_warnings(action="error"):  # free faces have it, too
+        solve(mesh, [0, int(mesh.faces[wall[0], 0])], barriers=wall[:1])
+
+
+def test_a_vertex_in_no_face_is_not_in_a_blocked_one():
+    mesh = gc.TriangleMesh([*np.eye(3), [1.0, 1.0, 0.0], [5.0, 5.0, 5.0]], [[0, 1, 2], [0, 1, 3]])
+    with warnings.catch_warnings(action="error"):
+        assert np.isfinite(gc.exact_distance(mesh, 4, barriers=[0]).distances).sum() == 1

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+import pytest
 from hypothesis import given
 
 import geodesic_core as gc
@@ -11,6 +12,8 @@ from tests.support.certificates import check_path
 from tests.support.meshes import mesh_of
 from tests.support.oracles import unfolding
 from tests.support.random_meshes import cases
+
+pytestmark = pytest.mark.filterwarnings("ignore::geodesic_core.errors.BlockedSource")
 
 EXACT = 1e-9
 """Relative error allowed against the oracle."""

@@ -1,6 +1,7 @@
 """Every question asked of meshes as nobody means them: the answers agree, and with the oracle."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 
 import geodesic_core as gc
@@ -75,6 +76,7 @@ def test_kept_windows_agree_with_the_search(seed):
         check_between(mesh, points, distances)
 
 
+@pytest.mark.filterwarnings("ignore::geodesic_core.errors.BlockedSource")
 @given(seeds)
 def test_barriers_are_as_if_their_faces_were_not_there(seed):
     mesh, rng = soup(seed)

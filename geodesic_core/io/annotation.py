@@ -1,0 +1,98 @@
+"""Annotations of FreeSurfer: files that give a label to each vertex, with a table of their names.
+
+All numbers are big-endian integers of four bytes::
+
+    vertices, then a vertex and the code of its label, for each
+    1, where a table follows
+    entries of the table, or -2 for the second version of it
+        first version:   bytes and text of the name of its file, then the entries
+        second version:  largest number, bytes and text as above, entries, then the entries, each
+                         behind its number
+    an entry: bytes and text of the name, then red, green, blue and 255 - opacity
+
+The code of a label is its colour: red + 256 green + 65536 blue. nibabel reads files on disk only,
+and takes the vertices to be in order.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from geodesic_core.arrays import Longs
+from geodesic_core.errors import InvalidArgument
+
+_INTEGER = np.dtype(">i4")
+_SECOND_VERSION = -2
+
+
+class Annotation(NamedTuple):
+    """The codes of all vertices, and what they stand for."""
+
+    codes: Longs
+    """(V,): the code of the label of each vertex, 0 for none"""
+    table: dict[int, tuple[str, int]]
+    """Name and code of each label, by its number in the file"""
+
+
+class _Integers:
+    """A cursor over bytes."""
+
+    def __init__(self, data: bytes) -> None:
+        self._data, self._at = data, 0
+
+    def bytes_of(self, count: int) -> bytes:
+        taken = self._data[self._at : self._at + count]
+        if count < 0 or len(taken) < count:
+            raise InvalidArgument(f"it ends at byte {len(self._data)}, before it is complete")
+        self._at += count
+        return taken
+
+    def next(self) -> int:
+        return int.from_bytes(self.bytes_of(4), "big", signed=True)
+
+    def text(self) -> str:
+        return self.bytes_of(self.next()).rstrip(b"\0").decode("utf-8", "replace")
+
+    def is_at_end(self) -> bool:
+        return self._at >= len(self._data)
+
+
+def read_annotation(data: bytes, count: int) -> Annotation:
+    """Return the labels of a surface with ``count`` vertices.
+
+    Raises
+    ------
+    InvalidArgument
+        The bytes end too early, or the file is that of another surface.
+    """
+    integers = _Integers(data)
+    rows = integers.next()
+    if not 0 <= rows <= count:
+        raise InvalidArgument(f"it has {rows} vertices, but the mesh has {count}")
+    pairs = np.frombuffer(integers.bytes_of(8 * rows), _INTEGER).reshape(-1, 2).astype(np.int64)
+    wrong = pairs[(pairs[:, 0] < 0) | (pairs[:, 0] >= count), 0]
+    if len(wrong):
+        raise InvalidArgument(f"it lists vertex {wrong[0]}, but the mesh has {count}")
+    codes = np.zeros(count, np.int64)
+    codes[pairs[:, 0]] = pairs[:, 1]
+    has_table = not integers.is_at_end() and integers.next() == 1
+    return Annotation(codes, _table(integers) if has_table else {})
+
+
+def _table(integers: _Integers) -> dict[int, tuple[str, int]]:
+    entries = integers.next()
+    is_numbered = entries < 0
+    if is_numbered and entries != _SECOND_VERSION:
+        raise InvalidArgument(f"its table is of version {-entries}; versions 1 and 2 are read")
+    if is_numbered:
+        integers.next()
+    integers.text()
+    if is_numbered:
+        entries = integers.next()
+    table = {}
+    for i in range(entries):  # which ends with the bytes, whatever the file declares
+        number = integers.next() if is_numbered else i
+        name = integers.text()
+        red, green, blue, _ = (integers.next() for _ in range(4))
+        table[number] = name, red + (green << 8) + (blue << 16)
+    return table
