@@ -1,5 +1,7 @@
 """A matrix in parts, which may be computed on several machines and are then joined to one file."""
 
+from __future__ import annotations  # help() shows the names of types, not what they stand for
+
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import IO, Any, Literal
@@ -31,7 +33,8 @@ class MatrixParts:
     mesh
         The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     sources, targets
-        N and M vertex indices or `SurfacePoint`. Where both are the same, each pair is asked once.
+        N and M vertex indices or `SurfacePoint`. Without targets, the targets are the sources.
+        Where both are the same, each pair is computed once.
     layout
         ``"dense"`` for all distances, ``"sparse"`` for the finite ones.
     method, relative_error, absolute_error, effort, max_distance
@@ -58,7 +61,7 @@ class MatrixParts:
         self,
         mesh: MeshLike,
         sources: Sequence[Point],
-        targets: Sequence[Point],
+        targets: Sequence[Point] | None = None,
         *,
         layout: Literal["dense", "sparse"] = "dense",
         method: Method = "exact",
@@ -77,7 +80,7 @@ class MatrixParts:
         self._limit = as_limit(max_distance)
         self._dtype = np.dtype(dtype)
         starts = as_points(self._mesh, sources, "source", control)
-        stops = as_points(self._mesh, targets, "target", control)
+        stops = None if targets is None else as_points(self._mesh, targets, "target", control)
         self._is_sparse = layout == "sparse"
         self._plan = Plan.of(self._mesh, starts, stops, control, in_order=self._is_sparse)
 
