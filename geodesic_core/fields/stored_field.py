@@ -57,7 +57,7 @@ def load_field(path: str | Path, mesh: MeshLike) -> DistanceField:
     with refused_if_damaged(path):
         field = DistanceField.from_arrays(blocked, arrays)
     for name, array in shown.items():
-        if not np.array_equal(array, getattr(field, name) if name in SHOWN else None):
+        if not np.array_equal(array, getattr(field, name) if name in SHOWN else ()):
             raise InvalidArgument(
                 f"{path} holds other {name!r} than the field that was saved into it: load_field "
                 "reads only files as DistanceField.save writes them"

@@ -208,7 +208,6 @@ BAD = [
     ({"sources": np.empty(0, int)}, "InvalidArgument", "no sources"),
     ({"sources": 3.5}, "InvalidArgument", "sources is 3.5"),
     ({"targets": "12"}, "InvalidArgument", "targets is '12'"),
-    ({"targets": None}, "InvalidArgument", "targets is None"),
     ({"sources": [0, -1]}, "InvalidPoint", "source 1 is vertex -1"),
     ({"targets": [0, 1, 99]}, "InvalidPoint", "target 2 is vertex 99"),
     ({"targets": [0, 1.5]}, "InvalidPoint", "target 1 is 1.5"),
