@@ -125,7 +125,7 @@ class MatrixParts:
         Examples
         --------
         >>> gc.MatrixParts.areas(300, None, faces=20_000)
-        [76800, 1936]
+        [31800, 20564, 7744]
         """
         sweeps = sources if targets is None else min(sources, targets)
         width = sources if targets is None else max(sources, targets)
