@@ -29,7 +29,7 @@ SEVERAL: dict[str, Callable[[Any], Any]] = {
 """Calls that take points, where a start distance or a curve has no meaning"""
 SOURCES: dict[str, Callable[[Any], Any]] = {
     "sources": lambda points: gc.exact_distance(MESH, points),
-    "sources, approximate": lambda points: SOLVER.approximate_distance(points),
+    "sources, approximate": SOLVER.approximate_distance,
     "sources, fast": lambda points: gc.fast_distance(MESH, points),
     "a curve": lambda points: gc.exact_distance(MESH, gc.Curve(points)),
 }
@@ -143,7 +143,9 @@ def test_a_face_that_is_no_index(face: Any) -> None:
         MESH.point(gc.SurfacePoint.face(face, (1.0, 0.0, 0.0)))
 
 
-@pytest.mark.parametrize("thing", [None, object(), "7", {}, [[0, 1], [2]], 1j], ids=str)
+@pytest.mark.parametrize(
+    "thing", [None, object(), "7", {}, [[0, 1], [2]], 1j], ids=lambda thing: type(thing).__name__
+)
 def test_other_things_are_refused_without_advice(thing: Any) -> None:
     with pytest.raises(gc.errors.InvalidPoint, match=r"\(an integer\) or a SurfacePoint$"):
         MESH.point(thing)

@@ -387,9 +387,11 @@ def test_without_targets_all_pairs_are_found_each_once(case, method, monkeypatch
         np.testing.assert_array_equal(table, expected)
         np.testing.assert_array_equal(table, table.T)
         np.testing.assert_array_equal(np.diag(table), 0.0)
-        sparse = ask(points, method=method, layout="sparse")
-        expected_sparse = np.where(np.isfinite(expected), expected, 0.0)
-        np.testing.assert_array_equal(sparse.toarray(), expected_sparse)
+        sparse = [
+            ask(points, targets, method=method, layout="sparse") for targets in (None, points)
+        ]
+        np.testing.assert_array_equal(*map(as_dense, sparse))
+        np.testing.assert_allclose(as_dense(sparse[0]), expected, rtol=EXACT)
     parts = gc.MatrixParts(mesh, points, method=method)
     assert parts.shape == (4, 4)
     np.testing.assert_array_equal(parts.compute(0), expected[np.ix_(*2 * [_order(mesh, points)])])
