@@ -109,9 +109,9 @@ def check_index(index: Any, count: int, kind: str, name: str) -> None:
     InvalidPoint
         Negative indices are refused, too.
     """
-    if not is_index(index) and kind == "face":
-        raise InvalidPoint(f"the {name} is in face {index!r}; a face id is an integer")
     if not is_index(index):
+        if kind == "face":
+            raise InvalidPoint(f"the {name} is in face {index!r}; a face id is an integer")
         raise InvalidPoint(
             f"the {name} is {index!r}; it must be a vertex index (an integer) or a SurfacePoint"
             f"{remedy(index)}"
