@@ -1,5 +1,7 @@
 """Solvers: arguments in, sweeps and searches, results out."""
 
+from __future__ import annotations  # help() shows the names of types, not what they stand for
+
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
@@ -18,8 +20,6 @@ from geodesic_core.fields.fast_sweep import FastSweep, estimated_error
 from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep, stats_of
 from geodesic_core.fields.sources import (
-    Source,
-    Sources,
     as_sources,
     component_of,
     disconnected,
@@ -30,7 +30,7 @@ from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.curve import Polyline
-from geodesic_core.mesh.surface_point import Point, Points, SurfacePoint
+from geodesic_core.mesh.surface_point import Point, Points, Source, Sources, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.call_lock import CallLock
 from geodesic_core.search.matrix import Layout, find_matrix
@@ -388,7 +388,7 @@ def shortest_path(
 def distance_matrix(
     mesh: MeshLike,
     sources: Points,
-    targets: Points,
+    targets: Points | None = None,
     max_distance: float | None = None,
     layout: Layout = "dense",
     *,
@@ -402,7 +402,7 @@ def distance_matrix(
     cancel: Callable[[], bool] | None = None,
     deadline_s: float | None = None,
     memory_limit: int | None = None,
-) -> "Floats | csr_array":
+) -> Floats | csr_array:
     """Return the geodesic distances from each source to each target, exact by default.
 
     Parameters
@@ -410,7 +410,8 @@ def distance_matrix(
     mesh
         The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     sources, targets
-        N and M vertex indices or `SurfacePoint`; a single one needs no list.
+        N and M vertex indices or `SurfacePoint`; a single one needs no list. Without targets, the
+        targets are the sources.
     max_distance
         Limit of the sweeps, mesh units; None for no limit. Points beyond it count as unreachable.
     layout
@@ -459,6 +460,8 @@ def distance_matrix(
 
     >>> gc.distance_matrix(mesh, [0, 1], [2, 3]).round(3).tolist()
     [[1.0, 1.414], [1.414, 1.0]]
+    >>> gc.distance_matrix(mesh, [0, 1, 3]).round(3).tolist()  # between all of these
+    [[0.0, 1.0, 1.414], [1.0, 0.0, 1.0], [1.414, 1.0, 0.0]]
     >>> gc.distance_matrix(mesh, [0, 1], [2, 3], layout="pairs").round(3).tolist()
     [1.0, 1.0]
     >>> gc.distance_matrix(mesh, [0, 1], [1, 2, 3], max_distance=1.0, layout="sparse").nnz
@@ -501,7 +504,7 @@ class Solver:
         self._sweep: TargetSweep | None = None
         self._lock = CallLock()
 
-    def __reduce__(self) -> tuple[type["Solver"], tuple[TriangleMesh]]:
+    def __reduce__(self) -> tuple[type[Solver], tuple[TriangleMesh]]:
         """Copy and pickle the mesh alone: memory and landmarks are found again."""
         return Solver, (self.mesh,)
 
@@ -727,7 +730,7 @@ class Solver:
     def distance_matrix(
         self,
         sources: Points,
-        targets: Points,
+        targets: Points | None = None,
         max_distance: float | None = None,
         layout: Layout = "dense",
         *,
@@ -741,7 +744,7 @@ class Solver:
         cancel: Callable[[], bool] | None = None,
         deadline_s: float | None = None,
         memory_limit: int | None = None,
-    ) -> "Floats | csr_array":
+    ) -> Floats | csr_array:
         """Return the distances from each source to each target, as `distance_matrix` does.
 
         The memory of one of the threads is reused by the next call.
@@ -828,7 +831,7 @@ class Solver:
                 solver.mesh, solver._shared_sweep, source, candidates, k, max_distance, control
             )
 
-    def _with_barriers(self, barriers: Iterable[int], control: Control) -> tuple["Solver", Control]:
+    def _with_barriers(self, barriers: Iterable[int], control: Control) -> tuple[Solver, Control]:
         """Return a solver of the mesh with the barriers of a call, itself where there are none."""
         mesh, control = with_barriers(self.mesh, barriers, control)
         return (self if mesh is self.mesh else Solver(mesh)), control

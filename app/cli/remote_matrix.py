@@ -81,6 +81,9 @@ def _write_facts(wanted: MatrixToWrite, written: WrittenMatrix, service: str, me
     facts = {
         "service": service,
         "mesh": mesh_id,
+        "barriers": sorted(set(wanted.barriers)),
+        "sources": _as_members(wanted.sources),
+        "targets": _as_members(wanted.sources if wanted.targets is None else wanted.targets),
         "shape": written.shape,
         **wanted.accuracy,
         "error_bound": written.error_bound,

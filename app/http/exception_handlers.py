@@ -65,9 +65,18 @@ def _allow(app: FastAPI, path: str) -> Mapping[str, str] | None:
 
 def validation_problem(errors: Sequence[Any]) -> Problem:
     """Return the problem for pydantic's ``errors``."""
-    faults = tuple(Fault(_pointer(error["loc"]), error["msg"]) for error in errors[:10])
+    # A default that is another member's value is at fault where that one is.
+    errors = [error for error in errors if error["type"] != "default_factory_not_called"]
+    faults = tuple(Fault(_pointer(error["loc"]), _message(error)) for error in errors[:10])
     place = faults[0].pointer or "the body"
     return Problem("invalid_request", f"{place}: {faults[0].message}", errors=faults)
+
+
+def _message(error: Mapping[str, Any]) -> str:
+    if error["type"] == "extra_forbidden" and error["loc"][-1] == "start_distance":
+        return "Only sources of distances, isolines and borders have a start_distance"
+    message: str = error["msg"]
+    return message
 
 
 def _pointer(location: Sequence[str | int]) -> str:

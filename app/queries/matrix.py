@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,6 +65,8 @@ class MatrixQuery(Query[MatrixRequest]):
                 if getattr(request, name) == "all":
                     message = "pairs need lists of points; give vertex indices instead of `all`"
                     raise invalid_fields([f"/{name}"], message)
+            if "targets" not in request.model_fields_set:
+                raise invalid_fields(["/targets"], "pairs need targets, one for each source")
             sources, targets = len(request.sources), len(request.targets)
             if sources != targets:
                 message = (
@@ -118,8 +121,12 @@ class MatrixQuery(Query[MatrixRequest]):
     def areas_of_parts(self, size: MeshSize) -> list[int]:
         """Return the number of distances in each part."""
         sources, targets = self._count(size)
-        is_symmetric = self.request.sources == self.request.targets
-        return gc.MatrixParts.areas(sources, None if is_symmetric else targets)
+        return gc.MatrixParts.areas(
+            sources,
+            None if self._is_symmetric else targets,
+            size.faces,
+            self.request.max_distance,
+        )
 
     def bytes_in_parts(self, representation: Representation, size: MeshSize) -> int:
         """Return the size of the parts and of the file that they become.
@@ -172,8 +179,8 @@ class MatrixQuery(Query[MatrixRequest]):
         return points if self.request.layout == "sparse" else points + self._cells(size)
 
     def written_points(self) -> WrittenPoints:
-        """Yield the sources, then the targets, where they are written one by one."""
-        for name in ("sources", "targets"):
+        """Yield the sources, then other targets, where they are written one by one."""
+        for name in ("sources",) if self._is_symmetric else ("sources", "targets"):
             points = getattr(self.request, name)
             if points != "all":
                 yield from numbered(f"/{name}", points)
@@ -182,6 +189,8 @@ class MatrixQuery(Query[MatrixRequest]):
         """Return the sources, then the targets; raises as `resolve_points`."""
         written = super().resolved(mesh, cancel)
         before, after = (each == "all" for each in (self.request.sources, self.request.targets))
+        if self._is_symmetric and not before:
+            return [*written, *written]
         if not (before or after):
             return written
         everywhere = [mesh.point(vertex) for vertex in range(len(mesh.vertices))]
@@ -275,6 +284,11 @@ class MatrixQuery(Query[MatrixRequest]):
         if radii:
             costs.append(self._cost_of_sweeps(mesh, np.array(list(radii.values()))))
         return Cost(sum(cost.seconds for cost in costs), sum(cost.memory_bytes for cost in costs))
+
+    @cached_property
+    def _is_symmetric(self) -> bool:
+        """Whether the targets are the sources."""
+        return self.request.sources == self.request.targets
 
     @property
     def _as_job(self) -> str | None:

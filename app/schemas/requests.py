@@ -250,8 +250,9 @@ class MatrixRequest(AccuracyOrEffort, AmongBarriers):
 
     sources: Ends = Field(description="Points, or `all` for every vertex")
     targets: Ends = Field(
-        description="Points, or `all` for every vertex; if they are the sources, each pair is "
-        "computed once"
+        default_factory=lambda known: known.get("sources", "all"),
+        description="Points, or `all` for every vertex; the sources if not given. If they are the "
+        "sources, each pair is computed once",
     )
     max_distance: NonNegative | None = Field(
         default=None, description="Points farther than this, in mesh units, count as unreachable"

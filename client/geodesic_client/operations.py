@@ -273,7 +273,7 @@ def borders(
 def matrix(
     mesh: Mesh | str,
     sources: Sequence[Point],
-    targets: Sequence[Point],
+    targets: Sequence[Point] | None = None,
     *,
     method: Accuracy = "exact",
     relative_error: float | None = None,
@@ -284,7 +284,10 @@ def matrix(
     barriers: Sequence[int] = (),
     progress: Progress = ignore_progress,
 ) -> Flow[Matrix]:
-    """Return the distances from each source to each target, or for pairs of them."""
+    """Return the distances from each source to each target, or for pairs of them.
+
+    Without targets, the targets are the sources.
+    """
     body = _body(
         sources=sources,
         targets=targets,
@@ -303,7 +306,7 @@ def matrix(
 def store_matrix(
     mesh: Mesh | str,
     sources: Sequence[Point] | Literal["all"],
-    targets: Sequence[Point] | Literal["all"],
+    targets: Sequence[Point] | Literal["all"] | None = None,
     *,
     method: Accuracy = "exact",
     relative_error: float | None = None,
@@ -317,9 +320,9 @@ def store_matrix(
 ) -> Flow[StoredMatrix]:
     """Let the service compute any number of distances, and store them in a file.
 
-    All workers of the service share the work. If sources and targets are the same, each pair is
-    computed once. If a call was stopped, the next one continues where it stopped. A ``sparse``
-    matrix holds the finite distances only.
+    All workers of the service share the work. Without targets, the targets are the sources; then
+    each pair is computed once. If a call was stopped, the next one continues where it stopped. A
+    ``sparse`` matrix holds the finite distances only.
     """
     body = _body(
         sources=sources,

@@ -1432,9 +1432,9 @@ export interface components {
             sources: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[] | "all";
             /**
              * Targets
-             * @description Points, or `all` for every vertex; if they are the sources, each pair is computed once
+             * @description Points, or `all` for every vertex; the sources if not given. If they are the sources, each pair is computed once
              */
-            targets: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[] | "all";
+            targets?: (number | components["schemas"]["VertexPoint"] | components["schemas"]["EdgePoint"] | components["schemas"]["FacePoint"] | components["schemas"]["PositionPoint"])[] | "all";
             /**
              * Max Distance
              * @description Points farther than this, in mesh units, count as unreachable

@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
-from geodesic_core.errors import InternalError, NoPath
+from geodesic_core.errors import InternalError, InvalidArgument, NoPath
 from geodesic_core.facts import as_table
 from geodesic_core.fields import picture
 from geodesic_core.fields.borders import Border, borders_of, swept_borders
 from geodesic_core.fields.fast_sweep import FastSweep
-from geodesic_core.fields.field_file import write_field_file
+from geodesic_core.fields.field_file import SHOWN, write_field_file
 from geodesic_core.fields.gradient import gradient_at_vertices
 from geodesic_core.fields.isolines import (
     Drawing,
@@ -36,17 +36,16 @@ from geodesic_core.fields.point_query import (
     with_target,
 )
 from geodesic_core.fields.repeatable_sweep import Lazy, RepeatableSweep, SweepResult, SweepStats
-from geodesic_core.fields.sources import Nodes, Source, component_of, disconnected
+from geodesic_core.fields.sources import Nodes, component_of, disconnected
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
 from geodesic_core.mesh.curve import (
-    Curve,
     Polyline,
     polylines_from_arrays,
     polylines_to_arrays,
 )
-from geodesic_core.mesh.surface_point import Point, SurfacePoint
+from geodesic_core.mesh.surface_point import Curve, Point, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import LEVEL
 
@@ -58,13 +57,17 @@ class DistanceField:
     The solvers return it. Paths, points inside faces, gradients and isolines come from retained
     data, or from a second sweep if those data were not retained.
 
+    ``numpy.asarray(field)`` is `distances`, and ``field[5]`` is the distance of vertex 5.
+
     Examples
     --------
     >>> mesh = gc.samples.plane(2)
     >>> field = gc.exact_distance(mesh, 0)
 
-    >>> field.distances.round(3).tolist()
+    >>> field.distances.round(3).tolist()  # or numpy.asarray(field)
     [0.0, 1.0, 1.0, 1.414]
+    >>> float(field[2])  # of vertex 2
+    1.0
     >>> field.path_to(3).points.tolist()
     [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
     """
@@ -92,9 +95,10 @@ class DistanceField:
 
     @classmethod
     def from_arrays(cls, mesh: TriangleMesh, arrays: Mapping[str, NDArray[Any]]) -> "DistanceField":
-        """Return the field on ``mesh`` whose `arrays` these are; trusted, not checked.
+        """Return the field on ``mesh`` whose `arrays` these are.
 
-        Its answers are the same to the bit; its sources are spelled canonically.
+        Its answers are the same to the bit; its sources are spelled canonically. Contents
+        are trusted: they must be those of a field on this mesh.
 
         Parameters
         ----------
@@ -107,6 +111,13 @@ class DistanceField:
         -------
         DistanceField
             The same field.
+
+        Raises
+        ------
+        InvalidArgument
+            A name is that of none of the field's arrays.
+        KeyError
+            One of the field's arrays is missing.
 
         Examples
         --------
@@ -130,7 +141,7 @@ class DistanceField:
         created, kept, peak, peak_bytes = arrays["counts"].tolist()
         seconds = float(arrays["seconds"])
         sweep = RepeatableSweep.between(mesh, polylines, starts, targets, bounds, Control())
-        return field_of(
+        field = field_of(
             sources,
             polylines,
             targets,
@@ -140,6 +151,12 @@ class DistanceField:
             SweepResult.from_arrays(arrays),
             SweepStats.of(mesh, created, kept, peak, peak_bytes, seconds),
         )
+        if foreign := arrays.keys() - field.arrays().keys():
+            raise InvalidArgument(
+                f"arrays has {min(foreign)!r}, which is none of this field's arrays: give what "
+                "DistanceField.arrays has returned, and nothing else"
+            )
+        return field
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the question and the result as arrays, for a store.
@@ -199,10 +216,7 @@ class DistanceField:
         >>> np.load(file)["distances"].round(3).tolist()
         [0.0, 1.0, 1.0, 1.414]
         """
-        shown: dict[str, NDArray[Any]] = {
-            "distances": self.distances,
-            "nearest_source": self.nearest_source,
-        }
+        shown = {name: getattr(self, name) for name in SHOWN}
         write_field_file(path, self.mesh, shown, self.arrays())
 
     def to_pyvista(self) -> Any:
@@ -268,6 +282,17 @@ class DistanceField:
                 point_size=picture.POINT_SIZE,
                 render_points_as_spheres=True,
             )
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        """Return `distances`, as numpy asks for them: ``numpy.asarray(field)``."""
+        return np.array(self.distances, dtype=dtype, copy=copy)
+
+    def __getitem__(self, vertices: Any) -> Any:
+        """Return the distance of a vertex, or those of some, indexed as `distances` are."""
+        return self.distances[vertices]
+
+    def __len__(self) -> int:
+        return len(self.distances)
 
     def __repr__(self) -> str:
         facts = (f"{fact} {name}" for name, fact in self._counts().items())

@@ -24,6 +24,10 @@ from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 _SWEEP = "sweep."
+_BINDING = {"barriers", "mesh", "kernels"}
+
+SHOWN = ("distances", "nearest_source")
+"""Attributes of a field that any reader of its file is shown"""
 
 
 def write_field_file(
@@ -53,8 +57,8 @@ def write_field_file(
 
 def read_field_file(
     path: str | Path, mesh: TriangleMesh
-) -> tuple[TriangleMesh, dict[str, NDArray[Any]]]:
-    """Return the mesh of a field, with its barriers, and the arrays of the field.
+) -> tuple[TriangleMesh, dict[str, NDArray[Any]], dict[str, NDArray[Any]]]:
+    """Return the mesh of a field, with its barriers; the arrays of the field; and those shown.
 
     Raises
     ------
@@ -78,12 +82,12 @@ def read_field_file(
             f"{path} holds a field with other barriers than the mesh: give the mesh without "
             "barriers"
         )
-    sweep = {
-        name.removeprefix(_SWEEP): array
-        for name, array in members.items()
+    arrays = {
+        name.removeprefix(_SWEEP): members.pop(name)
+        for name in list(members)
         if name.startswith(_SWEEP)
     }
-    return blocked, sweep
+    return blocked, arrays, {name: members[name] for name in members.keys() - _BINDING}
 
 
 @contextmanager
@@ -114,7 +118,7 @@ def _members_of(path: str | Path) -> dict[str, NDArray[Any]]:
         np.load(stream, allow_pickle=False) as file,
     ):
         members = dict(file)
-    if not members.keys() >= {"mesh", "kernels", "barriers"}:
+    if not members.keys() >= _BINDING:
         raise InvalidArgument(f"{path} was not written by DistanceField.save")
     return members
 

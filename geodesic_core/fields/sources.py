@@ -13,44 +13,17 @@ from geodesic_core.control import Control
 from geodesic_core.errors import BlockedSource, InvalidArgument, InvalidPoint, NoPath
 from geodesic_core.kernels.sweep.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.mesh.barriers import walled_in
-from geodesic_core.mesh.canonical import half_edges_around
+from geodesic_core.mesh.canonical import half_edges_around, remedy
 from geodesic_core.mesh.curve import (
-    Curve,
     Polyline,
     SegmentInFace,
     polyline_of,
     segments_of,
     weights_by_face,
 )
-from geodesic_core.mesh.surface_point import UNPLACED, Point, Points, SurfacePoint
+from geodesic_core.mesh.surface_point import UNPLACED, Curve, Point, Points, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.validation import is_number, unboxed
-
-
-@dataclass(frozen=True, slots=True)
-class Source:
-    """A point or a curve, and the distance at which it starts.
-
-    Parameters
-    ----------
-    point
-        A vertex index, a `SurfacePoint` or a `Curve`.
-    start_distance
-        Mesh units, finite, 0 or more; added to every distance from this source.
-
-    Examples
-    --------
-    >>> mesh = gc.samples.plane(2)
-    >>> gc.exact_distance(mesh, gc.Source(0, start_distance=0.5)).distances.round(3).tolist()
-    [0.5, 1.5, 1.5, 1.914]
-    """
-
-    point: Point | Curve
-    start_distance: float = 0.0
-
-
-Sources = Points | Curve | Source | Sequence[Point | Curve | Source]
-"""Every way to write the sources of a field"""
 
 
 @dataclass(frozen=True)
@@ -307,7 +280,9 @@ def each_of(points: Points, name: str) -> Iterable[Point]:
     if isinstance(points, SurfacePoint | int | np.integer) and not isinstance(points, bool):
         return [points]
     if isinstance(points, str | bytes) or not isinstance(points, Iterable):
-        raise InvalidArgument(f"{name}s is {points!r}; it must be a point, or a sequence of points")
+        raise InvalidArgument(
+            f"{name}s is {points!r}; it must be a point, or a sequence of points{remedy(points)}"
+        )
     return points
 
 

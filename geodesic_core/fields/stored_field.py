@@ -1,9 +1,14 @@
 """Fields that `DistanceField.save` stored."""
 
+from __future__ import annotations  # help() shows the names of types, not what they stand for
+
 from pathlib import Path
 
+import numpy as np
+
+from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.distance_field import DistanceField
-from geodesic_core.fields.field_file import read_field_file, refused_if_damaged
+from geodesic_core.fields.field_file import SHOWN, read_field_file, refused_if_damaged
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 
 
@@ -48,6 +53,13 @@ def load_field(path: str | Path, mesh: MeshLike) -> DistanceField:
     >>> gc.load_field(file, mesh).path_to(3).points.tolist()
     [[0.0, 0.0, 0.0], [1.0, 1.0, 0.0]]
     """
-    blocked, arrays = read_field_file(path, as_mesh(mesh))
+    blocked, arrays, shown = read_field_file(path, as_mesh(mesh))
     with refused_if_damaged(path):
-        return DistanceField.from_arrays(blocked, arrays)
+        field = DistanceField.from_arrays(blocked, arrays)
+    for name, array in shown.items():
+        if not np.array_equal(array, getattr(field, name) if name in SHOWN else ()):
+            raise InvalidArgument(
+                f"{path} holds other {name!r} than the field that was saved into it: load_field "
+                "reads only files as DistanceField.save writes them"
+            )
+    return field

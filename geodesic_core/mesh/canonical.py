@@ -14,7 +14,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.errors import InvalidPoint
 from geodesic_core.kernels.mesh.half_edges import APEX, HEAD, Topology, next_around, previous
-from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
 from geodesic_core.tolerances import EDGE_STEPS, ROUNDED_SUM, WEIGHT, WEIGHT_ERROR
 from geodesic_core.validation import is_index, is_number
 
@@ -110,12 +110,36 @@ def check_index(index: Any, count: int, kind: str, name: str) -> None:
         Negative indices are refused, too.
     """
     if not is_index(index):
-        raise InvalidPoint(f"the {name} is {index!r}; it must be a vertex index or a SurfacePoint")
+        if kind == "face":
+            raise InvalidPoint(f"the {name} is in face {index!r}; a face id is an integer")
+        raise InvalidPoint(
+            f"the {name} is {index!r}; it must be a vertex index (an integer) or a SurfacePoint"
+            f"{remedy(index)}"
+        )
     if not 0 <= index < count:
         many = "vertices" if kind == "vertex" else f"{kind}s"
         raise InvalidPoint(
             f"the {name} is {kind} {index}, but {many} are numbered 0 to {count - 1}"
         )
+
+
+def remedy(value: Any) -> str:
+    """Return the end of a refusal: what helps a caller who gave this for a point."""
+    if isinstance(value, Source | Curve):
+        return (
+            "; curves and start distances are for the sources of exact_distance, "
+            "approximate_distance and fast_distance"
+        )
+    try:
+        array = np.asarray(value)
+    except (TypeError, ValueError):  # rows of different lengths
+        return ""
+    if array.dtype.kind == "b":
+        return "; for a mask, give numpy.flatnonzero(mask)"
+    is_integer = array.dtype.kind in "iu"
+    if array.dtype.kind == "f" or (is_integer and array.shape[-1:] == (3,)):
+        return "; for a position, give mesh.locate([x, y, z])"
+    return "; for nested indices, give numpy.ravel(indices)" if is_integer else ""
 
 
 def check_weights(weights: Any, face: int, name: str) -> None:

@@ -1,7 +1,6 @@
 """Curves on the surface: polylines each of whose segments lies in a face."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import chain, pairwise
 from typing import Any, NamedTuple
 
@@ -13,37 +12,13 @@ from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, InvalidPoint
 from geodesic_core.kernels.mesh.half_edges import APEX, TAIL
 from geodesic_core.mesh.canonical import half_edges_around
-from geodesic_core.mesh.surface_point import Point, SurfacePoint, Weights
+from geodesic_core.mesh.surface_point import Curve, Point, SurfacePoint, Weights
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 Polyline = tuple[SurfacePoint, ...]
 """The canonical points of a curve; of a point, itself alone."""
 
 _NO_VERTEX = -1
-
-
-@dataclass(frozen=True, slots=True)
-class Curve:
-    """A polyline on the surface; as a source, distances start at all of its points.
-
-    Each segment is straight, and lies in a face that both of its ends belong to. The `locations` of
-    a `GeodesicPath` make a curve. So to join points that are farther apart, find the
-    `shortest_path` with these points as waypoints. A closed curve ends where it begins.
-
-    Parameters
-    ----------
-    points
-        Vertex indices or `SurfacePoint`, at least one.
-
-    Examples
-    --------
-    >>> mesh = gc.samples.plane(2)
-    >>> side = gc.Curve([0, 1])  # the lower edge of the square
-    >>> gc.exact_distance(mesh, side).distances.tolist()
-    [0.0, 0.0, 1.0, 1.0]
-    """
-
-    points: Sequence[Point]
 
 
 class SegmentInFace(NamedTuple):

@@ -1,4 +1,4 @@
-"""Points of the surface: at a vertex, on an edge or inside a face."""
+"""Points of the surface, at a vertex, on an edge or inside a face; and sources made of them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -148,3 +148,53 @@ Point = int | np.integer[Any] | SurfacePoint
 
 Points = Point | Sequence[Point] | NDArray[np.integer[Any]]
 """One point or several."""
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A polyline on the surface; as a source, distances start at all of its points.
+
+    Each segment is straight, and lies in a face that both of its ends belong to. The `locations` of
+    a `GeodesicPath` make a curve. So to join points that are farther apart, find the
+    `shortest_path` with these points as waypoints. A closed curve ends where it begins.
+
+    Parameters
+    ----------
+    points
+        Vertex indices or `SurfacePoint`, at least one.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)
+    >>> side = gc.Curve([0, 1])  # the lower edge of the square
+    >>> gc.exact_distance(mesh, side).distances.tolist()
+    [0.0, 0.0, 1.0, 1.0]
+    """
+
+    points: Sequence[Point]
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A point or a curve, and the distance at which it starts.
+
+    Parameters
+    ----------
+    point
+        A vertex index, a `SurfacePoint` or a `Curve`.
+    start_distance
+        Mesh units, finite, 0 or more; added to every distance from this source.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)
+    >>> gc.exact_distance(mesh, gc.Source(0, start_distance=0.5)).distances.round(3).tolist()
+    [0.5, 1.5, 1.5, 1.914]
+    """
+
+    point: Point | Curve
+    start_distance: float = 0.0
+
+
+Sources = Points | Curve | Source | Sequence[Point | Curve | Source]
+"""Every way to write the sources of a field"""

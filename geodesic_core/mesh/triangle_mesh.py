@@ -406,7 +406,7 @@ class TriangleMesh:
         if wanted.shape != (3,) or not (np.abs(wanted) <= LARGEST_COORDINATE).all():
             raise InvalidPoint(
                 f"the position is {position!r}; it must be three finite numbers, at most "
-                f"{LARGEST_COORDINATE:g} in size"
+                f"{LARGEST_COORDINATE:g} in size (of several positions, locate one after another)"
             )
         limit = as_limit(max_distance)
         face, point, distance = self._nearest_face(wanted - self.origin)

@@ -41,7 +41,7 @@ def find_matrix(
     target_sweep: Callable[[], TargetSweep],
     search: Callable[[], PathSearch],
     sources: Points,
-    targets: Points,
+    targets: Points | None,
     max_distance: float | None,
     layout: Layout,
     threads: int | None,
@@ -55,9 +55,11 @@ def find_matrix(
     check_choice("layout", layout, get_args(Layout))
     most = as_threads(threads)
     starts = as_points(mesh, sources, "source", control)
-    stops = as_points(mesh, targets, "target", control)
+    stops = starts if targets is None else as_points(mesh, targets, "target", control)
     table: _Dense | _Sparse | _Pairs
     if layout == "pairs":
+        if targets is None:
+            raise InvalidArgument("pairs need targets, one for each source")
         table = _Pairs(mesh, starts, stops, SWEEP_FROM if solve is None else 1, control)
     elif layout == "dense":
         control.check_memory(8 * len(starts) * len(stops))

@@ -1,5 +1,7 @@
 """Nearest candidates: those with the shortest geodesic distance to a point."""
 
+from __future__ import annotations  # help() shows the names of types, not what they stand for
+
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 

@@ -13,7 +13,7 @@ from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.order import sweep_order
 
 _BLOCK_BYTES = 1 << 25
-"""Bytes of a block, at most: a process that is killed loses one or two"""
+"""Bytes of a block, at most"""
 _BLOCK_ROWS = 256
 """Rows of a block, at most: its columns are as wide where a symmetric table is mirrored"""
 

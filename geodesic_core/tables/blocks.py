@@ -1,5 +1,6 @@
 """Blocks of finished rows in a scratch folder, from which an interrupted table goes on."""
 
+import hashlib
 import json
 import os
 import shutil
@@ -7,6 +8,7 @@ import tempfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +16,19 @@ import numpy as np
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 
+from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidArgument
 
 _QUESTION = "question.json"
+_DIGEST_BYTES = 16
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """The folder of a table in the making; each block is an array: checked, or missing."""
+    """The folder of a table in the making; each block is an array: checked, or missing.
+
+    Of a block that is not complete, the rows that are there may be kept.
+    """
 
     folder: Path
 
@@ -75,6 +82,7 @@ class Blocks:
             os.fsync(file.fileno())
         # Last: without it the block counts as missing.
         _write(self.folder / f"{block}.crc32", _checksum(array))
+        self._rows_of(block).unlink(missing_ok=True)
 
     def get(self, block: int) -> NDArray[Any]:
         """Return a block, mapped."""
@@ -89,10 +97,33 @@ class Blocks:
         except (OSError, ValueError):
             return False
 
+    def keep(self, block: int, rows: Mapping[int, Floats]) -> None:
+        """Write those rows of a block that are there, by sweep, instead of earlier ones."""
+        content = BytesIO()
+        np.savez(content, allow_pickle=False, **{str(sweep): row for sweep, row in rows.items()})
+        _write(self._rows_of(block), _digest(content.getvalue()) + content.getvalue())
+
+    def kept(self, block: int) -> dict[int, Floats]:
+        """Return the rows that are kept of a block; none if they are not as they were written."""
+        path = self._rows_of(block)
+        content = path.read_bytes() if path.exists() else b""
+        digest, rows = content[:_DIGEST_BYTES], content[_DIGEST_BYTES:]
+        if digest != _digest(rows):
+            return {}
+        with np.load(BytesIO(rows), allow_pickle=False) as file:
+            return {int(sweep): row for sweep, row in file.items()}
+
+    def _rows_of(self, block: int) -> Path:
+        return self.folder / f"{block}.rows"
+
     def remove(self) -> None:
         """Remove the folder: the table is finished."""
         shutil.rmtree(self.folder)
         self.folder.with_suffix(".lock").unlink(missing_ok=True)
+
+
+def _digest(content: bytes) -> bytes:
+    return hashlib.blake2b(content, digest_size=_DIGEST_BYTES).digest()
 
 
 def _checksum(array: NDArray[Any]) -> bytes:

@@ -1,10 +1,14 @@
 """Matrices of distances larger than memory, written to a file, and continued after a stop."""
 
+from __future__ import annotations  # help() shows the names of types, not what they stand for
+
 import hashlib
 import json
 import math
 import threading
+import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import repeat
@@ -35,6 +39,7 @@ from geodesic_core.tables.formats import (
     DENSE,
     SPARSE,
     SUFFIXES,
+    Facts,
     may_replace,
     require,
     sha256_of,
@@ -44,6 +49,9 @@ from geodesic_core.validation import as_limit, check_choice
 
 Everywhere = Literal["all"]
 """Every vertex of the mesh"""
+
+_KEPT_SECONDS = 5.0
+"""Time after which finished rows are kept even though their block is not complete"""
 
 
 @dataclass(frozen=True)
@@ -89,9 +97,9 @@ def write_matrix(
 ) -> MatrixFile:
     """Write the distances from each source to each target to a file, however many there are.
 
-    If a call was interrupted, the same call continues where it stopped: finished rows are kept in
-    blocks, in a hidden folder beside the file, until the file is complete. Interruptions and the
-    number of threads do not change a bit of the file.
+    If a call was interrupted, the same call continues where it stopped: finished rows are kept in a
+    hidden folder beside the file until the file is complete. A process that is killed loses the
+    rows of its last 5 s. Interruptions and the number of threads do not change a bit of the file.
 
     Parameters
     ----------
@@ -124,7 +132,7 @@ def write_matrix(
     -------
     MatrixFile
         The file, its shape and its error. The same facts and the arguments are in ``out`` +
-        ``".json"``.
+        ``".json"``: the ids of the rows and columns among them, or ``"all"``, and the barriers.
 
     Raises
     ------
@@ -174,8 +182,8 @@ def write_matrix(
         absolute_error=absolute_error,
         effort=effort,
     )
-    starts = _points(mesh, sources, "source", control)
-    stops = None if targets is None else _points(mesh, targets, "target", control)
+    starts, rows = _points(mesh, sources, "source", control)
+    stops, columns = (None, rows) if targets is None else _points(mesh, targets, "target", control)
     plan = Plan.of(mesh, starts, stops, control, in_order=suffix in SPARSE)
     chosen: Mapping[str, Mapping[str, Any]] = {
         "approximate": {"relative_error": relative_error, "absolute_error": absolute_error},
@@ -183,8 +191,9 @@ def write_matrix(
     }
     facts = {
         "mesh": _digest(mesh.vertices, mesh.faces, mesh.barriers),
-        "sources": _written(starts),
-        "targets": None if stops is None else _written(stops),
+        "barriers": mesh.barriers.tolist(),
+        "sources": rows,
+        "targets": columns,
         "shape": plan.shape,
         "method": method,
         **chosen.get(method, {}),
@@ -200,8 +209,7 @@ def write_matrix(
         swept = sweep.run(blocks, most, control)
         write_table(plan, blocks, sweep.dtype, facts, path)
         written = MatrixFile(path, plan.shape, bound, sha256_of(path), swept)
-        text = json.dumps(facts | {"sha256": written.sha256}, indent=1)
-        path.with_name(f"{path.name}.json").write_text(text + "\n")
+        _write_beside(path, facts | {"sha256": written.sha256})
         blocks.remove()
     if control.progress is not None:
         control.progress(1.0)
@@ -210,14 +218,23 @@ def write_matrix(
 
 def _points(
     mesh: TriangleMesh, points: Sequence[Point] | Everywhere, name: str, control: Control
-) -> list[SurfacePoint]:
-    chosen = range(len(mesh.vertices)) if isinstance(points, str) and points == "all" else points
-    return as_points(mesh, chosen, name, control)
+) -> tuple[list[SurfacePoint], Any]:
+    """Return canonical points, and how the facts of a file name them, which a service reads too."""
+    if isinstance(points, str) and points == "all":
+        return as_points(mesh, range(len(mesh.vertices)), name, control), points
+    canonical = as_points(mesh, points, name, control)
+    return canonical, [
+        {"face": int(point.face_index), "barycentric": point.barycentric}
+        if point.vertex_index is None
+        else point.vertex_index
+        for point in canonical
+    ]
 
 
-def _written(points: Sequence[SurfacePoint]) -> str:
-    """Return a hash of points, hexadecimal."""
-    return hashlib.sha256(repr(points).encode()).hexdigest()
+def _write_beside(path: Path, facts: Facts) -> None:
+    """Write what a file holds into another one beside it, one fact a line."""
+    rows = (f" {json.dumps(name)}: {json.dumps(fact)}" for name, fact in facts.items())
+    path.with_name(f"{path.name}.json").write_text("{\n" + ",\n".join(rows) + "\n}\n")
 
 
 def _digest(*arrays: NDArray[Any]) -> str:
@@ -229,7 +246,10 @@ def _digest(*arrays: NDArray[Any]) -> str:
 
 @dataclass(frozen=True)
 class _Sweep:
-    """The sweeps of a plan, in threads; each block is written once its rows are there."""
+    """The sweeps of a plan, in threads; each block is written once its rows are there.
+
+    The rows of blocks that are not complete are kept from time to time, and where the call stops.
+    """
 
     mesh: TriangleMesh
     plan: Plan
@@ -243,18 +263,32 @@ class _Sweep:
         missing = [
             block for block in control.watched(range(self.plan.blocks)) if not blocks.has(block)
         ]
-        sweeps = [sweep for block in missing for sweep in self.plan.rows_of(block)]
+        unfinished = {block: blocks.kept(block) for block in missing}
+        sweeps = [
+            sweep
+            for block, rows in unfinished.items()
+            for sweep in self.plan.rows_of(block)
+            if sweep not in rows
+        ]
         if not sweeps:
             return 0
-        unfinished: dict[int, dict[int, Floats]] = {block: {} for block in missing}
-        lock = threading.Lock()
+        lock, last_kept = threading.Lock(), time.monotonic()
+
+        def keep() -> None:
+            for block, rows in unfinished.items():
+                if rows:
+                    blocks.keep(block, rows)
 
         def put(sweep: int, row: Floats) -> None:
+            nonlocal last_kept
             block = sweep // self.plan.block_rows
             with lock:
                 rows = unfinished[block]
                 rows[sweep] = row
                 if len(rows) < len(self.plan.rows_of(block)):
+                    if time.monotonic() - last_kept >= _KEPT_SECONDS:
+                        keep()
+                        last_kept = time.monotonic()
                     return
                 del unfinished[block]
             blocks.put(block, self.layout.block_of(self.plan, block, rows, self.dtype))
@@ -267,5 +301,10 @@ class _Sweep:
             rows_of, self.plan.ends, self.limit, self.solve, partial(TargetSweep, self.mesh)
         )
         states = (make() for _ in repeat(None))
-        share_within_memory(len(sweeps), states, work, threads, control, held=lambda: 0)
+        try:
+            share_within_memory(len(sweeps), states, work, threads, control, held=lambda: 0)
+        except BaseException:
+            with suppress(OSError):  # a full disk is what may have stopped the call
+                keep()
+            raise
         return len(sweeps)

@@ -1,6 +1,9 @@
 """A matrix in parts, which may be computed on several machines and are then joined to one file."""
 
+from __future__ import annotations  # help() shows the names of types, not what they stand for
+
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import IO, Any, Literal
 
@@ -19,6 +22,21 @@ from geodesic_core.tables import dense, sparse
 from geodesic_core.tables.formats import write_npy, write_npz
 from geodesic_core.validation import as_limit, check_choice
 
+_PART_WORK = 3e8
+"""Faces to the power of 1.5, for each of the whole sweeps of a part: about 5 s on a core.
+
+Whole sweeps over spheres, the dearest meshes, took 1.5e-8 s for each. A part is lost as a whole
+where its process ends.
+"""
+
+
+def _part_rows(width: int, faces: int, max_distance: float | None) -> int:
+    """Return the number of sweeps in a part, for a matrix of this width."""
+    rows = block_rows(width)
+    if max_distance is None:  # sweeps to a limit take any time below that
+        rows = min(rows, int(_PART_WORK / faces**1.5))
+    return max(1, rows)
+
 
 class MatrixParts:
     """A matrix in parts, each with the distances of some sweeps.
@@ -31,7 +49,8 @@ class MatrixParts:
     mesh
         The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     sources, targets
-        N and M vertex indices or `SurfacePoint`. Where both are the same, each pair is asked once.
+        N and M vertex indices or `SurfacePoint`. Without targets, the targets are the sources.
+        Where both are the same, each pair is computed once.
     layout
         ``"dense"`` for all distances, ``"sparse"`` for the finite ones.
     method, relative_error, absolute_error, effort, max_distance
@@ -58,7 +77,7 @@ class MatrixParts:
         self,
         mesh: MeshLike,
         sources: Sequence[Point],
-        targets: Sequence[Point],
+        targets: Sequence[Point] | None = None,
         *,
         layout: Literal["dense", "sparse"] = "dense",
         method: Method = "exact",
@@ -77,18 +96,26 @@ class MatrixParts:
         self._limit = as_limit(max_distance)
         self._dtype = np.dtype(dtype)
         starts = as_points(self._mesh, sources, "source", control)
-        stops = as_points(self._mesh, targets, "target", control)
+        stops = None if targets is None else as_points(self._mesh, targets, "target", control)
         self._is_sparse = layout == "sparse"
-        self._plan = Plan.of(self._mesh, starts, stops, control, in_order=self._is_sparse)
+        plan = Plan.of(self._mesh, starts, stops, control, in_order=self._is_sparse)
+        rows = _part_rows(plan.width, len(self._mesh.faces), max_distance)
+        self._plan = replace(plan, block_rows=rows)
 
     @staticmethod
-    def areas(sources: int, targets: int | None) -> list[int]:
-        """Return the number of distances in each part, by the numbers of points alone.
+    def areas(
+        sources: int, targets: int | None, faces: int, max_distance: float | None = None
+    ) -> list[int]:
+        """Return the number of distances in each part, by the size of the question alone.
 
         Parameters
         ----------
         sources, targets
             Numbers of points, 1 or more; None for targets that are the sources.
+        faces
+            Number of faces of the mesh.
+        max_distance
+            As of the parts.
 
         Returns
         -------
@@ -97,12 +124,12 @@ class MatrixParts:
 
         Examples
         --------
-        >>> gc.MatrixParts.areas(300, None)
-        [76800, 1936]
+        >>> gc.MatrixParts.areas(300, None, faces=20_000)
+        [31800, 20564, 7744]
         """
         sweeps = sources if targets is None else min(sources, targets)
         width = sources if targets is None else max(sources, targets)
-        rows = block_rows(width)
+        rows = _part_rows(width, faces, max_distance)
         return [
             min(rows, sweeps - first) * (width - (first if targets is None else 0))
             for first in range(0, sweeps, rows)

@@ -84,7 +84,8 @@ def test_the_file_is_the_one_of_this_machine(
         assert ran.code == 0, ran.err
         assert there.read_bytes() == here.read_bytes()
         facts = [json.loads(Path(f"{out}.json").read_text()) for out in (here, there)]
-        for name in ("shape", "sha256", "error_bound", "max_distance", "dtype", "method"):
+        names = "sources", "targets", "barriers", "shape", "method", "max_distance", "dtype"
+        for name in (*names, "sha256", "error_bound"):
             assert facts[0][name] == facts[1][name]
         assert ran.figure("sha256") == facts[0]["sha256"]
     assert set(asked) == {("http://service.test", service_key)}

@@ -2,6 +2,7 @@
 
 import doctest
 import inspect
+import pydoc
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -48,6 +49,10 @@ RECORDS |= {"gc.Border"}
 """Classes whose attributes are documented one by one: users read them, and make none."""
 
 
+SCREEN = 12 * 100
+"""Characters that a signature in `help` may have: twelve lines"""
+
+
 def section(thing: Callable[..., Any], title: str) -> str | None:
     """Return the text of a section of a docstring; None where it has none."""
     found = re.search(
@@ -92,7 +97,7 @@ def test_documented_parameters_are_the_real_ones(name: str) -> None:
 @pytest.mark.parametrize("name", ROUTINES)
 def test_routines_tell_their_results(name: str) -> None:
     thing = PUBLIC[name]
-    if inspect.signature(thing).return_annotation is not None:
+    if inspect.signature(thing).return_annotation not in (None, "None"):
         assert section(thing, "Returns") or section(thing, "Yields"), "no section on the result"
     if set(parameters_of(thing)) >= CONTROLS:
         assert "DeadlineExceeded" in (section(thing, "Raises") or "")
@@ -110,6 +115,18 @@ def test_results_that_are_arrays_tell_shape_and_type() -> None:
 @pytest.mark.parametrize("name", PUBLIC)
 def test_each_has_an_example(name: str) -> None:
     assert ">>> " in (section(PUBLIC[name], "Examples") or "")
+
+
+@pytest.mark.parametrize("name", ROUTINES)
+def test_help_shows_a_signature_that_fits_on_a_screen(name: str) -> None:
+    """Types have names there, such as ``MeshLike``, which would else be pages of unions."""
+    text = pydoc.plain(pydoc.render_doc(PUBLIC[name]))
+    last = name.rpartition(".")[2]
+    (shown,) = (line for line in text.splitlines() if line.startswith(f"{last}("))
+    assert len(shown) <= SCREEN
+    if last in vars(gc.Solver):
+        assert len(shown) <= SCREEN / 2
+        assert "numpy._typing" not in shown
 
 
 def examples() -> Iterator[doctest.DocTest]:

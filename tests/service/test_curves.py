@@ -153,6 +153,30 @@ def test_curves_are_sources_of_sweeps_only(client: TestClient, plane: str) -> No
         assert [fault["pointer"] for fault in problem["errors"]] == [place]
 
 
+def test_start_distances_are_for_sources_of_sweeps_only(client: TestClient, plane: str) -> None:
+    """Where no other source competes, one would add a constant."""
+    late, point = {"vertex": 0, "start_distance": 1}, {"vertex": 1}
+    for operation, body, place in (
+        ("distances", {"sources": [point], "targets": [late]}, "/targets/0"),
+        ("paths", {"source": late, "targets": [point]}, "/source"),
+        ("path", {"source": late, "target": point}, "/source"),
+        ("path", {"source": point, "target": point, "waypoints": [late]}, "/waypoints/0"),
+        ("matrix", {"sources": [late]}, "/sources/0"),
+        ("matrix", {"sources": [point], "targets": [late]}, "/targets/0"),
+        ("nearest", {"source": late, "candidates": [point]}, "/source"),
+        ("nearest", {"source": point, "candidates": [late]}, "/candidates/0"),
+    ):
+        refused = client.post(f"/v1/meshes/{plane}/{operation}", json=body)
+        problem = check_problem(refused, 422, "invalid_request")
+        (fault,) = problem["errors"]
+        assert fault["pointer"] == f"{place}/start_distance"
+        assert fault["message"].startswith("Only sources of distances, isolines and borders")
+    unknown = client.post(
+        f"/v1/meshes/{plane}/nearest", json={"source": {"vertex": 0, "end": 1}, "candidates": [0]}
+    )
+    assert "start_distance" not in check_problem(unknown, 422, "invalid_request")["detail"]
+
+
 def test_all_points_of_curves_count(tmp_path: Path) -> None:
     with serving(tmp_path, max_sources=4) as client:
         mesh_id = upload_sample(client, "plane", 200)

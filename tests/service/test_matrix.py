@@ -273,12 +273,48 @@ def test_refused_matrices(client: TestClient, knot: str, change: dict, place: st
         assert [fault["pointer"] for fault in problem["errors"]] == [place]
 
 
-@pytest.mark.parametrize(("given", "missing"), [("sources", "targets"), ("targets", "sources")])
-def test_a_missing_side_is_named(client: TestClient, knot: str, given: str, missing: str) -> None:
-    response = client.post(f"/v1/meshes/{knot}/matrix", json={given: [{"vertex": 0}]})
+def test_missing_sources_are_named(client: TestClient, knot: str) -> None:
+    for body in ({"targets": [{"vertex": 0}]}, {}):
+        response = client.post(f"/v1/meshes/{knot}/matrix", json=body)
+
+        problem = check_problem(response, 422, "invalid_request")
+        assert [fault["pointer"] for fault in problem["errors"]] == ["/sources"]
+
+
+@pytest.mark.parametrize("layout", ["dense", "sparse"])
+@pytest.mark.parametrize(
+    "sources", [[0, {"face": 7, "barycentric": [0.2, 0.3, 0.5]}, 9], [3], "all"], ids=str
+)
+def test_without_targets_the_targets_are_the_sources(
+    client: TestClient, layout: str, sources: Any
+) -> None:
+    mesh_id = upload_sample(client, "sphere", 80)
+    answers = [
+        client.post(f"/v1/meshes/{mesh_id}/matrix", json=body | {"layout": layout})
+        for body in ({"sources": sources}, {"sources": sources, "targets": sources})
+    ]
+    assert [answer.status_code for answer in answers] == [200, 200]
+    assert answers[0].content == answers[1].content
+    assert answers[0].headers["etag"] == answers[1].headers["etag"]
+    table = answers[0].json()
+    assert table["sources"] == table["targets"]
+
+
+def test_faults_of_sources_that_are_targets_too_are_told_once(
+    client: TestClient, knot: str
+) -> None:
+    response = client.post(f"/v1/meshes/{knot}/matrix", json={"sources": [0, 10**6]})
+
+    problem = check_problem(response, 422, "invalid_point")
+    assert [fault["pointer"] for fault in problem["errors"]] == ["/sources/1"]
+
+
+def test_pairs_need_targets(client: TestClient, knot: str) -> None:
+    response = client.post(f"/v1/meshes/{knot}/matrix", json={"sources": [0, 1], "layout": "pairs"})
 
     problem = check_problem(response, 422, "invalid_request")
-    assert [fault["pointer"] for fault in problem["errors"]] == [f"/{missing}"]
+    assert [fault["pointer"] for fault in problem["errors"]] == ["/targets"]
+    assert "one for each source" in problem["detail"]
 
 
 def test_limits_of_matrices(tmp_path: Path) -> None:

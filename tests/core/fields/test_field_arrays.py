@@ -116,3 +116,34 @@ def test_the_mesh_keeps_its_barriers() -> None:
     again = gc.DistanceField.from_arrays(among, field.arrays())
 
     np.testing.assert_equal(answers(again), answers(field))
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("name", ["distances", "scalar", "temperature", "Distance", "", "arrays"])
+@pytest.mark.parametrize("kind", ["exact", "exact, windows kept", "for paths", "for isolines"])
+def test_an_array_of_another_name_is_refused(kind: str, name: str) -> None:
+    """It would be ignored: isolines would be those of the field itself."""
+    arrays = KINDS[kind](sources=[3]).arrays()
+    foreign = arrays | {name: np.arange(len(MESH.vertices), dtype=float)}
+    with pytest.raises(gc.errors.InvalidArgument, match=f"arrays has {name!r}, which is none of"):
+        gc.DistanceField.from_arrays(MESH, foreign)
+
+
+@pytest.mark.jit
+def test_arrays_of_what_a_field_has_not_retained_are_refused() -> None:
+    """Half of what it needs for paths, beside a field without, is not taken for paths."""
+    full = gc.exact_distance(MESH, 3).arrays()
+    bare = gc.exact_distance(MESH, 3, retain="distances").arrays()
+    for name in full.keys() - bare.keys() - {"winner"}:
+        with pytest.raises(gc.errors.InvalidArgument, match=f"arrays has {name!r}"):
+            gc.DistanceField.from_arrays(MESH, bare | {name: full[name]})
+    gc.DistanceField.from_arrays(MESH, bare)
+
+
+@pytest.mark.jit
+def test_a_missing_array_is_named() -> None:
+    for arrays in (gc.exact_distance(MESH, 3).arrays(), gc.fast_distance(MESH, 3).arrays()):
+        for name in arrays.keys() - {"effort", "winner"}:  # without these, others are foreign
+            rest = {other: array for other, array in arrays.items() if other != name}
+            with pytest.raises(KeyError, match=name):
+                gc.DistanceField.from_arrays(MESH, rest)

@@ -160,6 +160,27 @@ def test_a_missing_array_is_refused(file: Path, name: str) -> None:
         gc.load_field(file, MESH)
 
 
+@pytest.mark.jit
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("scalar", "holds other 'scalar' than the field"),
+        ("distances", "holds other 'distances' than the field"),
+        ("nearest_source", "holds other 'nearest_source' than the field"),
+        ("sweep.scalar", "arrays has 'scalar', which is none of this field's"),
+        ("swept", "holds other 'swept' than the field"),
+    ],
+)
+def test_a_foreign_or_changed_array_is_refused(file: Path, name: str, message: str) -> None:
+    """Else the field would be as it was, without a word."""
+    with np.load(file) as whole:
+        members = dict(whole)
+    members[name] = members["distances"] + 1.0
+    np.savez(file, allow_pickle=False, **members)
+    with pytest.raises(InvalidArgument, match=message):
+        gc.load_field(file, MESH)
+
+
 @pytest.mark.parametrize(
     ("path", "message"),
     [

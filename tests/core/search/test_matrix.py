@@ -3,6 +3,7 @@
 import itertools
 import math
 import threading
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ from scipy.sparse import csr_array
 
 import geodesic_core as gc
 from geodesic_core.search import matrix, path_search, threads
+from geodesic_core.search.order import sweep_order
+from geodesic_core.search.rows import ExactRows, FieldRows
 from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_points import EXACT, SAME, random_points
 from tests.support import zoo
@@ -208,13 +211,13 @@ BAD = [
     ({"sources": np.empty(0, int)}, "InvalidArgument", "no sources"),
     ({"sources": 3.5}, "InvalidArgument", "sources is 3.5"),
     ({"targets": "12"}, "InvalidArgument", "targets is '12'"),
-    ({"targets": None}, "InvalidArgument", "targets is None"),
     ({"sources": [0, -1]}, "InvalidPoint", "source 1 is vertex -1"),
     ({"targets": [0, 1, 99]}, "InvalidPoint", "target 2 is vertex 99"),
     ({"targets": [0, 1.5]}, "InvalidPoint", "target 1 is 1.5"),
     ({"sources": [gc.SurfacePoint.face(8, (1, 0, 0))]}, "InvalidPoint", "source 0 is face 8"),
     ({"layout": "csr"}, "InvalidArgument", "layout is 'csr'"),
     ({"layout": None}, "InvalidArgument", "layout is None"),
+    ({"layout": "pairs", "targets": None}, "InvalidArgument", "pairs need targets"),
     ({"layout": "pairs", "targets": [1, 2, 3]}, "InvalidArgument", "2 sources and 3 targets"),
     ({"max_distance": -1.0}, "InvalidArgument", "max_distance is -1.0"),
     ({"max_distance": math.nan}, "InvalidArgument", "max_distance is nan"),
@@ -359,3 +362,41 @@ def test_a_matrix_counts_as_memory(mesh):
     many = [0] * 1000
     with pytest.raises(gc.errors.MemoryLimitExceeded, match="8000000 bytes or more"):
         gc.distance_matrix(mesh, many, many, memory_limit=7_999_999)
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("method", ["exact", "approximate", "fast"])
+@zoo.each({name: zoo.SMALL[name] for name in ("hills", "two_components", "octahedron")})
+def test_without_targets_all_pairs_are_found_each_once(case, method, monkeypatch):
+    mesh = mesh_of(case)
+    points = [0, 5, gc.SurfacePoint.face(3, (0.2, 0.3, 0.5)), 1]
+    expected = gc.distance_matrix(mesh, points, list(points), method=method)
+    swept: list[int] = []
+    kind = ExactRows if method == "exact" or mesh.is_rough else FieldRows
+    distances = kind.distances
+
+    def counted(rows, source, targets, control):
+        swept.append(len(targets))
+        return distances(rows, source, targets, control)
+
+    monkeypatch.setattr(kind, "distances", counted)
+    for ask in (partial(gc.distance_matrix, mesh), gc.Solver(mesh).distance_matrix):
+        swept.clear()
+        table = ask(points, method=method)
+        assert sorted(swept) == [1, 2, 3, 4]
+        np.testing.assert_array_equal(table, expected)
+        np.testing.assert_array_equal(table, table.T)
+        np.testing.assert_array_equal(np.diag(table), 0.0)
+        sparse = [
+            ask(points, targets, method=method, layout="sparse") for targets in (None, points)
+        ]
+        np.testing.assert_array_equal(*map(as_dense, sparse))
+        np.testing.assert_allclose(as_dense(sparse[0]), expected, rtol=EXACT)
+    parts = gc.MatrixParts(mesh, points, method=method)
+    assert parts.shape == (4, 4)
+    np.testing.assert_array_equal(parts.compute(0), expected[np.ix_(*2 * [_order(mesh, points)])])
+    assert gc.distance_matrix(mesh, 0).tolist() == [[0.0]]
+
+
+def _order(mesh, points):
+    return sweep_order(np.array([mesh.position(point) for point in map(mesh.point, points)]))

@@ -75,7 +75,9 @@ def test_parts_are_the_file_to_the_bit(
     parts.write(file, found.__getitem__)
 
     others = None if ends == "symmetric" else targets
-    areas = gc.MatrixParts.areas(len(sources), others and len(others))
+    areas = gc.MatrixParts.areas(
+        len(sources), others and len(others), len(mesh.faces), options.get("max_distance")
+    )
     assert parts.count == len(areas) > 1
     if layout == "dense":
         assert [part.size for part in found] == areas

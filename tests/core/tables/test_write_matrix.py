@@ -1,12 +1,14 @@
 """Matrices in files: the same distances in each format, and after any number of stops."""
 
 import errno
+import itertools
 import json
 import math
 import multiprocessing
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +20,8 @@ from scipy.sparse import load_npz
 import geodesic_core as gc
 from geodesic_core.search import plan, threads
 from geodesic_core.search.order import sweep_order
+from geodesic_core.search.rows import ExactRows
+from geodesic_core.tables import matrix_file
 from geodesic_core.tables.blocks import Blocks
 from geodesic_core.tables.formats import sha256_of
 from tests.core.fields.test_points import EXACT, random_points
@@ -127,32 +131,169 @@ def test_the_file_tells_what_was_asked(mesh, tmp_path):
             "kind": "guaranteed",
         }
         assert facts[suffix]["shape"] == [3, 2]
+        assert facts[suffix]["sources"] == [0, 5, 9]
+        assert facts[suffix]["targets"] == [1, 2]
+        assert facts[suffix]["barriers"] == []
     schema = pyarrow.parquet.read_schema(tmp_path / "table.parquet")
     assert json.loads(schema.metadata[b"geodesic"]) == facts[".parquet"]
     attributes = zarr.open_array(tmp_path / "table.zarr", mode="r").attrs.asdict()
     assert attributes == facts[".zarr"]
 
 
+@pytest.mark.jit
+def test_the_facts_hold_all_that_the_table_is_made_from(mesh, tmp_path):
+    """By them alone the same table is made again."""
+    inside = gc.SurfacePoint.face(np.int64(200), (0.2, 0.3, 0.5))
+    on_edge = mesh.point(gc.SurfacePoint.edge(7, 1, 0.25))
+    questions = [
+        (np.array([3, 7]), None, {}),
+        ([9, inside, on_edge, gc.SurfacePoint.vertex(4)], [0], {"method": "fast", "effort": 4}),
+        ("all", [inside], {"barriers": [31, 30], "max_distance": 0.75}),
+        ([5], "all", {"method": "approximate", "relative_error": None, "absolute_error": 0.01}),
+        ("all", None, {"dtype": "float32", "max_distance": 0.5}),
+        (range(len(mesh.vertices)), None, {}),
+    ]
+
+    def point_of(written):
+        if isinstance(written, int):
+            return written
+        return gc.SurfacePoint.face(written["face"], tuple(written["barycentric"]))
+
+    def side_of(written):
+        return written if written == "all" else [point_of(each) for each in written]
+
+    for sources, targets, options in questions:
+        out = tmp_path / "table.npy"
+        written = gc.write_matrix(mesh, out, sources, targets, **options)
+        text = (tmp_path / "table.npy.json").read_text()
+        facts = json.loads(text)
+        assert facts["sha256"] == written.sha256
+        sides = [facts["sources"], facts["targets"]]
+        for side, count in zip(sides, written.shape, strict=True):
+            assert side == "all" or len(side) == count
+        names = "method", "relative_error", "absolute_error", "effort", "max_distance", "barriers"
+        asked = {name: facts[name] for name in (*names, "dtype") if name in facts}
+        again = gc.write_matrix(mesh, tmp_path / "again.npy", *map(side_of, sides), **asked)
+        assert again.sha256 == written.sha256
+        assert json.loads((tmp_path / "again.npy.json").read_text()) == facts
+        assert len(text.splitlines()) == len(facts) + 2
+    assert facts["sources"] == list(range(len(mesh.vertices)))
+
+
 KILLED = """
 import sys
 import geodesic_core as gc
 from geodesic_core.search import plan
-from geodesic_core.tables.blocks import Blocks
-from geodesic_core.tables.formats import sha256_of
+from geodesic_core.tables import matrix_file
 
-plan._BLOCK_ROWS = 2
+plan._BLOCK_ROWS = int(sys.argv[2])
+matrix_file._KEPT_SECONDS = 0.0
 mesh = gc.samples.sphere(1280)
 print(gc.write_matrix(mesh, sys.argv[1], range(0, 640, 10), threads=2).swept)
 """
 
 
-def run_killed(out: Path, blocks: int) -> int:
-    """Run the script, and kill it when there are so many blocks; return its exit code."""
-    process = subprocess.Popen([sys.executable, "-c", KILLED, out], stdout=subprocess.DEVNULL)  # noqa: S603 - this Python
+def run_killed(out: Path, rows: int, is_time: Callable[[Path], bool]) -> int:
+    """Run the script with blocks of so many rows, and kill it when it is time; return its code."""
+    command = [sys.executable, "-c", KILLED, out, str(rows)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL)  # noqa: S603 - this Python
     folder = out.with_name(f".{out.name}.part")
-    wait_until(lambda: len(list(folder.glob("*.crc32"))) >= blocks or process.poll() is not None)
+    wait_until(lambda: is_time(folder) or process.poll() is not None)
     process.kill()
     return process.wait()
+
+
+def run_to_its_end(out: Path, rows: int) -> int:
+    """Run the script with blocks of so many rows; return the number of rows that it computed."""
+    command = [sys.executable, "-c", KILLED, out, str(rows)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)  # noqa: S603 - this Python
+    return int(done.stdout)
+
+
+class Stopped:
+    """A matrix that is stopped by its caller after some rows, in one block."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.rows = 0
+        distances = ExactRows.distances
+
+        def counted(*arguments):
+            self.rows += 1
+            return distances(*arguments)
+
+        monkeypatch.setattr(ExactRows, "distances", counted)
+
+    def write(self, mesh: gc.TriangleMesh, out: Path, after: int, **options) -> None:
+        """Write until so many rows more are begun."""
+        end = self.rows + after
+        with pytest.raises(gc.errors.Cancelled):
+            gc.write_matrix(
+                mesh, out, range(0, 160, 4), cancel=lambda: self.rows > end, threads=1, **options
+            )
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_call_that_is_cancelled_within_a_block_goes_on_after_it(
+    mesh, suffix, tmp_path, monkeypatch
+):
+    """However short the time was: nothing that is done is lost."""
+    whole, out, count = tmp_path / f"whole{suffix}", tmp_path / f"stopped{suffix}", 40
+    gc.write_matrix(mesh, whole, range(0, 160, 4))
+    stopped = Stopped(monkeypatch)
+    monkeypatch.setattr(matrix_file, "_KEPT_SECONDS", math.inf)
+    folder = Blocks.beside(out)
+    for after in (5, 12):
+        stopped.write(mesh, out, after)
+    kept = len(folder.kept(0))
+    assert 12 <= kept < count
+    began = stopped.rows
+    assert gc.write_matrix(mesh, out, range(0, 160, 4)).swept == count - kept
+    assert stopped.rows == began + count - kept
+    assert sha256_of(out) == sha256_of(whole)
+    assert not folder.folder.exists()
+
+
+@pytest.mark.jit
+def test_rows_are_kept_once_their_time_has_come(mesh, tmp_path, monkeypatch):
+    """By a clock of the test: each row takes two of its seconds."""
+    clock = itertools.count(0, 2)
+    monkeypatch.setattr(matrix_file.time, "monotonic", lambda: 0.0)
+    kept: list[int] = []
+
+    def keep(_blocks: Blocks, block: int, rows: dict) -> None:
+        assert block == 0
+        kept.append(len(rows))
+
+    monkeypatch.setattr(Blocks, "keep", keep)
+    gc.write_matrix(mesh, tmp_path / "table.npy", range(20), threads=1)
+    assert kept == []
+    monkeypatch.setattr(matrix_file.time, "monotonic", lambda: float(next(clock)))
+    gc.write_matrix(mesh, tmp_path / "table.npy", range(20), threads=1)
+    assert kept == [3, 6, 9, 12, 15, 18]
+
+
+@pytest.mark.jit
+@pytest.mark.parametrize("at", [0, 3, 20, -1])
+def test_kept_rows_that_are_damaged_are_computed_again(mesh, at, tmp_path, monkeypatch):
+    whole, out = tmp_path / "whole.npy", tmp_path / "stopped.npy"
+    gc.write_matrix(mesh, whole, range(0, 160, 4))
+    Stopped(monkeypatch).write(mesh, out, 9)
+    path = tmp_path / ".stopped.npy.part" / "0.rows"
+    content = bytearray(path.read_bytes())
+    content[at] ^= 1
+    path.write_bytes(content)
+    assert gc.write_matrix(mesh, out, range(0, 160, 4)).swept == 40
+    assert out.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.jit
+def test_a_full_disk_does_not_hide_why_a_call_stopped(mesh, tmp_path, monkeypatch):
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Blocks, "keep", full)
+    Stopped(monkeypatch).write(mesh, tmp_path / "table.npy", 3)
 
 
 @pytest.mark.jit
@@ -160,13 +301,30 @@ def run_killed(out: Path, blocks: int) -> int:
 @pytest.mark.parametrize("suffix", [".npy", pytest.param(".npz", marks=pytest.mark.full)])
 def test_a_process_that_is_killed_goes_on_where_it_was(suffix, tmp_path):
     whole, out = tmp_path / f"whole{suffix}", tmp_path / f"killed{suffix}"
-    command = [sys.executable, "-c", KILLED]
-    expected = subprocess.run([*command, whole], check=True, capture_output=True, text=True)  # noqa: S603 - this Python
-    assert int(expected.stdout) == 64
+    assert run_to_its_end(whole, 2) == 64
     for blocks in (1, 9, 20):
-        assert run_killed(out, blocks) == -signal.SIGKILL
-    last = subprocess.run([*command, out], check=True, capture_output=True, text=True)  # noqa: S603 - this Python
-    assert int(last.stdout) <= 24
+
+        def has_blocks(folder: Path, blocks: int = blocks) -> bool:
+            return len(list(folder.glob("*.crc32"))) >= blocks
+
+        assert run_killed(out, 2, has_blocks) == -signal.SIGKILL
+    assert run_to_its_end(out, 2) <= 24
+    assert out.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.jit
+@pytest.mark.slow
+@pytest.mark.parametrize("suffix", [".npy", pytest.param(".npz", marks=pytest.mark.full)])
+def test_a_process_that_is_killed_within_a_block_keeps_the_rows_that_are_done(suffix, tmp_path):
+    whole, out = tmp_path / f"whole{suffix}", tmp_path / f"killed{suffix}"
+    assert run_to_its_end(whole, 64) == 64
+
+    def has_rows(folder: Path) -> bool:
+        return len(Blocks(folder).kept(0)) >= 20
+
+    assert run_killed(out, 64, has_rows) == -signal.SIGKILL
+    assert not list(tmp_path.glob(".*/*.crc32")), "the only block is not complete"
+    assert 0 < run_to_its_end(out, 64) <= 44
     assert out.read_bytes() == whole.read_bytes()
 
 
