@@ -78,6 +78,8 @@ from geodesic_core.tolerances import (
     LOOSE_OVERLAP,
     LOWER_BOUND,
     MOST_AT_LARGE,
+    MOST_CROSSINGS,
+    MOST_RUNS,
     NO_AREA,
     ON_PATH,
     OVERLAP,
@@ -559,6 +561,38 @@ def test_runs_are_more_than_winding_about_a_tip_takes():
     topology = topology_of(zoo.Case("flat", *zoo.grid(2, 2)))
     counted = np.iinfo(new_wavefront(topology, merges=True).pool.runs.dtype).max
     assert 1.5 * 2 * math.pi / SHARP < RUNS < counted
+
+
+def test_most_runs_are_far_more_than_lists_of_a_sweep_that_ends_come_up(monkeypatch):
+    """A list with one run left ends its sweep well; with none left the face is named."""
+    mesh, left = gc.samples.knot(500), 2
+    assert 10 * 2 * math.pi / SHARP < MOST_RUNS < np.iinfo(np.uint16).max
+
+    def new_used_wavefront(*args, **kwargs):
+        wave = new_wavefront(*args, **kwargs)
+        wave.pool.runs[:] = MOST_RUNS - left
+        return wave
+
+    expected = gc.exact_distance(mesh, 3).distances
+    monkeypatch.setattr(state, "new_wavefront", new_used_wavefront)
+    left = 100
+    assert gc.exact_distance(mesh, 3).distances.tobytes() == expected.tobytes()
+    left = 0
+    with pytest.raises(gc.errors.InternalError, match=r"circles through face \d+; .*fast_distance"):
+        gc.exact_distance(mesh, 3)
+    with pytest.raises(gc.errors.InternalError, match="does not end"):
+        gc.approximate_distance(mesh, 3, 1e-3)
+
+
+@pytest.mark.parametrize(("most", "ends"), [(0, False), (12, True), (MOST_CROSSINGS, True)])
+def test_most_crossings_are_more_than_a_fast_sweep_needs(monkeypatch, most, ends):
+    mesh = gc.samples.sphere(20480)
+    monkeypatch.setattr(fast_sweep, "MOST_CROSSINGS", most)
+    if ends:
+        assert np.isfinite(gc.fast_distance(mesh, 0, effort=8).distances).all()
+    else:
+        with pytest.raises(gc.errors.InternalError, match="exact_distance"):
+            gc.fast_distance(mesh, 0, effort=8)
 
 
 def is_rough(saddles: int, excess: float, vertices: int = 2 * ROUGH_VERTICES) -> bool:
