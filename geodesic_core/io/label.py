@@ -1,7 +1,5 @@
 """Labels of brain surfaces, such as the medial wall: files that name vertices of a surface."""
 
-import gzip
-import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -10,15 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Longs
-from geodesic_core.errors import EmptyBarrier, GeodesicError, InvalidArgument
+from geodesic_core.errors import EmptyBarrier, GeodesicError, InvalidArgument, InvalidMesh
 from geodesic_core.extras import extra
 from geodesic_core.io.annotation import read_annotation
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.io.unpacking import read_unpacked
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 _Label = str | float | None
-_GZIP = b"\x1f\x8b"
-"""First bytes of compressed data"""
 
 
 def load_label(
@@ -32,7 +29,7 @@ def load_label(
         The path of a FreeSurfer label (``.label``), which lists vertices, of an annotation
         (``.annot``), which has several labels, or of a GIFTI file (``.label.gii``,
         ``.shape.gii``, ``.func.gii``), which has a value for each vertex. Any of them may be
-        compressed (``.gz``).
+        packed, as mesh files may (``.gz``).
     mesh
         The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
     label
@@ -131,19 +128,18 @@ def load_label_vertices(
 
 def _vertices_of(path: Path, mesh: TriangleMesh, label: _Label, outside: bool) -> NDArray[np.bool_]:
     """Return which vertices of a mesh are in the label of a file, or outside; at least one is."""
-    kind = _SUFFIX.search(path.name.lower())
-    if kind is None:
+    count = len(mesh.vertices if mesh.vertex_map is None else mesh.vertex_map)
+    try:
+        file = read_unpacked(path, _READERS, None)
+    except InvalidMesh as error:
+        raise InvalidArgument(str(error)) from error
+    if file.suffix not in _READERS:
         raise InvalidArgument(
             f"{path} is not a label file: its name must end in .label, .annot or .gii, or in one "
             "of these and .gz"
         )
-    count = len(mesh.vertices if mesh.vertex_map is None else mesh.vertex_map)
     try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InvalidArgument(f"cannot read {path}: {error.strerror}") from error
-    try:
-        inside = _inside(data, kind[1], count, label)
+        inside = _inside(file.data, file.suffix, count, label)
     except InvalidArgument as error:
         raise InvalidArgument(f"{path} is not a label of this surface: {error}") from None
     except GeodesicError:
@@ -163,7 +159,6 @@ def _vertices_of(path: Path, mesh: TriangleMesh, label: _Label, outside: bool) -
 
 def _inside(data: bytes, kind: str, count: int, label: _Label) -> NDArray[np.bool_]:
     """Return which of ``count`` vertices are in a label; at least one is."""
-    data = gzip.decompress(data) if data.startswith(_GZIP) else data
     inside: NDArray[np.bool_] = _READERS[kind](data, count, label)
     if not inside.any():
         named = "no vertex is in it" if label is None else f"no vertex has the label {label!r}"
@@ -236,4 +231,3 @@ def _number(label: str | float, known: str) -> float:
 
 
 _READERS = {"label": _freesurfer, "annot": _annotation, "gii": _gifti}
-_SUFFIX = re.compile(rf"\.({'|'.join(_READERS)})(\.gz)?$")

@@ -53,10 +53,13 @@ def load_mesh(
 
     Vertices keep the file's numbering and faces its order. Polygons become triangles, in place, and
     ``mesh.face_map`` leads from these to the polygon. Lines, points and curves are left out, and
-    ``mesh.warnings`` say so. The parts of a glTF scene are placed by its nodes and put one after the
-    other, in the order of its meshes; those that share their positions share vertices. Skins stand
-    as their joints do at rest, and morph targets count by their default weights. An STL file has no numbering: its equal corners are always
-    merged, in order of first appearance, and ``mesh.vertex_map[3 * face + corner]`` is the vertex.
+    ``mesh.warnings`` say so.
+
+    The parts of a glTF scene are placed by its nodes and put one after the other, in the order of
+    its meshes; those that share their positions share vertices. Skins stand as their joints do at
+    rest, and morph targets count by their default weights. An STL file has no numbering: its equal
+    corners are always merged, in order of first appearance, and
+    ``mesh.vertex_map[3 * face + corner]`` is the vertex.
 
     Parameters
     ----------
@@ -64,10 +67,10 @@ def load_mesh(
         A path, the bytes of a file, or a file object. It may be packed by gzip, bzip2 or xz, or be
         a zip archive that holds one mesh.
     file_type
-        ``"obj"``, ``"off"``, ``"ply"``, ``"stl"``, ``"glb"``, ``"gltf"``, ``"gii"``, ``"freesurfer"``,
-        ``"vtk"`` (or ``"vtp"``, ``"vtu"``, ``"vts"``, ``"vtr"``, ``"vti"``) or ``"asc"``; by
-        default the suffix of the name. Without a known suffix, as FreeSurfer's ``lh.pial``, the
-        first bytes decide where they can.
+        ``"obj"``, ``"off"``, ``"ply"``, ``"stl"``, ``"glb"``, ``"gltf"``, ``"gii"``,
+        ``"freesurfer"``, ``"vtk"`` (or ``"vtp"``, ``"vtu"``, ``"vts"``, ``"vtr"``, ``"vti"``) or
+        ``"asc"``; by default the suffix of the name. Without a known suffix, as FreeSurfer's
+        ``lh.pial``, the first bytes decide where they can.
     merge
         ``"exact"`` merges vertices at equal positions, a distance those within it, as
         `TriangleMesh` does.

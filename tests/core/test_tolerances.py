@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import geodesic_core as gc
 from geodesic_core import tolerances
 from geodesic_core.control import Control
+from geodesic_core.fields import fast_sweep
 from geodesic_core.fields.sources import nodes_of
 from geodesic_core.fields.sweep import run_sweep
 from geodesic_core.kernels.fast import state as fast_state
@@ -78,6 +79,8 @@ from geodesic_core.tolerances import (
     LOOSE_OVERLAP,
     LOWER_BOUND,
     MOST_AT_LARGE,
+    MOST_CROSSINGS,
+    MOST_RUNS,
     NEARLY_JOINED,
     NO_AREA,
     ON_PATH,
@@ -593,6 +596,37 @@ def test_runs_are_more_than_winding_about_a_tip_takes():
     topology = topology_of(zoo.Case("flat", *zoo.grid(2, 2)))
     counted = np.iinfo(new_wavefront(topology, merges=True).pool.runs.dtype).max
     assert 1.5 * 2 * math.pi / SHARP < RUNS < counted
+
+
+@pytest.mark.parametrize("left", [0, 100])
+def test_most_runs_are_what_a_list_may_come_up(monkeypatch, left):
+    """Far more than about the sharpest tip; else the sweep ends, and names a face."""
+    mesh = gc.samples.knot(500)
+    assert 10 * 2 * math.pi / SHARP < MOST_RUNS < np.iinfo(np.uint16).max
+    expected = gc.exact_distance(mesh, 3).distances
+
+    def new_used_wavefront(*args, **kwargs):
+        wave = new_wavefront(*args, **kwargs)
+        wave.pool.runs[:] = MOST_RUNS - left
+        return wave
+
+    monkeypatch.setattr(state, "new_wavefront", new_used_wavefront)
+    if left:
+        assert gc.exact_distance(mesh, 3).distances.tobytes() == expected.tobytes()
+    else:
+        with pytest.raises(gc.errors.InternalError, match=r"circles through face \d+; .*fast_dist"):
+            gc.exact_distance(mesh, 3)
+
+
+@pytest.mark.parametrize(("most", "ends"), [(0, False), (12, True), (MOST_CROSSINGS, True)])
+def test_most_crossings_are_more_than_a_fast_sweep_needs(monkeypatch, most, ends):
+    mesh = gc.samples.sphere(20480)
+    monkeypatch.setattr(fast_sweep, "MOST_CROSSINGS", most)
+    if ends:
+        assert np.isfinite(gc.fast_distance(mesh, 0, effort=8).distances).all()
+    else:
+        with pytest.raises(gc.errors.InternalError, match="exact_distance"):
+            gc.fast_distance(mesh, 0, effort=8)
 
 
 def is_rough(saddles: int, excess: float, vertices: int = 2 * ROUGH_VERTICES) -> bool:

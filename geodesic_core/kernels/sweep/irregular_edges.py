@@ -11,6 +11,13 @@ Elsewhere no shortest path goes with it, into any face. Let p, an earlier one, b
 the faces beyond, p goes as well; into the face that it came from leads a straighter way than over
 x; and what bends at an end of the edge that end emits, for it emits all around.
 
+No shortest path crosses an edge twice: along the edge it would be shorter. So a window does not
+cross one that it has crossed since its pseudosource (`has_crossed`). Rounding alone cannot tell:
+about the tip of a needle, windows crossed an edge in a new stretch at each turn, nearer to the tip,
+where nothing overlapped them and all ways were as long as far as numbers show. In an exact sweep a
+window refers to its last crossing, and a crossing to the one before. In a merging sweep windows of
+several crossings are one; there `RUNS` is the bound.
+
 In a merging sweep distances fall short, by up to ξ. A window is dropped where earlier ones are as
 near at each of its points: a path that it follows goes on with one of them. Of any other window all
 is kept but what is surely longer, for between windows that share an edge there may be a wedge that
@@ -43,7 +50,7 @@ from geodesic_core.kernels.sweep.window import (
 )
 from geodesic_core.tolerances import GAP, SLACK
 
-DEPTH = XI  # column
+DEPTH = XI  # column of a crossing in an exact sweep: how many led to it since the pseudosource
 
 
 @kernel
@@ -110,7 +117,7 @@ def record_crossing(wave: Any, g: int, slot: int, window: Window) -> None:
 
 @kernel
 def has_crossed(wave: Any, window: Window, crossing: int) -> bool:
-    """Whether a crossing is one of those that led to a window. O(edges between them)."""
+    """Whether a crossing is one of those that led to a window. O(crossings between them)."""
     rows, depth = as_ints(wave.pool.windows), depth_of(wave, crossing)
     last = window.reference
     while depth_of(wave, last) > depth:

@@ -283,7 +283,7 @@ def new_wavefront(
             heap_place=np.full(vertices, -1, np.int32),
             ring=np.empty(half_edges, np.int32),
         ),
-        pool=_new_pool(topology, sites, merges, paths, windows),
+        pool=_new_pool(topology, sites, paths, windows),
         vertices=Vertices(
             distance=np.full(nodes, np.inf),
             winner=np.empty((nodes, 2)),
@@ -301,9 +301,7 @@ def new_wavefront(
     )
 
 
-def _new_pool(
-    topology: Topology, sites: Sites, merges: bool, paths: bool, windows: Flags | None
-) -> Pool:
+def _new_pool(topology: Topology, sites: Sites, paths: bool, windows: Flags | None) -> Pool:
     half_edges = len(topology.links)
     irregular = bool((topology.flags & (SEAM | PINCHED)).any())
     lists = np.zeros((half_edges, LIST), np.int32)

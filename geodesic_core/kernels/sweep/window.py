@@ -14,11 +14,13 @@ weight                                  1; 0 where the rays are parallel
 root                                    node of the pseudosource; of a merged window, of one of
                                         those that it replaces; of a parallel one, its segment
 xi             ξ                        how much it may fall short of the exact distance
-reference      reference list (4.3)     what was merged into it: a merge's index, or -1 - root
+reference      reference list (4.3)     what was merged into it: a merge's index, or -1 - root;
+                                        in an exact sweep, its last crossing of an irregular edge
+                                        (a slot), or < 0: see `irregular_edges`
 =============  =======================  =========================================================
 
 The unfolded position replaces the two distances d0, d1, whose every use would cost a square root,
-and its side of the edge replaces the direction τ. The last two fields have a meaning in a merging
+and its side of the edge replaces the direction τ. ξ has a meaning in a merging
 sweep only.
 
 A window is *parallel* where its rays leave a straight segment of a curve at right angles. Its

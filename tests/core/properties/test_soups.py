@@ -3,11 +3,12 @@
 import itertools
 
 import numpy as np
+import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import geodesic_core as gc
-from tests.support.oracles import graph, unfolding
+from tests.support.oracles import graph, needles, unfolding
 from tests.support.random_meshes import cases
 
 EXACT = 1e-9
@@ -179,3 +180,78 @@ def test_a_mess_of_polygons_is_solved_or_refused(seed):
     for face, polygon in zip(mesh.faces.tolist(), owner.tolist(), strict=True):
         assert set(face) <= set(corners[ends[polygon] - sizes[polygon] : ends[polygon]].tolist())
     check_answers(mesh, range(len(points)))
+
+
+def soup_of_needles(seed):
+    """Needles along one line with edges in common: positions, width, vertices, faces and a point.
+
+    The point is a face and its barycentric coordinates.
+    """
+    rng = np.random.default_rng(seed)
+    width = 10.0 ** -rng.choice([6, 7, 8, 9, 9, 9, 10, 11, 12, 13])
+    corners, count = int(rng.integers(4, 9)), int(rng.integers(3, 8))
+    if rng.integers(3):
+        corners, count = 7, 6
+    along = rng.random(corners)
+    sides, kind = int(rng.integers(1, 3)), rng.integers(3)
+    if kind == 0:
+        across = rng.integers(1, 11, (corners, sides)).astype(float)
+    else:
+        across = rng.normal(size=(corners, sides))
+    if kind == 2:
+        across[rng.random(across.shape) < 0.4] = 0
+    vertices = np.zeros((corners, 3))
+    vertices[:, 0], vertices[:, 1 : 1 + sides] = along, width * across
+    if rng.integers(2):
+        vertices = vertices @ np.linalg.qr(rng.normal(size=(3, 3)))[0].T
+    every = list(itertools.permutations(range(corners), 3))
+    faces = np.array(every)[rng.choice(len(every), min(count, len(every)), replace=False)]
+    rng = np.random.default_rng(seed + 10**9)
+    face, weights = int(rng.integers(len(faces))), rng.choice([0, 0.25, 0.5, 0.75, 1, 0.3], 3)
+    if weights.sum() == 0 or rng.integers(2):
+        weights = rng.dirichlet([1, 1, 1])
+    return along, width, vertices, faces, (face, weights / weights.sum())
+
+
+def check_needles(along, width, vertices, faces, point):
+    """All methods end, with what is there in the limit of no width."""
+    mesh, (face, weights) = gc.TriangleMesh(vertices, faces), point
+    at = gc.SurfacePoint.face(face, tuple(weights.tolist()))
+    places = [(face, float(weights @ along[faces[face]]))]
+    expected = needles.distance_matrix(along, faces.tolist(), places)[:, : len(along)]
+    used, close = np.unique(faces), {"rtol": 0, "atol": 100 * len(faces) * width + 1e-12}
+    for source, row in [*zip(used.tolist(), expected[used], strict=True), (at, expected[-1])]:
+        exact = gc.exact_distance(mesh, source, deadline_s=DEADLINE)
+        assert exact.stats.windows_created < 200
+        np.testing.assert_allclose(exact.distances[used], row[used], **close)
+        near = gc.approximate_distance(mesh, source, 1e-2, deadline_s=DEADLINE).distances
+        np.testing.assert_allclose(near, exact.distances, rtol=1e-2 + EXACT, atol=1e-13)
+        fast = gc.fast_distance(mesh, source, deadline_s=DEADLINE).distances
+        assert (fast >= exact.distances * (1 - EXACT) - 1e-13).all()
+        for target in used[np.isfinite(row[used])][:3].tolist():
+            path = gc.shortest_path(mesh, source, target, deadline_s=DEADLINE)
+            assert abs(path.length - row[target]) <= close["atol"]
+
+
+@pytest.mark.parametrize(
+    "seed",
+    [1196, 1569, 2448, 3410, 3927, 4583, 4765, 5639, 10968, 11129, 11341, 11791, 12376, 14370],
+)
+def test_soups_of_needles_that_did_not_end(seed):
+    """All of 15,000, before windows crossed an edge only once."""
+    check_needles(*soup_of_needles(seed))
+
+
+@given(seeds)
+def test_a_soup_of_needles_ends(seed):
+    check_needles(*soup_of_needles(seed))
+
+
+@pytest.mark.parametrize("width", [1e-12, 1e-10, 1e-9, 1e-8, 1e-6, 1e-5, 1e-4])
+def test_windows_that_wind_about_a_tip_cross_its_edges_once(width):
+    """At each turn they crossed an edge nearer to the tip, where no earlier one had crossed."""
+    along = np.array([0.53, 0.47, 0.87, 0.21, 0.32, 0.40, 0.75])
+    across = [(3, 7), (1, 10), (6, 6), (2, 4), (5, 1), (3, 9), (1, 7)]
+    faces = np.array([(5, 3, 6), (2, 0, 6), (2, 3, 1), (2, 1, 3), (4, 2, 5), (2, 3, 4)])
+    vertices = np.column_stack([along, width * np.array(across)])
+    check_needles(along, width, vertices, faces, (0, np.array([0.0, 0.25, 0.75])))
