@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 _PIXEL, _STRIP = 8, 6
 _POLYGONS = (5, 7, 9)
 """VTK's numbers of triangles, polygons and quadrangles, whose points go around them."""
-_FIRST_QUADRATIC, _BEZIER = 21, (75, 76, 77)
+_BEZIER = (76, 77)
 _HIDDEN_POINT, _DOUBLE_OR_HIDDEN_CELL = 2, 1 | 32
 """Flags of VTK's ghost arrays."""
 
@@ -43,9 +43,11 @@ def polygons_of(
     Raises
     ------
     ValueError
-        There are cells whose points do not lie on the surface (Bézier).
+        There are cells whose points do not lie on the surface (Bézier), or that have too few points
+        or some that do not exist.
     """
     from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkCommonDataModel import vtkGenericCell
 
     grid = _as_unstructured(data)
     if grid.GetNumberOfCells() == 0:
@@ -56,6 +58,7 @@ def polygons_of(
     starts = vtk_to_numpy(cells.GetOffsetsArray()).astype(np.int64)
     corners = vtk_to_numpy(cells.GetConnectivityArray()).astype(np.int64)
     types = vtk_to_numpy(_types_of(grid))
+    _check_points(starts, corners, len(points))
     shown = _shown_cells(grid, starts, corners)
     pieces: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]] = []
     left_out: dict[str, int] = {}
@@ -63,20 +66,22 @@ def polygons_of(
         chosen = np.flatnonzero((types == kind) & shown)
         if len(chosen) == 0:
             continue
-        cell = grid.GetCell(int(chosen[0]))
-        if kind in _BEZIER and cell.GetCellDimension() == 2:
+        if kind in _BEZIER:
             raise ValueError(
                 "it has Bézier cells, whose points do not lie on the surface: triangulate it first"
             )
-        if cell.GetCellDimension() != 2:
-            name = _in_words(cell.GetClassName())
+        cell = vtkGenericCell.InstantiateCell(kind)
+        if cell is None or cell.GetCellDimension() != 2:
+            name = f"cells of type {kind}" if cell is None else _in_words(cell.GetClassName())
             left_out[name] = left_out.get(name, 0) + len(chosen)
         elif kind in _POLYGONS:
             sizes = starts[chosen + 1] - starts[chosen]
             pieces.append((chosen, sizes, _rows(starts[chosen], sizes, corners)))
         elif kind == _PIXEL:
+            sizes = starts[chosen + 1] - starts[chosen]
+            _check_sizes(chosen, sizes, cell.GetNumberOfPoints())
             rows = corners[starts[chosen][:, None] + [0, 1, 3, 2]]
-            pieces.append((chosen, np.full(len(chosen), 4), rows.ravel()))
+            pieces.append((chosen, sizes, rows.ravel()))
         else:
             pieces.append(_split(grid, chosen, starts, corners, is_strip=kind == _STRIP))
     hidden = len(shown) - int(np.count_nonzero(shown))
@@ -111,6 +116,25 @@ def _types_of(grid: Any) -> Any:
         return grid.GetCellTypes()
     except TypeError:  # before VTK 9.6, a method of another kind
         return grid.GetCellTypesArray()
+
+
+def _check_points(starts: NDArray[np.int64], corners: NDArray[np.int64], count: int) -> None:
+    """Refuse points that do not exist: VTK would read beyond its arrays."""
+    bad = np.flatnonzero((corners < 0) | (corners >= count))
+    if len(bad):
+        cell = int(np.searchsorted(starts, bad[0], side="right")) - 1
+        raise ValueError(
+            f"cell {cell} has the point {corners[bad[0]]}, but points are numbered 0 to {count - 1}"
+        )
+
+
+def _check_sizes(cells: NDArray[np.int64], sizes: NDArray[np.int64], least: int) -> None:
+    """Refuse cells with fewer points than their type has."""
+    short = np.flatnonzero(sizes < least)
+    if len(short):
+        raise ValueError(
+            f"cell {cells[short[0]]} has {sizes[short[0]]} points; its type has {least}"
+        )
 
 
 def _shown_cells(
@@ -152,6 +176,7 @@ def _split(
             grid.GetCell(cell).TriangulateLocalIds(0, ids)
             local = np.array([ids.GetId(i) for i in range(ids.GetNumberOfIds())], np.int64)
             local = local.reshape(-1, 3)
+            _check_sizes(np.array([cell]), np.array([len(own)]), int(local.max(initial=-1)) + 1)
         rows.append(own[local])
         cells += [cell] * len(local)
     triangles = np.concatenate(rows)
