@@ -41,6 +41,7 @@ def _exact() -> None:
     field.distance_at(_INSIDE)
     field.path_to(8)
     mesh.report  # noqa: B018 - computed on access
+    TriangleMesh(mesh.vertices, mesh.faces, merge=1e-9)
 
 
 def _paths() -> None:

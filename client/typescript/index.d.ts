@@ -1508,6 +1508,17 @@ export interface components {
             isolated_vertices: components["schemas"]["Sample"];
             /** @description Vertices at the position of an earlier vertex; `merge=exact` joins them */
             duplicate_vertices: components["schemas"]["Sample"];
+            /** @description Pairs of border vertices that are nearly joined: a thousand times as far apart over the surface; `merge` takes a distance, which joins them. Null, as the next three, for a mesh that was stored by a release without them */
+            near_vertices?: components["schemas"]["Sample"] | null;
+            /**
+             * Near Distance
+             * @description Largest distance between the vertices of such a pair; 0 without any
+             */
+            near_distance?: number | null;
+            /** @description Border vertices that lie on a border edge of which they are no end */
+            t_junctions?: components["schemas"]["Sample"] | null;
+            /** @description The edge that each of them lies on, in the same order */
+            t_junction_edges?: components["schemas"]["Sample"] | null;
             /** @description Faces with fewer than three different vertices; they are not part of the surface */
             repeated_vertex_faces: components["schemas"]["Sample"];
             /** @description Edges between different vertices at the same position: their ends are one point */
@@ -4689,8 +4700,8 @@ export interface operations {
                 name?: string;
                 /** @description Overrides `Content-Type` */
                 format?: "obj" | "off" | "ply" | "stl" | "glb";
-                /** @description `exact` joins vertices at the same position */
-                merge?: "none" | "exact";
+                /** @description `exact` joins vertices at the same position; a distance in mesh units joins those no farther apart, and so all that steps of this length lead to, from vertex to vertex */
+                merge?: ("none" | "exact") | number;
                 /** @description The sample to make, instead of reading a mesh */
                 sample?: "knot" | "sphere" | "terrain" | "obstacles" | "plane";
                 /** @description Approximate number of faces of the sample; 20000 if not given */

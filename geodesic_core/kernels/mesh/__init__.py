@@ -1,1 +1,1 @@
-"""The half-edge structure of a mesh, and its construction."""
+"""The half-edge structure of a mesh and its construction, and a search tree over its points."""
