@@ -110,7 +110,7 @@ def open_display(view: View) -> None:
 
 def test_a_file_is_dropped(view: View, wedge: str) -> None:
     view.open()
-    with view.page.expect_response("**/v1/meshes?name=wedge.obj*"):
+    with view.page.expect_response("**/v1/meshes?merge=none"):
         view.page.evaluate(
             """text => {
                 const files = new DataTransfer();
@@ -221,7 +221,7 @@ def test_faults_are_marked(view: View, wedge: str) -> None:
     view.page.click("text=Show >> nth=0")
     view.wait()
 
-    assert "edge of three or more faces" in view.text("#report")
+    assert "1 edge is shared by three faces or more" in view.text("#report")
     assert len(seen(view, red)) > 20
 
 
@@ -231,7 +231,7 @@ def test_a_refused_file_is_told_in_the_service_s_words(view: View) -> None:
     view.page.set_input_files("#file", nonsense)
     view.wait("error")
 
-    with view.page.expect_response("**/v1/meshes?name=nonsense.ply*") as answer:
+    with view.page.expect_response("**/v1/meshes?merge=none") as answer:
         view.page.set_input_files("#file", nonsense)
     view.wait("error")
 
@@ -493,7 +493,7 @@ def test_points_can_be_written(view: View, sphere: str) -> None:
 
     view.page.fill("#target", "nonsense")
     view.page.press("#target", "Enter")
-    view.page.wait_for_selector("#error-detail:has-text('“nonsense” is not a point')")
+    view.page.wait_for_selector("#error-detail:has-text('“nonsense” is not a point.')")
 
 
 def test_points_that_are_located_late_do_not_undo_what_was_written_since(

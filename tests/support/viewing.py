@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
-from playwright.sync_api import FilePayload, Page
+from playwright.sync_api import ConsoleMessage, FilePayload, Page
 
 Pixel = tuple[float, float]
 
@@ -23,6 +23,12 @@ class View:
         self._devtools = page.context.new_cdp_session(page)  # for what Playwright has no words
         self._fingers = 0
         page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("console", self._note)
+
+    def _note(self, message: ConsoleMessage) -> None:
+        # The browser itself writes of each refusal of the service.
+        if message.type == "error" and not message.text.startswith("Failed to load resource"):
+            self.errors.append(message.text)
 
     def open(self, address: str = "/") -> None:
         self.page.goto(address)
@@ -40,7 +46,7 @@ class View:
     def upload(self, name: str, text: str) -> None:
         """Choose a file, and wait until its mesh is shown."""
         file = FilePayload(name=name, mimeType="", buffer=text.encode())
-        with self.page.expect_response("**/v1/meshes?name=*"):
+        with self.page.expect_response("**/v1/meshes?merge=*"):
             self.page.set_input_files("#file", file)
         self.wait()
 

@@ -7,15 +7,23 @@ import { Fields } from "./ask/fields";
 import { Isolines } from "./ask/isolines";
 import { Routes } from "./ask/routes";
 import { byId } from "./dom";
-import { dismissHint, isDark, setUpAppearance, showHint } from "./panel/appearance";
-import { Controls, resolved } from "./panel/controls";
+import {
+  dismissHint,
+  foldOnPhone,
+  isDark,
+  setUpAppearance,
+  showHint,
+  tell,
+} from "./panel/appearance";
+import { Controls, located } from "./panel/controls";
 import { ExportPanel } from "./panel/exportPanel";
 import { listenToKeys } from "./panel/keys";
 import { Meshes } from "./panel/meshes";
+import { Notes } from "./panel/notes";
 import { Pointer } from "./panel/pointer";
 import { showReport } from "./panel/report";
 import { readState, writeState } from "./state/permalink";
-import { type State, Store, unitOf } from "./state/state";
+import { type State, Store, unitOf, withMesh } from "./state/state";
 import { Status } from "./status";
 import { drawRamp } from "./view/legend";
 import { Stage } from "./view/scene";
@@ -27,12 +35,13 @@ const stage = new Stage(byId("canvas", HTMLCanvasElement));
 const sceneView = new SceneView(stage);
 const status = new Status(() => stage.drawn());
 const store = new Store();
-const fields = new Fields(status, sceneView);
-const isolines = new Isolines(status, sceneView, fields);
-const borders = new Borders(status, sceneView, fields);
-const routes = new Routes(status, sceneView);
+const notes = new Notes();
+const fields = new Fields(status, sceneView, notes);
+const isolines = new Isolines(status, sceneView, fields, notes);
+const borders = new Borders(status, sceneView, fields, notes);
+const routes = new Routes(status, sceneView, notes);
 const meshes = new Meshes(store, status);
-const controls = new Controls(store, status, sceneView);
+const controls = new Controls(store, status, sceneView, notes);
 const exportPanel = new ExportPanel(store, status, stage);
 const pointer = new Pointer(sceneView, store, () => controls.tool);
 pointer.onHover = (point) => fields.tell(point, store.state);
@@ -57,6 +66,9 @@ let report: MeshDocument | null = null;
 store.listen((state, before) => {
   if (state.mesh !== null && (state.mesh !== before.mesh || isTurned(state))) open(state.mesh);
   if (before.mesh !== null && state.mesh !== before.mesh) pointer.follows = false;
+  if (state.mesh !== before.mesh) foldOnPhone();
+  tell("");
+  if (arePointsOther(state, before)) notes.tell("points", []);
   controls.show(state);
   exportPanel.show(state);
   fields.follow(state);
@@ -68,9 +80,14 @@ store.listen((state, before) => {
   if (state.wireframe !== before.wireframe) void showWires(state);
   if (state.sources.length > 0 && !pointer.follows) dismissHint();
   if (sceneView.mesh) sceneView.showPoints(state);
-  if (state.barriers !== before.barriers) sceneView.barriers.show(sceneView.mesh, state.barriers);
+  if (state.barriers !== before.barriers || state.isReadable !== before.isReadable)
+    sceneView.showBarriers(state);
   writeAddress();
 });
+
+function arePointsOther(now: State, before: State): boolean {
+  return (["sources", "target", "waypoints"] as const).some((each) => now[each] !== before[each]);
+}
 
 function nameUnit(state: State): void {
   fields.paint(state);
@@ -98,6 +115,7 @@ function open(mesh: string): void {
   isolines.forget();
   borders.forget();
   report = null;
+  notes.begin(report);
   showReport(report, sceneView, "", null);
   const stop = new AbortController();
   opening = stop;
@@ -109,10 +127,11 @@ function open(mesh: string): void {
     const now = store.state;
     stage.look(now.view ?? sceneView.viewOf(now));
     report = document;
+    notes.begin(report);
     showReport(report, sceneView, unitOf(now), meshes.joiningOf(mesh));
     if (now.sources.length === 0 || pointer.follows) showHint();
     sceneView.showPoints(now);
-    sceneView.barriers.show(sceneView.mesh, now.barriers);
+    sceneView.showBarriers(now);
     fields.paint(now);
     routes.draw();
     showPalette(now);
@@ -142,23 +161,25 @@ function setAddress(): void {
 function begin(): void {
   status.run("loading", "Loading…", new AbortController(), async () => {
     const about = await getAbout();
-    meshes.offer(about.samples);
+    meshes.offer(about);
     exportPanel.offer(about);
     void meshes.list().catch((error: unknown) => status.fail(error));
-    const written = readState(location.search);
-    const { mesh } = written;
+    const mesh = new URLSearchParams(location.search).get("mesh");
     const isEmpty = mesh === null && store.state.mesh === null;
     byId("welcome").hidden = !isEmpty;
     if (isEmpty && about.samples.includes("knot")) await showExample();
     if (mesh === null) return;
-    const [sources, target, waypoints] = await Promise.all([
-      resolved(mesh, written.sources),
-      resolved(mesh, written.target ? [written.target] : []),
-      resolved(mesh, written.waypoints),
-    ]);
     const isOpen = mesh === store.state.mesh;
-    store.update({ ...written, sources, target: target[0] ?? null, waypoints });
-    if (isOpen) open(mesh); // without a valid key it was not loaded the first time
+    try {
+      const asked = await located(mesh, readState(location.search));
+      store.update(asked.change);
+      notes.tell("points", asked.notes);
+    } catch (error) {
+      store.update(withMesh(mesh, store.state)); // without the question that cannot be read
+      throw error;
+    } finally {
+      if (isOpen) open(mesh); // without a valid key it was not loaded the first time
+    }
   });
 }
 

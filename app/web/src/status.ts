@@ -2,12 +2,17 @@
 import { isAbort, setKey } from "./api/http";
 import { ProblemError } from "./api/problemError";
 import { byId } from "./dom";
+import { InputError } from "./inputError";
 
-type Kind = "loading" | "busy";
+/** Work on a question, on the mesh itself, or on lines: these follow an answer, and no question. */
+type Kind = "loading" | "busy" | "drawing";
 type Work<T> = (onProgress: OnProgress) => Promise<T>;
 
 /** Report the share of the work that is done; null where it is unknown. */
 export type OnProgress = (share: number | null) => void;
+
+/** What is answered within this time shows no bar (see style.css), and no blank before. */
+export const PATIENCE_MS = 300;
 
 interface Task {
   kind: Kind;
@@ -37,7 +42,7 @@ export class Status {
   async during<T>(kind: Kind, words: string, stop: AbortController, work: Work<T>): Promise<T> {
     const task: Task = { kind, words, share: null, stop };
     this.tasks.add(task);
-    this.hasFailed = false;
+    if (kind !== "drawing") this.hasFailed = false;
     this.show();
     try {
       return await work((share) => {
@@ -77,18 +82,21 @@ export class Status {
 
   private describe(error: unknown): void {
     const problem = error instanceof ProblemError ? error.problem : null;
+    const input = error instanceof InputError ? error : null;
     const isOffline = error instanceof TypeError && /fetch/i.test(error.message);
     byId("error-title").textContent =
-      problem?.title ?? (isOffline ? "The service does not answer" : "Something went wrong");
+      problem?.title ??
+      input?.title ??
+      (isOffline ? "The service does not answer" : "Something went wrong");
     byId("error-detail").textContent = isOffline
       ? "It may have stopped, or the network may be down."
       : error instanceof Error
         ? error.message
         : String(error);
-    byId("error-hint").textContent = problem?.hint ?? "";
+    byId("error-hint").textContent = problem?.hint ?? input?.hint ?? "";
     byId("error-request").textContent = problem?.request_id ? `Request ${problem.request_id}` : "";
     byId("key-form").hidden = problem?.status !== 401;
-    if (!isOffline && !problem) console.error(error);
+    if (!isOffline && !problem && !input) console.error(error);
   }
 
   private show(): void {
@@ -110,7 +118,7 @@ export class Status {
     }
   }
 
-  private set state(state: Kind | "ready" | "error") {
+  private set state(state: "loading" | "busy" | "ready" | "error") {
     const { dataset } = document.documentElement;
     if (dataset.state !== state) dataset.state = state;
   }

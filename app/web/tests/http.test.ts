@@ -119,3 +119,18 @@ describe("errors", () => {
     await expect(call("/v1")).rejects.toThrow(TypeError);
   });
 });
+
+test.each([
+  ["/source/vertex", "Source: it does not exist"],
+  ["/sources/3/vertex", "Sources: it does not exist"],
+  ["/waypoints/0/edge/1", "Via: it does not exist"],
+  ["/barriers/12", "Barriers: it does not exist"],
+  ["/points/0", "it does not exist"],
+])("a message names a field, and not %s", (pointer, words) => {
+  const message = "it does not exist";
+  const members = { title: "", code: "invalid_point", status: 422, request_id: "" };
+  const detail = `${pointer}: ${message}`;
+  const error = new ProblemError({ ...members, detail, errors: [{ pointer, message }] });
+  expect(error.message).toBe(words);
+  expect(error.problem.detail).toBe(detail);
+});

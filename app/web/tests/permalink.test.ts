@@ -23,6 +23,7 @@ function randomState(random: Random): State {
     error: random.pick([INITIAL.error, random.size()]),
     effort: random.pick([1, 2, 4, 8] as const),
     maxDistance: random.pick([null, random.size()]),
+    isReadable: true,
     unit: random.pick(["", "mm", "µm & more"]),
     shade: random.pick(["distance", "territories", "difference"] as const),
     lines: random.pick([null, { count: 1 + random.below(99) }, { spacing: random.size() }]),
@@ -95,6 +96,13 @@ describe("reading", () => {
     expect(() => readState("?via=v0,v1")).toThrow("“v0,v1” is not a point");
   });
 
+  test.each(["x", "-4", "5-", "7-6", "1.5", "0-99999999999", "3;4"])(
+    "“%s” as barriers is refused by name",
+    (part) => {
+      expect(() => readState(`?barriers=1,${part}`)).toThrow(`“${part}” is neither the number`);
+    },
+  );
+
   test.each([
     ["method=fastest", {}],
     ["method=", {}],
@@ -129,7 +137,7 @@ describe("reading", () => {
     ["view=1,2,3,4,5,6,7", {}],
     ["view=1,2,3,4,5,6", { view: [1, 2, 3, 4, 5, 6], up: "y" as const }],
     ["barriers=", {}],
-    ["barriers=x,3,-4,5-,7-6,1.5", { barriers: [3] }],
+    ["barriers=3, 4,,5", { barriers: [3, 4, 5] }],
     ["barriers=8-10,2", { barriers: [8, 9, 10, 2] }],
   ])("%s", (search, change) => {
     expect(readState(`?${search}`)).toEqual({ ...initial, ...change });

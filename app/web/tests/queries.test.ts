@@ -25,6 +25,7 @@ function distances(values: number[], timing = "queue;dur=0.1, compute;dur=12.5")
     "Server-Timing": timing,
     "Geodesic-Error-Bound": JSON.stringify(BOUND),
     "Geodesic-Unreachable": JSON.stringify(UNREACHABLE),
+    "Geodesic-Warnings": '["careful"]',
   };
   return new Response(body, { headers });
 }
@@ -44,21 +45,12 @@ describe("isolines", () => {
     expect(question).not.toHaveProperty("effort");
   });
 
-  test("are all lines of all levels", async () => {
-    const [first, second, third] = [[[0, 0, 0]], [[1, 1, 1]], [[2, 2, 2]]];
-    const requests = fakeService({
-      "POST /v1/meshes/m/isolines": () =>
-        json({
-          isolines: [
-            { level: 1, lines: [{ points: first }, { points: second }] },
-            { level: 2, lines: [] },
-            { level: 3, lines: [{ points: third }] },
-          ],
-        }),
-    });
+  test("come with all that the service says of them", async () => {
+    const lines = [{ points: [[0, 0, 0]], closed: true }];
+    const answer = { isolines: [{ level: 1, lines }], error_bound: BOUND, warnings: ["careful"] };
+    const requests = fakeService({ "POST /v1/meshes/m/isolines": () => json(answer) });
     const question = { ...QUESTION, count: 3 };
-    const lines = await askIsolines("m", question, () => undefined, signal);
-    expect(lines).toEqual([first, second, third]);
+    expect(await askIsolines("m", question, () => undefined, signal)).toEqual(answer);
     expect(requests[0]?.body).toEqual(question);
   });
 });
@@ -76,6 +68,7 @@ describe("distances", () => {
       largest: 2,
       bound: BOUND,
       unreachable: UNREACHABLE,
+      warnings: ["careful"],
       seconds: 0.0125,
     });
     expect(requests).toHaveLength(1);
@@ -173,10 +166,11 @@ describe("paths", () => {
 
 describe("points", () => {
   test("positions are located", async () => {
-    const located = { face: 3, barycentric: [0.5, 0.25, 0.25], position: [1, 2, 3], distance: 0 };
+    const located = { face: 3, barycentric: [0.5, 0.25, 0.25], position: [1, 2, 3], distance: 4 };
     const requests = fakeService({ "POST /v1/meshes/m/locate": () => json({ points: [located] }) });
 
-    expect(await locate("m", [1, 2, 3])).toEqual({ face: 3, barycentric: [0.5, 0.25, 0.25] });
+    const point = { face: 3, barycentric: [0.5, 0.25, 0.25] };
+    expect(await locate("m", [1, 2, 3])).toEqual({ point, distance: 4 });
     expect(requests[0]?.body).toEqual({ points: [[1, 2, 3]] });
   });
 

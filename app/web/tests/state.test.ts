@@ -92,3 +92,15 @@ test("a unit without a name is that of the mesh", () => {
   expect(unitOf({ ...INITIAL, unit: "mm" })).toBe("mm");
   expect(unitOf(INITIAL)).toBe("mesh units");
 });
+
+test("what cannot be read is no question until there is another one", () => {
+  const store = new Store();
+  store.update({ isReadable: false });
+  store.update({ wireframe: true, view: null });
+  expect(store.state.isReadable).toBe(false);
+  for (const change of [{ sources: [] }, { target: null }, { barriers: [1] }, { mesh: "m" }]) {
+    store.update({ isReadable: false });
+    store.update(change);
+    expect(store.state.isReadable).toBe(true);
+  }
+});

@@ -20,20 +20,22 @@ export async function makeSample(name: string, faces: number): Promise<MeshDocum
   ).json() as Promise<MeshDocument>;
 }
 
-/** Upload a file by XMLHttpRequest, because fetch does not report upload progress. */
+/**
+ * Upload a file with its name: the service tells its format by both.
+ *
+ * By XMLHttpRequest, because fetch does not report upload progress.
+ */
 export function uploadMesh(
   file: File,
   merge: "none" | "exact",
   onProgress: (share: number | null) => void,
   signal: AbortSignal,
 ): Promise<MeshDocument> {
-  const extension = file.name.split(".").pop()?.toLowerCase() ?? "";
-  const parameters = new URLSearchParams({ name: file.name, merge });
-  if (extension !== "json") parameters.set("format", extension);
+  const form = new FormData();
+  form.set("file", file);
   return new Promise((resolve, reject) => {
     const request = new XMLHttpRequest();
-    request.open("POST", `/v1/meshes?${parameters}`);
-    if (extension === "json") request.setRequestHeader("Content-Type", "application/json");
+    request.open("POST", `/v1/meshes?merge=${merge}`);
     for (const [name, value] of Object.entries(authorization())) {
       request.setRequestHeader(name, value);
     }
@@ -53,7 +55,8 @@ export function uploadMesh(
     request.onerror = () =>
       reject(
         new ProblemError({
-          detail: "The upload was interrupted.",
+          title: "Upload interrupted",
+          detail: "The service may have stopped, or the network or the file is no longer there.",
           code: "unknown",
           status: 0,
           request_id: "",
@@ -61,6 +64,6 @@ export function uploadMesh(
       );
     request.onabort = () => reject(new DOMException("The upload was cancelled.", "AbortError"));
     signal.addEventListener("abort", () => request.abort());
-    request.send(file);
+    request.send(form);
   });
 }

@@ -4,11 +4,34 @@ import type { Problem } from "./types";
 /** The members of a problem that are always there; a problem of our own making has no others. */
 type ProblemLike = Pick<Problem, "detail" | "code" | "status" | "request_id"> & Partial<Problem>;
 
-/** An error that the service has explained. */
+/** The fields of the page by the members of a request. */
+const FIELDS: Record<string, string> = {
+  source: "Source",
+  sources: "Sources",
+  target: "Target",
+  targets: "Target",
+  waypoints: "Via",
+  barriers: "Barriers",
+  max_distance: "Up to",
+  relative_error: "Allowed error",
+  effort: "Effort",
+  levels: "Isolines",
+  count: "Isolines",
+};
+
+/** An error that the service has explained; its message is for people. */
 export class ProblemError extends Error {
   constructor(readonly problem: ProblemLike) {
-    super(problem.detail);
+    super(inWords(problem));
   }
+}
+
+/** Return what is wrong, with the field where a JSON pointer names the member of a request. */
+function inWords({ detail, errors }: ProblemLike): string {
+  const [fault] = errors ?? [];
+  if (!fault || detail !== `${fault.pointer}: ${fault.message}`) return detail;
+  const field = FIELDS[fault.pointer.split("/")[1] ?? ""];
+  return field ? `${field}: ${fault.message}` : fault.message;
 }
 
 export async function problemOfResponse(response: Response): Promise<ProblemError> {

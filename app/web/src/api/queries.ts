@@ -4,7 +4,6 @@ import { answerOf } from "./jobs";
 import { parseNpy } from "./npy";
 import type {
   About,
-  Border,
   BordersAnswer,
   DistancesAnswer,
   DistancesRequest,
@@ -28,6 +27,7 @@ export interface Field {
   largest: number;
   bound: ErrorBound;
   unreachable: Unreachable;
+  warnings: string[];
   /** Computing time by the service's own clock; null for a cached answer. */
   seconds: number | null;
 }
@@ -46,6 +46,7 @@ export async function askDistances(
     largest: largestOf(distances),
     bound: jsonHeader(response, "Geodesic-Error-Bound"),
     unreachable: jsonHeader(response, "Geodesic-Unreachable"),
+    warnings: jsonHeader<string[] | null>(response, "Geodesic-Warnings") ?? [],
     seconds: secondsOf(response),
   };
 }
@@ -64,17 +65,16 @@ export async function askTerritories(
 
 export type IsolinesQuestion = Question & ({ levels: number[] } | { count: number });
 
-/** Return the polylines of the isolines at some levels. */
+/** Return the isolines at some levels. */
 export async function askIsolines(
   mesh: string,
   question: IsolinesQuestion,
   onProgress: (share: number) => void,
   signal: AbortSignal,
-): Promise<[number, number, number][][]> {
+): Promise<IsolinesAnswer> {
   const path = `/v1/meshes/${mesh}/isolines`;
   const response = await answerOf(path, question, JSON_TYPE, onProgress, signal);
-  const { isolines } = (await response.json()) as IsolinesAnswer;
-  return isolines.flatMap(({ lines }) => lines.map(({ points }) => points));
+  return response.json() as Promise<IsolinesAnswer>;
 }
 
 export type BordersQuestion = Omit<Question, "method" | "relative_error" | "effort">;
@@ -85,10 +85,10 @@ export async function askBorders(
   question: BordersQuestion,
   onProgress: (share: number) => void,
   signal: AbortSignal,
-): Promise<Border[]> {
+): Promise<BordersAnswer> {
   const path = `/v1/meshes/${mesh}/borders`;
   const response = await answerOf(path, question, JSON_TYPE, onProgress, signal);
-  return ((await response.json()) as BordersAnswer).borders;
+  return response.json() as Promise<BordersAnswer>;
 }
 
 export interface RouteQuestion {
@@ -123,12 +123,15 @@ async function nearestSource(
   return ((await response.json()) as DistancesAnswer).nearest_source?.[0] ?? 0;
 }
 
-/** Return the point of the surface that is nearest to a position. */
-export async function locate(mesh: string, position: [number, number, number]): Promise<Point> {
+/** Return the point of the surface that is nearest to a position, and its distance from there. */
+export async function locate(
+  mesh: string,
+  position: [number, number, number],
+): Promise<{ point: Point; distance: number }> {
   const response = await post(`/v1/meshes/${mesh}/locate`, { points: [position] });
-  const [point] = ((await response.json()) as LocateAnswer).points;
-  if (!point) throw new Error("The service found no point of the surface there.");
-  return pointOf(point);
+  const [found] = ((await response.json()) as LocateAnswer).points;
+  if (!found) throw new Error("The service found no point of the surface there.");
+  return { point: pointOf(found), distance: found.distance };
 }
 
 /** Return a point as the page has it: at a vertex by its number, otherwise within a face. */

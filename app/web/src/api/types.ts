@@ -8,6 +8,7 @@ export type Border = Schemas["BorderDocument"];
 export type BordersAnswer = Schemas["BordersAnswer"];
 export type ErrorBound = Schemas["ErrorBound"];
 export type IsolinesAnswer = Schemas["IsolinesAnswer"];
+export type Line = Schemas["IsolineDocument"];
 export type Job = Schemas["JobDocument"];
 export type LocateAnswer = Schemas["LocateAnswer"];
 export type MeshDocument = Schemas["MeshDocument"];

@@ -1,5 +1,6 @@
 // Borders of territories: requested when the surface is coloured by them, then drawn.
 import { askBorders, type BordersQuestion } from "../api/queries";
+import type { Notes } from "../panel/notes";
 import type { State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
@@ -13,9 +14,10 @@ export class Borders {
     status: Status,
     private readonly sceneView: SceneView,
     private readonly fields: Fields,
+    private readonly notes: Notes,
   ) {
     const clear = () => sceneView.showBorders(new Int32Array(), []);
-    this.drawing = new Drawing(status, "Drawing borders…", clear);
+    this.drawing = new Drawing(status, notes, "borders", clear);
   }
 
   /** Request the borders that `state` shows and that are not drawn yet, and draw them. */
@@ -29,8 +31,11 @@ export class Borders {
     }
     const question = bordersOf(state);
     this.drawing.follow(JSON.stringify([mesh, question]), async (onProgress, signal) => {
-      const borders = await askBorders(mesh, question, onProgress, signal);
-      return () => this.sceneView.showBorders(nearest, borders);
+      const { borders, warnings } = await askBorders(mesh, question, onProgress, signal);
+      return () => {
+        this.sceneView.showBorders(nearest, borders);
+        this.notes.tell("borders", warnings);
+      };
     });
   }
 

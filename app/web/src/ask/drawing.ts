@@ -1,4 +1,5 @@
 // Lines that the service draws: requested when the question changes, then shown.
+import type { Notes } from "../panel/notes";
 import type { OnProgress, Status } from "../status";
 
 type Draw = (onProgress: OnProgress, signal: AbortSignal) => Promise<() => void>;
@@ -10,8 +11,9 @@ export class Drawing {
 
   constructor(
     private readonly status: Status,
-    private readonly message: string,
-    private readonly hide: () => void,
+    private readonly notes: Notes,
+    private readonly what: "isolines" | "borders",
+    private readonly hideLines: () => void,
   ) {}
 
   /** Draw, unless the question is the one before; `draw` returns a function that shows the lines. */
@@ -22,7 +24,7 @@ export class Drawing {
     this.question = question;
     const stop = new AbortController();
     this.stop = stop;
-    this.status.run("busy", this.message, stop, async (onProgress) => {
+    this.status.run("drawing", `Drawing ${this.what}…`, stop, async (onProgress) => {
       const show = await draw(onProgress, stop.signal);
       if (!stop.signal.aborted) show();
     });
@@ -33,6 +35,11 @@ export class Drawing {
     if (this.question === "") return;
     this.forget();
     this.hide();
+  }
+
+  private hide(): void {
+    this.hideLines();
+    this.notes.tell(this.what, []);
   }
 
   /** Draw anew next time: the mesh has been opened anew. */

@@ -1,12 +1,13 @@
 // Distances to all vertices: requested when sources, method or limits change, then painted.
 import type { Field, Question } from "../api/queries";
 import { askDistances, askTerritories } from "../api/queries";
-import type { Effort, Method } from "../api/types";
-import { byId, duration, written } from "../dom";
+import type { Effort, ErrorBound, Method } from "../api/types";
+import { byId, count, duration, written } from "../dom";
 import type { FacePoint } from "../mesh/picking";
+import type { Notes } from "../panel/notes";
 import { sayPoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
-import type { Status } from "../status";
+import { PATIENCE_MS, type Status } from "../status";
 import { hideLegend, showHere, showScale, showTerritories } from "../view/legend";
 import type { SceneView } from "../view/sceneView";
 import type { Surface } from "../view/surface";
@@ -33,11 +34,12 @@ export class Fields {
   constructor(
     private readonly status: Status,
     private readonly sceneView: SceneView,
+    private readonly notes: Notes,
   ) {}
 
   /** Return the field that is drawn, or null. */
-  of(state: State): Field | null {
-    return this.answers[state.method] ?? null;
+  of({ method, isReadable }: State): Field | null {
+    return isReadable ? (this.answers[method] ?? null) : null;
   }
 
   /** Return the nearest source of each vertex, where it is drawn; else null. */
@@ -47,32 +49,39 @@ export class Fields {
 
   /** Request what ``state`` needs and has not been answered yet, and paint it. */
   follow(state: State): void {
-    const { mesh, sources, barriers, maxDistance, method, error, effort, shade } = state;
-    const asked = [mesh, sources, barriers, maxDistance, method, error, effort, shade];
+    const { mesh, sources, barriers, maxDistance, method, error, effort, shade, isReadable } =
+      state;
+    const asked = [mesh, sources, barriers, maxDistance, method, error, effort, shade, isReadable];
     const requested = JSON.stringify(asked);
     if (requested === this.requested) return;
     this.requested = requested;
     this.stop.abort();
+    this.stop = new AbortController();
     const key = JSON.stringify([mesh, sources, barriers, maxDistance]);
     if (key !== this.answers.key) this.answers = { key };
     if (error !== this.answers.error) delete this.answers.approximate;
     if (effort !== this.answers.effort) delete this.answers.fast;
-    if (!mesh || sources.length === 0) this.paint(state);
+    if (!mesh || sources.length === 0 || !isReadable) this.paint(state);
     else this.request(mesh, state);
   }
 
   private request(mesh: string, state: State): void {
     const stop = new AbortController();
     this.stop = stop;
+    const isLatest = (): boolean => this.stop === stop;
+    // Until the answer is there, the one before remains for a moment only.
+    const clearing = setTimeout(() => isLatest() && this.paint(state), PATIENCE_MS);
     this.status.run("busy", "Computing distances…", stop, async (onProgress) => {
       try {
         await this.fetchMissing(mesh, state, onProgress, stop.signal);
       } catch (failure) {
         // After a failure or an abort, the same request may be made again.
-        if (this.stop === stop) this.requested = "";
+        if (isLatest()) this.requested = "";
         throw failure;
+      } finally {
+        clearTimeout(clearing);
+        if (isLatest()) this.paint(state);
       }
-      if (!stop.signal.aborted) this.paint(state);
     });
   }
 
@@ -104,6 +113,7 @@ export class Fields {
     this.compare();
     if (!surface) return;
     surface.setTerritories(null);
+    this.notes.tell("distances", field ? notesOn(field, state) : []);
     if (field) this.paintField(surface, field, state);
     else {
       surface.setValues(null, 1);
@@ -176,6 +186,24 @@ export function questionOf(state: State, method: Method): Question {
 /** Return the method that is compared with the exact one. */
 function roughOf({ method }: State): Exclude<Method, "exact"> {
   return method === "exact" ? "approximate" : method;
+}
+
+/** Return what there is to know about a field but its colours. */
+function notesOn({ bound, unreachable, warnings }: Field, { method }: State): string[] {
+  const { disconnected, beyond_max_distance } = unreachable;
+  const said = (n: number, what: string): string[] =>
+    n > 0 ? [`${count(n, "vertex", "vertices")} ${what}`] : [];
+  return [
+    ...(method === "exact" ? [] : [`Distances: ${boundInWords(bound)}.`]),
+    ...said(disconnected, "not connected to a source."),
+    ...said(beyond_max_distance, "beyond the limit."),
+    ...warnings,
+  ];
+}
+
+export function boundInWords({ value, kind, type }: ErrorBound): string {
+  const size = type === "relative" ? percent(value) : written(value, 3);
+  return `error ${kind === "guaranteed" ? "at most" : "about"} ${size} (${kind})`;
 }
 
 /** Return by how many per cent each distance is wrong; -1 where unreachable. */

@@ -1,10 +1,11 @@
 // Isolines: requested when the field or the levels change, then drawn.
 import { askIsolines, type IsolinesQuestion } from "../api/queries";
+import type { Notes } from "../panel/notes";
 import type { Lines, State } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
 import { Drawing } from "./drawing";
-import { type Fields, questionOf } from "./fields";
+import { boundInWords, type Fields, questionOf } from "./fields";
 
 export class Isolines {
   private readonly drawing: Drawing;
@@ -13,24 +14,35 @@ export class Isolines {
     status: Status,
     private readonly sceneView: SceneView,
     private readonly fields: Fields,
+    private readonly notes: Notes,
   ) {
-    this.drawing = new Drawing(status, "Drawing isolines…", () => sceneView.showIsolines([]));
+    this.drawing = new Drawing(status, notes, "isolines", () => sceneView.showIsolines([]));
   }
 
   /** Request the isolines that `state` needs and that are not drawn yet, and draw them. */
   follow(state: State): void {
     const { mesh, lines, shade } = state;
     const field = this.fields.of(state);
-    const isDrawn = field && lines && shade !== "difference" && this.sceneView.surface;
-    const question = isDrawn ? isolinesOf(state, lines, field.largest) : null;
+    const isDrawn = lines && shade !== "difference" && this.sceneView.surface;
+    // Where nothing but the sources is reached, there is no line.
+    const question =
+      isDrawn && field && field.largest > 0 ? isolinesOf(state, lines, field.largest) : null;
     const isEmpty = question && "levels" in question && question.levels.length === 0;
     if (!mesh || !question || isEmpty) {
       this.drawing.clear();
       return;
     }
-    this.drawing.follow(JSON.stringify([mesh, question]), async (onProgress, signal) => {
-      const found = await askIsolines(mesh, question, onProgress, signal);
-      return () => this.sceneView.showIsolines(found);
+    const asked = JSON.stringify([mesh, question, state.method]);
+    this.drawing.follow(asked, async (onProgress, signal) => {
+      const answer = await askIsolines(mesh, question, onProgress, signal);
+      const isOfOtherMethod = answer.method !== state.method;
+      return () => {
+        this.sceneView.showIsolines(answer.isolines.flatMap((level) => level.lines));
+        this.notes.tell("isolines", [
+          ...(isOfOtherMethod ? [`Isolines: ${boundInWords(answer.error_bound)}.`] : []),
+          ...answer.warnings,
+        ]);
+      };
     });
   }
 

@@ -3,10 +3,12 @@ import { LatestOnly } from "../api/latestOnly";
 import { askRoute, pointOf, type RouteQuestion } from "../api/queries";
 import type { Outline, Point, Step } from "../api/types";
 import { byId, count, duration, written } from "../dom";
+import type { Notes } from "../panel/notes";
 import { writePoint } from "../state/point";
 import { type State, unitOf } from "../state/state";
-import type { Status } from "../status";
+import { PATIENCE_MS, type Status } from "../status";
 import type { SceneView } from "../view/sceneView";
+import { boundInWords } from "./fields";
 
 type RouteRequest = RouteQuestion & { mesh: string };
 
@@ -25,19 +27,21 @@ export class Routes {
   private unit = "";
   private steps: Step[] = [];
   private request: RouteRequest | null = null;
+  private clearing = 0;
   private readonly latestOnly: LatestOnly<RouteRequest>;
 
   constructor(
     private readonly status: Status,
     private readonly sceneView: SceneView,
+    private readonly notes: Notes,
   ) {
     this.latestOnly = new LatestOnly<RouteRequest>(
-      ({ mesh, ...question }, stop) =>
-        status.during("busy", "Searching for the path…", stop, async () =>
-          this.show(await askRoute(mesh, question, stop.signal), question),
+      (request, stop) =>
+        status.during("busy", "Searching for the path…", stop, () =>
+          this.answer(request, stop.signal),
         ),
       (error) => {
-        this.requested = "";
+        this.clear();
         status.fail(error);
       },
     );
@@ -48,23 +52,37 @@ export class Routes {
 
   /** Request the path that ``state`` asks for. */
   follow(state: State): void {
-    const { mesh, sources, target, waypoints, barriers } = state;
+    const { mesh, sources, target, waypoints, barriers, isReadable } = state;
     this.unit = unitOf(state);
     this.note();
-    const requested = JSON.stringify([mesh, sources, target, waypoints, barriers]);
+    const requested = JSON.stringify([mesh, sources, target, waypoints, barriers, isReadable]);
     if (requested === this.requested) return;
     this.requested = requested;
     this.endSteps();
-    const hasPath = mesh !== null && target !== null && sources.length > 0;
+    const hasPath = mesh !== null && target !== null && sources.length > 0 && isReadable;
     this.request = hasPath ? { mesh, sources, target, waypoints, barriers, explain: false } : null;
     byId("explain-start", HTMLButtonElement).disabled = !hasPath;
-    if (this.request) this.latestOnly.ask(this.request);
-    else {
+    if (this.request) {
+      this.latestOnly.ask(this.request);
+      this.clearSoon();
+    } else {
       this.latestOnly.cancel();
-      this.outline = null;
-      byId("readout").hidden = true;
-      this.draw();
+      this.clear();
     }
+  }
+
+  /** Let the path before remain for a moment only. */
+  private clearSoon(): void {
+    this.clearing ||= setTimeout(() => this.clear(), PATIENCE_MS);
+  }
+
+  private clear(): void {
+    clearTimeout(this.clearing);
+    this.clearing = 0;
+    this.outline = null;
+    byId("readout").hidden = true;
+    this.notes.tell("path", []);
+    this.draw();
   }
 
   /** The start of the path that was found. */
@@ -77,13 +95,31 @@ export class Routes {
     this.sceneView.showRoute(this.outline);
   }
 
-  private show(outline: Outline, question: RouteQuestion): void {
-    if (!this.request) return;
+  private async answer(request: RouteRequest, signal: AbortSignal): Promise<void> {
+    const { mesh, ...question } = request;
+    try {
+      this.show(await askRoute(mesh, question, signal), request);
+    } catch (failure) {
+      // After a failure or an abort, the same request may be made again.
+      if (request === this.request) this.requested = "";
+      throw failure;
+    }
+  }
+
+  private show(outline: Outline, request: RouteRequest): void {
+    const { mesh, sources, barriers } = this.request ?? {};
+    const isOfOther =
+      mesh !== request.mesh || sources !== request.sources || barriers !== request.barriers;
+    if (isOfOther) return;
+    clearTimeout(this.clearing);
+    this.clearing = 0;
+    if (request !== this.request) this.clearSoon(); // a point has been pulled on meanwhile
     this.outline = outline;
     this.draw();
+    this.notes.tell("path", outline.warnings);
     const readout = byId("readout");
     readout.hidden = false;
-    readout.dataset.target = writePoint(question.target);
+    readout.dataset.target = writePoint(request.target);
     const { length } = outline;
     byId("length").textContent = length == null ? "No path" : written(length, 6);
     this.note();
@@ -93,10 +129,11 @@ export class Routes {
     const { outline, unit } = this;
     if (!outline) return;
     const { length } = outline.waypoints;
+    const bound = outline.exact ? "exact" : boundInWords(outline.error_bound);
     byId("length-note").textContent =
       outline.length == null
         ? reason(outline)
-        : `${unit}, exact${length > 0 ? `, via ${length}` : ""}`;
+        : `${unit}, ${bound}${length > 0 ? `, via ${length}` : ""}`;
   }
 
   private explain(): void {

@@ -3,7 +3,7 @@ import { BufferAttribute, BufferGeometry } from "three";
 import { MeshBVH } from "three-mesh-bvh";
 import { authorization } from "../api/http";
 import { ProblemError } from "../api/problemError";
-import type { MeshDocument } from "../api/types";
+import type { MeshDocument, Point } from "../api/types";
 import { drawnIn, type Frame, type Up } from "./frame";
 
 type Triple = [number, number, number];
@@ -62,6 +62,13 @@ export class LoadedMesh {
 
   get frame(): Frame {
     return this.shape.frame;
+  }
+
+  /** Whether the vertex, the edge's ends or the face of a point are among those of the mesh. */
+  has(point: Point): boolean {
+    const { vertices, faces } = this.document;
+    if ("face" in point) return point.face < faces;
+    return ("edge" in point ? point.edge : [point.vertex]).every((vertex) => vertex < vertices);
   }
 
   corners(face: number): Triple {

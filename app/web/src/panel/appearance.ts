@@ -3,6 +3,7 @@ import { byId } from "../dom";
 
 const THEME = "geodesic-theme";
 const HINT = "geodesic-hint";
+const TOLD_MS = 4000;
 
 export function setUpAppearance(onTheme: () => void): void {
   const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -17,14 +18,28 @@ export function setUpAppearance(onTheme: () => void): void {
     apply();
   });
   apply();
-  const fold = byId("fold");
-  const setFolded = (isFolded: boolean): void => {
-    byId("folded").hidden = isFolded;
-    fold.setAttribute("aria-expanded", String(!isFolded));
-  };
-  fold.addEventListener("click", () => setFolded(!byId("folded").hidden));
-  setFolded(matchMedia("(max-width: 46rem)").matches);
+  byId("fold").addEventListener("click", () => setFolded(!byId("folded").hidden));
+  foldOnPhone();
   byId("hint-close").addEventListener("click", dismissHint);
+}
+
+function setFolded(isFolded: boolean): void {
+  byId("folded").hidden = isFolded;
+  byId("fold").setAttribute("aria-expanded", String(!isFolded));
+}
+
+/** Fold the panel where it would lie over the mesh. */
+export function foldOnPhone(): void {
+  if (matchMedia("(max-width: 46rem)").matches) setFolded(true);
+}
+
+let telling = 0;
+
+/** Tell in a few words what became of a click or a key: for a while, or until something changes. */
+export function tell(words: string): void {
+  clearTimeout(telling);
+  byId("told").textContent = words;
+  if (words) telling = setTimeout(() => tell(""), TOLD_MS);
 }
 
 export function isDark(): boolean {

@@ -1,10 +1,11 @@
 // Fields and switches: they show the state and change it.
+import { getMesh } from "../api/meshes";
 import { locate } from "../api/queries";
 import type { Effort, Method, Point } from "../api/types";
-import { byId, query } from "../dom";
+import { byId, query, written } from "../dom";
 import type { Up } from "../mesh/frame";
-import { LONGEST_UNIT, readState, writeRanges } from "../state/permalink";
-import { parsePoints, type WrittenPoint } from "../state/point";
+import { LONGEST_UNIT, readState, type WrittenState, writeRanges } from "../state/permalink";
+import type { WrittenPoint } from "../state/point";
 import {
   INITIAL,
   type Lines,
@@ -15,8 +16,16 @@ import {
 } from "../state/state";
 import type { Status } from "../status";
 import type { SceneView } from "../view/sceneView";
+import type { Notes } from "./notes";
 import type { Tool } from "./pointer";
 import { PointField } from "./pointField";
+
+/** Positions that are this many edges from the surface, at most, are on it: they were rounded. */
+const FAR = 0.1;
+
+type Question = Pick<WrittenState, "sources" | "target" | "waypoints" | "barriers" | "maxDistance">;
+type Located<Q> = Omit<Q, "sources" | "target" | "waypoints"> &
+  Pick<State, "sources" | "target" | "waypoints">;
 
 export class Controls {
   private readonly sources = new PointField("sources");
@@ -28,6 +37,7 @@ export class Controls {
     private readonly store: Store,
     private readonly status: Status,
     sceneView: SceneView,
+    private readonly notes: Notes,
   ) {
     byId("points").addEventListener("submit", (event) => {
       event.preventDefault();
@@ -81,11 +91,7 @@ export class Controls {
 
   /** Show ``state`` in all fields. */
   show(state: State): void {
-    this.sources.show(state.sources);
-    this.target.show(state.target ? [state.target] : []);
-    this.waypoints.show(state.waypoints);
-    setValue("barriers", writeRanges(state.barriers));
-    setValue("max-distance", state.maxDistance === null ? "" : String(state.maxDistance));
+    if (state.isReadable) this.showQuestion(state);
     if (state.waypoints.length > 0 || state.barriers.length > 0 || state.maxDistance !== null)
       byId("more-points", HTMLDetailsElement).open = true;
     choose("methods", state.method);
@@ -109,33 +115,43 @@ export class Controls {
     byId("wireframe", HTMLInputElement).checked = state.wireframe;
   }
 
+  /** Show the question; what cannot be read stays as it was typed. */
+  private showQuestion(state: State): void {
+    this.sources.show(state.sources);
+    this.target.show(state.target ? [state.target] : []);
+    this.waypoints.show(state.waypoints);
+    setValue("barriers", writeRanges(state.barriers));
+    setValue("max-distance", state.maxDistance === null ? "" : String(state.maxDistance));
+  }
+
   private readPoints(): void {
     const { mesh } = this.store.state;
     if (mesh === null) return;
-    const text = (id: string): string => byId(id, HTMLInputElement).value.trim();
     this.reading.abort(); // what was written before could be located later
     const reading = new AbortController();
     this.reading = reading;
     this.status.run("busy", "Locating points…", reading, async () => {
-      const [sources, targets, waypoints] = await Promise.all([
-        resolved(mesh, parsePoints(this.sources.text)),
-        resolved(mesh, parsePoints(this.target.text)),
-        resolved(mesh, parsePoints(this.waypoints.text)),
-      ]);
-      reading.signal.throwIfAborted();
-      const written = new URLSearchParams({
-        barriers: text("barriers"),
-        max_distance: text("max-distance"),
-      });
-      const { barriers, maxDistance } = readState(written.toString());
-      this.store.update({
-        sources,
-        target: targets[0] ?? null,
-        waypoints,
-        barriers,
-        maxDistance,
-      });
+      try {
+        const { change, notes } = await located(mesh, this.read());
+        reading.signal.throwIfAborted();
+        this.store.update(change);
+        this.notes.tell("points", notes);
+      } catch (error) {
+        if (!reading.signal.aborted) this.store.update({ isReadable: false });
+        throw error;
+      }
     });
+  }
+
+  /** Read the question as it is written; throw where there is something else. */
+  private read(): Question {
+    const text = (id: string): string => byId(id, HTMLInputElement).value.trim();
+    const limits = { barriers: text("barriers"), max_distance: text("max-distance") };
+    const { barriers, maxDistance } = readState(new URLSearchParams(limits).toString());
+    const [sources, targets, waypoints] = [this.sources, this.target, this.waypoints].map((field) =>
+      field.read(),
+    ) as [WrittenPoint[], WrittenPoint[], WrittenPoint[]];
+    return { sources, target: targets[0] ?? null, waypoints, barriers, maxDistance };
   }
 
   private readLines(isOtherKind: boolean): void {
@@ -153,11 +169,35 @@ export class Controls {
   usualSpacing: () => number = () => 1;
 }
 
-/** Return points of the surface: the service locates those written as positions. */
-export function resolved(mesh: string, points: WrittenPoint[]): Promise<Point[]> {
-  return Promise.all(
-    points.map((point) => ("position" in point ? locate(mesh, point.position) : point)),
-  );
+/**
+ * Return a question with points of the surface, where it has positions: the service locates these.
+ *
+ * The notes tell how far from the surface they are, where that is much.
+ */
+export async function located<Q extends Pick<WrittenState, "sources" | "target" | "waypoints">>(
+  mesh: string,
+  question: Q,
+): Promise<{ change: Located<Q>; notes: string[] }> {
+  const notes: string[] = [];
+  const pointOf = async (given: WrittenPoint): Promise<Point> => {
+    if (!("position" in given)) return given;
+    const [{ point, distance }, { mean_edge_length }] = await Promise.all([
+      locate(mesh, given.position),
+      getMesh(mesh),
+    ]);
+    if (distance > FAR * mean_edge_length) {
+      const away = `${written(distance, 4)} away from the surface`;
+      notes.push(`The position ${given.position.join(", ")} is ${away}: its nearest point counts.`);
+    }
+    return point;
+  };
+  const { sources, target, waypoints } = question;
+  const [first, last, between] = await Promise.all([
+    Promise.all(sources.map(pointOf)),
+    target && pointOf(target),
+    Promise.all(waypoints.map(pointOf)),
+  ]);
+  return { change: { ...question, sources: first, target: last, waypoints: between }, notes };
 }
 
 function errorOf(slider: HTMLInputElement): number {

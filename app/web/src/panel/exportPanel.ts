@@ -67,12 +67,12 @@ export class ExportPanel {
 
   /** Enable the exports that ``state`` has answers for. */
   show(state: State): void {
-    const hasField = state.mesh !== null && state.sources.length > 0;
+    const hasField = state.mesh !== null && state.sources.length > 0 && state.isReadable;
     const has = {
       distances: hasField,
       path: hasField && state.target !== null,
       isolines: hasField && state.lines !== null,
-      borders: state.mesh !== null && state.sources.length > 1,
+      borders: hasField && state.sources.length > 1,
     };
     for (const [what, isThere] of Object.entries(has)) {
       for (const choice of byId(`download-${what}`).querySelectorAll("button"))

@@ -16,10 +16,8 @@ export function listenToKeys(
   pointer: Pointer,
 ): void {
   const { stage } = sceneView;
-  const inTheMiddle = (tool: Tool, adds = false): void => {
-    const point = sceneView.pick(0, 0);
-    if (point) pointer.set(point, tool, adds);
-  };
+  const inTheMiddle = (tool: Tool, adds = false): void =>
+    pointer.set(sceneView.pick(0, 0), tool, adds);
   const onMesh: Record<string, (event: KeyboardEvent) => void> = {
     ArrowLeft: () => stage.turn(-STEP, 0),
     ArrowRight: () => stage.turn(STEP, 0),

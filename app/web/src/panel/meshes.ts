@@ -1,8 +1,8 @@
 // Choosing a mesh: from a file, from a sample or from the store.
 import { listMeshes, makeSample, uploadMesh } from "../api/meshes";
-import { ProblemError } from "../api/problemError";
-import type { MeshDocument } from "../api/types";
+import type { About, MeshDocument } from "../api/types";
 import { button, byId, count } from "../dom";
+import { InputError } from "../inputError";
 import { type Store, withMesh } from "../state/state";
 import type { OnProgress, Status } from "../status";
 
@@ -13,7 +13,14 @@ const SAMPLES = [
   ["obstacles", "Obstacles", 20_000],
 ] as const;
 
-const SUFFIXES = ["obj", "off", "ply", "stl", "glb", "json"];
+/** What a file is that is no mesh, by its media type. The service tells what is wrong with others. */
+const NO_MESHES: [RegExp, string][] = [
+  [/^image\//, "an image"],
+  [/^(audio|video)\//, "a recording"],
+  [/^application\/(pdf|msword|vnd\.(ms-|oasis|openxml).*)$/, "a document"],
+];
+/** Texts by their names: the media type of a mesh may be that of a text. */
+const TEXT = /\.(txt|md|csv|html?|log)$/i;
 
 /** The value of the option that lists more of the store; no mesh has this id. */
 const MORE = "more";
@@ -21,6 +28,7 @@ const MORE = "more";
 export class Meshes {
   /** Files of this visit by the id of their mesh, to send again with its vertices joined. */
   private readonly files = new Map<string, File>();
+  private formats = "";
   private readonly select = byId("meshes", HTMLSelectElement);
 
   constructor(
@@ -52,8 +60,10 @@ export class Meshes {
     this.acceptDrops();
   }
 
-  /** Hide the samples that this service does not make. */
-  offer(samples: readonly string[]): void {
+  /** Name the formats that this service reads, and hide the samples that it does not make. */
+  offer({ samples, mesh_formats }: Pick<About, "samples" | "mesh_formats">): void {
+    this.formats = mesh_formats.map((format) => format.toUpperCase()).join(", ");
+    byId("welcome-formats").textContent = this.formats;
     for (const choice of document.querySelectorAll<HTMLButtonElement>("[data-sample]")) {
       choice.hidden = !samples.includes(choice.dataset.sample ?? "");
     }
@@ -100,7 +110,7 @@ export class Meshes {
   }
 
   private upload(file: File, merge: "none" | "exact" = "none"): void {
-    const refusal = refusalOf(file);
+    const refusal = refusalOf(file, this.formats);
     if (refusal) {
       this.status.fail(refusal);
       return;
@@ -146,23 +156,16 @@ function nameOf({ id, name, faces }: MeshDocument): string {
   return `${name ?? id.slice(0, 8)}, ${count(faces, "face")}`;
 }
 
-/** Return why a file cannot be a mesh, judged by its name; null if it may be one. */
-export function refusalOf({ name, type }: Pick<File, "name" | "type">): ProblemError | null {
-  const suffix = name.split(".").pop()?.toLowerCase() ?? "";
-  if (SUFFIXES.includes(suffix)) return null;
-  const [kind] = type.split("/");
-  const what =
-    kind === "image"
-      ? "an image"
-      : kind === "text"
-        ? "a text file"
-        : "not a mesh that can be read here";
-  return new ProblemError({
-    title: "Not a mesh",
-    detail: `${name} is ${what}.`,
-    hint: `Choose a file that ends in ${SUFFIXES.slice(0, -1).join(", ")} or ${SUFFIXES.at(-1)}.`,
-    code: "unsupported_media_type",
-    status: 415,
-    request_id: "",
-  });
+/** Return why a file cannot be a mesh, judged by its name and type; null if it may be one. */
+export function refusalOf(
+  { name, type }: Pick<File, "name" | "type">,
+  formats: string,
+): InputError | null {
+  const what = TEXT.test(name) ? "a text file" : NO_MESHES.find(([kind]) => kind.test(type))?.[1];
+  if (!what) return null;
+  return new InputError(
+    "Not a mesh",
+    `${name} is ${what}.`,
+    formats && `This service reads ${formats}.`,
+  );
 }

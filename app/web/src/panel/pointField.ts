@@ -1,7 +1,7 @@
 // A field for points: in words, and as coordinates while it is edited.
 import type { Point } from "../api/types";
 import { byId } from "../dom";
-import { sayPoint, writePoint } from "../state/point";
+import { parsePoints, sayPoint, type WrittenPoint, writePoint } from "../state/point";
 
 export class PointField {
   private readonly input: HTMLInputElement;
@@ -25,9 +25,9 @@ export class PointField {
     });
   }
 
-  /** The points as coordinates. */
-  get text(): string {
-    return this.written.trim();
+  /** Read the points as they are written; throw where there is something else. */
+  read(): WrittenPoint[] {
+    return parsePoints(this.written);
   }
 
   /** Show points; what is being edited stays as it is. */

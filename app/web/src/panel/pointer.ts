@@ -5,6 +5,7 @@ import { type FacePoint, positionOf } from "../mesh/picking";
 import { rounded } from "../state/point";
 import type { State, Store } from "../state/state";
 import type { SceneView } from "../view/sceneView";
+import { tell } from "./appearance";
 
 export type Tool = "source" | "target" | "waypoint" | "barrier";
 
@@ -114,17 +115,23 @@ export class Pointer {
     const isClick = start !== null && !this.hasMoved(event);
     if (drag && !isClick) drag(event);
     if (this.painted) this.store.update({ barriers: [...this.painted] });
-    else if (isClick) this.click(event, event.shiftKey || isHeld(start, event));
+    if (isClick) {
+      const adds = event.shiftKey || isHeld(start, event);
+      this.set(this.at(event), event.altKey ? "target" : this.tool(), adds);
+    }
     this.end();
   }
 
-  private click(event: PointerEvent, adds: boolean): void {
-    const point = this.at(event);
-    if (point) this.set(point, event.altKey ? "target" : this.tool(), adds);
-  }
-
-  /** Set the point that ``tool`` stands for; ``adds`` joins a source to those there are. */
-  set(point: Point, tool: Tool, adds: boolean): void {
+  /**
+   * Set the point that ``tool`` stands for; ``adds`` joins a source to those there are.
+   *
+   * A place beside the mesh (null) sets nothing, and is told.
+   */
+  set(point: Point | null, tool: Tool, adds: boolean): void {
+    if (!point) {
+      if (this.sceneView.isPickable) tell("That is beside the mesh");
+      return;
+    }
     const { sources, waypoints } = this.store.state;
     if (tool === "source") this.store.update({ sources: adds ? [...sources, point] : [point] });
     if (tool === "target") this.store.update({ target: point });

@@ -20,19 +20,26 @@ export function showReport(
   const words = document.createElement("p");
   words.textContent = describe(document_, unit);
   const list = document.createElement("ul");
-  for (const [faults, noun, plural, kind] of faultsOf(document_)) {
+  const lines = new Map(document_.warnings.map((warning) => [warning, lineOf(warning)]));
+  for (const [faults, kind, what, title] of faultsOf(document_)) {
     if (faults.count === 0) continue;
-    const line = row(count(faults.count, noun, plural), faults, kind, sceneView);
+    // The service has told it in a sentence, with the remedy.
+    const words = document_.warnings.find((warning) => what.test(warning)) ?? title;
+    const line = lines.get(words) ?? lineOf(words);
+    lines.set(words, line);
+    line.append(showing(faults, kind, title, sceneView));
     if (join && faults === document_.duplicate_vertices) line.append(button("Join them", join));
-    list.append(line);
   }
-  for (const warning of document_.warnings) {
-    const line = document.createElement("li");
-    line.className = "warning";
-    line.textContent = warning;
-    list.append(line);
-  }
+  list.append(...lines.values());
   report.append(words, list);
+}
+
+function lineOf(words: string): HTMLLIElement {
+  const line = document.createElement("li");
+  const text = document.createElement("span");
+  text.textContent = words;
+  line.append(text);
+  return line;
 }
 
 function describe(mesh: MeshDocument, unit: string): string {
@@ -43,63 +50,46 @@ function describe(mesh: MeshDocument, unit: string): string {
     mesh.boundary_loops === 0
       ? "closed"
       : `with ${count(mesh.boundary_loops, "boundary", "boundaries")}`;
+  const divided =
+    mesh.triangulated_polygons === 0
+      ? ""
+      : ` ${count(mesh.triangulated_polygons, "polygon")} divided into triangles.`;
   return (
     `${count(mesh.vertices, "vertex", "vertices")}, ${count(mesh.faces, "face")}; ${parts}, ${rim}. ` +
-    `${size} ${unit}, edges of ${written(mesh.mean_edge_length, 3)} on average.`
+    `${size} ${unit}, edges of ${written(mesh.mean_edge_length, 3)} on average.${divided}`
   );
 }
 
-function faultsOf(mesh: MeshDocument): [Faults, string, string, Kind][] {
+/** Return the faults of each kind, how the service's sentence on them is known, and their name. */
+function faultsOf(mesh: MeshDocument): [Faults, Kind, RegExp, string][] {
   return [
-    [
-      mesh.non_manifold_edges,
-      "edge of three or more faces",
-      "edges of three or more faces",
-      "edge",
-    ],
-    [
-      mesh.misoriented_edges,
-      "edge with faces of opposite orientation",
-      "edges with faces of opposite orientation",
-      "edge",
-    ],
-    [mesh.degenerate_faces, "face without area", "faces without area", "face"],
-    [
-      mesh.repeated_vertex_faces,
-      "face that repeats a vertex",
-      "faces that repeat a vertex",
-      "face",
-    ],
-    [mesh.duplicate_faces, "duplicate face", "duplicate faces", "face"],
-    [mesh.collapsed_faces, "collapsed face", "collapsed faces", "face"],
-    [mesh.zero_length_edges, "edge of zero length", "edges of zero length", "edge"],
-    [
-      mesh.bow_tie_vertices,
-      "vertex where several fans of faces meet",
-      "vertices where several fans of faces meet",
-      "vertex",
-    ],
-    [mesh.isolated_vertices, "vertex without a face", "vertices without a face", "vertex"],
-    [mesh.duplicate_vertices, "duplicate vertex", "duplicate vertices", "vertex"],
+    [mesh.duplicate_vertices, "vertex", /position of an earlier vertex/, "duplicate vertices"],
+    [mesh.isolated_vertices, "vertex", /in no face/, "vertices without a face"],
+    [mesh.repeated_vertex_faces, "face", /than three different/, "faces that repeat a vertex"],
+    [mesh.zero_length_edges, "edge", /zero length/, "edges of zero length"],
+    [mesh.collapsed_faces, "face", /reduced to an edge/, "collapsed faces"],
+    [mesh.duplicate_faces, "face", /same vertices as an earlier/, "duplicate faces"],
+    [mesh.degenerate_faces, "face", /without area/, "faces without area"],
+    [mesh.non_manifold_edges, "edge", /three faces or more/, "edges of three or more faces"],
+    [mesh.misoriented_edges, "edge", /in the same direction/, "edges of opposite orientation"],
+    [mesh.bow_tie_vertices, "vertex", /fans of faces/, "vertices of several fans of faces"],
   ];
 }
 
-function row(words: string, faults: Faults, kind: Kind, sceneView: SceneView): HTMLLIElement {
-  const line = document.createElement("li");
-  const text = document.createElement("span");
-  text.textContent = words;
+/** Return a button that marks faults on the mesh, or ends this. */
+function showing(faults: Faults, kind: Kind, title: string, sceneView: SceneView): HTMLElement {
   const shows = button("Show", () => {
     const isShown = shows.getAttribute("aria-pressed") === "true";
-    for (const other of byId("report").querySelectorAll("button"))
+    for (const other of byId("report").querySelectorAll("[aria-pressed]"))
       other.setAttribute("aria-pressed", "false");
     shows.setAttribute("aria-pressed", String(!isShown));
     if (isShown) sceneView.showFaults([], []);
     else mark(faults.ids, kind, sceneView);
   });
   shows.setAttribute("aria-pressed", "false");
-  shows.setAttribute("aria-label", `Show ${words}`);
-  line.append(text, shows);
-  return line;
+  shows.title = `Show ${title}`;
+  shows.setAttribute("aria-label", shows.title);
+  return shows;
 }
 
 /** Mark faults by their ids; the report lists the first ten of each kind. */

@@ -1,5 +1,6 @@
 // The state as the page's address, and back: /?mesh=ID&source=v0&target=v99
 import type { Effort, Method } from "../api/types";
+import { InputError } from "../inputError";
 import type { Up } from "../mesh/frame";
 import { parsePoint, type WrittenPoint, writePoint } from "./point";
 import { INITIAL, type Lines, PALETTES, type Palette, type Shade, type State } from "./state";
@@ -7,6 +8,8 @@ import { INITIAL, type Lines, PALETTES, type Palette, type Shade, type State } f
 /** Characters of the name of a unit. */
 export const LONGEST_UNIT = 12;
 const EFFORTS: Effort[] = [1, 2, 4, 8];
+/** No mesh has more faces. */
+const MOST_FACES = 1e8;
 
 /** A state whose points may still be positions, which the service has to locate. */
 export type WrittenState = Omit<State, "sources" | "target" | "waypoints"> & {
@@ -57,6 +60,7 @@ export function readState(search: string): WrittenState {
     error: positive(query.get("error")) ?? INITIAL.error,
     effort: EFFORTS.find((effort) => String(effort) === query.get("effort")) ?? INITIAL.effort,
     maxDistance: positive(query.get("max_distance")),
+    isReadable: true,
     unit: query.get("unit")?.slice(0, LONGEST_UNIT) ?? "",
     shade: oneOf<Shade>(query.get("shade"), ["distance", "territories", "difference"]),
     lines: readLines(query.get("lines")),
@@ -97,11 +101,18 @@ export function writeRanges(numbers: number[]): string {
 }
 
 function readRanges(text: string): number[] {
-  return text.split(",").flatMap((part) => {
-    const match = /^(\d+)(?:-(\d+))?$/.exec(part);
-    if (!match) return [];
-    const [first, last] = [Number(match[1]), Number(match[2] ?? match[1])];
-    return Array.from({ length: Math.max(0, last - first + 1) }, (_, i) => first + i);
+  return text.split(/[\s,]+/).flatMap((part) => {
+    if (!part) return [];
+    const [, first, last = first] = /^(\d+)(?:-(\d+))?$/.exec(part) ?? [];
+    const length = Number(last) - Number(first) + 1;
+    if (!(length > 0 && Number(last) < MOST_FACES)) {
+      throw new InputError(
+        "Not a range of faces",
+        `“${part}” is neither the number of a face nor a range of them.`,
+        "Write 3,7,40-59 for the faces 3, 7 and 40 to 59.",
+      );
+    }
+    return Array.from({ length }, (_, i) => Number(first) + i);
   });
 }
 

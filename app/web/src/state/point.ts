@@ -1,5 +1,6 @@
 // Points as text: v12, e12-13:0.3, f7:0.2,0.3,0.5, p1,2,3.
 import type { Point } from "../api/types";
+import { InputError } from "../inputError";
 
 export type WrittenPoint = Point | { position: [number, number, number] };
 
@@ -19,8 +20,11 @@ export function parsePoint(text: string): WrittenPoint {
   if (face) return { face: Number(face[1]), barycentric: triple(face, 2) };
   const position = POSITION.exec(text);
   if (position) return { position: triple(position, 1) };
-  throw new Error(
-    `“${text}” is not a point. Write it as v12, e12-13:0.3, f7:0.2,0.3,0.5 or p1,2,3.`,
+  throw new InputError(
+    "Not a point",
+    `“${text}” is not a point.`,
+    "Write v12 for a vertex, e12-13:0.3 for a place on an edge, f7:0.2,0.3,0.5 for one in a face, " +
+      "or p1,2,3 for a position.",
   );
 }
 

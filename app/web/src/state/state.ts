@@ -17,6 +17,8 @@ export interface State {
   error: number;
   effort: Effort;
   maxDistance: number | null;
+  /** Whether all fields of the question can be read; as long as one cannot, there is no question. */
+  isReadable: boolean;
   /** The name of the unit of the mesh; empty: unknown. */
   unit: string;
   shade: Shade;
@@ -41,6 +43,7 @@ export const INITIAL: State = {
   error: 0.01,
   effort: 2,
   maxDistance: null,
+  isReadable: true,
   unit: "",
   shade: "distance",
   lines: { count: 20 },
@@ -50,6 +53,9 @@ export const INITIAL: State = {
   up: null,
   view: null,
 };
+
+/** A change to any of these is another question: it can be read, unless the change says otherwise. */
+const QUESTION = ["mesh", "sources", "target", "waypoints", "barriers", "maxDistance"] as const;
 
 type Listener = (state: State, before: State) => void;
 
@@ -63,7 +69,8 @@ export class Store {
 
   update(change: Partial<State>): void {
     const before = this.current;
-    this.current = { ...before, ...change };
+    const asks = QUESTION.some((name) => name in change);
+    this.current = { ...before, isReadable: before.isReadable || asks, ...change };
     for (const listener of this.listeners) listener(this.current, before);
   }
 

@@ -1,8 +1,9 @@
-// Isolines as thin lines with a dark casing, so that they show on each colour.
+// Isolines and borders as thin lines with a dark casing, so that they show on each colour.
 import { BufferGeometry } from "three";
+import type { Line } from "../api/types";
+import type { LoadedMesh } from "../mesh/loader";
 import { ribbonMesh, ribbons } from "./ribbon";
 import type { Stage } from "./scene";
-import type { Triple } from "./simplified";
 
 export class IsolineLayer {
   private readonly object = ribbonMesh({
@@ -20,12 +21,19 @@ export class IsolineLayer {
     stage.add(this.object);
   }
 
-  /** Show lines through drawn positions, in place of the ones before. */
-  show(lines: Triple[][]): void {
-    if (lines.length === 0 && !this.object.visible) return;
-    this.object.visible = lines.length > 0;
+  /** Show lines on a mesh, in place of the ones before. A closed line does not repeat its start. */
+  show(mesh: Pick<LoadedMesh, "drawn"> | null, lines: Pick<Line, "points" | "closed">[]): void {
+    const isShown = mesh !== null && lines.length > 0;
+    if (!isShown && !this.object.visible) return;
+    this.object.visible = isShown;
     this.object.geometry.dispose();
-    this.object.geometry = lines.length > 0 ? ribbons(lines) : new BufferGeometry();
+    this.object.geometry = isShown
+      ? ribbons(
+          lines.map(({ points, closed }) =>
+            (closed ? [...points, points[0]!] : points).map((point) => mesh.drawn(point)),
+          ),
+        )
+      : new BufferGeometry();
     this.stage.invalidate();
   }
 }

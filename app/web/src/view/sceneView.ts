@@ -1,7 +1,7 @@
 // The mesh on the stage, with points, path, barriers and faults on it.
 import { Mesh, PlaneGeometry, Vector3 } from "three";
 import type { MeshBVH } from "three-mesh-bvh";
-import type { Border, MeshDocument, Outline, Point } from "../api/types";
+import type { Border, Line, MeshDocument, Outline, Point } from "../api/types";
 import type { Up } from "../mesh/frame";
 import { type LoadedMesh, loadMesh } from "../mesh/loader";
 import { type FacePoint, pick, positionOf } from "../mesh/picking";
@@ -67,11 +67,11 @@ export class SceneView {
       [0, 0, 0],
     ];
     this.points.show([{ position: [0, 0, 0], fill: SOURCE, size: 0 }]);
-    this.isolines.show([nowhere]);
+    this.isolines.show({ drawn: () => [0, 0, 0] }, [{ points: nowhere, closed: false }]);
     this.route.show(nowhere);
     this.stage.warmUp(new Mesh(new PlaneGeometry(0, 0), this.paint));
     this.points.show([]);
-    this.isolines.show([]);
+    this.isolines.show(null, []);
     this.route.show([]);
   }
 
@@ -84,9 +84,13 @@ export class SceneView {
     for (const patch of [this.barriers, this.region, this.faults]) patch.show(null, []);
     this.points.show([]);
     this.faultPoints.show([]);
-    this.isolines.show([]);
+    this.isolines.show(null, []);
     this.route.show([]);
     this.showBorders(new Int32Array(), []);
+  }
+
+  get isPickable(): boolean {
+    return this.tree !== null;
   }
 
   /** Return the point of the surface under a place of the canvas, or null where there is none. */
@@ -97,7 +101,7 @@ export class SceneView {
   /** Return a view in which the points can be seen; null where there are none. */
   viewOf({ sources, target }: State): number[] | null {
     const mesh = this.mesh;
-    const points = target ? [...sources, target] : sources;
+    const points = (target ? [...sources, target] : sources).filter((point) => mesh?.has(point));
     if (!mesh || points.length === 0) return null;
     const normals = mesh.geometry.getAttribute("normal");
     const direction = new Vector3();
@@ -113,13 +117,19 @@ export class SceneView {
     return this.stage.viewFrom(direction);
   }
 
-  showPoints({ sources, target, waypoints, shade }: State): void {
+  /** Show the points of the question: those that the mesh has. */
+  showPoints({ sources, target, waypoints, shade, isReadable }: State): void {
     const fill = (i: number): Rgb => (shade === "territories" ? territory(i) : SOURCE);
-    this.points.show([
-      ...sources.map((source, i) => this.mark(source, fill(i), 17)),
-      ...waypoints.map((waypoint) => this.mark(waypoint, WAYPOINT, 14)),
-      ...(target ? [this.mark(target, TARGET, 17)] : []),
-    ]);
+    const marks = [
+      ...sources.flatMap((source, i) => this.mark(source, fill(i), 17)),
+      ...waypoints.flatMap((waypoint) => this.mark(waypoint, WAYPOINT, 14)),
+      ...(target ? this.mark(target, TARGET, 17) : []),
+    ];
+    this.points.show(isReadable ? marks : []);
+  }
+
+  showBarriers({ barriers, isReadable }: State): void {
+    this.barriers.show(this.mesh, isReadable ? barriers : []);
   }
 
   showRoute(outline: Outline | null): void {
@@ -127,9 +137,8 @@ export class SceneView {
     this.route.show(points.map((point) => this.mesh!.drawn(point)));
   }
 
-  showIsolines(lines: Triple[][]): void {
-    const { mesh } = this;
-    this.isolines.show(mesh ? lines.map((line) => line.map((point) => mesh.drawn(point))) : []);
+  showIsolines(lines: Line[]): void {
+    this.isolines.show(this.mesh, lines);
   }
 
   /** Show the borders of territories; ``nearest`` is the nearest source of each vertex. */
@@ -147,7 +156,8 @@ export class SceneView {
     this.faultPoints.show(marks);
   }
 
-  private mark(point: Point, fill: Rgb, size: number): Mark {
-    return { position: this.mesh!.drawn(positionOf(this.mesh!, point)), fill, size };
+  private mark(point: Point, fill: Rgb, size: number): Mark[] {
+    const { mesh } = this;
+    return mesh?.has(point) ? [{ position: mesh.drawn(positionOf(mesh, point)), fill, size }] : [];
   }
 }

@@ -24,13 +24,7 @@ export class Territories {
 
   /** Show borders on a mesh that is coloured by ``nearest``, the nearest source of each vertex. */
   show(mesh: LoadedMesh | null, nearest: Int32Array, borders: Border[]): void {
-    this.lines.show(
-      mesh
-        ? borders.map(({ points, closed }) =>
-            (closed ? [...points, points[0]!] : points).map((point) => mesh.drawn(point)),
-          )
-        : [],
-    );
+    this.lines.show(mesh, borders);
     this.object.geometry.dispose();
     this.object.geometry = mesh ? divided(mesh, nearest, borders) : new BufferGeometry();
     this.object.visible = mesh !== null && borders.length > 0;

@@ -1,0 +1,401 @@
+"""An answer on the screen belongs to the question on the screen, and is shown whole."""
+
+import json
+import re
+from collections.abc import Callable
+from typing import Any
+
+import httpx2
+import numpy as np
+import pytest
+from playwright.sync_api import FilePayload, Route, expect
+from scipy import ndimage
+
+from tests.page.conftest import sample
+from tests.page.test_page import PATH, seen
+from tests.support.viewing import PLAIN, View, angle_at, length_of, query_of
+
+pytestmark = pytest.mark.file_slice(3)
+
+TWO_SHEETS = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 0 0\nv 6 0 0\nv 5 1 0\nf 1 2 3\nf 4 5 6\n"
+
+
+def ask(view: View, field: str, text: str) -> None:
+    """Write something into a field of the question."""
+    view.page.fill(field, text)
+    view.page.press(field, "Enter")
+
+
+def has_path(view: View) -> bool:
+    """Whether there is a path; what is as small is the marker of a target."""
+    places = seen(view, PATH)
+    return len(places) > 0 and bool(np.ptp(places, axis=0).max() > 30)
+
+
+def assert_blank(view: View) -> None:
+    """Check that there is no answer: no length, no path, no colours."""
+    assert not view.page.is_visible("#readout")
+    assert not view.page.is_visible("#legend")
+    assert not has_path(view)
+    assert np.ptp(view.colour(40, 40)) < 40
+
+
+# Whole
+
+
+@pytest.mark.parametrize("level", [0.5, 0.9])
+def test_a_closed_isoline_has_no_gap(view: View, sphere: str, level: float) -> None:
+    """Around the middle of what is seen, where an isoline is a circle on the screen."""
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(0, 0)
+    without = view.pixels()
+    view.page.select_option("#lines", "spacing")
+    ask(view, "#lines-value", str(level))
+    view.wait()
+
+    changed = np.abs(view.pixels() - without).max(axis=2) > 30
+    parts, _ = ndimage.label(~changed)
+    x, y = map(round, view.centre)
+    radius = min(range(190), key=lambda away: abs(angle_at(view, away) - level))
+    outside = radius + 12
+    beyond = [parts[y, x + outside], parts[y, x - outside], parts[y + outside, x]]
+    assert parts[y, x] not in beyond, "the line divides what is within from what is beyond"
+    assert set(beyond) == {beyond[0]}
+    assert 0 not in (parts[y, x], beyond[0])
+
+
+def test_what_is_not_reached_is_told(view: View) -> None:
+    view.open()
+    view.upload("two.obj", TWO_SHEETS)
+    ask(view, "#sources", "v0")
+    view.wait()
+    assert view.text("#notes").splitlines() == ["3 vertices not connected to a source."]
+    assert "2 connected components" in view.text("#report"), "the mesh's own warnings are here"
+
+    view.page.click("#more-points > summary")
+    ask(view, "#max-distance", "0.5")
+    view.wait()
+    assert "2 vertices beyond the limit." in view.text("#notes")
+
+
+def test_the_error_bound_is_told(view: View, knot: str) -> None:
+    view.open(f"/?mesh={knot}&source=v0&error=0.1")
+    assert view.text("#notes") == ""
+    view.page.click("#methods >> text=Approximate")
+    view.wait()
+    assert "Distances: error at most 0.2 % (guaranteed)." in view.text("#notes")
+    view.page.click("#methods >> text=Fast")
+    view.wait()
+    assert re.search(r"Distances: error about [\d.]+ % \(estimated\)\.", view.text("#notes"))
+    expect(view.page.locator("#notes")).to_contain_text("Isolines: error at most")
+    view.page.click("#methods >> text=Exact")
+    view.wait()
+    assert view.text("#notes") == ""
+
+
+def warning_in(header: str | None, words: str) -> Callable[[Route], None]:
+    """Return what adds a warning to answers: in a header, or in JSON."""
+
+    def add(route: Route) -> None:
+        answer = route.fetch()
+        if header and "application/json" not in answer.headers["content-type"]:
+            headers = {**answer.headers, header: json.dumps([words])}
+            route.fulfill(response=answer, headers=headers)
+        else:
+            route.fulfill(response=answer, json={**answer.json(), "warnings": [words]})
+
+    return add
+
+
+@pytest.mark.parametrize(
+    ("kind", "header"),
+    [("distances", "Geodesic-Warnings"), ("path", None), ("isolines", None), ("borders", None)],
+)
+def test_warnings_of_an_answer_are_shown(
+    view: View, sphere: str, kind: str, header: str | None
+) -> None:
+    words = f"The {kind} are to be taken with care."
+    view.page.route(f"**/{kind}", warning_in(header, words))
+    view.open(f"/?mesh={sphere}&source=v0&source=v9&target=v900&shade=territories")
+    expect(view.page.locator("#notes")).to_have_text(words)
+    view.page.click("#clear")
+    view.wait()
+    assert view.page.text_content("#notes") == ""
+
+
+def test_a_position_far_from_the_surface_is_told(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}&source=p0,0,3&target=p0,1.001,0")
+    view.wait()
+    told = view.text("#notes")
+    assert told.startswith("The position 0, 0, 3 is 2")
+    assert "0, 1.001, 0" not in told, "that is on the surface, but for rounding"
+    view.click(0, 0)
+    assert view.text("#notes") == ""
+
+
+# Of the question
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("v99999999", "Source: vertex 99999999 does not exist; the indices are 0 to 2561"),
+        ("e0-99999999:0.5", "Source: vertex 99999999 does not exist; the indices are 0 to 2561"),
+        ("f99999999:0.5,0.5,0", "Source: face 99999999 does not exist; the indices are 0 to 5119"),
+        ("v0 v99999999", "vertex 99999999 does not exist; the indices are 0 to 2561"),
+        ("nose", "“nose” is not a point."),
+        ("v0 v-1", "“v-1” is not a point."),
+    ],
+)
+def test_a_wrong_source_leaves_no_answer(view: View, sphere: str, text: str, words: str) -> None:
+    view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=none")
+    right = length_of(view)
+    assert has_path(view)
+
+    ask(view, "#sources", text)
+    view.wait("error")
+
+    assert_blank(view)
+    assert words in view.text("#error-detail")
+    assert view.text("#error-title") in ("Invalid point", "Not a point")
+    assert "/" not in view.text("#error")
+    assert view.page.input_value("#sources") == text
+    assert view.page.is_disabled("#copy-curl") is (view.text("#error-title") == "Not a point")
+
+    ask(view, "#sources", "v0")
+    view.wait()
+    assert length_of(view) == right
+    assert view.page.is_visible("#legend")
+    assert not view.page.is_visible("#error")
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "title"),
+    [
+        ("#target", "v99999999", "Invalid point"),
+        ("#target", "tip", "Not a point"),
+        ("#waypoints", "v99999999", "Invalid point"),
+        ("#waypoints", "v1,v2", "Not a point"),
+        ("#barriers", "99999999", "Invalid request"),
+        ("#barriers", "3;4", "Not a range of faces"),
+        ("#barriers", "7-6", "Not a range of faces"),
+        ("#barriers", "0-99999999999", "Not a range of faces"),
+    ],
+)
+def test_another_wrong_field_leaves_no_path(
+    view: View, sphere: str, field: str, text: str, title: str
+) -> None:
+    view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=none")
+    view.page.click("#more-points > summary")
+    ask(view, field, text)
+    view.wait("error")
+
+    assert not view.page.is_visible("#readout")
+    assert not has_path(view)
+    assert view.text("#error-title") == title
+    assert "/" not in view.text("#error-detail")
+    if title.startswith("Not"):
+        assert_blank(view)
+        assert view.page.input_value(field) == text
+        view.click(0, 0)  # another question, of what is known
+        assert view.page.is_visible("#readout")
+        assert view.page.input_value(field) != text
+
+
+def test_a_message_remains_while_lines_are_drawn(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&target=v99999999")
+    with view.page.expect_response("**/isolines"):
+        ask(view, "#sources", "v0")
+    view.wait("error")
+    assert "Target: vertex 99999999" in view.text("#error-detail")
+    assert view.page.is_visible("#legend"), "distances need no target"
+
+
+@pytest.mark.parametrize("point", ["nose", "v99999999", "f99999999:1,0,0", "e7-99999999:0.5"])
+def test_a_link_with_a_wrong_point_shows_the_mesh(view: View, sphere: str, point: str) -> None:
+    view.page.goto(f"/?mesh={sphere}&source={point}&target=v900")
+    view.wait("error")
+    assert "one piece, closed" in view.text("#report")
+    assert view.text("#error-title") in ("Invalid point", "Not a point")
+    assert_blank(view)
+
+
+def hold(view: View, address: str) -> list[Route]:
+    """Hold requests back, and list them."""
+    held: list[Route] = []
+    view.page.route(address, lambda route: held.append(route))  # noqa: PLW0108 - Playwright marks it
+    return held
+
+
+def test_a_slow_answer_leaves_none_in_its_place(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=none")
+    distances, paths = hold(view, "**/distances"), hold(view, "**/path")
+    ask(view, "#sources", "v7")
+    expect(view.page.locator("#readout")).to_be_hidden()
+    expect(view.page.locator("#legend")).to_be_hidden()
+    assert_blank(view)
+    for route in (*distances, *paths):
+        route.continue_()
+    view.wait()
+    assert length_of(view) > 0
+    assert view.page.is_visible("#legend")
+
+
+def test_a_failed_question_can_be_asked_again(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=none")
+    right = length_of(view)
+    paths = hold(view, "**/path")
+    ask(view, "#target", "v901")
+    expect(view.page.locator("#readout")).to_be_hidden()
+    paths[0].abort()
+    view.wait("error")
+    assert view.text("#error-title") == "The service does not answer"
+    assert not view.page.is_visible("#readout")
+    view.page.unroute("**/path")
+    ask(view, "#target", "v901")
+    view.wait()
+    assert length_of(view) == pytest.approx(right, rel=0.5)
+
+
+def test_a_cancelled_question_leaves_no_answer(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&source=v0&target=v900&lines=none")
+    hold(view, "**/distances")
+    hold(view, "**/path")
+    ask(view, "#sources", "v7")
+    view.page.keyboard.press("Escape")
+    view.wait()
+    expect(view.page.locator("#readout")).to_be_hidden()
+    assert_blank(view)
+
+
+# Beside the mesh
+
+
+@pytest.mark.parametrize("tool", ["Source", "Target", "Via", "Barrier"])
+def test_a_click_beside_the_mesh_says_so(view: View, sphere: str, tool: str) -> None:
+    view.open(f"/?mesh={sphere}&source=v0&{PLAIN}")
+    view.page.click(f"#tools >> text={tool}")
+    before = query_of(view)
+    assert view.page.is_hidden("#told")
+    view.click(-300, 0)
+    assert view.text("#told") == "That is beside the mesh"
+    assert query_of(view) == before
+
+    view.click(10, 10)
+    assert view.page.is_hidden("#told")
+    assert query_of(view) != before
+
+
+@pytest.mark.parametrize("key", ["Enter", "t", "v", "Shift+Enter"])
+def test_a_key_beside_the_mesh_says_so(view: View, service: str, key: str) -> None:
+    obstacles = sample(service, "knot", 2000)
+    view.open(f"/?mesh={obstacles}&lines=none&view=0.6,1.2,2.9,3,0,0")
+    view.page.focus("#canvas")
+    view.page.keyboard.press(key)
+    assert view.text("#told") == "That is beside the mesh"
+
+
+def test_a_drag_beside_the_mesh_turns_it_without_words(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.drag((-300, 0), (-250, 40))
+    assert view.page.is_hidden("#told")
+
+
+# Words
+
+
+def test_alt_pulls_while_the_button_is_down(view: View, sphere: str) -> None:
+    view.open(f"/?mesh={sphere}")
+    assert "Hold Alt" not in (view.page.text_content("#hint") or "")
+    assert "Alt-drag" in (view.page.text_content("#hint") or "")
+    view.open(f"/?mesh={sphere}&{PLAIN}")
+    view.click(-100, 0)
+    view.page.keyboard.down("Alt")
+    view.drag((20, 60), (60, 20), (100, 0))
+    view.page.keyboard.up("Alt")
+    assert length_of(view) == pytest.approx(2 * angle_at(view, 100), rel=0.01)
+    assert len(query_of(view)["source"]) == 1
+
+
+EVERY_FAULT = """
+v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 0 -1 0\nv 9 9 9\nv 2 0 0\nv 2 0 0\nv 3 0 0\nv 2 1 0
+v 4 0 0\nv 5 0 0\nv 6 0 0\nv -1 0 0\nv -1 1 0
+v 20 0 0\nv 21 0 0\nv 20 1 0\nv 19 0 0\nv 20 -1 0\nv 21 0 0\nv 23 0 0\nv 22 1 0
+f 1 2 3\nf 1 2 4\nf 1 2 5\nf 7 7 9\nf 7 8 10\nf 7 9 10\nf 11 12 13\nf 1 14 15\nf 1 2 3\nf 9 10 7
+f 16 17 18\nf 16 19 20\nf 21 22 23
+"""
+
+
+FAULTS = (
+    "duplicate_vertices",
+    "isolated_vertices",
+    "repeated_vertex_faces",
+    "zero_length_edges",
+    "collapsed_faces",
+    "duplicate_faces",
+    "degenerate_faces",
+    "non_manifold_edges",
+    "misoriented_edges",
+    "bow_tie_vertices",
+)
+
+
+def test_each_fault_is_told_once(view: View) -> None:
+    view.open()
+    with view.page.expect_response("**/v1/meshes?*") as answer:
+        view.page.set_input_files(
+            "#file", FilePayload(name="all.obj", mimeType="", buffer=EVERY_FAULT.encode())
+        )
+    view.wait()
+    mesh = answer.value.json()
+    lines = view.page.locator("#report li span").all_inner_texts()
+    assert lines == mesh["warnings"], "in the service's words, and no others"
+    assert all(mesh[kind]["count"] for kind in FAULTS), "a mesh with every fault"
+    assert view.page.locator("#report >> text=Show").count() >= len(FAULTS)
+    assert view.page.locator("#report li", has_text="in no face").count() == 1
+
+
+# Files
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["lh.pial", "cube.surf.gii.gz", "cube.VTU", "mesh.zip", "rh.sphere.reg", "no-suffix", "a.json"],
+)
+def test_a_file_goes_to_the_service_with_its_name(view: View, name: str) -> None:
+    """The service knows which formats it reads, and tells it; the page has no list of its own."""
+    told: dict[str, Any] = {}
+
+    def listen(route: Route) -> None:
+        told["body"] = (route.request.post_data_buffer or b"").decode("latin-1")
+        told["answer"] = route.fetch()
+        route.fulfill(response=told["answer"])
+
+    view.open()
+    view.page.route("**/v1/meshes?merge=none", listen)
+    assert view.page.get_attribute("#file", "accept") is None
+    view.page.set_input_files("#file", FilePayload(name=name, mimeType="", buffer=b"\xff\xff\xfe"))
+    view.wait("error")
+    assert f'filename="{name}"' in told["body"]
+    assert "ÿÿþ" in told["body"]
+    assert view.text("#error-title") == told["answer"].json()["title"]
+
+
+def test_a_file_with_a_suffix_in_capitals_is_opened(view: View) -> None:
+    view.open()
+    view.upload("SHEET.OFF", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n")
+    assert "3 vertices, 1 face" in view.text("#report")
+    assert "SHEET.OFF" in view.text("#meshes option:checked")
+
+
+def test_the_formats_are_those_that_the_service_reads(view: View) -> None:
+    view.page.route("**/v1/meshes?sample=*", lambda route: route.abort())
+    view.page.goto("/")
+    view.wait("error")
+    about = httpx2.get(view.page.url.split("/?")[0].rstrip("/") + "/v1").json()
+    formats = ", ".join(each.upper() for each in about["mesh_formats"])
+    assert view.page.text_content("#welcome-formats") == formats
+    picture = FilePayload(name="cat.png", mimeType="image/png", buffer=b"\x89PNG")
+    view.page.set_input_files("#file", picture)
+    view.wait("error")
+    assert view.text("#error-hint") == f"This service reads {formats}."
