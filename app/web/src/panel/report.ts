@@ -5,6 +5,7 @@ import { positionOf } from "../mesh/picking";
 import type { SceneView } from "../view/sceneView";
 
 type Faults = MeshDocument["degenerate_faces"];
+const NONE: Faults = { count: 0, ids: [] };
 type Kind = "face" | "vertex" | "edge";
 
 /** Show the report; `join` uploads the mesh again with vertices at one position joined. */
@@ -64,6 +65,8 @@ function describe(mesh: MeshDocument, unit: string): string {
 function faultsOf(mesh: MeshDocument): [Faults, Kind, RegExp, string][] {
   return [
     [mesh.duplicate_vertices, "vertex", /position of an earlier vertex/, "duplicate vertices"],
+    [mesh.near_vertices ?? NONE, "edge", /apart but not joined/, "borders that are nearly joined"],
+    [mesh.t_junctions ?? NONE, "vertex", /T-junction/, "vertices on an edge of others"],
     [mesh.isolated_vertices, "vertex", /in no face/, "vertices without a face"],
     [mesh.repeated_vertex_faces, "face", /than three different/, "faces that repeat a vertex"],
     [mesh.zero_length_edges, "edge", /zero length/, "edges of zero length"],
