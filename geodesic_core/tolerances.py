@@ -151,7 +151,7 @@ would. They are not known on any mesh.
 """
 
 MOST_CROSSINGS = 1000
-"""Windows per half-edge of the mesh that a fast sweep may cross before it ends in an `InternalError`.
+"""Windows per half-edge that a fast sweep may cross before it ends in an `InternalError`.
 
 Each must be the nearest so far at a place of its half-edge. Measured: 3 with eight places.
 """
