@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 import pytest
 import trimesh
-from pyvista import ImageData, PolyData, Sphere
+from pyvista import ImageData, PolyData
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidMesh
