@@ -43,6 +43,10 @@ def read_gifti(data: bytes, max_faces: int | None) -> FileContents:
     with extra("brain", "nibabel", "load_mesh of a GIFTI file"):
         from nibabel.gifti.gifti import GiftiImage
 
+    if b"ExternalFileBinary" in data:
+        raise InvalidMesh(
+            "the arrays of the GIFTI file are in another file: save it with them inside"
+        )
     return _contents(*surface_arrays(GiftiImage.from_bytes(data)), max_faces)
 
 

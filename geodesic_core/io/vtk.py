@@ -41,19 +41,18 @@ def read_vtk(data: bytes, max_faces: int | None) -> FileContents:
     stream = io.BytesIO(done.stdout)
     if done.returncode:
         said = done.stderr.decode("utf-8", "replace").strip().splitlines()
-        reason = said[-1][:200] if said else "it crashed"
+        reason = said[-1][:200] if said and done.returncode > 0 else "it crashed"
         raise InvalidMesh(
-            f"the VTK file is damaged: VTK cannot read it in {limits[0]} s and "
-            f"{limits[1] >> 20} MiB ({reason})"
+            f"VTK cannot read the file in {limits[0]} s and {limits[1] >> 20} MiB: {reason}"
         )
     answer = json.loads(stream.readline())
     if "error" in answer:
         raise InvalidMesh(f"the VTK file cannot be read: {answer['error']}")
     points, corners, sizes = (np.load(stream) for _ in range(3))
     if len(sizes) == 0:
-        others = ", ".join(f"{count} {name}" for name, count in answer["left_out"].items())
+        cells = ", ".join(f"{count} {name}" for name, count in answer["left_out"].items())
         raise InvalidMesh(
-            f"the VTK file holds no polygons, but {others or 'no cells'}", kind="face"
+            f"the VTK file holds no polygons: it has {cells or 'no cells'}", kind="face"
         )
     check_face_count(int((sizes - 2).sum()), max_faces)
     return FileContents(points, corners, sizes, note_on_ignored("VTK", answer["left_out"]))

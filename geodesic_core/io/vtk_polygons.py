@@ -18,6 +18,12 @@ _POLYGONS = (5, 7, 9)
 _BEZIER = (76, 77)
 _HIDDEN_POINT, _DOUBLE_OR_HIDDEN_CELL = 2, 1 | 32
 """Flags of VTK's ghost arrays."""
+_LEGACY = b"# vtk DataFile"
+_GRAVE = re.compile("Error reading|coordinates read")
+"""What warnings say where VTK (9.7) goes on with memory that it has not filled"""
+_PLACE = re.compile(r"^.*, line \d+\s|\w+ \(0x\w+\):?|for file:.*$", re.DOTALL)
+"""What VTK's messages tell beside: the line of its source, the object, and a file without a name"""
+_XML_END = re.compile(rb"</VTKFile\s*>")
 
 
 def polygons_of(
@@ -216,24 +222,46 @@ def read_file(content: bytes) -> Any:
     ValueError
         VTK reports an error.
     """
+    from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
+
+    if not content.startswith(_LEGACY) and not _XML_END.search(content[-1000:]):
+        raise ValueError("it ends before </VTKFile>")
     reader = _reader_of(content)
     errors: list[str] = []
 
-    def note_error(_reader: Any, _event: str, text: str) -> None:
-        errors.append(" ".join(text.rpartition("): ")[2].split()))
+    def note_error(_window: Any, event: str, text: str) -> None:
+        if event == "ErrorEvent" or _GRAVE.search(text):
+            errors.append(" ".join(_PLACE.sub("", text).split()))
 
     note_error.CallDataType = "string0"  # type: ignore[attr-defined]  # VTK then hands on the text
-    reader.AddObserver("ErrorEvent", note_error)
-    reader.GetExecutive().AddObserver("ErrorEvent", note_error)
-    reader.Update()
+    # Of all objects: the reader of a legacy file has others read it, and hands on no error.
+    window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
+    for event in ("ErrorEvent", "WarningEvent"):
+        window.AddObserver(event, note_error)
+    vtkOutputWindow.SetInstance(window)
+    try:
+        reader.Update()
+    finally:
+        vtkOutputWindow.SetInstance(before)
     data = reader.GetOutputDataObject(0)
     if errors or data is None:
         raise ValueError(errors[0] if errors else "VTK reads nothing from it")
+    _check_axes(data)
     return data
 
 
+def _check_axes(data: Any) -> None:
+    """Refuse a rectilinear grid without a coordinate for each point of its axes."""
+    if not data.IsA("vtkRectilinearGrid"):
+        return
+    axes = (data.GetXCoordinates(), data.GetYCoordinates(), data.GetZCoordinates())
+    counts = [axis.GetNumberOfTuples() for axis in axes]
+    if counts != list(data.GetDimensions()):
+        raise ValueError(f"it has {counts} coordinates, but {list(data.GetDimensions())} points")
+
+
 def _reader_of(content: bytes) -> Any:
-    if content.startswith(b"# vtk DataFile"):
+    if content.startswith(_LEGACY):
         from vtkmodules.vtkIOLegacy import vtkDataSetReader
 
         reader: Any = vtkDataSetReader()

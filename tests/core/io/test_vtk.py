@@ -341,12 +341,34 @@ def test_files_that_lead_to_other_files_and_files_that_lie_are_refused() -> None
     for content, message in (
         (parallel, "its type is 'PUnstructuredGrid'; it must be one of PolyData, Unstr"),
         (blocks, "its type is 'vtkMultiBlockDataSet'"),
-        (head + b"NOTHING\n", "cannot be read|damaged"),
-        (head + square + b"POLYGONS 2 3\nOFFSETS vtktypeint64\n0 3\n", "cannot be read|damaged"),
+        (head + b"NOTHING\n", "cannot be read"),
+        (head + square + b"POLYGONS 2 3\nOFFSETS vtktypeint64\n0 3\n", "cannot be read: Error re"),
+        (head + square, "no polygons: it has no cells"),
     ):
         with pytest.raises(InvalidMesh, match=message) as refusal:
             gc.load_mesh(content, "vtk")
         assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("kind", "way", "left_out"),
+    [
+        ("StructuredGrid", "4.2 Binary", 100),
+        ("PolyData", "5.1 Binary", 9),
+        ("PolyData", "5.1 ASCII", 20),
+        ("RectilinearGrid", "4.2 ASCII", 40),
+        ("StructuredGrid", "raw", 60),
+    ],
+)
+def test_no_memory_is_read_beyond_the_end_of_a_file(
+    kind: str, way: str, left_out: int, tmp_path: Path
+) -> None:
+    data, _ = DATA_SETS[kind]
+    path = tmp_path / "cut.vtk"
+    content = legacy(data, *LEGACY[way], path) if way in LEGACY else xml(data, XML[way], path)
+    with pytest.raises(InvalidMesh, match="VTK file cannot be read: ") as refusal:
+        gc.load_mesh(content[:-left_out], "vtk")
+    assert "0x" not in str(refusal.value)
 
 
 def test_blocks_of_pyvista_are_joined_in_their_order() -> None:
