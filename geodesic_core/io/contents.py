@@ -1,6 +1,6 @@
 """Contents of a mesh file: vertices and polygons, as every reader returns them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from geodesic_core.arrays import Floats, Longs
@@ -24,17 +24,14 @@ def note_on_ignored(kind: str, ignored: Mapping[str, int]) -> tuple[str, ...]:
 
     ``ignored`` counts them by name.
     """
-    if not ignored:
+    held = [f"{count} {name}" for name, count in ignored.items() if count]
+    if not held:
         return ()
-    what = ", ".join(f"{count} {name}" for name, count in ignored.items())
+    what = ", ".join(held)
     return (
         f"The {kind} file also holds {what}, which are not part of the surface and were left out.",
     )
 
 
-def note_on_rest(kind: str, rest: Sequence[bytes] | bytes) -> tuple[str, ...]:
-    """Return a sentence on rows or bytes behind the last element; none where there are none."""
-    if not rest or (isinstance(rest, bytes) and not rest.strip()):
-        return ()
-    unit = "bytes" if isinstance(rest, bytes) else "rows"
-    return (f"Behind the last element of the {kind} file follow {len(rest)} {unit}, left out.",)
+BEHIND = "behind its last element"
+"""Where the rows or bytes are that a file has after all that it declares."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.io.contents import FileContents, note_on_rest
+from geodesic_core.io.contents import BEHIND, FileContents, note_on_ignored
 from geodesic_core.io.limits import check_declared_counts, check_face_count
 from geodesic_core.io.text import (
     COMMENT,
@@ -95,7 +95,8 @@ def _from_rows(lines: list[bytes], counts: dict[str, int], layout: _Layout) -> F
     if layout.has_weight:
         check_columns(vertex_rows, 4)
     table = number_table(vertex_rows, 4 if layout.has_weight else 3)
-    return FileContents(_positions(table), corners, sizes, note_on_rest("OFF", rows[behind:]))
+    notes = note_on_ignored("OFF", {f"rows {BEHIND}": len(rows) - behind})
+    return FileContents(_positions(table), corners, sizes, notes)
 
 
 def _rows_of_words(
@@ -151,6 +152,7 @@ def _read_binary(data: bytes, at: int, layout: _Layout, max_faces: int | None) -
     if not faces:
         raise InvalidMesh("the OFF file holds no faces", kind="face")
     positions = table[:, : 4 if layout.has_weight else 3].astype(np.float64)
-    notes = note_on_rest("OFF", data[at + 4 * place :])
+    rest = data[at + 4 * place :].strip()
+    notes = note_on_ignored("OFF", {f"bytes {BEHIND}": len(rest)})
     corners = np.concatenate(faces).astype(np.int64)
     return FileContents(_positions(positions), corners, np.array(sizes), notes)

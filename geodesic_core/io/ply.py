@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.io.contents import FileContents, note_on_ignored, note_on_rest
+from geodesic_core.io.contents import BEHIND, FileContents, note_on_ignored
 from geodesic_core.io.limits import check_declared_counts, check_face_count, counts_in_words
 from geodesic_core.io.text import (
     INDEX_ROW,
@@ -130,7 +130,7 @@ def read_ply(data: bytes, max_faces: int | None) -> FileContents:
         found["vertex"][0],
         np.concatenate([corners for corners, _ in polygons]),
         np.concatenate([sizes for _, sizes in polygons]),
-        note_on_ignored("PLY", others) + note_on_rest("PLY", rest),
+        note_on_ignored("PLY", others | rest),
     )
 
 
@@ -199,8 +199,8 @@ def _as_polygons(element: _Element, corners: Longs, sizes: Longs) -> tuple[Longs
     return rows.reshape(-1), np.full(len(rows), 3)
 
 
-def _read_text(elements: list[_Element], body: bytes) -> tuple[_Found, list[bytes]]:
-    """Return what the rows hold, and the rows behind the last element."""
+def _read_text(elements: list[_Element], body: bytes) -> tuple[_Found, dict[str, int]]:
+    """Return what the rows hold, and how many follow behind the last element."""
     rows = [row for row in body.splitlines() if row.strip()]
     check_row_count({element.name: element.size for element in elements}, len(rows))
     found: _Found = {}
@@ -217,7 +217,7 @@ def _read_text(elements: list[_Element], body: bytes) -> tuple[_Found, list[byte
                 at = 0
             flat, sizes = index_rows(counted_polygons(block, skipped=at))
             found[element.name] = _as_polygons(element, flat, sizes)
-    return found, rows[start:]
+    return found, {f"rows {BEHIND}": len(rows) - start}
 
 
 def _words_by_property(element: _Element, rows: list[bytes]) -> Iterator[list[bytes]]:
@@ -262,8 +262,10 @@ def _read_text_positions(element: _Element, rows: list[bytes]) -> Floats:
     return np.stack([by_name[axis] for axis in _AXES], axis=1).astype(np.float64)
 
 
-def _read_binary(elements: list[_Element], body: bytes, order: str) -> tuple[_Found, bytes]:
-    """Return what the records hold, and the bytes behind the last element."""
+def _read_binary(
+    elements: list[_Element], body: bytes, order: str
+) -> tuple[_Found, dict[str, int]]:
+    """Return what the records hold, and how many bytes follow behind the last element."""
     found: _Found = {}
     at = 0
     for element in elements:
@@ -275,7 +277,7 @@ def _read_binary(elements: list[_Element], body: bytes, order: str) -> tuple[_Fo
             elif element.name in _POLYGONS:
                 corners, sizes = values[element.wanted()[0]]
                 found[element.name] = _as_polygons(element, corners.astype(np.int64), sizes)
-    return found, body[at:]
+    return found, {f"bytes {BEHIND}": len(body[at:].strip())}
 
 
 def _values_of(

@@ -235,7 +235,8 @@ def read_file(content: bytes) -> Any:
 
     note_error.CallDataType = "string0"  # type: ignore[attr-defined]  # VTK then hands on the text
     # Of all objects: the reader of a legacy file has others read it, and hands on no error.
-    window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
+    window: Any = vtkStringOutputWindow()
+    before = vtkOutputWindow.GetInstance()
     for event in ("ErrorEvent", "WarningEvent"):
         window.AddObserver(event, note_error)
     vtkOutputWindow.SetInstance(window)

@@ -643,7 +643,7 @@ def test_binary_ply_with_uneven_lists_everywhere() -> None:
     assert "2 strip" in mesh.warnings[0]
     for end in range(len(body)):
         refusal(header + body[:end], "ply")
-    assert "follow 1 bytes" in load_mesh(header + body + b"x", "ply").warnings[1]
+    assert "1 bytes behind its last" in load_mesh(header + body + b"x", "ply").warnings[0]
 
 
 def test_numbers_are_of_the_type_that_a_ply_header_says() -> None:
