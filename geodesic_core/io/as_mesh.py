@@ -3,6 +3,8 @@
 None of these libraries is imported: an object is known by its attributes.
 """
 
+from __future__ import annotations  # help() shows the names of types, not what they stand for
+
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 

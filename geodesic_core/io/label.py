@@ -1,5 +1,7 @@
 """Labels of brain surfaces, such as the medial wall: files that name vertices of a surface."""
 
+from __future__ import annotations  # help() shows the names of types, not what they stand for
+
 import warnings
 from pathlib import Path
 from typing import Any

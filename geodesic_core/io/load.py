@@ -5,6 +5,8 @@ texture seams, group faces by material or by their number of corners, drop what 
 the counts of a header, and read sparse glTF positions as zeros. No file can have another one read.
 """
 
+from __future__ import annotations  # help() shows the names of types, not what they stand for
+
 from collections.abc import Callable
 
 import numpy as np

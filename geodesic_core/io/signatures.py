@@ -1,4 +1,4 @@
-"""What a file is by its first bytes, whatever its name says."""
+"""Types of files by their first bytes, whatever their names say."""
 
 import re
 from typing import NamedTuple

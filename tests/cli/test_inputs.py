@@ -1,4 +1,4 @@
-"""What commands read: meshes from standard input, files of points and of faces, labels."""
+"""Input of commands: meshes from standard input, files of points and of faces, labels."""
 
 import gzip
 import io

@@ -118,7 +118,7 @@ def test_meshes_of_pyvista_have_an_accessor() -> None:
 def test_the_accessor_refuses_as_the_library_does() -> None:
     with pytest.raises(InvalidPoint, match="vertex 999"):
         MESH.to_pyvista().geodesics.distance(999)
-    with pytest.raises(InvalidMesh, match="no faces"):
+    with pytest.raises(InvalidMesh, match="is not a surface"):
         PolyData(MESH.vertices.copy()).geodesics.path(0, 1)
 
 

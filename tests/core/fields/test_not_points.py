@@ -1,4 +1,4 @@
-"""What is no point is refused wherever points are asked for, and the refusal names what helps."""
+"""Values that are no points, wherever points are asked for: the refusal names what helps."""
 
 from collections.abc import Callable
 from pathlib import Path
