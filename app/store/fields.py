@@ -51,7 +51,7 @@ class FieldStore:
         """Return the arrays of a field; None where it is missing or damaged."""
         path = self._path(mesh_id, key)
         try:
-            arrays = _read(path)
+            arrays = {name: array for name, array in _read(path).items() if name != _CODE}
             note_use(path)
         except FileNotFoundError:
             return None

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import geodesic_core as gc
 from app.store.fields import FieldStore, code_of_field, field_files
 from tests.support.logs import Log
 from tests.support.service import distances, serving, upload_sample, wait_until
@@ -31,12 +32,25 @@ def test_a_field_comes_back_as_it_was(store: FieldStore) -> None:
     again = store.read(MESH, "k")
 
     assert again is not None
+    assert again.keys() == ARRAYS.keys()
     for name, array in ARRAYS.items():
         np.testing.assert_array_equal(again[name], array)
         assert again[name].dtype == array.dtype
     assert [code_of_field(path) for path in store.folder.rglob("*.npz")] == ["code 7"]
     assert store.read(MESH, "l") is None
     assert store.read(OTHER, "k") is None
+
+
+def test_what_comes_back_is_a_field(store: FieldStore) -> None:
+    """The library refuses arrays that are none of a field's."""
+    mesh = gc.samples.sphere(80)
+    for solve in (gc.exact_distance, gc.fast_distance):
+        field = solve(mesh, 0)
+        store.write(MESH, "k", field.arrays(), "code 7")
+        arrays = store.read(MESH, "k")
+        assert arrays is not None
+        again = gc.DistanceField.from_arrays(mesh, arrays)
+        np.testing.assert_array_equal(again.distances, field.distances)
 
 
 @pytest.mark.slow
