@@ -128,7 +128,7 @@ def test_text_that_ends_within_a_character_is_refused() -> None:
         gc.load_mesh(FILES["obj"].decode().encode("utf-16")[:-1], "obj")
 
 
-class Path2(os.PathLike[str]):
+class LikeAPath(os.PathLike[str]):
     def __init__(self, path: Path) -> None:
         self.path = path
 
@@ -136,39 +136,45 @@ class Path2(os.PathLike[str]):
         return str(self.path)
 
 
-def opened(folder: Path) -> dict[str, Any]:
-    path = folder / "square.obj"
+def temporary() -> Any:
+    file = tempfile.SpooledTemporaryFile()  # noqa: SIM115 - closed by the test
+    file.write(FILES["obj"])
+    file.seek(0)
+    return file
+
+
+OPENED: dict[str, Callable[[Path], Any]] = {
+    "BytesIO": lambda _: io.BytesIO(FILES["obj"]),
+    "BufferedReader": lambda _: io.BufferedReader(io.BytesIO(FILES["obj"])),
+    "StringIO": lambda _: io.StringIO(FILES["obj"].decode()),
+    "a temporary file": lambda _: temporary(),
+    "an entry of an archive": lambda _: zipfile.ZipFile(io.BytesIO(zipped(FILES["obj"]))).open(
+        "a/mesh.obj"
+    ),
+    "gzip": lambda _: gzip.GzipFile(fileobj=io.BytesIO(gzip.compress(FILES["obj"]))),
+    "bytearray": lambda _: bytearray(FILES["obj"]),
+    "memoryview": lambda _: memoryview(FILES["obj"]),
+    "open": lambda path: path.open("rb"),
+    "open as text": lambda path: path.open(),
+    "path": lambda path: path,
+    "path as text": str,
+    "path-like": LikeAPath,
+}
+
+
+@pytest.mark.parametrize("name", OPENED)
+def test_whatever_can_be_read_is_a_file(name: str, tmp_path: Path) -> None:
+    path = tmp_path / "square.obj"
     path.write_bytes(FILES["obj"])
-    spooled = tempfile.SpooledTemporaryFile()  # noqa: SIM115 - read at once
-    spooled.write(FILES["obj"])
-    spooled.seek(0)
-    box = io.BytesIO(zipped(FILES["obj"]))
-    return {
-        "BytesIO": io.BytesIO(FILES["obj"]),
-        "BufferedReader": io.BufferedReader(io.BytesIO(FILES["obj"])),
-        "StringIO": io.StringIO(FILES["obj"].decode()),
-        "a temporary file": spooled,
-        "an entry of an archive": zipfile.ZipFile(box).open("a/mesh.obj"),
-        "gzip": gzip.open(io.BytesIO(gzip.compress(FILES["obj"]))),
-        "bytearray": bytearray(FILES["obj"]),
-        "memoryview": memoryview(FILES["obj"]),
-        "open": path.open("rb"),
-        "open as text": path.open(),
-        "path": path,
-        "text": str(path),
-        "path-like": Path2(path),
-    }
-
-
-def test_whatever_can_be_read_is_a_file(tmp_path: Path) -> None:
-    things = opened(tmp_path)
-    for name, thing in things.items():
-        check_square(gc.load_mesh(thing, "obj"))
-        if hasattr(thing, "close"):
-            thing.close()
-        if name.startswith(("open", "path", "text")):  # which have a name
-            check_square(gc.load_mesh(opened(tmp_path)[name]))
-            check_square(gc.as_mesh(opened(tmp_path)[name]))
+    has_name = name.startswith(("open", "path"))
+    for read in (
+        lambda file: gc.load_mesh(file, "obj"),
+        *((gc.load_mesh, gc.as_mesh) if has_name else ()),
+    ):
+        file = OPENED[name](path)
+        check_square(read(file))
+        if hasattr(file, "close"):
+            file.close()
 
 
 @pytest.mark.parametrize("thing", [None, 3, 3.5, object(), ["a.obj"]])
