@@ -232,8 +232,8 @@ def _words_by_property(element: _Element, rows: list[bytes]) -> Iterator[list[by
         words, by_property, at = row.split(), [], 0
         for part in element.properties:
             end = at + 1
-            if part.count_type and at < len(words) and INDEX_ROW.fullmatch(words[at]):
-                end += int(words[at])
+            if part.count_type and at < len(words):
+                end += int(words[at]) if INDEX_ROW.fullmatch(words[at]) else len(words)
             if not at < end <= len(words):
                 raise InvalidMesh(
                     f"{element.name} {number} reads {excerpt(row)}; it must have "

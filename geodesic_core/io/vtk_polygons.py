@@ -270,7 +270,6 @@ def _reader_of(content: bytes) -> Any:
         reader.ReadFromInputStringOn()
         return reader
     from vtkmodules import vtkIOXML
-    from vtkmodules.vtkIOCore import vtkMemoryResourceStream
 
     found = re.search(rb"<VTKFile\b[^>]*?\btype\s*=\s*[\"'](\w+)", content)
     kind = found[1].decode() if found else ""
@@ -279,11 +278,9 @@ def _reader_of(content: bytes) -> Any:
         raise ValueError(
             f"its type is {kind!r}; it must be one of {', '.join(_DATA_SETS)}, or a legacy file"
         )
-    stream = vtkMemoryResourceStream()
-    stream.SetBuffer(content, len(content))
     xml_reader = make()
-    xml_reader.SetStream(stream)
-    xml_reader.ReadFromInputStreamOn()
+    xml_reader.ReadFromInputStringOn()
+    xml_reader.SetInputString(content)
     return xml_reader
 
 

@@ -335,7 +335,7 @@ def test_pieces_follow_each_other(kind: str, count: int) -> None:
 
 def test_files_that_lead_to_other_files_and_files_that_lie_are_refused() -> None:
     parallel = b'<VTKFile type="PUnstructuredGrid"><PUnstructuredGrid/></VTKFile>'
-    blocks = b'<?xml version="1.0"?>\n<VTKFile type="vtkMultiBlockDataSet"/>'
+    blocks = b'<?xml version="1.0"?>\n<VTKFile type="vtkMultiBlockDataSet"></VTKFile>'
     head = b"# vtk DataFile Version 5.1\nby hand\nASCII\nDATASET "
     square = b"POLYDATA\nPOINTS 3 float\n0 0 0 1 0 0 0 1 0\n"
     for content, message in (
