@@ -192,8 +192,8 @@ export interface paths {
          * Upload a mesh, or make a sample
          * @description Read, check and store a mesh; the id is a hash of its content.
          *
-         *     The body is the file itself (with its format in `Content-Type` or `?format=`), a form with one
-         *     file, or JSON. Except in a form, it may be compressed (`Content-Encoding: gzip`). Vertices and
+         *     The body is the file itself, a form with one file, or JSON. The file may be packed by gzip,
+         *     bzip2, xz or zip; the body, except a form, may also have `Content-Encoding: gzip`. Vertices and
          *     triangles keep the order they have in the file; polygons become triangles in their place, and
          *     `face_map` leads back to them.
          */
@@ -4698,8 +4698,8 @@ export interface operations {
             query?: {
                 /** @description Name for people; if not given, the file name in a form, or the name of the sample */
                 name?: string;
-                /** @description Overrides `Content-Type` */
-                format?: "obj" | "off" | "ply" | "stl" | "glb";
+                /** @description Format of the file. By default, `Content-Type` tells it, else the suffix of its name in the form or in `Content-Disposition`, else its first bytes */
+                format?: "obj" | "off" | "ply" | "stl" | "glb" | "gltf" | "gii" | "freesurfer" | "vtk" | "vtp" | "vtu" | "vts" | "vtr" | "vti" | "asc";
                 /** @description `exact` joins vertices at the same position; a distance in mesh units joins those no farther apart, and so all that steps of this length lead to, from vertex to vertex */
                 merge?: ("none" | "exact") | number;
                 /** @description The sample to make, instead of reading a mesh */
