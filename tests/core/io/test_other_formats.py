@@ -1,8 +1,12 @@
 """Files that other libraries write: GIFTI, FreeSurfer and VTK, good and bad."""
 
+import base64
 import gzip
 import lzma
+import re
 import struct
+import tracemalloc
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -222,3 +226,48 @@ def test_obj_numbers_that_are_none_are_refused(number: str, axis: int) -> None:
 def test_obj_comments_stay_comments(comment: str) -> None:
     text = f"v 0 0 0 {comment}\nv 1 0 0{comment}\n{comment}\nv 1 1 0\nf 1 2 3 {comment}\n"
     assert gc.load_mesh(text.encode(), "obj").faces.tolist() == [[0, 1, 2]]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        # nibabel would count up to it, hours long
+        (
+            b'Dimensionality="2"',
+            b'Dimensionality="9223372036854775807"',
+            "'9223372036854775807' dim",
+        ),
+        (b'Dim0="162"', b'Dim0="-162"', "has '-162' rows"),
+        (b'Dim0="162"', b'Dim0="1000000"', "1000000 rows, but 1000 faces have at most 3000 vert"),
+        (b'Dim0="320"', b'Dim0="1001"', "1001 faces; at most 1000"),
+        (b"</GIFTI>", b"", "is no whole XML document: no element found"),
+        (b"GIFTI", b"NIFTI", "begins with the element 'NIFTI'"),
+    ],
+)
+def test_gifti_that_lies_is_refused_at_once(
+    old: bytes, new: bytes, message: str, tmp_path: Path
+) -> None:
+    data = gifti(tmp_path).read_bytes()
+    assert old in data
+    with pytest.raises(gc.errors.InvalidMesh, match=message):
+        gc.load_mesh(data.replace(old, new), "gii", max_faces=1000)
+
+
+def test_gifti_is_not_unpacked_beyond_its_values(tmp_path: Path) -> None:
+    data = gifti(tmp_path).read_bytes()
+    begin = data.index(b"<Data>") + len(b"<Data>")
+    bomb = base64.b64encode(zlib.compress(bytes(50_000_000)))
+    data = data[:begin] + bomb + data[data.index(b"</Data>") :]
+    tracemalloc.start()
+    with pytest.raises(gc.errors.InvalidMesh, match="holds more than its 486 values"):
+        gc.load_mesh(data, "gii")
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 5_000_000
+
+
+def test_gifti_of_another_number_of_arrays_is_read_without_a_warning(tmp_path: Path) -> None:
+    data = gifti(tmp_path).read_bytes()
+    lie = re.sub(rb'NumberOfDataArrays="\d+"', b'NumberOfDataArrays="7"', data)
+    assert lie != data
+    assert len(gc.load_mesh(lie, "gii").faces) == 320
