@@ -117,6 +117,9 @@ def as_mesh(mesh: MeshLike) -> TriangleMesh:
             return read(mesh)
     if is_file(mesh):
         return load_mesh(mesh)
+    for attribute, remedy in _SEVERAL:
+        if hasattr(mesh, attribute):
+            raise InvalidMesh(f"this {type(mesh).__name__} may hold several meshes: give {remedy}")
     raise InvalidMesh(
         f"a mesh cannot be made from this {type(mesh).__name__}: give a TriangleMesh, (vertices, "
         "faces), a file, or a mesh of trimesh, meshio, VTK, PyVista, Open3D, nibabel, nilearn, "
@@ -125,6 +128,7 @@ def as_mesh(mesh: MeshLike) -> TriangleMesh:
 
 
 def _from_vtk(data: Any) -> TriangleMesh:
+    data = getattr(data, "VTKObject", data)  # BrainSpace wraps it
     try:
         points, corners, sizes, left_out = polygons_of(data)
     except ValueError as error:
@@ -216,3 +220,10 @@ _READERS: tuple[tuple[tuple[str, ...], Callable[[Any], TriangleMesh]], ...] = (
     (("points", "simplices"), _from_attributes("points", "simplices")),  # SciPy
 )
 """Attributes by which an object is known, the more telling ones first, and what reads it."""
+_SEVERAL = (
+    ("current_mesh", "one, as meshes.current_mesh()"),  # PyMeshLab's MeshSet
+    ("parts", "one of its parts, as mesh.parts['left']"),  # nilearn's PolyMesh
+    ("mesh", "one of its parts, as image.mesh.parts['left']"),  # nilearn's SurfaceImage
+    ("recursive_unpack", "one, as assembly.unpack()[0]"),  # vedo's Assembly
+)
+"""Attributes of objects that hold meshes, and which mesh to give instead"""

@@ -1,7 +1,12 @@
 """Surfaces of brains: GIFTI and FreeSurfer, read by nibabel, the field's own library."""
 
+import base64
+import math
+import zlib
+from collections.abc import Mapping
 from io import BytesIO
 from typing import Any
+from xml.parsers.expat import ExpatError
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +30,8 @@ _TRIANGLE_FILE, _QUAD_FILE, _NEW_QUAD_FILE = b"\xff\xff\xfe", b"\xff\xff\xff", b
 """First bytes of FreeSurfer's surfaces, which have no suffix of their own: ``lh.pial``"""
 _HUNDREDTHS = 0.01
 """Unit of the integers that older quadrangle files have for positions, mm"""
+_BASE64_GZIP, _MOST_BYTES_OF_VALUE = 3, 16
+"""Of GIFTI: the number of an encoding, and bytes of the largest type"""
 _POINTS, _TRIANGLES = "NIFTI_INTENT_POINTSET", "NIFTI_INTENT_TRIANGLE"
 
 
@@ -43,11 +50,70 @@ def read_gifti(data: bytes, max_faces: int | None) -> FileContents:
     with extra("brain", "nibabel", "load_mesh of a GIFTI file"):
         from nibabel.gifti.gifti import GiftiImage
 
-    if b"ExternalFileBinary" in data:
+    parser = _bounded_parser(GiftiImage.parser, len(data), max_faces)
+    try:
+        parser.parse(data)
+    except ExpatError as error:
+        raise InvalidMesh(f"the GIFTI file is no whole XML document: {error}") from error
+    return _contents(*surface_arrays(parser.img), max_faces)
+
+
+def _bounded_parser(base: Any, size: int, max_faces: int | None) -> Any:
+    """Return a parser of nibabel that takes no more time or memory than a file declares."""
+
+    class Parser(base):  # type: ignore[misc]  # nibabel has no types
+        def StartElementHandler(self, name: str, attrs: dict[str, str]) -> None:  # noqa: N802
+            if self.img is None and name != "GIFTI":
+                raise InvalidMesh(f"the GIFTI file begins with the element {name[:20]!r}")
+            if name == "DataArray":
+                _check_array(attrs, max_faces)
+            # It only leads to a warning where it is wrong.
+            super().StartElementHandler(
+                name, {key: attrs[key] for key in attrs if key != "NumberOfDataArrays"}
+            )
+
+        def flush_chardata(self) -> None:
+            if self.write_to == "Data" and self._char_blocks:
+                text = "".join(self._char_blocks)
+                if not text.strip():
+                    raise InvalidMesh("an array of the GIFTI file is empty")
+                if self.da.encoding == _BASE64_GZIP:
+                    _check_unpacked(text, math.prod(self.da.dims))
+            super().flush_chardata()
+
+    return Parser(buffer_size=size)
+
+
+def _check_array(attributes: Mapping[str, str], max_faces: int | None) -> None:
+    """Refuse an array in another file, and one of more dimensions or rows than there can be."""
+    if attributes.get("Encoding") == "ExternalFileBinary":
         raise InvalidMesh(
             "the arrays of the GIFTI file are in another file: save it with them inside"
         )
-    return _contents(*surface_arrays(GiftiImage.from_bytes(data)), max_faces)
+    dimensions = attributes.get("Dimensionality", "")
+    if dimensions not in ("1", "2"):
+        raise InvalidMesh(
+            f"an array of the GIFTI file has {dimensions[:20]!r} dimensions; it must have 1 or 2"
+        )
+    rows = attributes.get("Dim0", "")
+    if not (rows.isdecimal() and len(rows) < 19):
+        raise InvalidMesh(f"an array of the GIFTI file has {rows[:20]!r} rows")
+    if max_faces is None:
+        return
+    if attributes.get("Intent") == _TRIANGLES:
+        check_face_count(int(rows), max_faces)
+    elif int(rows) > 3 * max_faces:
+        raise InvalidMesh(
+            f"an array of the GIFTI file has {rows} rows, but {max_faces} faces have at most "
+            f"{3 * max_faces} vertices"
+        )
+
+
+def _check_unpacked(text: str, values: int) -> None:
+    """Refuse an array that holds more than its values, once unpacked."""
+    most = _MOST_BYTES_OF_VALUE * max(values, 0)
+    if len(zlib.decompressobj().decompress(base64.b64decode(text), most + 1)) > most:
+        raise InvalidMesh(f"an array of the GIFTI file holds more than its {values} values")
 
 
 def surface_arrays(image: Any) -> tuple[NDArray[np.generic], NDArray[np.generic]]:
@@ -110,7 +176,8 @@ def _read_quads(data: bytes, max_faces: int | None) -> FileContents:
     width = 3 * np.dtype(kind).itemsize
     _check_counts(vertex_count, quad_count, width, 12, len(data) - 9)
     middle = 9 + vertex_count * width
-    vertices = np.frombuffer(data[9:middle], kind).reshape(-1, 3) * unit
+    with np.errstate(invalid="ignore"):  # the mesh refuses what is not finite
+        vertices = np.frombuffer(data[9:middle], kind).reshape(-1, 3) * unit
     quads = _three_byte_integers(data[middle : middle + 12 * quad_count]).reshape(-1, 4)
     even = quads[:, [0, 1, 3, 2, 3, 1]]
     odd = quads[:, [0, 1, 2, 0, 2, 3]]

@@ -51,14 +51,16 @@ def read_grid(data: bytes, max_faces: int | None) -> FileContents:
         ) from None
     measured = np.isfinite(heights) & (heights != header.get("nodata_value", _NO_DATA))
     row, column = np.divmod(np.flatnonzero(measured), columns)
-    x = _lowest(header, "x") + column * header.get("dx", header["cellsize"])
-    y = _lowest(header, "y") + (rows - 1 - row) * header.get("dy", header["cellsize"])
+    with np.errstate(over="ignore", invalid="ignore"):  # the mesh refuses what is not finite
+        x = _lowest(header, "x") + column * header.get("dx", header["cellsize"])
+        y = _lowest(header, "y") + (rows - 1 - row) * header.get("dy", header["cellsize"])
     number = np.where(measured, np.cumsum(measured) - 1, -1).reshape(rows, columns)
     corners = [number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]]
     squares = np.stack([corner.ravel() for corner in corners], axis=1)
     faces = squares[(squares >= 0).all(axis=1)][:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3)
     gaps = len(words) - len(row)
-    notes = (f"The grid has {gaps} gaps, which are holes of the surface.",) if gaps else ()
+    word = "gap, which is a hole" if gaps == 1 else "gaps, which are holes"
+    notes = (f"The grid has {gaps} {word} of the surface.",) if gaps else ()
     return FileContents(
         np.stack([x, y, heights[measured]], axis=1),
         faces.reshape(-1),

@@ -256,9 +256,10 @@ def _read_text_positions(element: _Element, rows: list[bytes]) -> Floats:
     check_rows(rows, VERTEX_ROW, "vertex", f"it must have {len(parts)} numbers")
     check_columns(rows, len(parts))
     table = number_table(rows, len(parts)).T
-    by_name = {
-        part.name: column.astype(part.type) for part, column in zip(parts, table, strict=True)
-    }
+    with np.errstate(over="ignore", invalid="ignore"):  # the mesh refuses what is not finite
+        by_name = {
+            part.name: column.astype(part.type) for part, column in zip(parts, table, strict=True)
+        }
     return np.stack([by_name[axis] for axis in _AXES], axis=1).astype(np.float64)
 
 

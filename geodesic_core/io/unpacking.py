@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol, TypeGuard
 
 from geodesic_core.errors import FileTooLarge, InvalidMesh
 
-_BLOCK = 1 << 20
+_BLOCK = 1 << 16
 _ZIP = b"PK\x03\x04"
 _PROGRAMS: tuple[tuple[str, bytes, Callable[[io.BytesIO], Any]], ...] = (
     ("gzip", b"\x1f\x8b\x08", lambda packed: gzip.GzipFile(fileobj=packed)),
@@ -128,7 +128,8 @@ def _only_member(data: bytes, suffixes: Container[str], max_bytes: int | None) -
             name = chosen[0]
             return NamedBytes(name, _unpack("zip", partial(archive.open, name), max_bytes))
     except (zipfile.BadZipFile, NotImplementedError, ValueError) as error:
-        raise InvalidMesh(f"the file is a damaged zip archive: {error}") from error
+        what = " ".join(str(error).split())[:100]  # which may hold any part of the file
+        raise InvalidMesh(f"the file is a damaged zip archive: {what}") from error
 
 
 def _is_content(name: str) -> bool:

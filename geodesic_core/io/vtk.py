@@ -52,7 +52,9 @@ def read_vtk(data: bytes, max_faces: int | None) -> FileContents:
     if len(sizes) == 0:
         cells = ", ".join(f"{count} {name}" for name, count in answer["left_out"].items())
         raise InvalidMesh(
-            f"the VTK file holds no polygons: it has {cells or 'no cells'}", kind="face"
+            f"the VTK file holds no polygons: it has {cells or 'no cells'}. Extract its surface "
+            "first (PyVista: data.extract_surface())",
+            kind="face",
         )
     check_face_count(int((sizes - 2).sum()), max_faces)
     return FileContents(points, corners, sizes, note_on_ignored("VTK", answer["left_out"]))

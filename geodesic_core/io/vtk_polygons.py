@@ -98,21 +98,26 @@ def polygons_of(
 
 def _as_unstructured(data: Any) -> Any:
     """Return a data set, or the blocks of a composite one, as one unstructured grid."""
-    from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
+    from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet, vtkUnstructuredGrid
     from vtkmodules.vtkFiltersCore import vtkAppendFilter
 
     if data.IsA("vtkUnstructuredGrid"):
         return data
+    blocks = [data]
+    if isinstance(data, vtkCompositeDataSet):
+        each = data.NewIterator()
+        blocks = []
+        each.InitTraversal()
+        while not each.IsDoneWithTraversal():
+            blocks.append(each.GetCurrentDataObject())
+            each.GoToNextItem()
+    blocks = [block for block in blocks if block.IsA("vtkDataSet")]  # and no tables
+    if not blocks:
+        return vtkUnstructuredGrid()
     append = vtkAppendFilter()
     append.SetOutputPointsPrecision(1)  # double
-    if isinstance(data, vtkCompositeDataSet):
-        blocks = data.NewIterator()
-        blocks.InitTraversal()
-        while not blocks.IsDoneWithTraversal():
-            append.AddInputData(blocks.GetCurrentDataObject())
-            blocks.GoToNextItem()
-    else:
-        append.AddInputData(data)
+    for block in blocks:
+        append.AddInputData(block)
     append.Update()
     return append.GetOutput()
 

@@ -1,7 +1,10 @@
 """Small mesh files of every format, with what files of that format may hold besides."""
 
 import base64
+import gzip
+import io
 import struct
+import zipfile
 from collections.abc import Mapping
 from typing import Any
 
@@ -250,6 +253,115 @@ def posed() -> GlbFile:
     return file
 
 
+PLY_STRIPS = """PLY
+format ascii 1.0
+element vertex 6
+property float x
+property list uchar int near
+property float y
+property float z
+element tristrips 2
+property list uchar float weights
+property list int int vertex_indices
+end_header
+0 1 3 0 0
+1 0 0 0
+0 2 1 2 1 0
+1 0 1 0.5
+0 0 2 0
+1 0 2 0
+0 4 0 1 2 3
+1 0.5 7 2 3 4 -1 3 4 5
+and more
+"""
+
+
+def off_binary(keyword: str = "OFF", colours: int = 0) -> bytes:
+    """Return a binary OFF file; of 4OFF with a weight of two."""
+    data = f"{keyword} BINARY\n".encode() + struct.pack(">3i", len(VERTICES), len(POLYGONS), 0)
+    for vertex in VERTICES:
+        data += struct.pack(">3f", *vertex) + (struct.pack(">f", 2) if keyword == "4OFF" else b"")
+    for polygon in POLYGONS:
+        data += struct.pack(f">{len(polygon) + 2}i", len(polygon), *polygon, colours)
+        data += struct.pack(f">{colours}f", *[0.5] * colours)
+    return data
+
+
+def ply_strips_binary(order: str) -> bytes:
+    """Return a binary PLY file of strips, with a list in each vertex."""
+    text = PLY_STRIPS.partition("end_header\n")[0] + "end_header\n"
+    form = "binary_little_endian" if order == "<" else "binary_big_endian"
+    data = text.replace("ascii", form).encode()
+    for i in range(6):
+        data += struct.pack(f"{order}fB{i % 2}iff", i % 2, i % 2, *[3] * (i % 2), i // 2, 0)
+    data += struct.pack(order + "Bi4i", 0, 4, 0, 1, 2, 3)
+    return data + struct.pack(order + "Bfi7i", 1, 0.5, 7, 2, 3, 4, -1, 3, 4, 5)
+
+
+def freesurfer_text() -> bytes:
+    rows = [f"#!ascii version of lh.white\n{len(VERTICES)} {len(TRIANGLES)}"]
+    rows += [f"{x} {y} {z} 0" for x, y, z in VERTICES.tolist()]
+    rows += [f"{a} {b} {c} 0" for a, b, c in TRIANGLES.tolist()]
+    return "\n".join([*rows, ""]).encode()
+
+
+def freesurfer_triangles() -> bytes:
+    counts = struct.pack(">2i", len(VERTICES), len(TRIANGLES))
+    body = VERTICES.astype(">f4").tobytes() + TRIANGLES.astype(">i4").tobytes()
+    return b"\xff\xff\xfeby hand\n\n" + counts + body
+
+
+def freesurfer_quads(magic: bytes, form: str) -> bytes:
+    """Return quadrangles, whose numbers have three bytes."""
+    quads = [(4, 3, 6, 7), (1, 2, 3, 0)]
+    numbers = [len(VERTICES), len(quads)], [corner for quad in quads for corner in quad]
+    counts, corners = (b"".join(n.to_bytes(3, "big") for n in row) for row in numbers)
+    unit = 100 if form == ">i2" else 1
+    return magic + counts + (unit * VERTICES).astype(form).tobytes() + corners
+
+
+GRID = b"""ncols 4
+nrows 3
+xllcorner 0.5
+yllcorner -10
+cellsize 2.5
+NODATA_value -9999
+0 1 2 3
+0 -9999 1e1 3
+0.5 1 2 -1
+"""
+
+
+def gifti(encoding: str) -> bytes:
+    """Return the surface as GIFTI, its arrays as ASCII or in base64."""
+    arrays = ""
+    for intent, kind, rows in (
+        ("POINTSET", "FLOAT32", VERTICES.astype("<f4")),
+        ("TRIANGLE", "INT32", TRIANGLES.astype("<i4")),
+    ):
+        data = " ".join(map(str, rows.ravel().tolist()))
+        if encoding == "Base64Binary":
+            data = base64.b64encode(rows.tobytes()).decode()
+        arrays += (
+            f'<DataArray Intent="NIFTI_INTENT_{intent}" DataType="NIFTI_TYPE_{kind}" '
+            'ArrayIndexingOrder="RowMajorOrder" Dimensionality="2" '
+            f'Dim0="{len(rows)}" Dim1="3" Encoding="{encoding}" Endian="LittleEndian" '
+            f'ExternalFileName="" ExternalFileOffset=""><Data>{data}</Data></DataArray>\n'
+        )
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?>\n<GIFTI Version="1.0" NumberOfDataArrays="2">\n'
+        f"{arrays}</GIFTI>\n"
+    ).encode()
+
+
+def zipped(data: bytes) -> bytes:
+    box = io.BytesIO()
+    with zipfile.ZipFile(box, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr(zipfile.ZipInfo("mesh.off"), data, zipfile.ZIP_DEFLATED)
+        archive.writestr(zipfile.ZipInfo("read.me"), b"")
+    return box.getvalue()
+
+
 def windows(data: bytes) -> bytes:
     return data.replace(b"\n", b"\r\n")
 
@@ -299,13 +411,34 @@ SEEDS: Mapping[str, tuple[bytes, ...]] = {
         posed().glb(),
     ),
     "gltf": (posed().gltf(),),
+    "free off": (
+        b" ".join(off(VERTICES, POLYGONS).split()),
+        b"4OFF\n3\n1\n0 0 0 1 2 0\n0 2 0 2 0 2 3\t0 1 2",
+        off(VERTICES, TRIANGLES).replace(b"\n", b"\r") + b"7 7\r",
+    ),
+    "binary off": (off_binary(), off_binary(colours=3), off_binary("4OFF") + b"behind"),
+    "strips ply": (PLY_STRIPS.encode(), windows(PLY_STRIPS.encode())),
+    "binary strips ply": (ply_strips_binary("<"), ply_strips_binary(">") + b"\n"),
+    "freesurfer": (freesurfer_text(), windows(freesurfer_text())),
+    "binary freesurfer": (
+        freesurfer_triangles(),
+        freesurfer_quads(b"\xff\xff\xff", ">i2"),
+        freesurfer_quads(b"\xff\xff\xfd", ">f4"),
+    ),
+    "asc": (GRID, windows(GRID), GRID.replace(b"xllcorner", b"XLLCENTER")),
+    "gii": (gifti("ASCII"), gifti("Base64Binary")),
+    "packed off": (
+        gzip.compress(off(VERTICES, POLYGONS), mtime=0),
+        zipped(off(VERTICES, POLYGONS)),
+        off(VERTICES, POLYGONS).decode().encode("utf-16"),
+    ),
 }
 """Files by format, text and binary ones apart"""
 
 
 def type_of(name: str) -> str:
     """Return the file type of a format."""
-    return name.removeprefix("binary ")
+    return name.rpartition(" ")[2]
 
 
 def glb_parts(data: bytes) -> tuple[bytes, bytes]:

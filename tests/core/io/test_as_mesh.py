@@ -1,5 +1,6 @@
 """Meshes of other libraries, arrays and paths: each is taken where a mesh is asked for."""
 
+import io
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -8,7 +9,10 @@ import meshio
 import numpy as np
 import pytest
 import trimesh
-from pyvista import ImageData, PolyData
+from nibabel.gifti import GiftiDataArray, GiftiImage
+from pyvista import ImageData, MultiBlock, PolyData
+from scipy.spatial import ConvexHull, Delaunay
+from vtkmodules.vtkCommonDataModel import vtkPolyData
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidMesh
@@ -41,6 +45,25 @@ def ball_file(folder: Path) -> Path:
     return path
 
 
+def gifti_image() -> Any:
+    arrays = [
+        GiftiDataArray(V, "NIFTI_INTENT_POINTSET", datatype="float64"),
+        GiftiDataArray(F.astype(np.int32), "NIFTI_INTENT_TRIANGLE"),
+    ]
+    return GiftiImage(darrays=arrays)
+
+
+def plain_vtk() -> Any:
+    plain = vtkPolyData()
+    plain.DeepCopy(PolyData.from_regular_faces(V, F))
+    return plain
+
+
+def imitation(**members: Any) -> Any:
+    """Return an object with the attributes of another library's, which is not installed."""
+    return SimpleNamespace(**members)
+
+
 GIVEN = {
     "mesh": lambda _: BALL,
     "arrays": lambda _: (V, F),
@@ -51,6 +74,29 @@ GIVEN = {
     "pyvista": lambda _: PolyData.from_regular_faces(V, F),
     "meshio": lambda _: meshio.Mesh(V, [("triangle", F)]),
     "open3d": lambda _: Open3DMesh(),
+    "open3d of tensors": lambda _: imitation(
+        vertex=imitation(positions=imitation(numpy=lambda: V)), triangle=imitation(indices=F)
+    ),
+    "skimage's marching cubes": lambda _: (V, F, V, V[:, 0]),
+    "igl with texture": lambda _: (V, F, None),
+    "dictionary": lambda _: {"vertices": V, "faces": F},
+    "nilearn's arrays": lambda _: {"coordinates": V, "faces": F},
+    "mne": lambda _: {"rr": V, "tris": F, "nn": V, "np": len(V), "ntri": len(F)},
+    "nilearn": lambda _: imitation(coordinates=V, faces=F, n_vertices=len(V)),
+    "pymeshlab": lambda _: imitation(vertex_matrix=lambda: V, face_matrix=lambda: F),
+    "vedo": lambda _: imitation(vertices=V, cells=F.tolist(), dataset=plain_vtk()),
+    "compas": lambda _: imitation(
+        vertex={"a": 0}, face={"b": 0}, to_vertices_and_faces=lambda: (V.tolist(), F.tolist())
+    ),
+    "brainspace": lambda _: imitation(
+        IsA=lambda _name: True, GetDataObjectType=lambda: 0, VTKObject=plain_vtk()
+    ),
+    "nibabel": lambda _: gifti_image(),
+    "scene": lambda _: trimesh.Scene([trimesh.Trimesh(V, F, process=False)]),
+    "blocks": lambda _: MultiBlock([PolyData.from_regular_faces(V, F)]),
+    "vtk": lambda _: plain_vtk(),
+    "bytes": lambda folder: ball_file(folder).read_bytes(),
+    "open file": lambda folder: io.BytesIO(ball_file(folder).read_bytes()),
 }
 given = pytest.mark.parametrize("kind", GIVEN)
 
@@ -64,7 +110,7 @@ def test_each_kind_is_the_same_mesh(kind: str, tmp_path: Path) -> None:
     assert mesh.warnings == ()
 
 
-@given
+@pytest.mark.parametrize("kind", ["mesh", "lists", "path", "trimesh", "pyvista", "scene", "mne"])
 @pytest.mark.jit
 def test_all_functions_take_each_kind(kind: str, tmp_path: Path) -> None:
     ball = GIVEN[kind](tmp_path)
@@ -145,6 +191,58 @@ def test_points_of_meshio_may_lie_in_the_plane() -> None:
 )
 def test_a_mesh_that_is_no_surface_is_refused(thing: Any, message: str) -> None:
     with pytest.raises(InvalidMesh, match=message):
+        gc.as_mesh(thing)
+
+
+SQUARE = SQUARES[:4]
+HALVES = [[0, 1, 2], [0, 2, 3]]
+
+
+def test_the_parts_of_a_scene_are_placed_and_joined() -> None:
+    scene = trimesh.Scene()
+    part = trimesh.Trimesh(SQUARE, HALVES, process=False)
+    scene.add_geometry(part, geom_name="square", node_name="here")
+    turned = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 0, 1])
+    turned[:3, 3] = [5, 0, 0]
+    scene.graph.update("there", geometry="square", matrix=turned)  # the same part once more
+    scene.add_geometry(trimesh.Trimesh(2 * SQUARE, HALVES, process=False))
+    mesh = gc.as_mesh(scene)
+    x, y, z = SQUARE.T
+    expected = [SQUARE, np.stack([5 - y, x, z], axis=1), 2 * SQUARE]
+    np.testing.assert_allclose(mesh.vertices, np.concatenate(expected), atol=1e-14)
+    assert mesh.faces.tolist() == [[i + 4 * k for i in face] for k in range(3) for face in HALVES]
+
+
+def test_hulls_and_triangulations_of_scipy_keep_the_numbers_of_their_points() -> None:
+    cube = np.array(np.meshgrid([0, 1], [0, 1], [0, 1])).reshape(3, -1).T.astype(float)
+    hull = gc.exact_distance(ConvexHull(cube), 0)
+    assert hull.mesh.vertices.tolist() == cube.tolist()
+    assert hull.distances.max() == pytest.approx(np.sqrt(5))
+    flat = gc.exact_distance(Delaunay(SQUARE[:, :2]), 0)
+    np.testing.assert_allclose(flat.distances, np.linalg.norm(SQUARE, axis=1))
+
+
+def test_polygons_of_other_libraries_are_triangulated() -> None:
+    for thing in (
+        imitation(to_vertices_and_faces=lambda: (SQUARES, [[0, 1, 2, 3], [1, 4, 5, 2]])),
+        imitation(vertices=SQUARES, cells=[[0, 1, 2, 3], [1, 4, 5, 2]], dataset=None),
+    ):
+        mesh = gc.as_mesh(thing)
+        assert mesh.face_map is not None
+        assert mesh.face_map.tolist() == [0, 0, 1, 1]
+
+
+@pytest.mark.parametrize(
+    ("thing", "remedy"),
+    [
+        (imitation(current_mesh=lambda: None), r"one, as meshes.current_mesh\(\)"),
+        (imitation(parts={"left": 0}), r"one of its parts, as mesh.parts\['left'\]"),
+        (imitation(mesh=0, data=0), r"one of its parts, as image.mesh.parts\['left'\]"),
+        (imitation(recursive_unpack=0), "one, as assembly.unpack"),
+    ],
+)
+def test_what_may_hold_several_meshes_says_how_to_give_one(thing: Any, remedy: str) -> None:
+    with pytest.raises(InvalidMesh, match=f"may hold several meshes: give {remedy}"):
         gc.as_mesh(thing)
 
 

@@ -148,9 +148,9 @@ OPENED: dict[str, Callable[[Path], Any]] = {
     "BufferedReader": lambda _: io.BufferedReader(io.BytesIO(FILES["obj"])),
     "StringIO": lambda _: io.StringIO(FILES["obj"].decode()),
     "a temporary file": lambda _: temporary(),
-    "an entry of an archive": lambda _: zipfile.ZipFile(io.BytesIO(zipped(FILES["obj"]))).open(
-        "a/mesh.obj"
-    ),
+    "an entry of an archive": lambda _: zipfile.ZipFile(  # noqa: SIM115 - as above
+        io.BytesIO(zipped(FILES["obj"]))
+    ).open("a/mesh.obj"),
     "gzip": lambda _: gzip.GzipFile(fileobj=io.BytesIO(gzip.compress(FILES["obj"]))),
     "bytearray": lambda _: bytearray(FILES["obj"]),
     "memoryview": lambda _: memoryview(FILES["obj"]),

@@ -373,12 +373,17 @@ def test_no_memory_is_read_beyond_the_end_of_a_file(
 
 def test_blocks_of_pyvista_are_joined_in_their_order() -> None:
     one, two = (pyvista.PolyData.from_regular_faces(PLANE + z, PAIRS) for z in (0, 5))
-    nested = pyvista.MultiBlock([one, None, pyvista.MultiBlock([DATA_SETS["ImageData"][0]]), two])
+    nested = pyvista.MultiBlock(
+        [one, None, pyvista.MultiBlock([DATA_SETS["ImageData"][0]]), pyvista.Table(X[:, None]), two]
+    )
     mesh = gc.as_mesh(nested)
     assert len(mesh.vertices) == 36
     assert mesh.vertices[24:].tolist() == (PLANE + 5).tolist()
     assert mesh.faces[:12].tolist() == PAIRS
     assert mesh.faces[24:].tolist() == (np.array(PAIRS) + 24).tolist()
+    for nothing in (pyvista.MultiBlock(), pyvista.MultiBlock([pyvista.Table(X[:, None])])):
+        with pytest.raises(InvalidMesh, match="MultiBlock is not a surface: it has no cells"):
+            gc.as_mesh(nothing)
 
 
 @pytest.mark.parametrize("kind", DATA_SETS)

@@ -375,3 +375,39 @@ def test_extreme_coordinates_are_right_or_refused(exponent):
         return
     scaled = gc.exact_distance(mesh, [gc.Source(0), gc.Source(20, 0.3 * scale)]).distances
     np.testing.assert_allclose(scaled / scale, distances, rtol=1e-12)
+
+
+def masked(array, place):
+    mask = np.zeros(array.shape, bool)
+    mask[place] = True
+    return np.ma.masked_array(array, mask)
+
+
+@pytest.mark.parametrize("place", [3, (3, 2), (slice(3, None), 0)])
+def test_masked_vertices_are_refused(place):
+    with pytest.raises(gc.errors.InvalidMesh, match="vertex 3 is masked: leave masked") as caught:
+        gc.TriangleMesh(masked(POINTS, place), FACES)
+    assert (caught.value.kind, caught.value.elements) == ("vertex", (3,))
+    with pytest.raises(gc.errors.InvalidMesh, match="vertex 3 is masked"):
+        gc.as_mesh((masked(POINTS, place), FACES))
+    with pytest.raises(gc.errors.InvalidMesh, match="vertex 3 is masked"):
+        gc.TriangleMesh.from_polygons(masked(POINTS, place), [0, 1, 2], [3])
+
+
+@pytest.mark.parametrize("place", [1, (1, 2), (slice(1, 2), slice(None))])
+def test_masked_faces_are_refused(place):
+    with pytest.raises(gc.errors.InvalidMesh, match="face 1 is masked") as caught:
+        gc.TriangleMesh(POINTS, masked(FACES, place))
+    assert (caught.value.kind, caught.value.elements) == ("face", (1,))
+    with pytest.raises(gc.errors.InvalidMesh, match="is masked"):
+        gc.TriangleMesh.from_polygons(POINTS, masked(FACES.ravel(), 4), [3] * 4)
+
+
+def test_several_masked_vertices_are_counted():
+    with pytest.raises(gc.errors.InvalidMesh, match=r"vertex 1 is masked \(and 2 more\)"):
+        gc.TriangleMesh(masked(POINTS, slice(1, None)), FACES)
+
+
+def test_arrays_that_mask_nothing_are_as_others():
+    mesh = gc.TriangleMesh(np.ma.masked_array(POINTS), np.ma.masked_less(FACES, 0))
+    assert mesh.faces.tolist() == FACES.tolist()
