@@ -95,6 +95,7 @@ def queue_list(wave: Any, h: int) -> None:
         pool.lists[LIST * h + MARKS] |= IN_RING
         prefetch(mesh.geometry, ROW * h)
         prefetch(mesh.links, ROW * h)
+        prefetch(pool.runs, h)
         ring_push(wave, h)
 
 
