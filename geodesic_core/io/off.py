@@ -152,7 +152,7 @@ def _read_binary(data: bytes, at: int, layout: _Layout, max_faces: int | None) -
     if not faces:
         raise InvalidMesh("the OFF file holds no faces", kind="face")
     positions = table[:, : 4 if layout.has_weight else 3].astype(np.float64)
-    rest = data[at + 4 * place :].strip()
-    notes = note_on_ignored("OFF", {f"bytes {BEHIND}": len(rest)})
+    rest = data[at + 4 * place :]
+    notes = note_on_ignored("OFF", {f"bytes {BEHIND}": len(rest) if rest.strip() else 0})
     corners = np.concatenate(faces).astype(np.int64)
     return FileContents(_positions(positions), corners, np.array(sizes), notes)

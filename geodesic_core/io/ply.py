@@ -278,7 +278,7 @@ def _read_binary(
             elif element.name in _POLYGONS:
                 corners, sizes = values[element.wanted()[0]]
                 found[element.name] = _as_polygons(element, corners.astype(np.int64), sizes)
-    return found, {f"bytes {BEHIND}": len(body[at:].strip())}
+    return found, {f"bytes {BEHIND}": len(body) - at if body[at:].strip() else 0}
 
 
 def _values_of(

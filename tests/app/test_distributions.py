@@ -76,7 +76,7 @@ def test_all_have_the_license() -> None:
 
 def test_all_extras_of_the_library_are_in_one() -> None:
     extras = project(LIBRARY)["optional-dependencies"]
-    for name in ("tables", "brain", "vtk", "plot"):  # large, or of a field of its own
+    for name in ("tables", "vtk", "plot"):  # large
         del extras[name]
     assert extras.pop("all") == [f"geodesic-core[{','.join(extras)}]"]
 

@@ -12,6 +12,8 @@ import pytest
 import geodesic_core as gc
 from tests.support.commands import Ran, Run, error_line
 
+pytestmark = pytest.mark.file_slice(40)
+
 CORNER_TO_CORNER = [[0.0, 2**0.5], [2**0.5, 0.0]]
 WALL = [6, 7, 14, 15, 22, 23, 30, 31]
 """Faces of the square from x = 0.75 on"""
@@ -335,7 +337,7 @@ REFUSED = [
         f"{DISTANCE} --method nonsense",
         "'--method': 'nonsense' is not one of 'exact', 'approximate'",
     ),
-    (f"{DISTANCE} --merge some", "'--merge': 'some' is not one of"),
+    (f"{DISTANCE} --merge some", "'some' is neither 'none' nor 'exact', nor a distance"),
     (f"{DISTANCE} --max-distance far", "'--max-distance': 'far': it must be a number"),
     (f"{DISTANCE} --relative-error much", "'--relative-error': 'much': it must be a number"),
     (f"{DISTANCE} --absolute-error 1,5", "'--absolute-error': '1,5': it must be a number"),

@@ -15,8 +15,8 @@ from tests.support.syntax import syntax_tree
 pytestmark = [pytest.mark.slow, pytest.mark.file_slice(2)]
 
 WORK = [ROOT / "geodesic_core", ROOT / "app/encoding", ROOT / "app/queries"]
-NOT_FOR_WORKERS = {"nibabel", "meshio", "zarr", "pyarrow", "pyvista", "PIL", "trimesh"}
-"""Packages for formats and pictures that the service does not offer"""
+NOT_FOR_WORKERS = {"nibabel", "vtkmodules", "zarr", "pyarrow", "pyvista", "PIL", "trimesh"}
+"""Packages for rare formats and for pictures, and VTK, which has processes of its own"""
 
 
 def late_imports(path: Path) -> set[str]:

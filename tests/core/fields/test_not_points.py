@@ -9,6 +9,8 @@ import pytest
 
 import geodesic_core as gc
 
+pytestmark = pytest.mark.file_slice(40)
+
 MESH = gc.samples.sphere(80)
 SOLVER = gc.Solver(MESH)
 FIELD = gc.exact_distance(MESH, 0)

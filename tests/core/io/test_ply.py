@@ -10,6 +10,8 @@ import geodesic_core as gc
 from geodesic_core.errors import InvalidMesh
 from tests.support.mesh_files import ply, ply_big_endian, ply_binary
 
+pytestmark = pytest.mark.file_slice(25)
+
 VERTICES = np.array([(x, y, 0.0) for y in range(3) for x in range(2)])
 """Two columns of a plane, in rows from below"""
 QUADS = [[0, 1, 3, 2], [2, 3, 5, 4]]

@@ -9,6 +9,8 @@ import geodesic_core as gc
 from geodesic_core.errors import InvalidMesh
 from tests.support.mesh_files import glb, off, ply, ply_big_endian, stl, stl_binary
 
+pytestmark = pytest.mark.file_slice(40)
+
 TRIANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], float)
 FACE = [[0, 1, 2]]
 GRID = b"ncols 2\nnrows 2\ncellsize 1\n0 0\n0 0\n"

@@ -18,6 +18,8 @@ import geodesic_core as gc
 from geodesic_core.errors import InvalidMesh, TooManyFaces
 from geodesic_core.io.vtk_polygons import polygons_of, read_file
 
+pytestmark = pytest.mark.file_slice(20)
+
 X, Y = (axis.ravel() for axis in np.meshgrid(np.arange(4.0), np.arange(3.0)))
 PLANE = np.stack([X, Y, 0 * X], axis=1)
 """Twelve points of a plane, as a grid of 4 × 3 numbers them"""
