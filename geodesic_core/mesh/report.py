@@ -310,8 +310,13 @@ def _edges(count: int) -> str:
     return "1 edge is" if count == 1 else f"{count} edges are"
 
 
+_SQUARABLE = 1e-150
+"""Mesh units: of smaller distances, the square may be no number, and they are found as 0."""
+
+
 def _rounded_up(distance: float) -> str:
     """Return a distance that is larger, of one digit, or of two."""
+    distance = max(distance, _SQUARABLE)
     unit = 10.0 ** math.floor(math.log10(distance))
     return f"{(math.floor(distance / unit) + 1) * unit:g}"
 

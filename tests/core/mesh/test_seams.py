@@ -409,3 +409,13 @@ def test_an_stl_file_takes_a_distance():
     data = (text + "endsolid\n").encode()
     assert len(gc.load_mesh(data, "stl").vertices) == 5
     assert len(gc.load_mesh(data, "stl", merge=1e-4).vertices) == 4
+
+
+@pytest.mark.parametrize("gap", [5e-324, 1e-170, 1e-120, 1e-7])
+def test_the_remedy_joins_however_narrow_the_gap_is(gap: float) -> None:
+    left = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    right = [[1, 0, gap], [1, 1, gap], [2, 0, 0], [2, 1, 0]]
+    faces = [[0, 1, 2], [0, 2, 3], [4, 6, 7], [4, 7, 5]]
+    (told,) = (words for words in gc.TriangleMesh(left + right, faces).warnings if "apart" in words)
+    remedy = float(told.partition("merge=")[2].partition(" ")[0])
+    assert gc.TriangleMesh(left + right, faces, merge=remedy).report.components == 1
