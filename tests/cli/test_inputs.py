@@ -12,7 +12,7 @@ import pytest
 import geodesic_core as gc
 from tests.support.commands import Ran, Run, error_line
 
-pytestmark = pytest.mark.file_slice(40)
+pytestmark = pytest.mark.slice(8)
 
 CORNER_TO_CORNER = [[0.0, 2**0.5], [2**0.5, 0.0]]
 WALL = [6, 7, 14, 15, 22, 23, 30, 31]

@@ -9,7 +9,7 @@ import pytest
 
 import geodesic_core as gc
 
-pytestmark = pytest.mark.file_slice(40)
+pytestmark = pytest.mark.slice(8)
 
 MESH = gc.samples.sphere(80)
 SOLVER = gc.Solver(MESH)

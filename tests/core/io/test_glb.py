@@ -18,7 +18,7 @@ from tests.core.io.test_load import FACES, LONG, VERTICES, lie, refusal
 from tests.support.fresh import told_by
 from tests.support.mesh_files import GlbFile, glb, glb_of, glb_tree, stl_binary
 
-pytestmark = pytest.mark.file_slice(50)
+pytestmark = pytest.mark.slice(8)
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], np.float32)
 HALVES = np.array([[0, 1, 2], [0, 2, 3]], np.uint16)

@@ -10,7 +10,7 @@ import geodesic_core as gc
 from geodesic_core.errors import InvalidMesh
 from tests.support.mesh_files import ply, ply_big_endian, ply_binary
 
-pytestmark = pytest.mark.file_slice(25)
+pytestmark = pytest.mark.slice(8)
 
 VERTICES = np.array([(x, y, 0.0) for y in range(3) for x in range(2)])
 """Two columns of a plane, in rows from below"""

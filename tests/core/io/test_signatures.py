@@ -9,7 +9,7 @@ import geodesic_core as gc
 from geodesic_core.errors import InvalidMesh
 from tests.support.mesh_files import glb, off, ply, ply_big_endian, stl, stl_binary
 
-pytestmark = pytest.mark.file_slice(40)
+pytestmark = pytest.mark.slice(8)
 
 TRIANGLE = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], float)
 FACE = [[0, 1, 2]]

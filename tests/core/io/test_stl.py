@@ -11,7 +11,7 @@ from geodesic_core.solvers import exact_distance
 from tests.core.io.test_load import FACES, LONG, VERTICES, refusal
 from tests.support.mesh_files import stl, stl_binary
 
-pytestmark = pytest.mark.file_slice(30)
+pytestmark = pytest.mark.slice(8)
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
 HALVES = [[0, 1, 2], [0, 2, 3]]

@@ -18,7 +18,7 @@ import geodesic_core as gc
 from geodesic_core.errors import FileTooLarge, InvalidMesh
 from tests.support.mesh_files import glb, obj, off, ply, ply_binary, stl_binary
 
-pytestmark = pytest.mark.file_slice(30)
+pytestmark = pytest.mark.slice(8)
 
 SQUARE = np.array([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], float)
 FACES = [[0, 1, 2], [0, 2, 3]]

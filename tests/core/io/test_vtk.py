@@ -18,7 +18,7 @@ import geodesic_core as gc
 from geodesic_core.errors import InvalidMesh, TooManyFaces
 from geodesic_core.io.vtk_polygons import polygons_of, read_file
 
-pytestmark = pytest.mark.file_slice(20)
+pytestmark = pytest.mark.slice(8)
 
 X, Y = (axis.ravel() for axis in np.meshgrid(np.arange(4.0), np.arange(3.0)))
 PLANE = np.stack([X, Y, 0 * X], axis=1)

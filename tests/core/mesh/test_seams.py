@@ -17,7 +17,7 @@ from geodesic_core.mesh.degeneracies import first_within
 from geodesic_core.tolerances import NEARLY_JOINED
 from tests.support import zoo
 
-pytestmark = pytest.mark.file_slice(40)
+pytestmark = pytest.mark.slice(8)
 
 NOTHING = gc.Sample(0, ())
 SCALES = [1e-9, 1.0, 1e9]
