@@ -4,6 +4,7 @@ A damaged file can crash VTK's readers, or have them run on. So `vtk` runs this 
 of its own, which imports nothing else of the library and starts in half a second.
 """
 
+import ctypes
 import json
 import re
 import sys
@@ -18,6 +19,8 @@ _POLYGONS = (5, 7, 9)
 _BEZIER = (76, 77)
 _HIDDEN_POINT, _DOUBLE_OR_HIDDEN_CELL = 2, 1 | 32
 """Flags of VTK's ghost arrays."""
+_M_PERTURB, _FILL = -6, 0xFE
+"""Of glibc's ``mallopt``: that memory is filled; and the byte for it"""
 _LEGACY = b"# vtk DataFile"
 _GRAVE = re.compile("Error reading|coordinates read")
 """What warnings say where VTK (9.7) goes on with memory that it has not filled"""
@@ -296,12 +299,34 @@ def _answer(content: bytes, out: BinaryIO) -> None:
     """Write the polygons of a file: a line of JSON, then arrays in numpy's format."""
     try:
         points, corners, sizes, left_out = polygons_of(read_file(content))
+        _check_filled(points)
     except ValueError as error:
         out.write(json.dumps({"error": str(error)}).encode() + b"\n")
         return
     out.write(json.dumps({"left_out": left_out}).encode() + b"\n")
     for array in (points, corners, sizes):
         np.save(out, array)
+
+
+def _mark_memory() -> None:
+    """Have all memory filled with bytes by which `_check_filled` knows it; with glibc only."""
+    try:
+        ctypes.CDLL(None).mallopt(_M_PERTURB, _FILL ^ 0xFF)
+    except (AttributeError, OSError, TypeError):  # macOS, Windows and others
+        return
+
+
+def _check_filled(points: NDArray[np.float64]) -> None:
+    """Refuse points that VTK has left as the memory was.
+
+    Of a damaged file it may give such points without an error (9.7). The least numbers of a type
+    that begin with `_FILL` twice are far below all coordinates, of four bytes and of eight.
+    """
+    for size in (4, 8):
+        ends = [bytes([_FILL, _FILL]).rjust(size, bytes([end])) for end in (0, 0xFF)]
+        high, low = (np.frombuffer(end, f"<f{size}")[0] for end in ends)
+        if ((low <= points) & (points <= high)).any():
+            raise ValueError("it is damaged: VTK finds no values for some points")
 
 
 def _limit(seconds: int, memory: int) -> None:
@@ -317,5 +342,6 @@ def _limit(seconds: int, memory: int) -> None:
 
 
 if __name__ == "__main__":
+    _mark_memory()
     _limit(*map(int, sys.argv[1:]))
     _answer(sys.stdin.buffer.read(), sys.stdout.buffer)

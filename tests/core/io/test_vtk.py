@@ -5,6 +5,7 @@ Most are read in this process, as `load_mesh` has them read in one of its own.
 
 import re
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from vtkmodules.vtkIOLegacy import vtkDataSetWriter
 import geodesic_core as gc
 from geodesic_core.errors import InvalidMesh, TooManyFaces
 from geodesic_core.io.vtk_polygons import polygons_of, read_file
+from tests.support.mutations import BYTES, TEXT, mutated
 
 pytestmark = pytest.mark.slice(8)
 
@@ -373,6 +375,19 @@ def test_no_memory_is_read_beyond_the_end_of_a_file(
     assert "0x" not in str(refusal.value)
 
 
+@pytest.mark.parametrize("way", ["inline", "inline lzma"])
+@pytest.mark.parametrize("kind", ["float32", "float64"])
+def test_no_points_without_values(kind: str, way: str, tmp_path: Path) -> None:
+    grid = pyvista.RectilinearGrid(*(np.arange(n, dtype=kind) for n in (4, 3, 1)))
+    content = xml(grid, XML[way], tmp_path / "grid.vtr")
+    begin = content.index(b">", content.index(b"<DataArray")) + 1
+    end = content.index(b"</DataArray>")
+    nothing = content[:begin] + b"AAAAAA==" + content[end:]  # VTK (9.7) finds no error in it
+    for cut in (nothing, content[:begin] + content[end:]):
+        with pytest.raises(InvalidMesh, match="VTK file cannot be read"):
+            gc.load_mesh(cut, "vtr")
+
+
 def test_blocks_of_pyvista_are_joined_in_their_order() -> None:
     one, two = (pyvista.PolyData.from_regular_faces(PLANE + z, PAIRS) for z in (0, 5))
     nested = pyvista.MultiBlock(
@@ -403,3 +418,35 @@ def test_cells_are_named_in_words() -> None:
     with pytest.raises(InvalidMesh) as refusal:
         gc.as_mesh(data)
     assert re.search(r"1 vertex cells, 1 poly line cells", str(refusal.value))
+
+
+def mutant(number: int, path: Path) -> bytes:
+    random = Random(f"vtk {number}")
+    data, _ = DATA_SETS[random.choice(list(DATA_SETS))]
+    way = random.choice([*LEGACY, *XML])
+    content = legacy(data, *LEGACY[way], path) if way in LEGACY else xml(data, XML[way], path)
+    content = re.sub(rb"0x[0-9a-f]+", b"0x0", content)  # addresses, of which VTK makes names
+    return mutated(random, content, random.choice((TEXT, BYTES)))
+
+
+def read(content: bytes) -> gc.TriangleMesh | InvalidMesh:
+    try:
+        return gc.load_mesh(content, "vtk", max_faces=1000)
+    except InvalidMesh as refusal:
+        return refusal
+
+
+@pytest.mark.slice(20)
+@pytest.mark.parametrize("number", range(500))
+def test_a_mutated_file_is_read_or_refused_and_always_alike(number: int, tmp_path: Path) -> None:
+    content = mutant(number, tmp_path / "mesh.vtk")
+    one, other = read(content), read(content)  # memory that is not filled would differ
+    if isinstance(one, InvalidMesh):
+        assert "\n" not in str(one)
+        assert len(str(one)) < 400
+        assert isinstance(other, InvalidMesh)
+    else:
+        assert isinstance(other, gc.TriangleMesh)
+        assert np.isfinite(one.vertices).all()
+        assert one.vertices.tobytes() == other.vertices.tobytes()
+        assert one.faces.tobytes() == other.faces.tobytes()
