@@ -618,6 +618,7 @@ def test_most_runs_are_what_a_list_may_come_up(monkeypatch, left):
             gc.exact_distance(mesh, 3)
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize(("most", "ends"), [(0, False), (12, True), (MOST_CROSSINGS, True)])
 def test_most_crossings_are_more_than_a_fast_sweep_needs(monkeypatch, most, ends):
     mesh = gc.samples.sphere(20480)

@@ -340,6 +340,7 @@ def test_nearest_points_and_points_on_edges(seed, count):
         assert may_be_on[i, found[i]]
 
 
+@pytest.mark.jit
 @pytest.mark.parametrize("merge", [1e-3, 0.6, 2.0])
 def test_many_vertices_that_are_close_take_no_list_of_pairs(merge):
     """All within one distance, or in two places: pairs would take terabytes."""
