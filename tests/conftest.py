@@ -46,7 +46,7 @@ EXAMPLES = {"quick": 4, "slice": 6, "full": 2000, "interpreted": 4}
 """Random examples of a property, by tier; kernels as plain Python take a hundred times as long."""
 
 QUICK_SLICE = 2
-CASES_WITHOUT_JIT = 1
+CASES_WITHOUT_JIT = 2
 """Cases of each test; one reaches nearly every line."""
 
 

@@ -216,6 +216,7 @@ def test_all_but_a_label_may_be_blocked(tmp_path: Path) -> None:
         gc.load_label(everywhere, BALL, outside=True)
 
 
+@pytest.mark.jit
 def test_distances_from_a_label_begin_at_all_of_its_vertices(tmp_path: Path) -> None:
     found = gc.exact_distance(BALL, gc.load_label_vertices(freesurfer(tmp_path), BALL)).distances
     each = [gc.exact_distance(BALL, int(vertex)).distances for vertex in WALL]
