@@ -46,8 +46,10 @@ EXAMPLES = {"quick": 4, "slice": 6, "full": 2000, "interpreted": 4}
 """Random examples of a property, by tier; kernels as plain Python take a hundred times as long."""
 
 QUICK_SLICE = 2
-CASES_WITHOUT_JIT = 2
+CASES_WITHOUT_JIT = 1
 """Cases of each test; one reaches nearly every line."""
+CASES_OF_READERS = 6
+"""Cases of each test of files, each of which reaches other lines, and hardly any kernel."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -176,7 +178,7 @@ def _test_of(item: pytest.Item) -> str:
 
 def _size_of_slice(config: pytest.Config, item: pytest.Item) -> int:
     if WITHOUT_JIT:
-        return CASES_WITHOUT_JIT
+        return CASES_OF_READERS if item.path.parent.name == "io" else CASES_WITHOUT_JIT
     marker = item.get_closest_marker("slice")
     if marker is None:
         return sys.maxsize

@@ -233,7 +233,7 @@ def check_needles(along, width, vertices, faces, point):
             assert abs(path.length - row[target]) <= close["atol"]
 
 
-@pytest.mark.slice(3)
+@pytest.mark.slice(2)
 @pytest.mark.parametrize(
     "seed",
     [1196, 1569, 2448, 3410, 3927, 4583, 4765, 5639, 10968, 11129, 11341, 11791, 12376, 14370],
@@ -248,7 +248,7 @@ def test_a_soup_of_needles_ends(seed):
     check_needles(*soup_of_needles(seed))
 
 
-@pytest.mark.slice(2)
+@pytest.mark.slice(1)
 @pytest.mark.parametrize("width", [1e-12, 1e-10, 1e-9, 1e-8, 1e-6, 1e-5, 1e-4])
 def test_windows_that_wind_about_a_tip_cross_its_edges_once(width):
     """At each turn they crossed an edge nearer to the tip, where no earlier one had crossed."""
