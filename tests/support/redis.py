@@ -50,12 +50,6 @@ class Redis:
         for key in client.scan_iter(pattern):
             client.delete(key)
 
-    def keep(self, pattern: str) -> None:
-        """Have the time of keys run out no more."""
-        client = self._client()
-        for key in client.scan_iter(pattern):
-            client.persist(key)
-
     def _answers(self) -> bool:
         from redis.exceptions import RedisError
 

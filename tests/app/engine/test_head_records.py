@@ -24,10 +24,10 @@ def refusal(url: str) -> str:
     return message
 
 
-@pytest.fixture
-def short_lease(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A claim that others wait for a moment only; its holder renews none here."""
-    monkeypatch.setattr(head_records, "_LEASE_S", 0.1)
+@pytest.fixture(autouse=True)
+def long_lease(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A claim that does not run out while a test holds it: no head renews its own here."""
+    monkeypatch.setattr(head_records, "_LEASE_S", 3600.0)
 
 
 def test_a_server_that_does_not_exist() -> None:
@@ -67,19 +67,19 @@ def test_it_is_told_whether_they_are_durable(redis_server: Redis) -> None:
         assert "but a crash of that Redis loses them" in records.durability
 
 
-@pytest.mark.usefixtures("short_lease")
-def test_records_belong_to_one_head_at_a_time(redis_server: Redis) -> None:
+def test_records_belong_to_one_head_at_a_time(
+    redis_server: Redis, monkeypatch: pytest.MonkeyPatch
+) -> None:
     url = SecretStr(redis_server.url())
     with in_redis(url, TOKEN), in_redis(url, "another-token-of-tests") as other:
-        redis_server.keep("geodesic-*-claim")
         other.renew()
+        monkeypatch.setattr(head_records, "_LEASE_S", 0.1)  # and so the wait of another head
         assert "another head uses the records geodesic-" in refusal(redis_server.url())
         redis_server.forget("geodesic-*-claim")
         with in_redis(url, TOKEN):
             pass
 
 
-@pytest.mark.usefixtures("short_lease")
 def test_a_head_whose_claim_has_run_out_takes_it_again_or_ends(redis_server: Redis) -> None:
     url = SecretStr(redis_server.url())
     with in_redis(url, TOKEN) as records:
@@ -87,7 +87,6 @@ def test_a_head_whose_claim_has_run_out_takes_it_again_or_ends(redis_server: Red
         records.renew()
         redis_server.forget("geodesic-*")
         with in_redis(url, TOKEN) as successor:
-            redis_server.keep("geodesic-*")
             with pytest.raises(ClusterError, match="another head has taken over the records"):
                 records.renew()
             successor.renew()
