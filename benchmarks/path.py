@@ -310,7 +310,8 @@ def _add_landmarks(solver: gc.Solver, far: Iterator[Pair]) -> list[float]:
     seconds = []
     for pair in far:
         seconds.append(timed(partial(solver.shortest_path, *pair))[0])
-        if solver._shared_search()._landmarks.count == LANDMARKS:  # nobody else needs to know
+        # Nobody else needs to know how many landmarks there are.
+        if solver._workspace.path_search()._landmarks.count == LANDMARKS:
             break
     return seconds
 

@@ -31,7 +31,7 @@ from geodesic_core.mesh.curve import share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
 from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.search.nearest import Nearest, nearest
+from geodesic_core.search.nearest import Nearest
 from geodesic_core.solvers import (
     Retain,
     Solver,
@@ -41,6 +41,7 @@ from geodesic_core.solvers import (
     exact_distance,
     fast_distance,
     kernel_digest,
+    nearest,
     shortest_path,
 )
 from geodesic_core.tables.matrix_file import MatrixFile, write_matrix

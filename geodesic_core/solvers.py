@@ -1,4 +1,7 @@
-"""Solvers: arguments in, sweeps and searches, results out."""
+"""Solvers: arguments in, sweeps and searches, results out.
+
+Each is a function of a mesh or of a `Solver`, and the method of the same name.
+"""
 
 from __future__ import annotations  # help() shows the names of types, not what they stand for
 
@@ -32,12 +35,11 @@ from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.curve import Polyline
 from geodesic_core.mesh.surface_point import Point, Points, Source, Sources, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.search.call_lock import CallLock
 from geodesic_core.search.matrix import Layout, find_matrix
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.rows import Method, Solve
-from geodesic_core.search.target_sweep import TargetSweep
+from geodesic_core.search.workspace import Workspace
 from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
 from geodesic_core.validation import as_limit, check_choice, is_index, is_number
 
@@ -52,7 +54,7 @@ Effort = Literal[1, 2, 4, 8]
 
 
 def exact_distance(
-    mesh: MeshLike,
+    mesh: MeshLike | Solver,
     sources: Sources,
     max_distance: float | None = None,
     targets: Points = (),
@@ -69,7 +71,7 @@ def exact_distance(
     Parameters
     ----------
     mesh
-        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
     sources
         A vertex index, a `SurfacePoint`, a `Curve`, a `Source` with a start distance, or several
         of these.
@@ -125,12 +127,12 @@ def exact_distance(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     bounds = exact_bounds(as_limit(max_distance))
-    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
-    return _solve(mesh, sources, targets, bounds, EXACT, retain, control)
+    surface, control = _surface_of(mesh, barriers, control)
+    return _solve(surface, sources, targets, bounds, EXACT, retain, control)
 
 
 def approximate_distance(
-    mesh: MeshLike,
+    mesh: MeshLike | Solver,
     sources: Sources,
     relative_error: float | None = 1e-3,
     absolute_error: float | None = None,
@@ -194,12 +196,12 @@ def approximate_distance(
     control = Control(progress, cancel, deadline_s, memory_limit)
     errors = _as_errors(relative_error, absolute_error)
     limit = as_limit(max_distance)
-    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
-    return _solve_within(mesh, sources, targets, limit, retain, control, errors=errors)
+    surface, control = _surface_of(mesh, barriers, control)
+    return _solve_within(surface, sources, targets, limit, retain, control, errors=errors)
 
 
 def fast_distance(
-    mesh: MeshLike,
+    mesh: MeshLike | Solver,
     sources: Sources,
     effort: Effort = 2,
     max_distance: float | None = None,
@@ -261,8 +263,8 @@ def fast_distance(
     places = _as_effort(effort)
     check_choice("retain", retain, ("distances", "paths"))
     limit = as_limit(max_distance)
-    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
-    return _solve_fast(mesh, sources, targets, limit, retain, control, effort=places)
+    surface, control = _surface_of(mesh, barriers, control)
+    return _solve_fast(surface, sources, targets, limit, retain, control, effort=places)
 
 
 def error_bound(
@@ -315,7 +317,7 @@ def error_bound(
 
 
 def shortest_path(
-    mesh: MeshLike,
+    mesh: MeshLike | Solver,
     source: Point,
     target: Point,
     waypoints: Points = (),
@@ -330,12 +332,13 @@ def shortest_path(
 ) -> GeodesicPath:
     """Return an exact shortest path between two points of the surface (section 5).
 
-    For many paths on one mesh, a `Solver` is faster.
+    For many paths on one mesh, a `Solver` is faster: its memory is reused, and landmarks narrow
+    the search, so that the time of a call does not depend on the size of the mesh.
 
     Parameters
     ----------
     mesh
-        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
     source, target
         Vertex indices or `SurfacePoint`.
     waypoints
@@ -380,13 +383,18 @@ def shortest_path(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     limit = as_limit(max_distance)
-    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
-    stops = _as_stops(mesh, source, target, waypoints, control)
-    return _shortest_through(PathSearch(mesh), stops, limit, control, explain=explain)
+    workspace, control = _workspace_of(mesh, barriers, control)
+    stops = _as_stops(workspace.mesh, source, target, waypoints, control)
+    with workspace.held(control):
+        search = workspace.path_search()
+        path = _shortest_through(search, stops, limit, control, explain=explain)
+        if isinstance(mesh, Solver) and mesh._workspace is workspace:  # there may be more paths
+            search.add_landmark_if_due(stops[0], replace(control, progress=None))
+        return path
 
 
 def distance_matrix(
-    mesh: MeshLike,
+    mesh: MeshLike | Solver,
     sources: Points,
     targets: Points | None = None,
     max_distance: float | None = None,
@@ -408,7 +416,7 @@ def distance_matrix(
     Parameters
     ----------
     mesh
-        The surface: a `TriangleMesh`, or anything else that `as_mesh` takes.
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
     sources, targets
         N and M vertex indices or `SurfacePoint`; a single one needs no list. Without targets, the
         targets are the sources.
@@ -470,10 +478,90 @@ def distance_matrix(
     [[1.0, 1.0, 1.414]]
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    mesh, control = with_barriers(as_mesh(mesh), barriers, control)
-    solve = row_solver(mesh, method, relative_error, absolute_error, effort)
-    make = partial(TargetSweep, mesh), partial(PathSearch, mesh)
-    return find_matrix(mesh, solve, *make, sources, targets, max_distance, layout, threads, control)
+    workspace, control = _workspace_of(mesh, barriers, control)
+    solve = row_solver(workspace.mesh, method, relative_error, absolute_error, effort)
+    with workspace.held(control):
+        return find_matrix(
+            workspace, solve, sources, targets, max_distance, layout, threads, control
+        )
+
+
+def nearest(
+    mesh: MeshLike | Solver,
+    source: Point,
+    candidates: Points,
+    k: int = 1,
+    max_distance: float | None = None,
+    *,
+    barriers: Iterable[int] = (),
+    progress: Callable[[float], None] | None = None,
+    cancel: Callable[[], bool] | None = None,
+    deadline_s: float | None = None,
+    memory_limit: int | None = None,
+) -> Nearest:
+    """Return the ``k`` candidates that are geodesically nearest to a point, exactly.
+
+    For many calls on one mesh, a `Solver` is faster: the time of a call does not depend on the size
+    of the mesh.
+
+    Parameters
+    ----------
+    mesh
+        The surface: a `TriangleMesh`, anything else that `as_mesh` takes, or a `Solver`.
+    source, candidates
+        Vertex indices or `SurfacePoint`.
+    k
+        Number to find, from 1 to the number of candidates. Fewer are returned where fewer can be
+        reached.
+    max_distance
+        Limit, mesh units; None for no limit. Candidates beyond it are left out.
+    barriers
+        As in `exact_distance`.
+    progress, cancel, deadline_s, memory_limit
+        See `Control`.
+
+    Returns
+    -------
+    Nearest
+        Indices into the candidates, (n,) int32, and distances, (n,) float64, nearest first.
+
+    Raises
+    ------
+    InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As in `exact_distance`.
+
+    Notes
+    -----
+    Distances that differ by rounding count as equal. The sweep goes no farther than the k-th
+    nearest; allocating its state is O(V + F), which a `Solver` does once.
+
+    Examples
+    --------
+    >>> mesh = gc.samples.plane(2)  # the unit square, in two triangles
+
+    >>> gc.nearest(mesh, 0, [3, 2]).indices.tolist()
+    [1]
+    """
+    control = Control(progress, cancel, deadline_s, memory_limit)
+    workspace, control = _workspace_of(mesh, barriers, control)
+    with workspace.held(control):
+        return find_nearest(workspace, source, candidates, k, max_distance, control)
+
+
+def kernel_digest() -> str:
+    """Return a digest of the kernels' sources: equal digests give answers equal to the bit.
+
+    Returns
+    -------
+    str
+        Hexadecimal; the same for equal sources on every machine.
+
+    Examples
+    --------
+    >>> gc.kernel_digest() == gc.kernel_digest()
+    True
+    """
+    return sources_digest()
 
 
 class Solver:
@@ -499,10 +587,12 @@ class Solver:
     """
 
     def __init__(self, mesh: MeshLike) -> None:
-        self.mesh = as_mesh(mesh)
-        self._search: PathSearch | None = None
-        self._sweep: TargetSweep | None = None
-        self._lock = CallLock()
+        self._workspace = Workspace(as_mesh(mesh))
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The surface of all calls."""
+        return self._workspace.mesh
 
     def __reduce__(self) -> tuple[type[Solver], tuple[TriangleMesh]]:
         """Copy and pickle the mesh alone: memory and landmarks are found again."""
@@ -514,337 +604,33 @@ class Solver:
     @property
     def nbytes(self) -> int:
         """Memory held between calls, bytes, without the mesh."""
-        return sum(part.nbytes for part in (self._search, self._sweep) if part is not None)
+        return self._workspace.nbytes
 
-    def exact_distance(
-        self,
-        sources: Sources,
-        max_distance: float | None = None,
-        targets: Points = (),
-        barriers: Iterable[int] = (),
-        *,
-        retain: Retain = "paths",
-        progress: Callable[[float], None] | None = None,
-        cancel: Callable[[], bool] | None = None,
-        deadline_s: float | None = None,
-        memory_limit: int | None = None,
-    ) -> DistanceField:
-        """Return exact distances from the nearest source to every vertex, as `exact_distance` does.
+    # The functions above, which take a solver in place of a mesh.
+    exact_distance = exact_distance
+    approximate_distance = approximate_distance
+    fast_distance = fast_distance
+    shortest_path = shortest_path
+    distance_matrix = distance_matrix
+    nearest = nearest
 
-        Parameters
-        ----------
-        sources, max_distance, targets, barriers, retain
-            As in the function `exact_distance`.
-        progress, cancel, deadline_s, memory_limit
-            See `Control`.
 
-        Returns
-        -------
-        DistanceField
-            Distances, (V,) float64, mesh units.
+def _surface_of(
+    mesh: MeshLike | Solver, barriers: Iterable[int], control: Control
+) -> tuple[TriangleMesh, Control]:
+    """Return the mesh of a call with its barriers, and a control that counts their memory."""
+    surface = mesh.mesh if isinstance(mesh, Solver) else as_mesh(mesh)
+    return with_barriers(surface, barriers, control)
 
-        Raises
-        ------
-        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in the function.
 
-        Examples
-        --------
-        >>> solver = gc.Solver(gc.samples.plane(2))
-        >>> solver.exact_distance([0, 3]).distances.tolist()
-        [0.0, 1.0, 1.0, 0.0]
-        """
-        return exact_distance(
-            self.mesh,
-            sources,
-            max_distance,
-            targets,
-            barriers,
-            retain=retain,
-            progress=progress,
-            cancel=cancel,
-            deadline_s=deadline_s,
-            memory_limit=memory_limit,
-        )
-
-    def approximate_distance(
-        self,
-        sources: Sources,
-        relative_error: float | None = 1e-3,
-        absolute_error: float | None = None,
-        max_distance: float | None = None,
-        targets: Points = (),
-        barriers: Iterable[int] = (),
-        *,
-        retain: Retain = "distances",
-        progress: Callable[[float], None] | None = None,
-        cancel: Callable[[], bool] | None = None,
-        deadline_s: float | None = None,
-        memory_limit: int | None = None,
-    ) -> DistanceField:
-        """Return distances within an error, never too long, as `approximate_distance` does.
-
-        Parameters
-        ----------
-        sources, relative_error, absolute_error, max_distance, targets, barriers, retain
-            As in the function `approximate_distance`.
-        progress, cancel, deadline_s, memory_limit
-            See `Control`.
-
-        Returns
-        -------
-        DistanceField
-            Distances, (V,) float64, mesh units, and their error bound.
-
-        Raises
-        ------
-        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in the function.
-
-        Examples
-        --------
-        >>> solver = gc.Solver(gc.samples.plane(2))
-        >>> solver.approximate_distance(0, None, absolute_error=0.1).error_bound
-        ErrorBound(type='absolute', value=0.1, kind='guaranteed')
-        """
-        return approximate_distance(
-            self.mesh,
-            sources,
-            relative_error,
-            absolute_error,
-            max_distance,
-            targets,
-            barriers,
-            retain=retain,
-            progress=progress,
-            cancel=cancel,
-            deadline_s=deadline_s,
-            memory_limit=memory_limit,
-        )
-
-    def fast_distance(
-        self,
-        sources: Sources,
-        effort: Effort = 2,
-        max_distance: float | None = None,
-        targets: Points = (),
-        barriers: Iterable[int] = (),
-        *,
-        retain: Literal["distances", "paths"] = "paths",
-        progress: Callable[[float], None] | None = None,
-        cancel: Callable[[], bool] | None = None,
-        deadline_s: float | None = None,
-        memory_limit: int | None = None,
-    ) -> DistanceField:
-        """Return distances in one quick pass, never too short, as `fast_distance` does.
-
-        Parameters
-        ----------
-        sources, effort, max_distance, targets, barriers, retain
-            As in the function `fast_distance`.
-        progress, cancel, deadline_s, memory_limit
-            See `Control`.
-
-        Returns
-        -------
-        DistanceField
-            Distances, (V,) float64, mesh units, and their estimated error.
-
-        Raises
-        ------
-        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in the function.
-
-        Examples
-        --------
-        >>> solver = gc.Solver(gc.samples.plane(2))
-        >>> solver.fast_distance([0, 3]).distances.tolist()
-        [0.0, 1.0, 1.0, 0.0]
-        """
-        return fast_distance(
-            self.mesh,
-            sources,
-            effort,
-            max_distance,
-            targets,
-            barriers,
-            retain=retain,
-            progress=progress,
-            cancel=cancel,
-            deadline_s=deadline_s,
-            memory_limit=memory_limit,
-        )
-
-    def shortest_path(
-        self,
-        source: Point,
-        target: Point,
-        waypoints: Points = (),
-        max_distance: float | None = None,
-        *,
-        barriers: Iterable[int] = (),
-        explain: bool = False,
-        progress: Callable[[float], None] | None = None,
-        cancel: Callable[[], bool] | None = None,
-        deadline_s: float | None = None,
-        memory_limit: int | None = None,
-    ) -> GeodesicPath:
-        """Return an exact shortest path between two points, as `shortest_path` does.
-
-        The time of a call does not depend on the size of the mesh: memory is reused, and landmarks
-        narrow the search.
-
-        Parameters
-        ----------
-        source, target, waypoints, max_distance, barriers, explain
-            As in the function `shortest_path`.
-        progress, cancel, deadline_s, memory_limit
-            See `Control`.
-
-        Returns
-        -------
-        GeodesicPath
-            Its points, (K, 3) float64, and its length, mesh units.
-
-        Raises
-        ------
-        NoPath, InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in the function.
-
-        Examples
-        --------
-        >>> solver = gc.Solver(gc.samples.plane(2))
-        >>> solver.shortest_path(1, 2).faces.tolist()
-        [0, 1]
-        """
-        control = Control(progress, cancel, deadline_s, memory_limit)
-        limit = as_limit(max_distance)
-        solver, control = self._with_barriers(barriers, control)
-        stops = _as_stops(solver.mesh, source, target, waypoints, control)
-        with solver._lock.held(control):
-            search = solver._shared_search()
-            path = _shortest_through(search, stops, limit, control, explain=explain)
-            search.add_landmark_if_due(stops[0], replace(control, progress=None))
-            return path
-
-    def distance_matrix(
-        self,
-        sources: Points,
-        targets: Points | None = None,
-        max_distance: float | None = None,
-        layout: Layout = "dense",
-        *,
-        method: Method = "exact",
-        relative_error: float | None = 1e-3,
-        absolute_error: float | None = None,
-        effort: Effort = 2,
-        barriers: Iterable[int] = (),
-        threads: int | None = None,
-        progress: Callable[[float], None] | None = None,
-        cancel: Callable[[], bool] | None = None,
-        deadline_s: float | None = None,
-        memory_limit: int | None = None,
-    ) -> Floats | csr_array:
-        """Return the distances from each source to each target, as `distance_matrix` does.
-
-        The memory of one of the threads is reused by the next call.
-
-        Parameters
-        ----------
-        sources, targets, max_distance, layout, method, relative_error, absolute_error, effort
-            As in the function `distance_matrix`.
-        barriers, threads
-            As in the function `distance_matrix`.
-        progress, cancel, deadline_s, memory_limit
-            See `Control`.
-
-        Returns
-        -------
-        numpy.ndarray or scipy.sparse.csr_array
-            Distances, float64, mesh units: (N, M), or (N,) for pairs.
-
-        Raises
-        ------
-        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded,
-        MissingExtra
-            As in the function.
-
-        Examples
-        --------
-        >>> solver = gc.Solver(gc.samples.plane(2))
-        >>> solver.distance_matrix([0, 1], [2, 3]).round(3).tolist()
-        [[1.0, 1.414], [1.414, 1.0]]
-        """
-        control = Control(progress, cancel, deadline_s, memory_limit)
-        solver, control = self._with_barriers(barriers, control)
-        mesh, shared = solver.mesh, (solver._shared_sweep, solver._shared_search)
-        solve = row_solver(mesh, method, relative_error, absolute_error, effort)
-        with solver._lock.held(control):
-            return find_matrix(
-                mesh, solve, *shared, sources, targets, max_distance, layout, threads, control
-            )
-
-    def nearest(
-        self,
-        source: Point,
-        candidates: Points,
-        k: int = 1,
-        max_distance: float | None = None,
-        *,
-        barriers: Iterable[int] = (),
-        progress: Callable[[float], None] | None = None,
-        cancel: Callable[[], bool] | None = None,
-        deadline_s: float | None = None,
-        memory_limit: int | None = None,
-    ) -> Nearest:
-        """Return the ``k`` geodesically nearest of some candidates, as `nearest` does.
-
-        The time of a call does not depend on the size of the mesh.
-
-        Parameters
-        ----------
-        source, candidates, k, max_distance, barriers
-            As in the function `nearest`.
-        progress, cancel, deadline_s, memory_limit
-            See `Control`.
-
-        Returns
-        -------
-        Nearest
-            Indices into the candidates, (n,) int32, and distances, (n,) float64, nearest first.
-
-        Raises
-        ------
-        InvalidPoint, InvalidArgument, Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in the function.
-
-        Examples
-        --------
-        >>> solver = gc.Solver(gc.samples.plane(2))
-        >>> solver.nearest(0, [3, 2], k=2).indices.tolist()
-        [1, 0]
-        """
-        control = Control(progress, cancel, deadline_s, memory_limit)
-        solver, control = self._with_barriers(barriers, control)
-        with solver._lock.held(control):
-            return find_nearest(
-                solver.mesh, solver._shared_sweep, source, candidates, k, max_distance, control
-            )
-
-    def _with_barriers(self, barriers: Iterable[int], control: Control) -> tuple[Solver, Control]:
-        """Return a solver of the mesh with the barriers of a call, itself where there are none."""
-        mesh, control = with_barriers(self.mesh, barriers, control)
-        return (self if mesh is self.mesh else Solver(mesh)), control
-
-    def _shared_search(self) -> PathSearch:
-        if self._search is None:
-            self._search = PathSearch(self.mesh)
-        return self._search
-
-    def _shared_sweep(self) -> TargetSweep:
-        if self._sweep is None:
-            self._sweep = TargetSweep(self.mesh)
-        return self._sweep
+def _workspace_of(
+    mesh: MeshLike | Solver, barriers: Iterable[int], control: Control
+) -> tuple[Workspace, Control]:
+    """Return the workspace of a call: that of its solver, unless the call has barriers."""
+    surface, control = _surface_of(mesh, barriers, control)
+    if isinstance(mesh, Solver) and mesh.mesh is surface:
+        return mesh._workspace, control
+    return Workspace(surface), control
 
 
 def _shortest_through(
@@ -878,22 +664,6 @@ def _shortest_through(
     if control.progress is not None:
         control.progress(1.0)
     return legs[0] if len(legs) == 1 else joined(legs)
-
-
-def kernel_digest() -> str:
-    """Return a digest of the kernels' sources: equal digests give answers equal to the bit.
-
-    Returns
-    -------
-    str
-        Hexadecimal; the same for equal sources on every machine.
-
-    Examples
-    --------
-    >>> gc.kernel_digest() == gc.kernel_digest()
-    True
-    """
-    return sources_digest()
 
 
 def row_solver(

@@ -1,7 +1,7 @@
 """Matrices of distances: sweeps from one side, in threads; searches where pairs are few."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain, repeat
@@ -21,6 +21,7 @@ from geodesic_core.search.plan import Plan
 from geodesic_core.search.rows import Rows, Solve, rows_of
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import as_threads, share_within_memory
+from geodesic_core.search.workspace import Workspace
 from geodesic_core.validation import as_limit, check_choice
 
 if TYPE_CHECKING:
@@ -36,10 +37,8 @@ Measured: a sweep costs as much as 7 searches on a scan of 10⁵ faces, as 20 wh
 
 
 def find_matrix(
-    mesh: TriangleMesh,
+    workspace: Workspace,
     solve: Solve | None,
-    target_sweep: Callable[[], TargetSweep],
-    search: Callable[[], PathSearch],
     sources: Points,
     targets: Points | None,
     max_distance: float | None,
@@ -47,11 +46,11 @@ def find_matrix(
     threads: int | None,
     control: Control,
 ) -> "Floats | csr_array":
-    """Do as `distance_matrix` does: by the fields of ``solve``, exactly where it is None.
+    """Return a matrix, see `geodesic_core.distance_matrix`.
 
-    The first `TargetSweep` and a `PathSearch` come from makers.
+    Its distances are those of the fields of ``solve``; where it is None, they are exact.
     """
-    limit = as_limit(max_distance)
+    mesh, limit = workspace.mesh, as_limit(max_distance)
     check_choice("layout", layout, get_args(Layout))
     most = as_threads(threads)
     starts = as_points(mesh, sources, "source", control)
@@ -69,14 +68,14 @@ def find_matrix(
     rest = control
     if isinstance(table, _Pairs) and len(table.searched):
         few, parts = len(table.searched), len(table.searched) + table.sweeps
-        finder = search()
+        finder = workspace.path_search()
         for done, i in enumerate(table.searched.tolist()):
             part = control.for_part(done, parts)
             table.values[i] = _searched(finder, starts[i], stops[i], limit, part)
         rest = control.for_part(few, parts, table.sweeps).holding(finder.nbytes)
     if table.sweeps:
         make = partial(rows_of, table.ends, limit, solve)
-        rows = map(make, chain([target_sweep], repeat(partial(TargetSweep, mesh))))
+        rows = map(make, chain([workspace.target_sweep], repeat(partial(TargetSweep, mesh))))
         share_within_memory(
             table.sweeps, rows, partial(_sweep, table), most, rest, held=lambda: table.nbytes
         )

@@ -37,7 +37,7 @@ def random_pairs(mesh: gc.TriangleMesh, count: int, seed: int = 0) -> list[tuple
 
 
 def landmark_count(solver: gc.Solver) -> int:
-    return 0 if solver._search is None else solver._search._landmarks.count
+    return 0 if solver._workspace._search is None else solver._workspace._search._landmarks.count
 
 
 def buy_landmarks(solver: gc.Solver, count: int) -> None:

@@ -179,7 +179,7 @@ def test_landmarks_lie_at_places_that_can_be_reached():
     both = Needled(zoo.SMALL["crumpled_sphere"], seed=7)
     solver = gc.Solver(both.mesh)
     buy_landmarks(solver, 3)
-    landmarks = solver._search._landmarks
+    landmarks = solver._workspace._search._landmarks
     known = landmarks.distances[both.mesh.topology.inner_vertex, : landmarks.count]
     assert (known.min(axis=0) == 0).all()
     assert (known.max(axis=0) > 0).all()

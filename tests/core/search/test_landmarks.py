@@ -81,7 +81,7 @@ def test_landmarks_of_several_components():
     for _ in range(4 if WITHOUT_JIT else 30):
         for source, target in ((0, 3), (15, 5), (2, 1), (4, 13)):
             check_searches(solver, source, [target])
-    search = solver._search
+    search = solver._workspace._search
     found = columns(solver.mesh, search._landmarks)
     assert {int(components[place]) for place in found.argmin(axis=0)} == set(components.tolist())
 

@@ -179,7 +179,7 @@ def test_a_limit_saves_work_and_leaves_the_search_sound():
     ends = [int(np.flatnonzero((case.vertices == (x, 0, 0)).all(axis=1))[0]) for x in (0, 7)]
     buy_landmarks(solver, 2)
     path = solver.shortest_path(*ends, explain=True)
-    search = solver._search
+    search = solver._workspace._search
     straight = float(np.linalg.norm(np.diff(solver.mesh.vertices[ends], axis=0)))
     touched = []
     for limit in (straight * (1 - NEAR), 0.6 * path.length, 0.9 * path.length, path.length):

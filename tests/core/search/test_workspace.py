@@ -80,6 +80,14 @@ def test_a_callback_cannot_call_the_solver_that_calls_it(solver, call):
     call(solver, progress=lambda _: gc.Solver(solver.mesh).shortest_path(1, 2))
 
 
+@pytest.mark.jit
+def test_functions_of_a_solver_are_its_methods(solver):
+    assert gc.shortest_path(solver, 0, 80).length == solver.shortest_path(0, 80).length
+    assert solver.nbytes > 0
+    blocked = gc.shortest_path(solver, 0, 80, barriers=[3])
+    assert blocked.length == gc.shortest_path(solver.mesh.with_barriers([3]), 0, 80).length
+
+
 def pickled(solver: gc.Solver) -> Any:
     return pickle.loads(pickle.dumps(solver))  # noqa: S301 - our own
 
