@@ -9,6 +9,7 @@ from typing import Any
 import pyvista
 
 from geodesic_core.mesh.surface_point import Point, Points, Sources
+from geodesic_core.plotting import with_distances
 from geodesic_core.solvers import exact_distance, shortest_path
 
 
@@ -51,11 +52,7 @@ class GeodesicsAccessor:
             As in `geodesic_core.exact_distance`.
         """
         field = exact_distance(self._dataset, sources, max_distance)
-        copy = self._dataset.copy()
-        copy.point_data["nearest_source"] = field.nearest_source
-        copy.point_data["distance"] = field.distances
-        copy.set_active_scalars("distance")
-        return copy
+        return with_distances(self._dataset.copy(), field.distances, field.nearest_source)
 
     def path(self, source: Point, target: Point, waypoints: Points = ()) -> Any:
         """Return the exact shortest path between two points as a line.

@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import InternalError, InvalidArgument, NoPath
-from geodesic_core.facts import as_table
-from geodesic_core.fields import picture
 from geodesic_core.fields.borders import Border, borders_of, swept_borders
 from geodesic_core.fields.fast_sweep import FastSweep
 from geodesic_core.fields.field_file import SHOWN, write_field_file
@@ -47,6 +46,7 @@ from geodesic_core.mesh.curve import (
 )
 from geodesic_core.mesh.surface_point import Curve, Point, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.reprs import as_table
 from geodesic_core.tolerances import LEVEL
 
 
@@ -240,10 +240,7 @@ class DistanceField:
         [0.0, 1.0, 1.0, 1.414]
         """
         surface = self.mesh.to_pyvista()
-        surface.point_data["nearest_source"] = self.nearest_source
-        surface.point_data["distance"] = self.distances
-        surface.set_active_scalars("distance")
-        return surface
+        return plotting.with_distances(surface, self.distances, self.nearest_source)
 
     def plot(self, screenshot: str | Path | None = None) -> None:
         """Draw the surface, coloured by distance: in a window, in a notebook, or into a file.
@@ -271,17 +268,10 @@ class DistanceField:
         >>> file.exists()
         True
         """
-        with picture.picture(screenshot, "DistanceField.plot") as plotter:
-            surface = self.to_pyvista()
-            reached = np.where(np.isfinite(self.distances), self.distances, np.nan)
-            surface.point_data["distance"] = reached
-            plotter.add_mesh(surface, scalars="distance", cmap="viridis", nan_color=picture.SURFACE)
-            plotter.add_points(
-                np.array([self.mesh.position(p) for line in self._polylines for p in line]),
-                color=picture.LINE,
-                point_size=picture.POINT_SIZE,
-                render_points_as_spheres=True,
-            )
+        with plotting.picture(screenshot, "DistanceField.plot") as plotter:
+            plotting.draw_distances(plotter, self.to_pyvista())
+            at = [self.mesh.position(point) for line in self._polylines for point in line]
+            plotting.draw_points(plotter, np.array(at))
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """Return `distances`, as numpy asks for them: ``numpy.asarray(field)``."""

@@ -8,11 +8,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InternalError
-from geodesic_core.extras import extra
-from geodesic_core.facts import as_table
-from geodesic_core.fields import picture
 from geodesic_core.fields.path_file import PathRecord, write_path_file
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.outcome import Outcome
@@ -22,6 +20,7 @@ from geodesic_core.kernels.paths.locations import Locations
 from geodesic_core.mesh.curve import foot_on
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
+from geodesic_core.reprs import as_table
 from geodesic_core.tolerances import PATH_LENGTH, ROUNDED_POSITION
 
 
@@ -178,11 +177,7 @@ class GeodesicPath:
         >>> gc.shortest_path(gc.samples.plane(2), 1, 2).to_pyvista().n_points
         3
         """
-        with extra("plot", "PyVista", "GeodesicPath.to_pyvista"):
-            import pyvista
-        count = len(self.points)
-        joined = [count, *range(count)] if count > 1 else None
-        line = pyvista.PolyData(self.points.copy(), lines=joined)
+        line = plotting.line_of(self.points, "GeodesicPath.to_pyvista")
         line.field_data["length"] = [self.length]
         return line
 
@@ -210,16 +205,11 @@ class GeodesicPath:
         >>> file.exists()
         True
         """
-        with picture.picture(screenshot, "GeodesicPath.plot") as plotter:
+        with plotting.picture(screenshot, "GeodesicPath.plot") as plotter:
             if self.mesh is not None:
-                plotter.add_mesh(self.mesh.to_pyvista(), color=picture.SURFACE)
-            plotter.add_mesh(self.to_pyvista(), color=picture.LINE, line_width=picture.LINE_WIDTH)
-            plotter.add_points(
-                self.points[[0, -1]],
-                color=picture.LINE,
-                point_size=picture.POINT_SIZE,
-                render_points_as_spheres=True,
-            )
+                plotting.draw_surface(plotter, self.mesh.to_pyvista())
+            plotting.draw_line(plotter, self.to_pyvista())
+            plotting.draw_points(plotter, self.points[[0, -1]])
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the mesh behind: it takes ten thousand times the memory of a path."""

@@ -8,10 +8,9 @@ from typing import Any, Literal, NoReturn
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.errors import InvalidArgument, InvalidMesh, InvalidPoint
-from geodesic_core.extras import extra
-from geodesic_core.facts import as_table
 from geodesic_core.kernels.mesh import build
 from geodesic_core.kernels.mesh.half_edges import TAIL, Topology
 from geodesic_core.kernels.outcome import Outcome
@@ -33,6 +32,7 @@ from geodesic_core.mesh.validation import (
     check_corners,
     check_vertices,
 )
+from geodesic_core.reprs import as_table
 from geodesic_core.tolerances import (
     LARGEST_COORDINATE,
     ROUGH,
@@ -640,9 +640,7 @@ class TriangleMesh:
         >>> gc.samples.sphere(80).to_pyvista().n_points
         42
         """
-        with extra("plot", "PyVista", "TriangleMesh.to_pyvista"):
-            import pyvista
-        return pyvista.PolyData.from_regular_faces(self.vertices.copy(), self.faces.copy())
+        return plotting.surface_of(self.vertices, self.faces, "TriangleMesh.to_pyvista")
 
     def __repr__(self) -> str:
         blocked = f", {len(self.barriers)} of them blocked" if len(self.barriers) else ""

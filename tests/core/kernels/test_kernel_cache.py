@@ -5,10 +5,12 @@ import shutil
 import subprocess
 import sys
 import threading
+from importlib import metadata
 from pathlib import Path
 
 import numba
 import pytest
+from packaging.requirements import Requirement
 
 from geodesic_core import tolerances
 from geodesic_core.kernels import jit
@@ -235,3 +237,11 @@ def test_nothing_is_printed_when_quiet(tmp_path, monkeypatch, capfd):
     with progress.shown(tmp_path):
         assert threading.active_count() == before
     assert capfd.readouterr().err == ""
+
+
+def test_numba_has_an_upper_bound_within_which_these_tests_run():
+    """`kernels/jit` uses parts of it that are not public: a newer one is tried here first."""
+    requirements = map(Requirement, metadata.requires("geodesic-core") or ())
+    (allowed,) = (each.specifier for each in requirements if each.name == "numba")
+    assert any(bound.operator == "<" for bound in allowed)
+    assert numba.__version__ in allowed

@@ -1,4 +1,4 @@
-"""Facts on results, as notebooks show them."""
+"""Tables of facts, as notebooks show meshes and results."""
 
 from collections.abc import Mapping
 from html import escape
