@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core import control
-from geodesic_core.errors import Cancelled, InvalidArgument, MemoryLimitExceeded
+from geodesic_core.errors import InvalidArgument
 from tests.core.fields.test_points import random_points
 from tests.support import zoo
 from tests.support.border_checks import (
@@ -225,25 +224,6 @@ def test_borders_end_at_the_limit():
     np.testing.assert_allclose(flat[:, 0], 4.0, atol=1e-9)
     np.testing.assert_allclose(np.sort(flat[[0, -1], 1]), [2.0, 6.0], atol=1e-9)
     assert gc.exact_distance(mesh, [a, b], 1.4).borders() == []
-
-
-@pytest.mark.parametrize("retain", ["paths", "windows"])
-def test_a_call_that_is_stopped_leaves_the_field_as_it_was(retain, monkeypatch):
-    monkeypatch.setattr(control, "_FIRST_ITEMS", 8)
-    mesh = gc.TriangleMesh(*zoo.icosphere(2))
-    field = gc.exact_distance(mesh, [0, 5, 77], retain=retain)
-    shares = []
-    expected = field.borders(progress=shares.append)
-    assert shares == sorted(shares)
-    assert shares[-1] == 1.0
-    for questions in range(4):
-        asked = iter([False] * questions + [True])
-        with pytest.raises(Cancelled):
-            field.borders(cancel=lambda asked=asked: next(asked))
-    with pytest.raises(MemoryLimitExceeded):
-        field.borders(memory_limit=1000)
-    for line, other in zip(field.borders(), expected, strict=True):
-        np.testing.assert_array_equal(line.points, other.points)
 
 
 @pytest.mark.slow

@@ -221,30 +221,6 @@ def test_the_gradient_is_the_direction_of_the_last_piece_of_the_path(source):
         assert math.acos(min(cosine, 1.0)) < 1e-4
 
 
-@pytest.mark.jit
-def test_progress_and_stopping():
-    mesh, seen = gc.TriangleMesh(*zoo.icosphere(3)), []
-    exact = gc.exact_distance(mesh, 0).distances
-    gc.fast_distance(mesh, 0, progress=seen.append)
-    assert seen == sorted(seen)
-    assert (seen[0], seen[-1]) == (0.0, 1.0)
-    with pytest.raises(gc.errors.Cancelled):
-        gc.fast_distance(mesh, 0, cancel=lambda: True)
-    with pytest.raises(gc.errors.DeadlineExceeded):
-        gc.fast_distance(mesh, 0, deadline_s=1e-9)
-    with pytest.raises(gc.errors.MemoryLimitExceeded):
-        gc.fast_distance(mesh, 0, memory_limit=1000)
-    check_never_below(gc.fast_distance(mesh, 0).distances, exact)
-
-
-@pytest.mark.jit
-def test_it_can_be_cancelled_on_the_way():
-    mesh, calls = gc.TriangleMesh(*zoo.icosphere(6)), []
-    with pytest.raises(gc.errors.Cancelled):
-        gc.fast_distance(mesh, 0, 8, cancel=lambda: len(calls) > 2 or calls.append(0) is not None)
-    assert len(calls) == 3
-
-
 @pytest.mark.parametrize("effort", [0, 3, 16, -1, 2.5, True, "2", None, math.nan])
 def test_efforts_that_are_none(effort):
     mesh = gc.samples.plane(2)

@@ -296,38 +296,12 @@ def test_approximate_distances_refuse_what_exact_ones_refuse(mesh):
         ({"sources": []}, gc.errors.InvalidPoint),
         ({"sources": gc.Source(0, np.nan)}, gc.errors.InvalidArgument),
         ({"sources": 0, "max_distance": -1.0}, gc.errors.InvalidArgument),
-        ({"sources": 0, "deadline_s": 0}, gc.errors.InvalidArgument),
-        ({"sources": 0, "memory_limit": "much"}, gc.errors.InvalidArgument),
     ]
     for arguments, error in refused:
         with pytest.raises(error):
             gc.approximate_distance(mesh, **arguments)
     with pytest.raises(gc.errors.InvalidPoint, match="4"):
         gc.approximate_distance(mesh, 0).path_to(4)
-
-
-@pytest.mark.parametrize("value", [0, -1, np.nan, "1", [1]], ids=repr)
-@pytest.mark.parametrize("name", ["deadline_s", "memory_limit"])
-def test_what_is_granted_is_a_number_above_zero(mesh, name, value):
-    with pytest.raises(gc.errors.InvalidArgument, match=name):
-        gc.exact_distance(mesh, 0, **{name: value})
-
-
-CALLS = [
-    lambda mesh, **control: gc.exact_distance(mesh, 0, **control),
-    lambda mesh, **control: gc.approximate_distance(mesh, 0, **control),
-    lambda mesh, **control: gc.fast_distance(mesh, 0, **control),
-    lambda mesh, **control: gc.shortest_path(mesh, 0, 1, **control),
-    lambda mesh, **control: gc.distance_matrix(mesh, 0, 1, **control),
-    lambda mesh, **control: gc.nearest(mesh, 0, 1, **control),
-]
-
-
-@pytest.mark.parametrize("name", ["progress", "cancel"])
-@pytest.mark.parametrize("call", CALLS)
-def test_callbacks_can_be_called(mesh, call, name):
-    with pytest.raises(gc.errors.InvalidArgument, match=f"{name} is 3; it must be a function"):
-        call(mesh, **{name: 3})
 
 
 def test_an_array_of_no_dimensions_is_the_index_in_it(mesh):

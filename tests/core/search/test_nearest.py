@@ -8,7 +8,6 @@ import pytest
 import geodesic_core as gc
 from geodesic_core.kernels.sweep import state
 from geodesic_core.search import target_sweep
-from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_points import EXACT, SAME, random_points
 from tests.support import zoo
 from tests.support.meshes import mesh_of
@@ -131,7 +130,6 @@ BAD = [
     ({"k": 1.0}, "InvalidArgument", "k is 1.0"),
     ({"k": True}, "InvalidArgument", "k is True"),
     ({"max_distance": -1.0}, "InvalidArgument", "max_distance is -1.0"),
-    ({"deadline_s": 0}, "InvalidArgument", "deadline_s is 0"),
 ]
 
 
@@ -142,52 +140,3 @@ def test_bad_arguments_are_named(changed, error, message):
     for ask in (lambda **kwargs: gc.nearest(mesh, **kwargs), gc.Solver(mesh).nearest):
         with pytest.raises(getattr(gc.errors, error), match=message):
             ask(**arguments)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "error"),
-    [
-        ({"cancel": lambda: True}, gc.errors.Cancelled),
-        ({"deadline_s": 1e-9}, gc.errors.DeadlineExceeded),
-        ({"memory_limit": 1000}, gc.errors.MemoryLimitExceeded),
-    ],
-)
-def test_it_stops_and_leaves_nothing_behind(arguments, error):
-    mesh = gc.TriangleMesh(*zoo.icosphere(2 if WITHOUT_JIT else 5))
-    solver, candidates = gc.Solver(mesh), random_points(mesh, 9, seed=34)
-    before = solver.nearest(0, candidates, 9)
-    for ask in (solver.nearest, lambda *a, **k: gc.nearest(mesh, *a, **k)):
-        with pytest.raises(error):
-            ask(0, candidates, 9, **arguments)
-    after = solver.nearest(0, candidates, 9)
-    np.testing.assert_array_equal(after.indices, before.indices)
-    np.testing.assert_array_equal(after.distances, before.distances)
-
-
-@pytest.mark.slow
-@pytest.mark.jit
-def test_a_question_that_was_stopped_under_way_leaves_nothing_behind():
-    mesh = gc.TriangleMesh(*zoo.icosphere(6))
-    solver, last = gc.Solver(mesh), len(mesh.vertices) - 1
-    expected = gc.nearest(mesh, 0, [last, 5, 9], 3)
-    for stop_at in (1, 2, 5, 20):
-        asked = []
-
-        def cancel(asked=asked, stop_at=stop_at):
-            asked.append(1)
-            return len(asked) > stop_at
-
-        with pytest.raises(gc.errors.Cancelled):
-            solver.nearest(0, [last], cancel=cancel)
-        found = solver.nearest(0, [last, 5, 9], 3)
-        np.testing.assert_array_equal(found.indices, expected.indices)
-        np.testing.assert_array_equal(found.distances, expected.distances)
-
-
-def test_progress_grows_from_zero_to_one():
-    mesh = mesh_of(zoo.SMALL["cube_in_fours"])
-    seen = []
-    gc.nearest(mesh, 0, [1, 2, 3], 2, progress=seen.append)
-    assert len(seen) >= 2
-    assert seen == sorted(seen)
-    assert seen[-1] == 1
