@@ -10,19 +10,14 @@ from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.io.contents import BEHIND, FileContents, note_on_ignored
-from geodesic_core.io.limits import check_declared_counts, check_face_count, counts_in_words
-from geodesic_core.io.text import (
-    INDEX_ROW,
-    VERTEX_ROW,
-    check_columns,
+from geodesic_core.io.contents import BEHIND, FileContents
+from geodesic_core.io.limits import (
+    check_declared_counts,
+    check_face_count,
     check_row_count,
-    check_rows,
-    counted_polygons,
-    excerpt,
-    index_rows,
-    number_table,
+    counts_in_words,
 )
+from geodesic_core.io.text import INDEX_ROW, bad_row, counted_polygons, excerpt, vertex_table
 from geodesic_core.mesh.degeneracies import of_three_vertices
 
 _HEADER = re.compile(
@@ -68,20 +63,15 @@ class _Element(NamedTuple):
     size: int
     properties: list[_Property]
 
-    @property
-    def has_lists(self) -> bool:
-        return any(part.count_type for part in self.properties)
-
     def wanted(self) -> list[int]:
         """Return which properties are read: the axes of vertices, the corners of polygons.
 
-        Raises
-        ------
-        InvalidMesh
-            Polygons have no list of corners.
+        Refuse vertices without x, y and z, and polygons without corners.
         """
         if self.name == "vertex":
             names = [part.name if not part.count_type else b"" for part in self.properties]
+            if [names.count(axis) for axis in _AXES] != [1, 1, 1]:
+                raise InvalidMesh("the PLY vertices must have x, y and z once each")
             return [names.index(axis) for axis in _AXES]
         if self.name not in _POLYGONS:
             return []
@@ -100,15 +90,7 @@ class _Element(NamedTuple):
 
 
 def read_ply(data: bytes, max_faces: int | None) -> FileContents:
-    """Read a PLY file.
-
-    Raises
-    ------
-    InvalidMesh
-        The bytes are damaged, or are no such file.
-    TooManyFaces
-        There are more faces than ``max_faces``.
-    """
+    """Read a PLY file."""
     header = _HEADER.match(data)
     if header is None:
         raise InvalidMesh("the PLY file has no header from 'ply' to 'end_header'")
@@ -118,19 +100,20 @@ def read_ply(data: bytes, max_faces: int | None) -> FileContents:
         raise InvalidMesh("the PLY file holds no vertex elements", kind="face")
     if not any(counts.get(name) for name in _POLYGONS):
         raise InvalidMesh("the PLY file holds no face elements", kind="face")
-    _check_properties(elements)
+    for element in elements:
+        element.wanted()
     body = data[header.end() :]
     least_bytes = {element.name: element.least_bytes(order) for element in elements}
-    check_declared_counts(counts, least_bytes, len(body))
+    check_declared_counts(counts, least_bytes, len(body), slack=0 if order else 1)
     check_face_count(counts.get("face", 0), max_faces)
     found, rest = _read_binary(elements, body, order) if order else _read_text(elements, body)
     polygons = [found[name] for name in _POLYGONS if name in found]
-    others = {name: n for name, n in counts.items() if n and name not in ("vertex", *_POLYGONS)}
+    others = {name: n for name, n in counts.items() if name not in ("vertex", *_POLYGONS)}
     return FileContents(
         found["vertex"][0],
         np.concatenate([corners for corners, _ in polygons]),
         np.concatenate([sizes for _, sizes in polygons]),
-        note_on_ignored("PLY", others | rest),
+        others | rest,
     )
 
 
@@ -170,17 +153,6 @@ def _read_header(header: bytes) -> tuple[str, list[_Element]]:
     return order, elements
 
 
-def _check_properties(elements: list[_Element]) -> None:
-    """Refuse vertices without x, y and z, and polygons without corners."""
-    for element in elements:
-        if element.name == "vertex":
-            names = [part.name for part in element.properties if not part.count_type]
-            if [names.count(axis) for axis in _AXES] != [1, 1, 1]:
-                raise InvalidMesh("the PLY vertices must have x, y and z once each")
-        elif element.name in _POLYGONS:
-            element.wanted()
-
-
 def _as_polygons(element: _Element, corners: Longs, sizes: Longs) -> tuple[Longs, Longs]:
     """Return the polygons of an element; strips of triangles become triangles."""
     if element.name == "face" or len(corners) < 3:
@@ -215,19 +187,13 @@ def _read_text(elements: list[_Element], body: bytes) -> tuple[_Found, dict[str,
             if any(part.count_type for part in element.properties[:at]):
                 block = [b" ".join(words[at:]) for words in _words_by_property(element, block)]
                 at = 0
-            flat, sizes = index_rows(counted_polygons(block, skipped=at))
+            flat, sizes = counted_polygons(block, skipped=at)
             found[element.name] = _as_polygons(element, flat, sizes)
     return found, {f"rows {BEHIND}": len(rows) - start}
 
 
 def _words_by_property(element: _Element, rows: list[bytes]) -> Iterator[list[bytes]]:
-    """Yield the words of each property of each row: of a list, its count and its items.
-
-    Raises
-    ------
-    InvalidMesh
-        A row is too short, or has no count.
-    """
+    """Yield the words of each property of each row: of a list, its count and its items."""
     for number, row in enumerate(rows):
         words, by_property, at = row.split(), [], 0
         for part in element.properties:
@@ -235,12 +201,9 @@ def _words_by_property(element: _Element, rows: list[bytes]) -> Iterator[list[by
             if part.count_type and at < len(words):
                 end += int(words[at]) if INDEX_ROW.fullmatch(words[at]) else len(words)
             if not at < end <= len(words):
-                raise InvalidMesh(
-                    f"{element.name} {number} reads {excerpt(row)}; it must have "
-                    f"{len(element.properties)} properties, lists with their counts",
-                    kind="face" if element.name in _POLYGONS else "vertex",
-                    elements=[number],
-                )
+                kind = "face" if element.name in _POLYGONS else "vertex"
+                rule = f"it must have {len(element.properties)} properties, lists with their counts"
+                raise bad_row(kind, number, row, rule, element.name)
             by_property.append(b" ".join(words[at:end]))
             at = end
         yield by_property
@@ -248,14 +211,12 @@ def _words_by_property(element: _Element, rows: list[bytes]) -> Iterator[list[by
 
 def _read_text_positions(element: _Element, rows: list[bytes]) -> Floats:
     parts = element.properties
-    if element.has_lists:
+    if any(part.count_type for part in parts):
         scalar = [i for i, part in enumerate(parts) if not part.count_type]
         by_property = _words_by_property(element, rows)
         rows = [b" ".join(words[i] for i in scalar) for words in by_property]
         parts = [parts[i] for i in scalar]
-    check_rows(rows, VERTEX_ROW, "vertex", f"it must have {len(parts)} numbers")
-    check_columns(rows, len(parts))
-    table = number_table(rows, len(parts)).T
+    table = vertex_table(rows, len(parts)).T
     with np.errstate(over="ignore", invalid="ignore"):  # the mesh refuses what is not finite
         by_name = {
             part.name: column.astype(part.type) for part, column in zip(parts, table, strict=True)
