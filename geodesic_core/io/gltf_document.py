@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple, NoReturn
 
 from geodesic_core.errors import InvalidMesh
@@ -36,10 +36,11 @@ class _Value(NamedTuple):
     is_right: Callable[[Any], bool]
 
 
-class _Required(NamedTuple):
-    """A member that is there wherever its object is."""
+class _Object(NamedTuple):
+    """Members that an object must have, and others that are read where it has them."""
 
-    kind: Any
+    required: dict[str, Any]
+    optional: dict[str, Any]
 
 
 def _integer(least: int = 0, most: int = 2**53) -> _Value:
@@ -60,85 +61,66 @@ _STRING = _Value("a string", lambda value: isinstance(value, str))
 _TRUTH = _Value("true or false", lambda value: isinstance(value, bool))
 
 
-def _members(tree: Any) -> Mapping[str, Any]:
-    """Return the members that are read, where ``tree`` has the lists that numbers point into."""
+def _document_for(tree: Any) -> _Object:
+    """Return what is read of a document, where ``tree`` has the lists that numbers point into."""
 
     def number_of(name: str) -> _Value:
         elements = tree.get(name, []) if isinstance(tree, dict) else []
         count = len(elements) if isinstance(elements, list) else 0
         return _integer(0, count - 1)._replace(words=f"the number of one of {count} {name}")
 
-    accessor, node, view = map(number_of, ("accessors", "nodes", "bufferViews"))
-    instances = {"TRANSLATION": accessor, "ROTATION": accessor, "SCALE": accessor}
-    attributes = {
-        "POSITION": accessor,
-        **{f"JOINTS_{number}": accessor for number in JOINT_SETS},
-        **{f"WEIGHTS_{number}": accessor for number in JOINT_SETS},
+    view, accessor, node = map(number_of, ("bufferViews", "accessors", "nodes"))
+    size, count = _integer(), _integer(1)
+    offset = {"byteOffset": size}
+    buffer = _Object({"byteLength": size}, {"uri": _STRING})
+    buffer_view = _Object(
+        {"buffer": number_of("buffers"), "byteLength": size}, offset | {"byteStride": size}
+    )
+    sparse = {
+        "count": count,
+        "indices": _Object({"bufferView": view, "componentType": size}, offset),
+        "values": _Object({"bufferView": view}, offset),
     }
-    component = {"componentType": _Required(_integer())}
-    elements = {"bufferView": _Required(view), "byteOffset": _integer()}
-    return {
+    array = _Object(
+        {"componentType": size, "count": count, "type": _STRING},
+        offset | {"bufferView": view, "normalized": _TRUTH, "sparse": _Object(sparse, {})},
+    )
+    names = [f"{kind}_{number}" for number in JOINT_SETS for kind in ("JOINTS", "WEIGHTS")]
+    target = _Object({}, {"POSITION": accessor})
+    primitive = _Object(
+        {"attributes": _Object({}, dict.fromkeys(["POSITION", *names], accessor))},
+        {"indices": accessor, "mode": _integer(0, 6), "targets": [target]},
+    )
+    mesh = _Object({"primitives": [primitive]}, {"weights": _numbers()})
+    instances = dict.fromkeys(("TRANSLATION", "ROTATION", "SCALE"), accessor)
+    extensions = {
+        "EXT_mesh_gpu_instancing": _Object({"attributes": _Object({}, instances)}, {}),
+        "KHR_node_visibility": _Object({}, {"visible": _TRUTH}),
+    }
+    placed = {
+        "mesh": number_of("meshes"),
+        "skin": number_of("skins"),
+        "weights": _numbers(),
+        "children": [node],
+        "matrix": _numbers(16),
+        "translation": _numbers(3),
+        "rotation": _numbers(4),
+        "scale": _numbers(3),
+        "extensions": _Object({}, extensions),
+    }
+    members = {
         "extensionsUsed": [_STRING],
         "extensionsRequired": [_STRING],
-        "buffers": [{"byteLength": _Required(_integer()), "uri": _STRING}],
-        "bufferViews": [
-            {
-                "buffer": _Required(number_of("buffers")),
-                "byteOffset": _integer(),
-                "byteLength": _Required(_integer()),
-                "byteStride": _integer(),
-            }
-        ],
-        "accessors": [
-            {
-                "bufferView": view,
-                "byteOffset": _integer(),
-                "normalized": _TRUTH,
-                "count": _Required(_integer(1)),
-                "type": _Required(_STRING),
-                "sparse": {
-                    "count": _Required(_integer(1)),
-                    "indices": _Required(elements | component),
-                    "values": _Required(elements),
-                },
-            }
-            | component
-        ],
-        "meshes": [
-            {
-                "primitives": _Required(
-                    [
-                        {
-                            "attributes": _Required(attributes),
-                            "indices": accessor,
-                            "mode": _integer(0, 6),
-                            "targets": [{"POSITION": accessor}],
-                        }
-                    ]
-                ),
-                "weights": _numbers(),
-            }
-        ],
-        "nodes": [
-            {
-                "mesh": number_of("meshes"),
-                "skin": number_of("skins"),
-                "weights": _numbers(),
-                "children": [node],
-                "matrix": _numbers(16),
-                "translation": _numbers(3),
-                "rotation": _numbers(4),
-                "scale": _numbers(3),
-                "extensions": {
-                    "EXT_mesh_gpu_instancing": {"attributes": _Required(instances)},
-                    "KHR_node_visibility": {"visible": _TRUTH},
-                },
-            }
-        ],
-        "skins": [{"joints": _Required([node]), "inverseBindMatrices": accessor}],
-        "scenes": [{"nodes": [node]}],
+        "buffers": [buffer],
+        "bufferViews": [buffer_view],
+        "accessors": [array],
+        "meshes": [mesh],
+        "nodes": [_Object({}, placed)],
+        "skins": [_Object({"joints": [node]}, {"inverseBindMatrices": accessor})],
+        "scenes": [_Object({}, {"nodes": [node]})],
         "scene": number_of("scenes"),
     }
+    return _Object({}, members)
 
 
 def read_document(text: memoryview) -> dict[str, Any]:
@@ -156,7 +138,7 @@ def read_document(text: memoryview) -> dict[str, Any]:
         tree: dict[str, Any] = json.loads(bytes(text))
     except (ValueError, RecursionError) as error:  # a number of too many digits is no JSON error
         raise InvalidMesh(f"the glTF document cannot be read: {error}") from error
-    _Checker().check(tree, _members(tree), "")
+    _Checker().check(tree, _document_for(tree), "")
     for name in tree.get("extensionsRequired", []):
         if name not in _READ and not _NO_GEOMETRY.match(name):
             remedy = "uncompressed" if name in _COMPRESSIONS else "without it"
@@ -181,28 +163,23 @@ class _Checker:
                 "its data into the binary chunk"
             )
         match expected:
-            case _Required(kind):
-                self.check(value, kind, place)
             case _Value(words, is_right):
                 if not is_right(value):
                     _refuse(value, place, words)
+            case _Object(required, optional):
+                if not isinstance(value, dict):
+                    _refuse(value, place, "an object")
+                for name, inner in (required | optional).items():
+                    inside = f"{place}.{name}" if place else name
+                    if name in value:
+                        self.check(value[name], inner, inside)
+                    elif name in required:
+                        raise InvalidMesh(f"{inside} is missing in the glTF document")
             case [item]:
                 if not isinstance(value, list):
                     _refuse(value, place, "a list")
                 for number, each in enumerate(value):
                     self.check(each, item, f"{place}[{number}]")
-            case _:
-                self._check_members(value, expected, place)
-
-    def _check_members(self, value: Any, expected: Mapping[str, Any], place: str) -> None:
-        if not isinstance(value, dict):
-            _refuse(value, place, "an object")
-        for name, inner in expected.items():
-            inside = f"{place}.{name}" if place else name
-            if name in value:
-                self.check(value[name], inner, inside)
-            elif isinstance(inner, _Required):
-                raise InvalidMesh(f"{inside} is missing in the glTF document")
 
 
 def _is_integer(value: Any, least: int, most: int) -> bool:
