@@ -14,24 +14,12 @@ The code of a label is its colour: red + 256 green + 65536 blue. nibabel reads f
 and takes the vertices to be in order.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from geodesic_core.arrays import Longs
 from geodesic_core.errors import InvalidArgument
 
-_INTEGER = np.dtype(">i4")
 _SECOND_VERSION = -2
-
-
-class Annotation(NamedTuple):
-    """The codes of all vertices, and what they stand for."""
-
-    codes: Longs
-    """(V,): the code of the label of each vertex, 0 for none"""
-    table: dict[int, tuple[str, int]]
-    """Name and code of each label, by its number in the file"""
 
 
 class _Integers:
@@ -57,26 +45,29 @@ class _Integers:
         return self._at >= len(self._data)
 
 
-def read_annotation(data: bytes, count: int) -> Annotation:
-    """Return the labels of a surface with ``count`` vertices.
+def read_annotation(data: bytes, count: int) -> tuple[Longs, dict[int, tuple[str, int]]]:
+    """Return the labels of a surface with ``count`` vertices, or refuse those of another.
 
-    Raises
-    ------
-    InvalidArgument
-        The bytes end too early, or the file is that of another surface.
+    They are the code of the label of each vertex, 0 for none, and a table: the name and the code of
+    each label by its number in the file.
     """
     integers = _Integers(data)
     rows = integers.next()
     if not 0 <= rows <= count:
         raise InvalidArgument(f"it has {rows} vertices, but the mesh has {count}")
-    pairs = np.frombuffer(integers.bytes_of(8 * rows), _INTEGER).reshape(-1, 2).astype(np.int64)
-    wrong = pairs[(pairs[:, 0] < 0) | (pairs[:, 0] >= count), 0]
-    if len(wrong):
-        raise InvalidArgument(f"it lists vertex {wrong[0]}, but the mesh has {count}")
+    pairs = np.frombuffer(integers.bytes_of(8 * rows), ">i4").reshape(-1, 2).astype(np.int64)
+    check_vertices(pairs[:, 0], count)
     codes = np.zeros(count, np.int64)
     codes[pairs[:, 0]] = pairs[:, 1]
     has_table = not integers.is_at_end() and integers.next() == 1
-    return Annotation(codes, _table(integers) if has_table else {})
+    return codes, _table(integers) if has_table else {}
+
+
+def check_vertices(vertices: Longs, count: int) -> None:
+    """Refuse vertices that are not among the ``count`` of a mesh."""
+    wrong = vertices[(vertices < 0) | (vertices >= count)]
+    if len(wrong):
+        raise InvalidArgument(f"it lists vertex {wrong[0]}, but the mesh has {count}")
 
 
 def _table(integers: _Integers) -> dict[int, tuple[str, int]]:

@@ -26,8 +26,8 @@ class _Trimesh(Protocol):
     def faces(self) -> Any: ...
 
 
-class _VtkObject(Protocol):
-    def IsA(self, name: str) -> bool: ...  # noqa: N802 - VTK's name
+class _Scene(Protocol):
+    def to_mesh(self) -> Any: ...
 
 
 class _Meshio(Protocol):
@@ -37,11 +37,26 @@ class _Meshio(Protocol):
     def cells(self) -> Any: ...
 
 
+class _VtkObject(Protocol):
+    def IsA(self, name: str) -> bool: ...  # noqa: N802 - VTK's name
+
+
 class _Open3D(Protocol):
     @property
     def vertices(self) -> Any: ...
     @property
     def triangles(self) -> Any: ...
+
+
+class _Open3DTensors(Protocol):
+    @property
+    def vertex(self) -> Any: ...
+    @property
+    def triangle(self) -> Any: ...
+
+
+class _Nibabel(Protocol):
+    def get_arrays_from_intent(self, intent: Any, /) -> Any: ...
 
 
 class _Nilearn(Protocol):
@@ -51,19 +66,48 @@ class _Nilearn(Protocol):
     def faces(self) -> Any: ...
 
 
-MeshLike = (
-    TriangleMesh
-    | tuple[Any, ...]
-    | list[ArrayLike]
-    | Mapping[str, ArrayLike]
-    | FileLike
-    | _Trimesh
-    | _VtkObject
+class _PyMeshLab(Protocol):
+    def vertex_matrix(self) -> Any: ...
+    def face_matrix(self) -> Any: ...
+
+
+class _Vedo(Protocol):
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def cells(self) -> Any: ...
+
+
+class _Compas(Protocol):
+    def to_vertices_and_faces(self) -> Any: ...
+
+
+class _SciPy(Protocol):
+    @property
+    def points(self) -> Any: ...
+    @property
+    def simplices(self) -> Any: ...
+
+
+_Known = (
+    _Trimesh
+    | _Scene
     | _Meshio
+    | _VtkObject
     | _Open3D
+    | _Open3DTensors
+    | _Nibabel
     | _Nilearn
+    | _PyMeshLab
+    | _Vedo
+    | _Compas
+    | _SciPy
 )
-"""All that `as_mesh` takes, as far as types can say it."""
+"""Meshes of other libraries, as far as types tell them from other objects."""
+MeshLike = (
+    TriangleMesh | tuple[Any, ...] | list[ArrayLike] | Mapping[str, ArrayLike] | FileLike | _Known
+)
+"""All that `as_mesh` takes"""
 
 
 def as_mesh(mesh: MeshLike) -> TriangleMesh:
@@ -106,15 +150,19 @@ def as_mesh(mesh: MeshLike) -> TriangleMesh:
     """
     if isinstance(mesh, TriangleMesh):
         return mesh
+    if isinstance(mesh, tuple | list) and any(map(_is_mesh, mesh)):
+        raise InvalidMesh(
+            f"this {type(mesh).__name__} holds {len(mesh)} meshes: give one of them, as meshes[0]"
+        )
     if (isinstance(mesh, tuple) and len(mesh) > 1) or (isinstance(mesh, list) and len(mesh) == 2):
         return TriangleMesh(mesh[0], mesh[1])
     if isinstance(mesh, Mapping):
-        names = next((names for names in _ARRAYS if all(name in mesh for name in names)), None)
-        if names is not None:
-            return TriangleMesh(mesh[names[0]], mesh[names[1]])
-    for attributes, read in _READERS:
-        if all(hasattr(mesh, name) for name in attributes):
-            return read(mesh)
+        for vertices, faces in _ARRAYS:
+            if vertices in mesh and faces in mesh:
+                return TriangleMesh(mesh[vertices], mesh[faces])
+    read = _reader_of(mesh)
+    if read is not None:
+        return read(mesh)
     if is_file(mesh):
         return load_mesh(mesh)
     for attribute, remedy in _SEVERAL:
@@ -125,6 +173,17 @@ def as_mesh(mesh: MeshLike) -> TriangleMesh:
         "faces), a file, or a mesh of trimesh, meshio, VTK, PyVista, Open3D, nibabel, nilearn, "
         "PyMeshLab, vedo, COMPAS or SciPy"
     )
+
+
+def _is_mesh(item: Any) -> bool:
+    """Tell whether an item of a sequence is a mesh by itself, so that the sequence is none."""
+    return isinstance(item, TriangleMesh | Mapping) or _reader_of(item) is not None
+
+
+def _reader_of(mesh: Any) -> Callable[[Any], TriangleMesh] | None:
+    """Return what reads the object of another library; None where none is known by it."""
+    readers = (read for names, read in _READERS if all(hasattr(mesh, name) for name in names))
+    return next(readers, None)
 
 
 def _from_vtk(data: Any) -> TriangleMesh:

@@ -14,17 +14,13 @@ from numpy.typing import NDArray
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.extras import extra
 from geodesic_core.io.contents import FileContents
-from geodesic_core.io.limits import check_face_count
-from geodesic_core.io.text import (
-    INDEX_ROW,
-    VERTEX_ROW,
-    VERTEX_RULE,
+from geodesic_core.io.limits import (
+    check_declared_counts,
+    check_face_count,
     check_row_count,
-    check_rows,
-    excerpt,
-    index_rows,
-    number_table,
+    check_vertex_count,
 )
+from geodesic_core.io.text import bad_row, polygon_rows, vertex_table
 
 _TRIANGLE_FILE, _QUAD_FILE, _NEW_QUAD_FILE = b"\xff\xff\xfe", b"\xff\xff\xff", b"\xff\xff\xfd"
 """First bytes of FreeSurfer's surfaces, which have no suffix of their own: ``lh.pial``"""
@@ -36,17 +32,7 @@ _POINTS, _TRIANGLES = "NIFTI_INTENT_POINTSET", "NIFTI_INTENT_TRIANGLE"
 
 
 def read_gifti(data: bytes, max_faces: int | None) -> FileContents:
-    """Read a GIFTI surface: the first point set, in its own coordinates, and the triangles.
-
-    Raises
-    ------
-    InvalidMesh
-        The bytes are damaged, or hold no surface.
-    TooManyFaces
-        There are more faces than ``max_faces``.
-    MissingExtra
-        nibabel is not installed.
-    """
+    """Read a GIFTI surface: the first point set, in its own coordinates, and the triangles."""
     with extra("brain", "nibabel", "load_mesh of a GIFTI file"):
         from nibabel.gifti.gifti import GiftiImage
 
@@ -55,7 +41,7 @@ def read_gifti(data: bytes, max_faces: int | None) -> FileContents:
         parser.parse(data)
     except ExpatError as error:
         raise InvalidMesh(f"the GIFTI file is no whole XML document: {error}") from error
-    return _contents(*surface_arrays(parser.img), max_faces)
+    return _contents(*surface_arrays(parser.img))
 
 
 def _bounded_parser(base: Any, size: int, max_faces: int | None) -> Any:
@@ -98,15 +84,10 @@ def _check_array(attributes: Mapping[str, str], max_faces: int | None) -> None:
     rows = attributes.get("Dim0", "")
     if not (rows.isdecimal() and len(rows) < 19):
         raise InvalidMesh(f"an array of the GIFTI file has {rows[:20]!r} rows")
-    if max_faces is None:
-        return
     if attributes.get("Intent") == _TRIANGLES:
         check_face_count(int(rows), max_faces)
-    elif int(rows) > 3 * max_faces:
-        raise InvalidMesh(
-            f"an array of the GIFTI file has {rows} rows, but {max_faces} faces have at most "
-            f"{3 * max_faces} vertices"
-        )
+    else:
+        check_vertex_count("an array of the GIFTI file", int(rows), max_faces)
 
 
 def _check_unpacked(text: str, values: int) -> None:
@@ -117,13 +98,7 @@ def _check_unpacked(text: str, values: int) -> None:
 
 
 def surface_arrays(image: Any) -> tuple[NDArray[np.generic], NDArray[np.generic]]:
-    """Return the points and the triangles of a GIFTI image of nibabel.
-
-    Raises
-    ------
-    InvalidMesh
-        It holds no surface.
-    """
+    """Return the points and the triangles of a GIFTI image of nibabel."""
     arrays = {name: image.get_arrays_from_intent(name) for name in (_POINTS, _TRIANGLES)}
     missing = [name for name, found in arrays.items() if not found]
     if missing:
@@ -132,15 +107,7 @@ def surface_arrays(image: Any) -> tuple[NDArray[np.generic], NDArray[np.generic]
 
 
 def read_freesurfer(data: bytes, max_faces: int | None) -> FileContents:
-    """Read a surface of FreeSurfer, in its own coordinates: binary, of quadrangles too, or text.
-
-    Raises
-    ------
-    InvalidMesh
-        The bytes are damaged, or are no such file.
-    TooManyFaces
-        There are more faces than ``max_faces``.
-    """
+    """Read a surface of FreeSurfer, in its own coordinates: binary, of quadrangles too, or text."""
     magic = data[:3]
     if magic == _TRIANGLE_FILE:
         return _read_triangles(data, max_faces)
@@ -161,10 +128,18 @@ def _read_triangles(data: bytes, max_faces: int | None) -> FileContents:
     if len(counts) < 8:
         raise InvalidMesh("the FreeSurfer file ends before its counts")
     vertex_count, face_count = np.frombuffer(counts, ">i4").tolist()
-    _check_counts(vertex_count, face_count, 12, 12, len(data) - stream.tell())
+    _check_counts(vertex_count, face_count, 12, len(data) - stream.tell(), max_faces)
     vertices = np.frombuffer(stream.read(12 * vertex_count), ">f4").reshape(-1, 3)
     faces = np.frombuffer(stream.read(12 * face_count), ">i4").reshape(-1, 3)
-    return _contents(vertices, faces, max_faces)
+    return _contents(vertices, faces)
+
+
+def _check_counts(
+    vertices: int, faces: int, vertex_bytes: int, room: int, max_faces: int | None
+) -> None:
+    least_bytes = {"vertex": vertex_bytes, "face": 12}
+    check_declared_counts({"vertex": vertices, "face": faces}, least_bytes, room)
+    check_face_count(faces, max_faces)
 
 
 def _read_quads(data: bytes, max_faces: int | None) -> FileContents:
@@ -174,7 +149,7 @@ def _read_quads(data: bytes, max_faces: int | None) -> FileContents:
     vertex_count, quad_count = _three_byte_integers(data[3:9]).tolist()
     kind, unit = (">i2", _HUNDREDTHS) if data[:3] == _QUAD_FILE else (">f4", 1.0)
     width = 3 * np.dtype(kind).itemsize
-    _check_counts(vertex_count, quad_count, width, 12, len(data) - 9)
+    _check_counts(vertex_count, quad_count, width, len(data) - 9, max_faces)
     middle = 9 + vertex_count * width
     with np.errstate(invalid="ignore"):  # the mesh refuses what is not finite
         vertices = np.frombuffer(data[9:middle], kind).reshape(-1, 3) * unit
@@ -182,7 +157,8 @@ def _read_quads(data: bytes, max_faces: int | None) -> FileContents:
     even = quads[:, [0, 1, 3, 2, 3, 1]]
     odd = quads[:, [0, 1, 2, 0, 2, 3]]
     faces = np.where(quads[:, :1] % 2 == 0, even, odd).reshape(-1, 3)
-    return _contents(vertices, faces, max_faces)
+    check_face_count(len(faces), max_faces)
+    return _contents(vertices, faces)
 
 
 def _three_byte_integers(data: bytes) -> NDArray[np.int64]:
@@ -200,40 +176,18 @@ def _read_text(data: bytes, max_faces: int | None) -> FileContents:
     vertex_count, face_count = map(int, counts)
     check_row_count({"vertex": vertex_count, "face": face_count}, len(rows) - 1)
     check_face_count(face_count, max_faces)
-    vertex_rows, face_rows = rows[1 : 1 + vertex_count], rows[1 + vertex_count :]
-    check_rows(vertex_rows, VERTEX_ROW, "vertex", VERTEX_RULE)
-    check_rows(face_rows, INDEX_ROW, "face", "its vertices must be integers")
-    corners, sizes = index_rows(face_rows)
+    vertices = vertex_table(rows[1 : 1 + vertex_count])
+    face_rows = rows[1 + vertex_count :]
+    corners, sizes = polygon_rows(face_rows)
     if (sizes < 3).any():
         short = int(np.flatnonzero(sizes < 3)[0])
-        raise InvalidMesh(
-            f"face {short} reads {excerpt(face_rows[short])}; it must have three vertices",
-            kind="face",
-            elements=[short],
-        )
+        raise bad_row("face", short, face_rows[short], "it must have three vertices")
     starts = np.cumsum(sizes) - sizes
-    faces = corners[starts[:, None] + np.arange(3)]
-    return _contents(number_table(vertex_rows, 3), faces, max_faces)
+    return _contents(vertices, corners[starts[:, None] + np.arange(3)])
 
 
-def _check_counts(
-    vertex_count: int, face_count: int, vertex_bytes: int, face_bytes: int, held: int
-) -> None:
-    needed = vertex_count * vertex_bytes + face_count * face_bytes
-    if min(vertex_count, face_count) < 0 or needed > held:
-        raise InvalidMesh(
-            f"the FreeSurfer file declares {vertex_count} vertices and {face_count} faces, which "
-            f"take {needed} bytes, but holds {held}"
-        )
-
-
-def _contents(
-    vertices: NDArray[np.generic], faces: NDArray[np.generic], max_faces: int | None
-) -> FileContents:
+def _contents(vertices: NDArray[np.generic], faces: NDArray[np.generic]) -> FileContents:
     for name, rows in (("points", vertices), ("triangles", faces)):
         if rows.ndim != 2 or rows.shape[1] != 3:
             raise InvalidMesh(f"the {name} have shape {rows.shape}; it must be (n, 3)")
-    check_face_count(len(faces), max_faces)
-    corners = np.ascontiguousarray(faces, np.int64).reshape(-1)
-    sizes = np.full(len(faces), 3, np.int64)
-    return FileContents(np.ascontiguousarray(vertices, np.float64), corners, sizes)
+    return FileContents.of_triangles(np.ascontiguousarray(vertices, np.float64), faces)

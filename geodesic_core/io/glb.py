@@ -6,19 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.io.contents import FileContents, note_on_ignored
+from geodesic_core.io.contents import FileContents
 from geodesic_core.io.gltf_accessors import Accessors
 from geodesic_core.io.gltf_document import read_document
 from geodesic_core.io.gltf_nodes import Nodes
 from geodesic_core.io.gltf_parts import (
-    Part,
     Shape,
     count_faces,
     placed_positions,
     shown_parts,
     triangles,
 )
-from geodesic_core.io.limits import check_face_count
+from geodesic_core.io.limits import check_face_count, check_vertex_count
 
 _HEADER, _CHUNK_HEADER = 12, 8
 
@@ -27,13 +26,6 @@ def read_glb(data: bytes, max_faces: int | None) -> FileContents:
     """Read a GLB file; its parts are placed by the nodes of its scene, in the order of its meshes.
 
     Primitives of a mesh that share their positions share vertices.
-
-    Raises
-    ------
-    InvalidMesh
-        The bytes are damaged, or are no such file.
-    TooManyFaces
-        There are more faces than ``max_faces``.
     """
     if data[:4] != b"glTF" or len(data) < _HEADER + _CHUNK_HEADER:
         raise InvalidMesh("the GLB file does not begin with a glTF header")
@@ -44,8 +36,8 @@ def read_glb(data: bytes, max_faces: int | None) -> FileContents:
     if data[4:8] != b"\2\0\0\0" or chunks[0][0] != b"JSON":
         raise InvalidMesh("the GLB file is not glTF 2, or its first chunk is not JSON")
     binary = next((chunk for kind, chunk in chunks if kind == b"BIN\0"), memoryview(b""))
-    behind = {"bytes behind its end": len(data) - length} if length < len(data) else {}
-    return _read_scene(chunks[0][1], binary, max_faces, behind)
+    left_out = {"bytes behind its end": len(data) - length}
+    return _read_scene(chunks[0][1], binary, max_faces, left_out)
 
 
 def read_gltf(data: bytes, max_faces: int | None) -> FileContents:
@@ -68,9 +60,9 @@ def _chunks(rest: memoryview) -> Iterator[tuple[bytes, memoryview]]:
 
 
 def _read_scene(
-    document: memoryview, binary: memoryview, max_faces: int | None, ignored: Mapping[str, int]
+    document: memoryview, binary: memoryview, max_faces: int | None, left_out: Mapping[str, int]
 ) -> FileContents:
-    """Read the scene of a document; ``ignored`` counts what was left out before."""
+    """Read the scene of a document; ``left_out`` counts what lies beside it."""
     tree = read_document(document)
     accessors = Accessors(tree, binary, len(document) + len(binary))
     nodes = Nodes(tree, accessors)
@@ -78,7 +70,10 @@ def _read_scene(
     parts, others = shown_parts(tree, nodes)
     if not parts:
         raise InvalidMesh("the glTF document's scene shows no triangles", kind="face")
-    _check_vertex_count(parts, nodes, accessors, max_faces)
+    # Nodes may share any number of vertices.
+    shapes = {part.shape for part in parts}
+    shown = sum(nodes.instances(each.node) * accessors.count(each.position) for each in shapes)
+    check_vertex_count("the glTF document's scene", shown, max_faces)
     placed: dict[Shape, tuple[int, NDArray[np.bool_]]] = {}
     vertices, faces, vertex_count, face_count = [], [], 0, 0
     for shape, primitive in parts:
@@ -96,27 +91,11 @@ def _read_scene(
         numbered[is_mirrored] = numbered[is_mirrored][:, :, ::-1]
         faces.append(numbered.reshape(-1, 3))
         face_count += len(faces[-1])
-    if others:
-        ignored = {**ignored, "parts of points or lines": others}
-    return FileContents(
+    return FileContents.of_triangles(
         np.concatenate(vertices),
-        np.concatenate(faces).reshape(-1),
-        np.full(face_count, 3),
-        note_on_ignored("GLB", ignored),
+        np.concatenate(faces),
+        {**left_out, "parts of points or lines": others},
     )
-
-
-def _check_vertex_count(
-    parts: list[Part], nodes: Nodes, accessors: Accessors, max_faces: int | None
-) -> None:
-    """Refuse more vertices than faces can have, since nodes may share any number of them."""
-    shapes = {part.shape for part in parts}
-    count = sum(nodes.instances(each.node) * accessors.count(each.position) for each in shapes)
-    if max_faces is not None and count > 3 * max_faces:
-        raise InvalidMesh(
-            f"the glTF document's scene shows {count} vertices, but {max_faces} faces have at most "
-            f"{3 * max_faces}"
-        )
 
 
 def _check_corners(corners: NDArray[np.integer], size: int, faces_before: int) -> None:

@@ -16,16 +16,10 @@ _WIDTHS = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 class Accessors:
-    """Reader of the accessors of a checked document.
+    """Reader of the accessors of a checked document; those that bytes do not bear out are refused.
 
-    Parameters
-    ----------
-    tree
-        The document.
-    binary
-        The binary chunk: what its first buffer holds, if that names no other place.
-    most
-        Most elements that an accessor may have without bytes of its own, which are zeros.
+    The ``binary`` chunk is what the first buffer holds, if that names no other place. An accessor
+    without bytes of its own, whose elements are zeros, may have at most ``most`` of them.
     """
 
     def __init__(self, tree: Mapping[str, Any], binary: memoryview, most: int) -> None:
@@ -44,26 +38,14 @@ class Accessors:
     def floats(self, number: int, shape: str, what: str) -> Floats:
         """Return the elements of an accessor as numbers, (count, width).
 
-        Parameters
-        ----------
-        number
-            The number of the accessor.
-        shape
-            Its type, such as ``"VEC3"``.
-        what
-            What it holds, for messages.
-
-        Raises
-        ------
-        InvalidMesh
-            The accessor is of another type, or its bytes are not there.
+        ``shape`` is the type that it must have, such as ``"VEC3"``; ``what`` names its content.
         """
         values, normalized = self._values(number, shape, what)
         if values.dtype.kind == "f":
             with np.errstate(invalid="ignore"):  # the mesh refuses what is not finite
                 return values.astype(np.float64)
         if values.itemsize == 4 or not (normalized or self._is_quantized):
-            _refuse(number, f"{what} must be floats, or integers by KHR_mesh_quantization")
+            refuse(number, f"{what} must be floats, or integers by KHR_mesh_quantization")
         if normalized:
             return np.maximum(values / np.iinfo(values.dtype).max, -1.0)
         return values.astype(np.float64)
@@ -72,29 +54,29 @@ class Accessors:
         """Return the elements of an accessor of unsigned integers, (count, width); see `floats`."""
         values, _ = self._values(number, shape, what)
         if values.dtype.kind != "u":
-            _refuse(number, f"{what} must be unsigned integers")
+            refuse(number, f"{what} must be unsigned integers")
         return values
 
     def _values(self, number: int, shape: str, what: str) -> tuple[NDArray[Any], bool]:
         accessor = self._tree["accessors"][number]
         if accessor["type"] != shape:
-            _refuse(number, f"{what} must be of type {shape}")
+            refuse(number, f"{what} must be of type {shape}")
         count, width = accessor["count"], _WIDTHS[shape]
         dtype = _dtype_of(number, accessor)
         if "bufferView" in accessor:
             values = self._rows(number, accessor, count, dtype, width)
         elif count > self._most:
-            _refuse(number, f"it declares {count} elements, but the file has {self._most} bytes")
+            refuse(number, f"it declares {count} elements, but the file has {self._most} bytes")
         else:
             values = np.zeros((count, width), dtype)
         if "sparse" in accessor:
             sparse = accessor["sparse"]
             places = _dtype_of(number, sparse["indices"])
             if places.kind != "u":
-                _refuse(number, "its sparse indices must be unsigned integers")
+                refuse(number, "its sparse indices must be unsigned integers")
             at = self._rows(number, sparse["indices"], sparse["count"], places, 1)[:, 0]
             if at.max() >= count:
-                _refuse(number, f"a sparse index is {at.max()}, but it has {count} elements")
+                refuse(number, f"a sparse index is {at.max()}, but it has {count} elements")
             values = values.copy()
             values[at] = self._rows(number, sparse["values"], sparse["count"], dtype, width)
         return values, accessor.get("normalized", False)
@@ -107,7 +89,7 @@ class Accessors:
         size = width * dtype.itemsize
         stride, start = view.get("byteStride", size), source.get("byteOffset", 0)
         if stride < size or start + stride * (count - 1) + size > view["byteLength"]:
-            _refuse(
+            refuse(
                 number,
                 f"it has {count} elements of {size} bytes, {stride} apart, which do not fit into "
                 f"bufferView {source['bufferView']}",
@@ -157,9 +139,10 @@ class Accessors:
 
 def _dtype_of(number: int, source: Mapping[str, Any]) -> np.dtype[Any]:
     if source["componentType"] not in _TYPES:
-        _refuse(number, f"it has the unknown componentType {source['componentType']}")
+        refuse(number, f"it has the unknown componentType {source['componentType']}")
     return np.dtype(_TYPES[source["componentType"]])
 
 
-def _refuse(number: int, why: str) -> NoReturn:
+def refuse(number: int, why: str) -> NoReturn:
+    """Refuse an accessor."""
     raise InvalidMesh(f"accessor {number} of the glTF document: {why}")

@@ -2,7 +2,7 @@
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple, NoReturn
 
 from geodesic_core.errors import InvalidMesh
@@ -29,118 +29,105 @@ _NO_GEOMETRY = re.compile(
 """Extensions that say nothing of where a surface is at rest"""
 
 
-class _Index(NamedTuple):
-    """The number of an element of one of the document's lists."""
+class _Value(NamedTuple):
+    """What a member must be that is neither an object nor a list of these."""
 
-    of: str
-
-
-class _Numbers(NamedTuple):
-    """A list of numbers, of so many if a length is given."""
-
-    length: int | None = None
+    words: str
+    is_right: Callable[[Any], bool]
 
 
-class _Integer(NamedTuple):
-    least: int = 0
-    most: int = 2**53
+class _Object(NamedTuple):
+    """Members that an object must have, and others that are read where it has them."""
+
+    required: dict[str, Any]
+    optional: dict[str, Any]
 
 
-class _Required(NamedTuple):
-    """A member that is there wherever its object is."""
-
-    kind: Any
+def _integer(least: int = 0, most: int = 2**53) -> _Value:
+    return _Value(f"an integer, {least} to {most}", lambda value: _is_integer(value, least, most))
 
 
-_ACCESSOR, _NODE = _Index("accessors"), _Index("nodes")
-_ELEMENTS = {"bufferView": _Required(_Index("bufferViews")), "byteOffset": _Integer()}
-_KIND = {"componentType": _Required(_Integer())}
-_MEMBERS: Mapping[str, Any] = {
-    "extensionsUsed": [str],
-    "extensionsRequired": [str],
-    "buffers": [{"byteLength": _Required(_Integer()), "uri": str}],
-    "bufferViews": [
-        {
-            "buffer": _Required(_Index("buffers")),
-            "byteOffset": _Integer(),
-            "byteLength": _Required(_Integer()),
-            "byteStride": _Integer(),
-        }
-    ],
-    "accessors": [
-        {
-            "bufferView": _Index("bufferViews"),
-            "byteOffset": _Integer(),
-            **_KIND,
-            "normalized": bool,
-            "count": _Required(_Integer(1)),
-            "type": _Required(str),
-            "sparse": {
-                "count": _Required(_Integer(1)),
-                "indices": _Required(_ELEMENTS | _KIND),
-                "values": _Required(_ELEMENTS),
-            },
-        }
-    ],
-    "meshes": [
-        {
-            "primitives": _Required(
-                [
-                    {
-                        "attributes": _Required(
-                            {"POSITION": _ACCESSOR}
-                            | {f"JOINTS_{number}": _ACCESSOR for number in JOINT_SETS}
-                            | {f"WEIGHTS_{number}": _ACCESSOR for number in JOINT_SETS}
-                        ),
-                        "indices": _ACCESSOR,
-                        "mode": _Integer(0, 6),
-                        "targets": [{"POSITION": _ACCESSOR}],
-                    }
-                ]
-            ),
-            "weights": _Numbers(),
-        }
-    ],
-    "nodes": [
-        {
-            "mesh": _Index("meshes"),
-            "skin": _Index("skins"),
-            "weights": _Numbers(),
-            "children": [_NODE],
-            "matrix": _Numbers(16),
-            "translation": _Numbers(3),
-            "rotation": _Numbers(4),
-            "scale": _Numbers(3),
-            "extensions": {
-                "EXT_mesh_gpu_instancing": {
-                    "attributes": _Required(
-                        {"TRANSLATION": _ACCESSOR, "ROTATION": _ACCESSOR, "SCALE": _ACCESSOR}
-                    )
-                },
-                "KHR_node_visibility": {"visible": bool},
-            },
-        }
-    ],
-    "skins": [{"joints": _Required([_NODE]), "inverseBindMatrices": _ACCESSOR}],
-    "scenes": [{"nodes": [_NODE]}],
-    "scene": _Index("scenes"),
-}
-_IN_WORDS = {str: "a string", bool: "true or false"}
+def _numbers(length: int | None = None) -> _Value:
+    words = "a list of numbers" if length is None else f"a list of {length} numbers"
+    return _Value(
+        words,
+        lambda value: (
+            isinstance(value, list) and all(map(_is_number, value)) and length in (None, len(value))
+        ),
+    )
+
+
+_STRING = _Value("a string", lambda value: isinstance(value, str))
+_TRUTH = _Value("true or false", lambda value: isinstance(value, bool))
+
+
+def _document_for(tree: Any) -> _Object:
+    """Return what is read of a document, where ``tree`` has the lists that numbers point into."""
+
+    def number_of(name: str) -> _Value:
+        elements = tree.get(name, []) if isinstance(tree, dict) else []
+        count = len(elements) if isinstance(elements, list) else 0
+        return _integer(0, count - 1)._replace(words=f"the number of one of {count} {name}")
+
+    view, accessor, node = map(number_of, ("bufferViews", "accessors", "nodes"))
+    size, count = _integer(), _integer(1)
+    offset = {"byteOffset": size}
+    buffer = _Object({"byteLength": size}, {"uri": _STRING})
+    buffer_view = _Object(
+        {"buffer": number_of("buffers"), "byteLength": size}, offset | {"byteStride": size}
+    )
+    sparse = {
+        "count": count,
+        "indices": _Object({"bufferView": view, "componentType": size}, offset),
+        "values": _Object({"bufferView": view}, offset),
+    }
+    array = _Object(
+        {"componentType": size, "count": count, "type": _STRING},
+        offset | {"bufferView": view, "normalized": _TRUTH, "sparse": _Object(sparse, {})},
+    )
+    names = [f"{kind}_{number}" for number in JOINT_SETS for kind in ("JOINTS", "WEIGHTS")]
+    target = _Object({}, {"POSITION": accessor})
+    primitive = _Object(
+        {"attributes": _Object({}, dict.fromkeys(["POSITION", *names], accessor))},
+        {"indices": accessor, "mode": _integer(0, 6), "targets": [target]},
+    )
+    mesh = _Object({"primitives": [primitive]}, {"weights": _numbers()})
+    instances = dict.fromkeys(("TRANSLATION", "ROTATION", "SCALE"), accessor)
+    extensions = {
+        "EXT_mesh_gpu_instancing": _Object({"attributes": _Object({}, instances)}, {}),
+        "KHR_node_visibility": _Object({}, {"visible": _TRUTH}),
+    }
+    placed = {
+        "mesh": number_of("meshes"),
+        "skin": number_of("skins"),
+        "weights": _numbers(),
+        "children": [node],
+        "matrix": _numbers(16),
+        "translation": _numbers(3),
+        "rotation": _numbers(4),
+        "scale": _numbers(3),
+        "extensions": _Object({}, extensions),
+    }
+    members = {
+        "extensionsUsed": [_STRING],
+        "extensionsRequired": [_STRING],
+        "buffers": [buffer],
+        "bufferViews": [buffer_view],
+        "accessors": [array],
+        "meshes": [mesh],
+        "nodes": [_Object({}, placed)],
+        "skins": [_Object({"joints": [node]}, {"inverseBindMatrices": accessor})],
+        "scenes": [_Object({}, {"nodes": [node]})],
+        "scene": number_of("scenes"),
+    }
+    return _Object({}, members)
 
 
 def read_document(text: memoryview) -> dict[str, Any]:
     """Return a glTF document whose members are of their types, and name only what is there.
 
-    Parameters
-    ----------
-    text
-        The document in JSON; members that are not read are not looked at.
-
-    Raises
-    ------
-    InvalidMesh
-        Naming the member, or an extension that the document requires and that is not read. Or the
-        document is no JSON, has more than 32 MiB, or more than a million values.
+    Members that are not read are not looked at. A document is refused that requires an extension
+    which is not read, and one of more than 32 MiB or a million values.
     """
     if len(text) > _LARGEST_DOCUMENT:
         raise InvalidMesh(
@@ -151,7 +138,7 @@ def read_document(text: memoryview) -> dict[str, Any]:
         tree: dict[str, Any] = json.loads(bytes(text))
     except (ValueError, RecursionError) as error:  # a number of too many digits is no JSON error
         raise InvalidMesh(f"the glTF document cannot be read: {error}") from error
-    _Checker(tree).check(tree, _MEMBERS, "")
+    _Checker().check(tree, _document_for(tree), "")
     for name in tree.get("extensionsRequired", []):
         if name not in _READ and not _NO_GEOMETRY.match(name):
             remedy = "uncompressed" if name in _COMPRESSIONS else "without it"
@@ -163,8 +150,9 @@ def read_document(text: memoryview) -> dict[str, Any]:
 
 
 class _Checker:
-    def __init__(self, document: Any) -> None:
-        self._document = document
+    """Compares values with what they must be, and counts them."""
+
+    def __init__(self) -> None:
         self._values = 0
 
     def check(self, value: Any, expected: Any, place: str) -> None:
@@ -175,42 +163,23 @@ class _Checker:
                 "its data into the binary chunk"
             )
         match expected:
-            case _Required(kind):
-                self.check(value, kind, place)
-            case {}:
-                self._check_members(value, expected, place)
-            case _Index(of):
-                elements = self._document.get(of, [])
-                if not isinstance(elements, list):
-                    _refuse(elements, of, "a list")
-                if not _is_integer(value, 0, len(elements) - 1):
-                    _refuse(value, place, f"the number of one of {len(elements)} {of}")
-            case _Integer(least, most):
-                if not _is_integer(value, least, most):
-                    _refuse(value, place, f"an integer, {least} to {most}")
-            case _Numbers(length):
-                if not isinstance(value, list) or not all(map(_is_number, value)):
-                    _refuse(value, place, "a list of numbers")
-                if length is not None and len(value) != length:
-                    _refuse(value, place, f"a list of {length} numbers")
+            case _Value(words, is_right):
+                if not is_right(value):
+                    _refuse(value, place, words)
+            case _Object(required, optional):
+                if not isinstance(value, dict):
+                    _refuse(value, place, "an object")
+                for name, inner in (required | optional).items():
+                    inside = f"{place}.{name}" if place else name
+                    if name in value:
+                        self.check(value[name], inner, inside)
+                    elif name in required:
+                        raise InvalidMesh(f"{inside} is missing in the glTF document")
             case [item]:
                 if not isinstance(value, list):
                     _refuse(value, place, "a list")
                 for number, each in enumerate(value):
                     self.check(each, item, f"{place}[{number}]")
-            case _:
-                if not isinstance(value, expected):
-                    _refuse(value, place, _IN_WORDS[expected])
-
-    def _check_members(self, value: Any, expected: Mapping[str, Any], place: str) -> None:
-        if not isinstance(value, dict):
-            _refuse(value, place, "an object")
-        for name, inner in expected.items():
-            inside = f"{place}.{name}" if place else name
-            if name in value:
-                self.check(value[name], inner, inside)
-            elif isinstance(inner, _Required):
-                raise InvalidMesh(f"{inside} is missing in the glTF document")
 
 
 def _is_integer(value: Any, least: int, most: int) -> bool:

@@ -14,23 +14,12 @@ _MOST_NODES = 100_000
 """Nodes of a scene; beyond, walking them takes longer than reading any mesh."""
 _AT_REST = {"translation": (0, 0, 0), "rotation": (0, 0, 0, 1), "scale": (1, 1, 1)}
 _INSTANCING = "EXT_mesh_gpu_instancing"
+_SHAPES = {"TRANSLATION": "VEC3", "ROTATION": "VEC4", "SCALE": "VEC3"}
+"""Attributes of instances, in the order of `_matrices`, and their types"""
 
 
 class Nodes:
-    """Nodes of a checked document.
-
-    Parameters
-    ----------
-    tree
-        The document.
-    accessors
-        Its accessors, of which instances and skins are read.
-
-    Raises
-    ------
-    InvalidMesh
-        The nodes form no tree, or are too many.
-    """
+    """Nodes of a checked document, which must form a tree; accessors have instances and skins."""
 
     def __init__(self, tree: Mapping[str, Any], accessors: Accessors) -> None:
         self._tree = tree
@@ -68,18 +57,11 @@ class Nodes:
         return [number for number in reversed(walked) if "mesh" in self[number]]
 
     def instances(self, node: int) -> int:
-        """Return how often a node shows its mesh.
-
-        Raises
-        ------
-        InvalidMesh
-            Attributes of its instances differ in number, or are none.
-        """
-        if _INSTANCING not in self[node].get("extensions", {}):
+        """Return how often a node shows its mesh."""
+        attributes = self._instancing(node)
+        if attributes is None:
             return 1
-        attributes = self[node]["extensions"][_INSTANCING]["attributes"]
-        kinds = attributes.keys() & {"TRANSLATION", "ROTATION", "SCALE"}
-        counts = {self._accessors.count(attributes[kind]) for kind in kinds}
+        counts = {self._accessors.count(attributes[kind]) for kind in attributes.keys() & _SHAPES}
         if len(counts) != 1 or "skin" in self[node]:
             raise InvalidMesh(
                 f"the instances of node {node} of the glTF document must have places, as many of "
@@ -90,19 +72,22 @@ class Nodes:
     def places(self, node: int) -> Floats:
         """Return the matrices that place a node's mesh in the scene, (instances, 4, 4)."""
         place = self._places[node][None]
-        if _INSTANCING not in self[node].get("extensions", {}):
+        attributes = self._instancing(node)
+        if attributes is None:
             return place
-        attributes = self[node]["extensions"][_INSTANCING]["attributes"]
-        parts = {
-            kind: self._accessors.floats(attributes[kind], shape, f"{kind} of instances")
-            for kind, shape in (("TRANSLATION", "VEC3"), ("ROTATION", "VEC4"), ("SCALE", "VEC3"))
+        parts = (
+            self._accessors.floats(attributes[kind], shape, f"{kind} of instances")
             if kind in attributes
-        }
-        return place @ _matrices(
-            parts.get("TRANSLATION", np.zeros((1, 3))),
-            parts.get("ROTATION", np.zeros((1, 4))),
-            parts.get("SCALE", np.ones((1, 3))),
+            else np.array([_AT_REST[kind.lower()]], np.float64)
+            for kind, shape in _SHAPES.items()
         )
+        return place @ _matrices(*parts)
+
+    def _instancing(self, node: int) -> Mapping[str, int] | None:
+        """Return the accessors of a node's instances by their kind; None if it has none."""
+        extensions = self[node].get("extensions", {})
+        attributes: Mapping[str, int] | None = extensions.get(_INSTANCING, {}).get("attributes")
+        return attributes
 
     def joints(self, skin: int) -> Floats:
         """Return the matrices by which the joints of a skin move positions, (joints, 4, 4)."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.io.gltf_accessors import Accessors
+from geodesic_core.io.gltf_accessors import Accessors, refuse
 from geodesic_core.io.gltf_document import JOINT_SETS
 from geodesic_core.io.gltf_nodes import Nodes
 
@@ -64,10 +64,7 @@ def _is_surface(primitive: Mapping[str, Any]) -> bool:
 def shown_parts(tree: Mapping[str, Any], nodes: Nodes) -> tuple[list[Part], int]:
     """Return the parts with triangles, in the order of the file's meshes, and the number of others.
 
-    Raises
-    ------
-    InvalidMesh
-        There are too many, or a part lacks what its node's skin or weights need.
+    Refuse too many, and parts that lack what their nodes' skins or weights need.
     """
     meshes = tree.get("meshes", [])
     count = sum(len(meshes[nodes[node]["mesh"]]["primitives"]) for node in nodes.shown)
@@ -121,24 +118,9 @@ def _joints(attributes: Mapping[str, int], node: int) -> tuple[tuple[int, int], 
 def placed_positions(
     shape: Shape, nodes: Nodes, accessors: Accessors
 ) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return where the scene shows the vertices of a shape.
+    """Return where the scene shows the n vertices of a shape, and which instances are mirrored.
 
-    Parameters
-    ----------
-    shape
-        The shape, of n vertices.
-    nodes, accessors
-        Those of the document.
-
-    Returns
-    -------
-    tuple
-        The positions, (instances, n, 3), and which instances are mirrored.
-
-    Raises
-    ------
-    InvalidMesh
-        An accessor has other elements than these need, or a joint is not there.
+    The positions have the shape (instances, n, 3).
     """
     points = accessors.floats(shape.position, "VEC3", "positions")
     for number, weight in shape.targets:
@@ -164,38 +146,24 @@ def _skinned(points: Floats, shape: Shape, matrices: Floats, accessors: Accessor
         _check_length(weights, shares, points)
         numbers = np.where(shares != 0.0, numbers, 0)  # elsewhere the number means nothing
         if numbers.max() >= len(matrices):
-            raise InvalidMesh(
-                f"accessor {joints} of the glTF document names joint {numbers.max()} of a skin of "
-                f"{len(matrices)}"
-            )
+            refuse(joints, f"it names joint {numbers.max()} of a skin of {len(matrices)}")
         for number, share in zip(numbers.T, shares.T[:, :, None], strict=True):
             matrix = matrices[number]
             moved += share * ((matrix[:, :3, :3] @ points[:, :, None])[:, :, 0] + matrix[:, :3, 3])
             total += share
     if not total.all():
-        raise InvalidMesh(
-            f"in accessor {shape.joints[0][1]} of the glTF document, the weights of element "
-            f"{np.argmin(total != 0.0)} are 0: no joint holds it"
-        )
+        element = np.argmin(total != 0.0)
+        refuse(shape.joints[0][1], f"the weights of element {element} are 0: no joint holds it")
     return moved / total
 
 
 def _check_length(number: int, elements: NDArray[Any], points: Floats) -> None:
     if len(elements) != len(points):
-        raise InvalidMesh(
-            f"accessor {number} of the glTF document has {len(elements)} elements for "
-            f"{len(points)} positions"
-        )
+        refuse(number, f"it has {len(elements)} elements for {len(points)} positions")
 
 
 def triangles(primitive: Mapping[str, Any], accessors: Accessors) -> NDArray[np.integer[Any]]:
-    """Return the corners of a part's triangles, (faces, 3), numbered within its positions.
-
-    Raises
-    ------
-    InvalidMesh
-        Corners do not form triangles, or are no unsigned integers.
-    """
+    """Return the corners of a part's triangles, (faces, 3), numbered within its positions."""
     number = primitive.get("indices", primitive["attributes"]["POSITION"])
     corners: NDArray[np.integer[Any]]
     if "indices" in primitive:
@@ -210,8 +178,5 @@ def triangles(primitive: Mapping[str, Any], accessors: Accessors) -> NDArray[np.
     if mode == _TRIANGLE_FAN:
         return corners[np.stack([first + 1, first + 2, np.zeros_like(first)], axis=1)]
     if len(corners) % 3:
-        raise InvalidMesh(
-            f"accessor {number} of the glTF document has {len(corners)} corners, which do not form "
-            "triangles"
-        )
+        refuse(number, f"its {len(corners)} corners do not form triangles")
     return corners.reshape(-1, 3)

@@ -7,7 +7,7 @@ import numpy as np
 from geodesic_core.errors import InvalidMesh
 from geodesic_core.io.contents import FileContents
 from geodesic_core.io.limits import check_face_count
-from geodesic_core.io.text import NUMBER, excerpt
+from geodesic_core.io.text import NUMBER, bad_row
 
 _HEADER = re.compile(rb"\s*([a-z_]+)[ \t]+(" + NUMBER + rb")[ \t]*(?:\r?\n|\r)", re.IGNORECASE)
 _NO_DATA = -9999.0
@@ -20,13 +20,6 @@ def read_grid(data: bytes, max_faces: int | None) -> FileContents:
     Vertices lie at the centres of cells, x to the east and y to the north. Four neighbours make two
     faces, which the diagonal from north-west to south-east divides; where one is missing there is a
     hole.
-
-    Raises
-    ------
-    InvalidMesh
-        The bytes are damaged, or are no such file.
-    TooManyFaces
-        There are more faces than ``max_faces``.
     """
     header, at = _read_header(data)
     columns, rows = int(header["ncols"]), int(header["nrows"])
@@ -44,11 +37,7 @@ def read_grid(data: bytes, max_faces: int | None) -> FileContents:
         heights = np.array(words, np.float64)
     except ValueError:
         bad = next(i for i, word in enumerate(words) if not re.fullmatch(NUMBER, word))
-        raise InvalidMesh(
-            f"height {bad} of the grid reads {excerpt(words[bad])}; it must be a number",
-            kind="vertex",
-            elements=[bad],
-        ) from None
+        raise bad_row("vertex", bad, words[bad], "it must be a number", "height") from None
     measured = np.isfinite(heights) & (heights != header.get("nodata_value", _NO_DATA))
     row, column = np.divmod(np.flatnonzero(measured), columns)
     with np.errstate(over="ignore", invalid="ignore"):  # the mesh refuses what is not finite
@@ -61,12 +50,8 @@ def read_grid(data: bytes, max_faces: int | None) -> FileContents:
     gaps = len(words) - len(row)
     word = "gap, which is a hole" if gaps == 1 else "gaps, which are holes"
     notes = (f"The grid has {gaps} {word} of the surface.",) if gaps else ()
-    return FileContents(
-        np.stack([x, y, heights[measured]], axis=1),
-        faces.reshape(-1),
-        np.full(len(faces), 3),
-        notes,
-    )
+    vertices = np.stack([x, y, heights[measured]], axis=1)
+    return FileContents.of_triangles(vertices, faces, notes=notes)
 
 
 def _read_header(data: bytes) -> tuple[dict[str, float], int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations  # help() shows the names of types, not what they stand for
 
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from geodesic_core.arrays import Longs
 from geodesic_core.errors import EmptyBarrier, GeodesicError, InvalidArgument, InvalidMesh
 from geodesic_core.extras import extra
-from geodesic_core.io.annotation import read_annotation
+from geodesic_core.io.annotation import check_vertices, read_annotation
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.io.unpacking import read_unpacked
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -163,8 +164,8 @@ def _inside(data: bytes, kind: str, count: int, label: _Label) -> NDArray[np.boo
     """Return which of ``count`` vertices are in a label; at least one is."""
     inside: NDArray[np.bool_] = _READERS[kind](data, count, label)
     if not inside.any():
-        named = "no vertex is in it" if label is None else f"no vertex has the label {label!r}"
-        raise InvalidArgument(named)
+        named = "is in it" if label is None else f"has the label {label!r}"
+        raise InvalidArgument(f"no vertex {named}")
     return inside
 
 
@@ -176,9 +177,7 @@ def _freesurfer(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:
     vertices = np.array([int(line.split()[0]) for line in lines if line.strip()], np.int64)
     if len(vertices) != int(declared):
         raise InvalidArgument(f"it declares {declared} vertices and lists {len(vertices)}")
-    if len(vertices) and not 0 <= vertices.min() <= vertices.max() < count:
-        wrong = vertices[(vertices < 0) | (vertices >= count)][0]
-        raise InvalidArgument(f"it lists vertex {wrong}, but the mesh has {count}")
+    check_vertices(vertices, count)
     inside = np.zeros(count, bool)
     inside[vertices] = True
     return inside
@@ -187,14 +186,14 @@ def _freesurfer(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:
 def _annotation(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:
     """Return which vertices have a label of an annotation."""
     codes, table = read_annotation(data, count)
-    known = _known(name for name, _ in table.values())
+    names = [name for name, _ in table.values()]
     if label is None:
-        raise InvalidArgument(f"it has several labels; name one: its labels are {known}")
+        raise InvalidArgument(f"it has several labels; name one: {_known(names)}")
     wanted = [code for name, code in table.values() if name == label]
     if not wanted:
-        number = _number(label, known)
+        number = _number(label, names)
         if number not in table:
-            raise InvalidArgument(f"it has no label {label!r}; its labels are {known}")
+            raise _unknown(label, names)
         wanted = [table[int(number)][1]]
     return np.isin(codes, wanted)
 
@@ -216,20 +215,24 @@ def _gifti(data: bytes, count: int, label: _Label) -> NDArray[np.bool_]:
     wanted = [key for key, name in names.items() if name == label]
     if wanted:
         return np.isin(values, wanted)
-    number = _number(label, _known(names.values()))
+    number = _number(label, names.values())
     return np.isnan(values) if np.isnan(number) else np.asarray(values == number)
 
 
-def _known(names: Any) -> str:
-    return ", ".join(map(repr, names)) or "none"
+def _known(names: Iterable[str]) -> str:
+    return f"its labels are {', '.join(map(repr, names)) or 'none'}"
 
 
-def _number(label: str | float, known: str) -> float:
-    """Return the number that a label is where it is none of the ``known`` names."""
+def _unknown(label: _Label, names: Iterable[str]) -> InvalidArgument:
+    return InvalidArgument(f"it has no label {label!r}; {_known(names)}")
+
+
+def _number(label: str | float, names: Iterable[str]) -> float:
+    """Return the number that a label is where it is none of the names."""
     try:
         return float(label)
     except ValueError:
-        raise InvalidArgument(f"it has no label {label!r}; its labels are {known}") from None
+        raise _unknown(label, names) from None
 
 
 _READERS = {"label": _freesurfer, "annot": _annotation, "gii": _gifti}

@@ -27,6 +27,9 @@ from geodesic_core.io.vtk import read_vtk
 from geodesic_core.mesh.triangle_mesh import Merge, TriangleMesh
 
 _Reader = Callable[[bytes, int | None], FileContents]
+"""Of the bytes of a file, with the most faces that are allowed, None for any number. All raise
+`InvalidMesh` where the bytes are damaged or are no such file, and `TooManyFaces` before they parse
+more faces than these."""
 _READERS: dict[str, _Reader] = {
     "obj": read_obj,
     "off": read_off,
@@ -118,17 +121,19 @@ def load_mesh(
     if not file.data:
         raise InvalidMesh(f"the {kind.upper()} file is empty")
     try:
-        read = _READERS[kind](file.data, max_faces)
+        read = _contents_of(file.data, kind, max_faces)
     except (TooManyFaces, MissingExtra, MemoryError):
         raise
     except Exception as error:  # any failure of a parser
         raise _explained(error, kind, file.data) from error
-    if len(read.sizes) == 0:
-        raise InvalidMesh(f"the {kind.upper()} file holds no faces", kind="face")
     check_face_count(int(np.maximum(read.sizes - 2, 1).sum()), max_faces)
     if kind == "stl" and merge == "none":
         merge = "exact"
-    return TriangleMesh.from_polygons(read.vertices, read.corners, read.sizes, merge, read.notes)
+    notes = read.notes
+    if left_out := read.left_out_in_words():
+        what = f"The {kind.upper()} file also holds {left_out}"
+        notes += (f"{what}, which are not part of the surface and were left out.",)
+    return TriangleMesh.from_polygons(read.vertices, read.corners, read.sizes, merge, notes)
 
 
 def _kind_of(file: NamedBytes, file_type: str | None) -> str:
@@ -144,6 +149,16 @@ def _kind_of(file: NamedBytes, file_type: str | None) -> str:
     if not kind:
         raise UnknownFileType(f"the file type is missing; it must be one of {known}")
     raise UnknownFileType(f"unknown mesh file type {kind!r}; it must be one of {known}")
+
+
+def _contents_of(data: bytes, kind: str, max_faces: int | None) -> FileContents:
+    """Return the contents of a file; one without faces is refused with what else it holds."""
+    read = _READERS[kind](data, max_faces)
+    if len(read.sizes) == 0:
+        left_out = read.left_out_in_words()
+        beside = f", only {left_out}" if left_out else ""
+        raise InvalidMesh(f"the {kind.upper()} file holds no faces{beside}", kind="face")
+    return read
 
 
 def _explained(error: Exception, kind: str, data: bytes) -> InvalidMesh:

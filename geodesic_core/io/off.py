@@ -7,19 +7,9 @@ import numpy as np
 
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.io.contents import BEHIND, FileContents, note_on_ignored
-from geodesic_core.io.limits import check_declared_counts, check_face_count
-from geodesic_core.io.text import (
-    COMMENT,
-    VERTEX_ROW,
-    VERTEX_RULE,
-    check_columns,
-    check_row_count,
-    check_rows,
-    counted_polygons,
-    index_rows,
-    number_table,
-)
+from geodesic_core.io.contents import BEHIND, FileContents
+from geodesic_core.io.limits import check_declared_counts, check_face_count, check_row_count
+from geodesic_core.io.text import COMMENT, counted_polygons, vertex_table
 
 _COUNT = rb"(-?\d{1,100})"  # Python refuses to read thousands of digits
 _KEYWORD = re.compile(rb"(?:\s|#[^\r\n]*)*(ST)?(C)?(N)?(4)?(n)?OFF\b")
@@ -41,15 +31,7 @@ class _Layout(NamedTuple):
 
 
 def read_off(data: bytes, max_faces: int | None) -> FileContents:
-    """Read an OFF file.
-
-    Raises
-    ------
-    InvalidMesh
-        The bytes are damaged, or are no such file.
-    TooManyFaces
-        There are more faces than ``max_faces``.
-    """
+    """Read an OFF file."""
     keyword = _KEYWORD.match(data)
     if keyword is None:
         raise InvalidMesh("the OFF file does not begin with OFF")
@@ -71,11 +53,9 @@ def _read_text(data: bytes, at: int, layout: _Layout, max_faces: int | None) -> 
     if header is None:
         raise InvalidMesh("the OFF file does not begin with OFF and its counts as ASCII numbers")
     counts = {"vertex": int(header[1]), "face": int(header[2])}
-    check_declared_counts(counts, _LEAST_BYTES, len(text) - header.end())
+    check_declared_counts(counts, _LEAST_BYTES, len(text) - header.end(), slack=1)
     check_face_count(counts["face"], max_faces)
     body = text[header.end() :]
-    if counts["face"] == 0:
-        raise InvalidMesh("the OFF file holds no faces", kind="face")
     try:
         return _from_rows(body.splitlines(), counts, layout)
     except InvalidMesh:  # rows are a habit: any white space may stand between numbers
@@ -89,14 +69,9 @@ def _from_rows(lines: list[bytes], counts: dict[str, int], layout: _Layout) -> F
     rows = [line for line in lines if line.strip()]
     check_row_count(counts, len(rows))
     behind = counts["vertex"] + counts["face"]
-    vertex_rows = rows[: counts["vertex"]]
-    check_rows(vertex_rows, VERTEX_ROW, "vertex", VERTEX_RULE)
-    corners, sizes = index_rows(counted_polygons(rows[counts["vertex"] : behind]))
-    if layout.has_weight:
-        check_columns(vertex_rows, 4)
-    table = number_table(vertex_rows, 4 if layout.has_weight else 3)
-    notes = note_on_ignored("OFF", {f"rows {BEHIND}": len(rows) - behind})
-    return FileContents(_positions(table), corners, sizes, notes)
+    table = vertex_table(rows[: counts["vertex"]], 3 + layout.has_weight)
+    corners, sizes = counted_polygons(rows[counts["vertex"] : behind])
+    return FileContents(_positions(table), corners, sizes, {f"rows {BEHIND}": len(rows) - behind})
 
 
 def _rows_of_words(
@@ -149,10 +124,8 @@ def _read_binary(data: bytes, at: int, layout: _Layout, max_faces: int | None) -
         faces.append(words[place + 1 : colour])
         sizes.append(size)
         place = colour + 1 + int(words[colour])
-    if not faces:
-        raise InvalidMesh("the OFF file holds no faces", kind="face")
-    positions = table[:, : 4 if layout.has_weight else 3].astype(np.float64)
+    positions = _positions(table[:, : 3 + layout.has_weight].astype(np.float64))
+    corners = np.concatenate([words[:0], *faces]).astype(np.int64)
     rest = data[at + 4 * place :]
-    notes = note_on_ignored("OFF", {f"bytes {BEHIND}": len(rest) if rest.strip() else 0})
-    corners = np.concatenate(faces).astype(np.int64)
-    return FileContents(_positions(positions), corners, np.array(sizes), notes)
+    left_out = {f"bytes {BEHIND}": len(rest) if rest.strip() else 0}
+    return FileContents(positions, corners, np.array(sizes, np.int64), left_out)

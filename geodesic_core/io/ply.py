@@ -10,19 +10,14 @@ from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.io.contents import BEHIND, FileContents, note_on_ignored
-from geodesic_core.io.limits import check_declared_counts, check_face_count, counts_in_words
-from geodesic_core.io.text import (
-    INDEX_ROW,
-    VERTEX_ROW,
-    check_columns,
+from geodesic_core.io.contents import BEHIND, FileContents
+from geodesic_core.io.limits import (
+    check_declared_counts,
+    check_face_count,
     check_row_count,
-    check_rows,
-    counted_polygons,
-    excerpt,
-    index_rows,
-    number_table,
+    counts_in_words,
 )
+from geodesic_core.io.text import INDEX_ROW, bad_row, counted_polygons, excerpt, vertex_table
 from geodesic_core.mesh.degeneracies import of_three_vertices
 
 _HEADER = re.compile(
@@ -52,8 +47,8 @@ _CORNER_NAMES = (b"vertex_indices", b"vertex_index")
 _AXES = (b"x", b"y", b"z")
 _POLYGONS = ("face", "tristrips")
 """Elements that make the surface"""
-_Found = dict[str, tuple[NDArray[Any], Longs]]
-"""By element: (V, 3) positions of vertices, or the corners of polygons; and the size of each"""
+_Values = dict[int, tuple[NDArray[Any], Longs]]
+"""Properties of an element by number: the values of all records, and how many each of these has"""
 
 
 class _Property(NamedTuple):
@@ -68,20 +63,15 @@ class _Element(NamedTuple):
     size: int
     properties: list[_Property]
 
-    @property
-    def has_lists(self) -> bool:
-        return any(part.count_type for part in self.properties)
-
     def wanted(self) -> list[int]:
         """Return which properties are read: the axes of vertices, the corners of polygons.
 
-        Raises
-        ------
-        InvalidMesh
-            Polygons have no list of corners.
+        Refuse vertices without x, y and z, and polygons without corners.
         """
         if self.name == "vertex":
             names = [part.name if not part.count_type else b"" for part in self.properties]
+            if [names.count(axis) for axis in _AXES] != [1, 1, 1]:
+                raise InvalidMesh("the PLY vertices must have x, y and z once each")
             return [names.index(axis) for axis in _AXES]
         if self.name not in _POLYGONS:
             return []
@@ -100,15 +90,7 @@ class _Element(NamedTuple):
 
 
 def read_ply(data: bytes, max_faces: int | None) -> FileContents:
-    """Read a PLY file.
-
-    Raises
-    ------
-    InvalidMesh
-        The bytes are damaged, or are no such file.
-    TooManyFaces
-        There are more faces than ``max_faces``.
-    """
+    """Read a PLY file."""
     header = _HEADER.match(data)
     if header is None:
         raise InvalidMesh("the PLY file has no header from 'ply' to 'end_header'")
@@ -118,20 +100,15 @@ def read_ply(data: bytes, max_faces: int | None) -> FileContents:
         raise InvalidMesh("the PLY file holds no vertex elements", kind="face")
     if not any(counts.get(name) for name in _POLYGONS):
         raise InvalidMesh("the PLY file holds no face elements", kind="face")
-    _check_properties(elements)
+    for element in elements:
+        element.wanted()
     body = data[header.end() :]
     least_bytes = {element.name: element.least_bytes(order) for element in elements}
-    check_declared_counts(counts, least_bytes, len(body))
+    check_declared_counts(counts, least_bytes, len(body), slack=0 if order else 1)
     check_face_count(counts.get("face", 0), max_faces)
-    found, rest = _read_binary(elements, body, order) if order else _read_text(elements, body)
-    polygons = [found[name] for name in _POLYGONS if name in found]
-    others = {name: n for name, n in counts.items() if n and name not in ("vertex", *_POLYGONS)}
-    return FileContents(
-        found["vertex"][0],
-        np.concatenate([corners for corners, _ in polygons]),
-        np.concatenate([sizes for _, sizes in polygons]),
-        note_on_ignored("PLY", others | rest),
-    )
+    vertices, corners, sizes, behind = _read_body(elements, body, order)
+    others = {name: n for name, n in counts.items() if name not in ("vertex", *_POLYGONS)}
+    return FileContents(vertices, corners, sizes, others | behind)
 
 
 def _read_header(header: bytes) -> tuple[str, list[_Element]]:
@@ -170,15 +147,35 @@ def _read_header(header: bytes) -> tuple[str, list[_Element]]:
     return order, elements
 
 
-def _check_properties(elements: list[_Element]) -> None:
-    """Refuse vertices without x, y and z, and polygons without corners."""
+def _read_body(
+    elements: list[_Element], body: bytes, order: str
+) -> tuple[Floats, Longs, Longs, dict[str, int]]:
+    """Return the positions, the corners and sizes of polygons, and what lies behind them."""
+    rows = [] if order else [row for row in body.splitlines() if row.strip()]
+    if not order:
+        check_row_count({element.name: element.size for element in elements}, len(rows))
+    vertices = np.empty((0, 3))
+    polygons: dict[str, tuple[Longs, Longs]] = {}
+    at = 0
     for element in elements:
-        if element.name == "vertex":
-            names = [part.name for part in element.properties if not part.count_type]
-            if [names.count(axis) for axis in _AXES] != [1, 1, 1]:
-                raise InvalidMesh("the PLY vertices must have x, y and z once each")
-        elif element.name in _POLYGONS:
-            element.wanted()
+        if order:
+            values, at = _read_binary(element, body, at, order)
+        else:
+            values, at = _read_text(element, rows, at)
+        with np.errstate(invalid="ignore"):  # the mesh refuses what is not finite
+            if element.name == "vertex":
+                axes = [values[i][0].astype(np.float64) for i in element.wanted()]
+                vertices = np.stack(axes, axis=1)
+            elif element.name in _POLYGONS:
+                corners, sizes = values[element.wanted()[0]]
+                polygons[element.name] = _as_polygons(element, corners.astype(np.int64), sizes)
+    if order:
+        behind = {f"bytes {BEHIND}": len(body) - at if body[at:].strip() else 0}
+    else:
+        behind = {f"rows {BEHIND}": len(rows) - at}
+    ordered = [polygons[name] for name in _POLYGONS if name in polygons]
+    corners, sizes = (np.concatenate(parts) for parts in zip(*ordered, strict=True))
+    return vertices, corners, sizes, behind
 
 
 def _as_polygons(element: _Element, corners: Longs, sizes: Longs) -> tuple[Longs, Longs]:
@@ -199,35 +196,36 @@ def _as_polygons(element: _Element, corners: Longs, sizes: Longs) -> tuple[Longs
     return rows.reshape(-1), np.full(len(rows), 3)
 
 
-def _read_text(elements: list[_Element], body: bytes) -> tuple[_Found, dict[str, int]]:
-    """Return what the rows hold, and how many follow behind the last element."""
-    rows = [row for row in body.splitlines() if row.strip()]
-    check_row_count({element.name: element.size for element in elements}, len(rows))
-    found: _Found = {}
-    start = 0
-    for element in elements:
-        block = rows[start : start + element.size]
-        start += element.size
-        if element.name == "vertex":
-            found["vertex"] = _read_text_positions(element, block), np.empty(0, np.int64)
-        elif element.name in _POLYGONS:
-            (at,) = element.wanted()
-            if any(part.count_type for part in element.properties[:at]):
-                block = [b" ".join(words[at:]) for words in _words_by_property(element, block)]
-                at = 0
-            flat, sizes = index_rows(counted_polygons(block, skipped=at))
-            found[element.name] = _as_polygons(element, flat, sizes)
-    return found, {f"rows {BEHIND}": len(rows) - start}
+def _read_text(element: _Element, rows: list[bytes], start: int) -> tuple[_Values, int]:
+    """Return the properties of an element that are wanted, and which row follows it."""
+    end = start + element.size
+    block = rows[start:end]
+    parts = element.properties
+    if element.name == "vertex":
+        scalar = [i for i, part in enumerate(parts) if not part.count_type]
+        if len(scalar) < len(parts):
+            by_property = _words_by_property(element, block)
+            block = [b" ".join(words[i] for i in scalar) for words in by_property]
+        table = vertex_table(block, len(scalar)).T
+        ones = np.ones(element.size, np.int64)
+        with np.errstate(over="ignore", invalid="ignore"):  # the mesh refuses what is not finite
+            columns = {
+                i: (column.astype(parts[i].type), ones)
+                for i, column in zip(scalar, table, strict=True)
+            }
+        return columns, end
+    if element.name in _POLYGONS:
+        (at,) = element.wanted()
+        skipped = at
+        if any(part.count_type for part in parts[:at]):
+            block = [b" ".join(words[at:]) for words in _words_by_property(element, block)]
+            skipped = 0
+        return {at: counted_polygons(block, skipped)}, end
+    return {}, end
 
 
 def _words_by_property(element: _Element, rows: list[bytes]) -> Iterator[list[bytes]]:
-    """Yield the words of each property of each row: of a list, its count and its items.
-
-    Raises
-    ------
-    InvalidMesh
-        A row is too short, or has no count.
-    """
+    """Yield the words of each property of each row: of a list, its count and its items."""
     for number, row in enumerate(rows):
         words, by_property, at = row.split(), [], 0
         for part in element.properties:
@@ -235,59 +233,16 @@ def _words_by_property(element: _Element, rows: list[bytes]) -> Iterator[list[by
             if part.count_type and at < len(words):
                 end += int(words[at]) if INDEX_ROW.fullmatch(words[at]) else len(words)
             if not at < end <= len(words):
-                raise InvalidMesh(
-                    f"{element.name} {number} reads {excerpt(row)}; it must have "
-                    f"{len(element.properties)} properties, lists with their counts",
-                    kind="face" if element.name in _POLYGONS else "vertex",
-                    elements=[number],
-                )
+                kind = "face" if element.name in _POLYGONS else "vertex"
+                rule = f"it must have {len(element.properties)} properties, lists with their counts"
+                raise bad_row(kind, number, row, rule, element.name)
             by_property.append(b" ".join(words[at:end]))
             at = end
         yield by_property
 
 
-def _read_text_positions(element: _Element, rows: list[bytes]) -> Floats:
-    parts = element.properties
-    if element.has_lists:
-        scalar = [i for i, part in enumerate(parts) if not part.count_type]
-        by_property = _words_by_property(element, rows)
-        rows = [b" ".join(words[i] for i in scalar) for words in by_property]
-        parts = [parts[i] for i in scalar]
-    check_rows(rows, VERTEX_ROW, "vertex", f"it must have {len(parts)} numbers")
-    check_columns(rows, len(parts))
-    table = number_table(rows, len(parts)).T
-    with np.errstate(over="ignore", invalid="ignore"):  # the mesh refuses what is not finite
-        by_name = {
-            part.name: column.astype(part.type) for part, column in zip(parts, table, strict=True)
-        }
-    return np.stack([by_name[axis] for axis in _AXES], axis=1).astype(np.float64)
-
-
-def _read_binary(
-    elements: list[_Element], body: bytes, order: str
-) -> tuple[_Found, dict[str, int]]:
-    """Return what the records hold, and how many bytes follow behind the last element."""
-    found: _Found = {}
-    at = 0
-    for element in elements:
-        values, at = _values_of(element, body, at, order)
-        with np.errstate(invalid="ignore"):  # the mesh refuses what is not finite
-            if element.name == "vertex":
-                axes = [values[i][0].astype(np.float64) for i in element.wanted()]
-                found["vertex"] = np.stack(axes, axis=1), np.empty(0, np.int64)
-            elif element.name in _POLYGONS:
-                corners, sizes = values[element.wanted()[0]]
-                found[element.name] = _as_polygons(element, corners.astype(np.int64), sizes)
-    return found, {f"bytes {BEHIND}": len(body) - at if body[at:].strip() else 0}
-
-
-def _values_of(
-    element: _Element, body: bytes, start: int, order: str
-) -> tuple[dict[int, tuple[NDArray[Any], Longs]], int]:
-    """Return the properties of an element that are wanted, and where the next one begins.
-
-    Each by its number: its values, one record after the other, and how many each record has.
-    """
+def _read_binary(element: _Element, body: bytes, start: int, order: str) -> tuple[_Values, int]:
+    """Return the properties of an element that are wanted, and at which byte the next begins."""
     table = _uniform_records(element, body, start, order)
     if table is None:
         return _walk_lists(element, body, start, order)
@@ -321,10 +276,8 @@ def _uniform_records(element: _Element, body: bytes, start: int, order: str) -> 
     return table if all((count == count[:1]).all() for count in counts) else None
 
 
-def _walk_lists(
-    element: _Element, body: bytes, at: int, order: str
-) -> tuple[dict[int, tuple[NDArray[Any], Longs]], int]:
-    """Return what `_values_of` does, of records of any lengths."""
+def _walk_lists(element: _Element, body: bytes, at: int, order: str) -> tuple[_Values, int]:
+    """Return what `_read_binary` does, of records of any lengths."""
     counters = [struct.Struct(order + part.count_type) for part in element.properties]
     widths = [np.dtype(part.type).itemsize for part in element.properties]
     chunks: dict[int, list[bytes]] = {i: [] for i in element.wanted()}

@@ -6,9 +6,9 @@ import numpy as np
 
 from geodesic_core.arrays import Floats
 from geodesic_core.errors import InvalidMesh
-from geodesic_core.io.contents import FileContents, note_on_ignored
+from geodesic_core.io.contents import FileContents
 from geodesic_core.io.limits import check_face_count
-from geodesic_core.io.text import VERTEX_ROW, VERTEX_RULE, check_rows, number_table
+from geodesic_core.io.text import vertex_table
 
 _HEADER = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -28,17 +28,11 @@ def read_stl(data: bytes, max_faces: int | None) -> FileContents:
 
     Bytes behind the triangles that a binary file declares are left out, with a note. Where it
     declares none, or the largest number there is, all are read that it holds.
-
-    Raises
-    ------
-    InvalidMesh
-        The bytes are damaged, or are no such file.
-    TooManyFaces
-        There are more faces than ``max_faces``.
     """
     declared = int.from_bytes(data[_HEADER - 4 : _HEADER], "little")
     whole, behind = divmod(len(data) - _HEADER, _TRIANGLE.itemsize)
     triangles = declared
+    left_out: dict[str, int] = {}
     notes: tuple[str, ...] = ()
     if declared in _UNCOUNTED and whole > 0 and not behind:
         triangles = whole
@@ -50,8 +44,7 @@ def read_stl(data: bytes, max_faces: int | None) -> FileContents:
         check_face_count(triangles, max_faces)
         vertices = _read_binary(data, triangles)
         behind = len(data) - _HEADER - triangles * _TRIANGLE.itemsize
-        ignored = {"bytes behind its last triangle": behind} if behind else {}
-        notes += note_on_ignored("STL", ignored)
+        left_out = {"bytes behind its last triangle": behind}
     else:
         data = data.replace(b"\r", b"\n")
         triangles = sum(1 for _ in _FACET.finditer(data))
@@ -63,7 +56,8 @@ def read_stl(data: bytes, max_faces: int | None) -> FileContents:
             )
         check_face_count(triangles, max_faces)
         vertices = _read_ascii(data)
-    return FileContents(vertices, np.arange(len(vertices)), np.full(triangles, 3), notes)
+    faces = np.arange(len(vertices)).reshape(-1, 3)
+    return FileContents.of_triangles(vertices, faces, left_out, notes)
 
 
 def _read_binary(data: bytes, triangles: int) -> Floats:
@@ -87,6 +81,4 @@ def _read_ascii(data: bytes) -> Floats:
             kind="face",
             elements=[facet],
         )
-    corners = _VERTEX.findall(data)
-    check_rows(corners, VERTEX_ROW, "vertex", VERTEX_RULE)
-    return number_table(corners, 3)
+    return vertex_table(_VERTEX.findall(data))

@@ -13,7 +13,9 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-_PIXEL, _STRIP = 8, 6
+_Longs = NDArray[np.int64]
+
+_PIXEL = 8
 _POLYGONS = (5, 7, 9)
 """VTK's numbers of triangles, polygons and quadrangles, whose points go around them."""
 _BEZIER = (76, 77)
@@ -26,28 +28,18 @@ _GRAVE = re.compile("Error reading|coordinates read")
 """What warnings say where VTK (9.7) goes on with memory that it has not filled"""
 _PLACE = re.compile(r"^.*, line \d+\s|\w+ \(0x\w+\):?|for file:.*$", re.DOTALL)
 """What VTK's messages tell beside: the line of its source, the object, and a file without a name"""
+_DATA_SETS = ("PolyData", "UnstructuredGrid", "StructuredGrid", "RectilinearGrid", "ImageData")
+"""Types of XML files that have no other files"""
 _XML_END = re.compile(rb"</VTKFile\s*>")
 
 
-def polygons_of(
-    data: Any,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64], dict[str, int]]:
+def polygons_of(data: Any) -> tuple[NDArray[np.float64], _Longs, _Longs, dict[str, int]]:
     """Return points, corners and sizes of a data set's polygons, and the number of other cells.
 
-    Points keep their numbers, and polygons the order of the cells. Strips become triangles. Cells
-    of higher order are split through their nodes as VTK does. The blocks of a composite data set
+    The arrays are as those of `FileContents`; the number is by the name of the cells' type. Points
+    keep their numbers, and polygons the order of the cells. Strips become triangles. Cells of
+    higher order are split through their nodes as VTK does. The blocks of a composite data set
     follow each other.
-
-    Returns
-    -------
-    points
-        (V, 3) float64.
-    corners
-        (C,) points of all polygons, one polygon after the other.
-    sizes
-        (P,) number of corners of each polygon.
-    left_out
-        Number of cells that are no polygons, by the name of their type.
 
     Raises
     ------
@@ -58,9 +50,9 @@ def polygons_of(
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkCommonDataModel import vtkGenericCell
 
+    none = np.empty(0, np.int64)
     grid = _as_unstructured(data)
     if grid.GetNumberOfCells() == 0:
-        none = np.empty(0, np.int64)
         return np.empty((0, 3)), none, none, {}
     points = vtk_to_numpy(grid.GetPoints().GetData()).astype(np.float64)
     cells = grid.GetCells()
@@ -69,34 +61,35 @@ def polygons_of(
     types = vtk_to_numpy(_types_of(grid))
     _check_points(starts, corners, len(points))
     shown = _shown_cells(grid, starts, corners)
-    pieces: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]] = []
+    pieces = [(none, none, none)]  # by type: the cell of each polygon, its first corner, its size
     left_out: dict[str, int] = {}
-    for kind in np.unique(types).tolist():
+    for kind in np.unique(types[shown]).tolist():
         chosen = np.flatnonzero((types == kind) & shown)
-        if len(chosen) == 0:
-            continue
+        first, sizes = starts[chosen], starts[chosen + 1] - starts[chosen]
+        cell = vtkGenericCell.InstantiateCell(kind)
         if kind in _BEZIER:
             raise ValueError(
                 "it has Bézier cells, whose points do not lie on the surface: triangulate it first"
             )
-        cell = vtkGenericCell.InstantiateCell(kind)
         if cell is None or cell.GetCellDimension() != 2:
             name = f"cells of type {kind}" if cell is None else _in_words(cell.GetClassName())
             left_out[name] = left_out.get(name, 0) + len(chosen)
-        elif kind in _POLYGONS:
-            sizes = starts[chosen + 1] - starts[chosen]
-            pieces.append((chosen, sizes, _rows(starts[chosen], sizes, corners)))
-        elif kind == _PIXEL:
-            sizes = starts[chosen + 1] - starts[chosen]
+            continue
+        if kind == _PIXEL:
             _check_sizes(chosen, sizes, cell.GetNumberOfPoints())
-            rows = corners[starts[chosen][:, None] + [0, 1, 3, 2]]
-            pieces.append((chosen, sizes, rows.ravel()))
-        else:
-            pieces.append(_split(grid, chosen, starts, corners, is_strip=kind == _STRIP))
+            last = first[:, None] + [2, 3]
+            corners[last] = corners[last[:, ::-1]]  # now they go around it
+        elif kind not in _POLYGONS:
+            chosen, triangles = _split(grid, chosen, starts, corners)
+            first, sizes = len(corners) + 3 * np.arange(len(chosen)), np.full(len(chosen), 3)
+            corners = np.concatenate([corners, triangles.ravel()])
+        pieces.append((chosen, first, sizes))
     hidden = len(shown) - int(np.count_nonzero(shown))
     if hidden:
         left_out["hidden cells"] = hidden
-    return points, *_in_order(pieces), left_out
+    cell_of, first, sizes = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+    order = np.argsort(cell_of, kind="stable")
+    return points, _rows(first[order], sizes[order], corners), sizes[order], left_out
 
 
 def _as_unstructured(data: Any) -> Any:
@@ -132,7 +125,7 @@ def _types_of(grid: Any) -> Any:
         return grid.GetCellTypesArray()
 
 
-def _check_points(starts: NDArray[np.int64], corners: NDArray[np.int64], count: int) -> None:
+def _check_points(starts: _Longs, corners: _Longs, count: int) -> None:
     """Refuse points that do not exist: VTK would read beyond its arrays."""
     bad = np.flatnonzero((corners < 0) | (corners >= count))
     if len(bad):
@@ -142,7 +135,7 @@ def _check_points(starts: NDArray[np.int64], corners: NDArray[np.int64], count: 
         )
 
 
-def _check_sizes(cells: NDArray[np.int64], sizes: NDArray[np.int64], least: int) -> None:
+def _check_sizes(cells: _Longs, sizes: _Longs, least: int) -> None:
     """Refuse cells with fewer points than their type has."""
     short = np.flatnonzero(sizes < least)
     if len(short):
@@ -151,9 +144,7 @@ def _check_sizes(cells: NDArray[np.int64], sizes: NDArray[np.int64], least: int)
         )
 
 
-def _shown_cells(
-    grid: Any, starts: NDArray[np.int64], corners: NDArray[np.int64]
-) -> NDArray[np.bool_]:
+def _shown_cells(grid: Any, starts: _Longs, corners: _Longs) -> NDArray[np.bool_]:
     """Tell which cells are neither blanked nor repeat one of another piece."""
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
@@ -169,52 +160,26 @@ def _shown_cells(
     return shown
 
 
-def _split(
-    grid: Any,
-    chosen: NDArray[np.int64],
-    starts: NDArray[np.int64],
-    corners: NDArray[np.int64],
-    *,
-    is_strip: bool,
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
-    """Return the triangles of cells: the cell of each, their sizes and corners."""
+def _split(grid: Any, chosen: _Longs, starts: _Longs, corners: _Longs) -> tuple[_Longs, _Longs]:
+    """Return the triangles of cells, as VTK splits them: the cell of each, and its corners."""
     from vtkmodules.vtkCommonCore import vtkIdList
 
     ids, rows, cells = vtkIdList(), [], []
     for cell in chosen.tolist():
         own = corners[starts[cell] : starts[cell + 1]]
-        if is_strip:
-            i = np.arange(len(own) - 2)
-            local = np.stack([i + i % 2, i + 1 - i % 2, i + 2], axis=1)
-        else:
-            grid.GetCell(cell).TriangulateLocalIds(0, ids)
-            local = np.array([ids.GetId(i) for i in range(ids.GetNumberOfIds())], np.int64)
-            local = local.reshape(-1, 3)
-            _check_sizes(np.array([cell]), np.array([len(own)]), int(local.max(initial=-1)) + 1)
-        rows.append(own[local])
-        cells += [cell] * len(local)
-    triangles = np.concatenate(rows)
-    return np.array(cells, np.int64), np.full(len(triangles), 3), triangles.ravel()
+        grid.GetCell(cell).TriangulateLocalIds(0, ids)
+        local = np.array([ids.GetId(i) for i in range(ids.GetNumberOfIds())], np.int64)
+        _check_sizes(np.array([cell]), np.array([len(own)]), int(local.max(initial=-1)) + 1)
+        rows.append(own[local].reshape(-1, 3))
+        cells += [cell] * len(rows[-1])
+    return np.array(cells, np.int64), np.concatenate(rows)
 
 
-def _rows(
-    starts: NDArray[np.int64], sizes: NDArray[np.int64], corners: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _rows(starts: _Longs, sizes: _Longs, corners: _Longs) -> _Longs:
     """Return the corners of rows of these sizes, which begin at these places."""
     ends = np.cumsum(sizes)
-    places: NDArray[np.int64] = np.arange(sizes.sum()) + np.repeat(starts - ends + sizes, sizes)
+    places: _Longs = np.arange(sizes.sum()) + np.repeat(starts - ends + sizes, sizes)
     return corners[places]
-
-
-def _in_order(
-    pieces: list[tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]],
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the corners and sizes of polygons of several types, in the order of their cells."""
-    if not pieces:
-        return np.empty(0, np.int64), np.empty(0, np.int64)
-    cells, sizes, corners = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-    order = np.argsort(cells, kind="stable")
-    return _rows((np.cumsum(sizes) - sizes)[order], sizes[order], corners), sizes[order]
 
 
 def _in_words(class_name: str) -> str:
@@ -225,10 +190,7 @@ def _in_words(class_name: str) -> str:
 def read_file(content: bytes) -> Any:
     """Return the data set in a file: a legacy one, or XML of any type that has no other files.
 
-    Raises
-    ------
-    ValueError
-        VTK reports an error.
+    Raise ValueError where VTK reports an error.
     """
     from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
@@ -237,7 +199,8 @@ def read_file(content: bytes) -> Any:
     reader = _reader_of(content)
     errors: list[str] = []
 
-    def note_error(_window: Any, event: str, text: str) -> None:
+    def note_error(_window: Any, event: str, text: str | None) -> None:
+        text = text or "its text is damaged"  # VTK hands on none that is no UTF-8
         if event == "ErrorEvent" or _GRAVE.search(text):
             errors.append(" ".join(_PLACE.sub("", text).split()))
 
@@ -255,18 +218,12 @@ def read_file(content: bytes) -> Any:
     data = reader.GetOutputDataObject(0)
     if errors or data is None:
         raise ValueError(errors[0] if errors else "VTK reads nothing from it")
-    _check_axes(data)
+    if data.IsA("vtkRectilinearGrid"):
+        axes = (data.GetXCoordinates(), data.GetYCoordinates(), data.GetZCoordinates())
+        counts, sides = [axis.GetNumberOfTuples() for axis in axes], list(data.GetDimensions())
+        if counts != sides:
+            raise ValueError(f"it has {counts} coordinates, but {sides} points")
     return data
-
-
-def _check_axes(data: Any) -> None:
-    """Refuse a rectilinear grid without a coordinate for each point of its axes."""
-    if not data.IsA("vtkRectilinearGrid"):
-        return
-    axes = (data.GetXCoordinates(), data.GetYCoordinates(), data.GetZCoordinates())
-    counts = [axis.GetNumberOfTuples() for axis in axes]
-    if counts != list(data.GetDimensions()):
-        raise ValueError(f"it has {counts} coordinates, but {list(data.GetDimensions())} points")
 
 
 def _reader_of(content: bytes) -> Any:
@@ -290,9 +247,6 @@ def _reader_of(content: bytes) -> Any:
     xml_reader.ReadFromInputStringOn()
     xml_reader.SetInputString(content)
     return xml_reader
-
-
-_DATA_SETS = ("PolyData", "UnstructuredGrid", "StructuredGrid", "RectilinearGrid", "ImageData")
 
 
 def _answer(content: bytes, out: BinaryIO) -> None:
@@ -330,7 +284,7 @@ def _check_filled(points: NDArray[np.float64]) -> None:
 
 
 def _limit(seconds: int, memory: int) -> None:
-    """End this process where it takes more processor time, or memory."""
+    """End this process where it takes more processor time, should no one else, or memory."""
     try:
         import resource
     except ImportError:  # Windows

@@ -16,6 +16,7 @@ from vtkmodules.vtkCommonDataModel import vtkPolyData
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidArgument, InvalidMesh
+from geodesic_core.io.as_mesh import MeshLike
 from tests.support.fresh import told_by
 
 BALL = gc.samples.sphere(320)
@@ -281,3 +282,68 @@ def test_what_is_no_point_is_refused(points: Any) -> None:
     ):
         with pytest.raises(InvalidArgument, match="it must be a point, or a sequence of points"):
             ask()
+
+
+class PyMeshLabMesh:
+    """A mesh with the methods of PyMeshLab's."""
+
+    def vertex_matrix(self) -> np.ndarray:
+        return V
+
+    def face_matrix(self) -> np.ndarray:
+        return F
+
+
+class CompasMesh:
+    """A mesh with the method of COMPAS's."""
+
+    def to_vertices_and_faces(self) -> tuple[list[list[float]], list[list[int]]]:
+        return V.tolist(), F.tolist()
+
+
+class TensorMesh:
+    """A mesh with the maps of Open3D's meshes of tensors."""
+
+    vertex = imitation(positions=V)
+    triangle = imitation(indices=F)
+
+
+class NilearnMesh:
+    """A mesh with the arrays of nilearn's."""
+
+    coordinates = V
+    faces = F
+
+
+def test_type_checkers_know_the_meshes_of_other_libraries() -> None:
+    meshes: list[MeshLike] = [
+        trimesh.Scene([trimesh.Trimesh(V, F, process=False)]),
+        PyMeshLabMesh(),
+        CompasMesh(),
+        TensorMesh(),
+        Open3DMesh(),
+        NilearnMesh(),
+        plain_vtk(),
+        gifti_image(),
+    ]
+    for mesh in meshes:
+        np.testing.assert_array_equal(gc.as_mesh(mesh).faces, F)
+
+
+class SourceSpaces(list[Any]):
+    """The two hemispheres of MNE's class, each a dictionary."""
+
+
+def test_lists_of_meshes_say_that_one_is_to_be_given() -> None:
+    hemisphere = {"rr": V, "tris": F, "nn": V}
+    part = trimesh.Trimesh(V, F, process=False)
+    for several, name in (
+        (SourceSpaces([hemisphere, hemisphere]), "SourceSpaces holds 2 meshes"),
+        (SourceSpaces([hemisphere]), "SourceSpaces holds 1 meshes"),
+        ([BALL, BALL, BALL], "list holds 3 meshes"),
+        ((part, part), "tuple holds 2 meshes"),
+        ([PolyData.from_regular_faces(V, F)] * 2, "list holds 2 meshes"),
+    ):
+        with pytest.raises(InvalidMesh, match=rf"{name}: give one of them, as meshes\[0\]"):
+            gc.as_mesh(several)
+        assert len(gc.as_mesh(several[0]).faces) == len(F)

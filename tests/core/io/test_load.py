@@ -874,3 +874,21 @@ def mesh_parts(faces: list[list[int]]) -> list[set[int]]:
             new = set().union(*(near.pop(v) for v in new)) - part
         parts.append(part)
     return parts
+
+
+@pytest.mark.parametrize(
+    ("rows", "held"),
+    [
+        (b"l 1 2 3\nl 3 1\np 1\n", "2 lines, 1 points"),
+        (b"p 1 2\n", "1 points"),
+        (b"curv 0 1 1 2\n", "1 curves"),
+    ],
+)
+def test_obj_without_faces_is_refused_with_what_it_holds(rows: bytes, held: str) -> None:
+    error = refusal(obj(VERTICES[:3], FACES[:0]) + rows, "obj")
+    assert str(error) == f"the OBJ file holds no faces, only {held}"
+    assert error.kind == "face"
+
+
+def test_obj_of_vertices_alone_is_refused() -> None:
+    assert str(refusal(obj(VERTICES[:3], FACES[:0]), "obj")) == "the OBJ file holds no faces"

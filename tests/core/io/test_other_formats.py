@@ -104,7 +104,8 @@ def test_counts_beyond_the_content_are_named(tmp_path: Path) -> None:
     begin = content.index(b"\n\n") + 2
     content[begin : begin + 4] = (2**31 - 1).to_bytes(4, "big")
     path.write_bytes(content)
-    with pytest.raises(gc.errors.InvalidMesh, match=r"declares 2147483647 vertices .* holds 5784"):
+    message = r"declares 2147483647 vertex elements .* 5784 bytes follow"
+    with pytest.raises(gc.errors.InvalidMesh, match=message):
         gc.load_mesh(path)
 
 
@@ -175,7 +176,7 @@ def test_freesurfer_s_surfaces_of_every_kind(
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        (SURFACES["old quadrangles"][:-3], "declares 4 vertices and 1 faces, which take 36"),
+        (SURFACES["old quadrangles"][:-3], "take at least 36 bytes, but 33 bytes follow"),
         (SURFACES["new quadrangles"][:7], "ends before its counts"),
         (SURFACES["triangles"][:16], "ends before its counts"),
         (TEXT[:-9], "declares 4 vertex elements and 2 face elements, but 5 rows"),
@@ -238,7 +239,7 @@ def test_obj_comments_stay_comments(comment: str) -> None:
             "'9223372036854775807' dim",
         ),
         (b'Dim0="162"', b'Dim0="-162"', "has '-162' rows"),
-        (b'Dim0="162"', b'Dim0="1000000"', "1000000 rows, but 1000 faces have at most 3000 vert"),
+        (b'Dim0="162"', b'Dim0="1000000"', "1000000 vertices, but 1000 faces have at most 3000"),
         (b'Dim0="320"', b'Dim0="1001"', "1001 faces; at most 1000"),
         (b"</GIFTI>", b"", "is no whole XML document: no element found"),
         (b"GIFTI", b"NIFTI", "begins with the element 'NIFTI'"),

@@ -4,6 +4,7 @@ Most are read in this process, as `load_mesh` has them read in one of its own.
 """
 
 import re
+import time
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -17,6 +18,7 @@ from vtkmodules.vtkIOLegacy import vtkDataSetWriter
 
 import geodesic_core as gc
 from geodesic_core.errors import InvalidMesh, TooManyFaces
+from geodesic_core.io import vtk
 from geodesic_core.io.vtk_polygons import polygons_of, read_file
 from tests.support.mutations import BYTES, TEXT, mutated
 
@@ -418,6 +420,27 @@ def test_cells_are_named_in_words() -> None:
     with pytest.raises(InvalidMesh) as refusal:
         gc.as_mesh(data)
     assert re.search(r"1 vertex cells, 1 poly line cells", str(refusal.value))
+
+
+@pytest.mark.parametrize("hostile", ["while True: pass", "import time; time.sleep(60)"])
+def test_the_time_of_a_read_is_limited_by_the_clock(
+    hostile: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = tmp_path / "hostile.py"
+    program.write_text(hostile)
+    monkeypatch.setattr(vtk.vtk_polygons, "__file__", str(program))
+    assert vtk._SECONDS < 10
+    monkeypatch.setattr(vtk, "_SECONDS", 1)
+    begin = time.monotonic()
+    with pytest.raises(InvalidMesh, match=r"VTK cannot read the file in 1 s .* it takes longer"):
+        gc.load_mesh(b"# vtk DataFile Version 3.0\n", "vtk")
+    assert time.monotonic() - begin < 10
+
+
+def test_an_error_that_is_no_text_counts() -> None:
+    head = b"# vtk DataFile Version 3.0\nby hand\n\xb5\xffASCII\nDATASET POLYDATA\n"
+    with pytest.raises(ValueError, match="its text is damaged"):
+        read_file(head + b"POINTS 3 float\n0 0 0 1 0 0 0 1 0\nPOLYGONS 1 4\n3 0 1 2\n")
 
 
 def mutant(number: int, path: Path) -> bytes:
