@@ -14,7 +14,7 @@ from geodesic_core.io.contents import FileContents
 from geodesic_core.io.limits import check_face_count
 
 _SECONDS, _BYTES_A_SECOND = 9, 1_000_000
-"""Time by the clock that VTK may take: in any case, and for how many bytes a second more"""
+"""Time by the clock, from when its process has started: in any case, and bytes of a second more"""
 _MEMORY, _MEMORY_OF_BYTE = 2 << 30, 200
 """Memory that VTK may take: in any case, of which its libraries take half, and for each byte"""
 
@@ -30,17 +30,20 @@ def read_vtk(data: bytes, max_faces: int | None) -> FileContents:
     memory = _MEMORY + _MEMORY_OF_BYTE * len(data)
     command = [sys.executable, "-P", vtk_polygons.__file__, str(seconds), str(memory)]
     refusal = f"VTK cannot read the file in {seconds} s and {memory >> 20} MiB"
-    try:
-        done = subprocess.run(  # noqa: S603
-            command, input=data, capture_output=True, check=False, timeout=seconds
-        )
-    except subprocess.TimeoutExpired:
-        raise InvalidMesh(f"{refusal}: it takes longer") from None
-    if done.returncode:
-        said = done.stderr.decode("utf-8", "replace").strip().splitlines()
-        reason = said[-1][:200] if said and done.returncode > 0 else "it crashed"
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) as process:  # noqa: S603
+        if process.stdout is not None:
+            process.stdout.readline()  # `READY`, or it has ended
+        try:
+            answered, complaint = process.communicate(data, seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            raise InvalidMesh(f"{refusal}: it takes longer") from None
+    if process.returncode:
+        said = complaint.decode("utf-8", "replace").strip().splitlines()
+        reason = said[-1][:200] if said and process.returncode > 0 else "it crashed"
         raise InvalidMesh(f"{refusal}: {reason}")
-    stream = io.BytesIO(done.stdout)
+    stream = io.BytesIO(answered)
     answer = json.loads(stream.readline())
     if "error" in answer:
         raise InvalidMesh(f"the VTK file cannot be read: {answer['error']}")

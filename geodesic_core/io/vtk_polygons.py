@@ -5,6 +5,7 @@ of its own, which imports nothing else of the library and starts in half a secon
 """
 
 import ctypes
+import importlib
 import json
 import re
 import sys
@@ -12,6 +13,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
+
+READY = "ready"
+"""Line that the program writes before it reads the file. Its start may take long."""
 
 _Longs = NDArray[np.int64]
 
@@ -298,4 +302,7 @@ def _limit(seconds: int, memory: int) -> None:
 if __name__ == "__main__":
     _mark_memory()
     _limit(*map(int, sys.argv[1:]))
+    for name in ("FiltersCore", "IOLegacy", "IOXML"):
+        importlib.import_module(f"vtkmodules.vtk{name}")
+    print(READY, flush=True)  # noqa: T201
     _answer(sys.stdin.buffer.read(), sys.stdout.buffer)

@@ -4,7 +4,6 @@ Most are read in this process, as `load_mesh` has them read in one of its own.
 """
 
 import re
-import time
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -422,19 +421,17 @@ def test_cells_are_named_in_words() -> None:
     assert re.search(r"1 vertex cells, 1 poly line cells", str(refusal.value))
 
 
-@pytest.mark.parametrize("hostile", ["while True: pass", "import time; time.sleep(60)"])
+@pytest.mark.parametrize("hostile", ["while True: pass", "import time; time.sleep(600)"])
 def test_the_time_of_a_read_is_limited_by_the_clock(
     hostile: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program = tmp_path / "hostile.py"
-    program.write_text(hostile)
+    program.write_text(f"print('ready', flush=True)\n{hostile}")
     monkeypatch.setattr(vtk.vtk_polygons, "__file__", str(program))
     assert vtk._SECONDS < 10
     monkeypatch.setattr(vtk, "_SECONDS", 1)
-    begin = time.monotonic()
     with pytest.raises(InvalidMesh, match=r"VTK cannot read the file in 1 s .* it takes longer"):
         gc.load_mesh(b"# vtk DataFile Version 3.0\n", "vtk")
-    assert time.monotonic() - begin < 10
 
 
 def test_an_error_that_is_no_text_counts() -> None:
