@@ -26,8 +26,8 @@ from geodesic_core.fields.sources import (
     each_of,
 )
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.kernels.front.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.kernels.jit.cache import sources_digest
-from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.curve import Polyline
 from geodesic_core.mesh.surface_point import Point, Points, Source, Sources, SurfacePoint

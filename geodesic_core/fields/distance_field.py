@@ -37,9 +37,9 @@ from geodesic_core.fields.point_query import (
 )
 from geodesic_core.fields.repeatable_sweep import Lazy, RepeatableSweep, SweepResult, SweepStats
 from geodesic_core.fields.sources import Nodes, component_of, disconnected
+from geodesic_core.kernels.front.bounds import exact_bounds, merging_bounds, with_parallel_windows
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
 from geodesic_core.mesh.curve import (
     Polyline,
     polylines_from_arrays,

@@ -11,11 +11,11 @@ from geodesic_core.fields.path import ErrorBound
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep, SweepResult, SweepStats
 from geodesic_core.kernels.fast import emission, state, sweep
 from geodesic_core.kernels.fast.state import FastBounds, Wavefront
+from geodesic_core.kernels.front.state import MERGE, MERGE_INTS
 from geodesic_core.kernels.mesh.half_edges import LENGTH
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources
-from geodesic_core.kernels.sweep.state import MERGE, MERGE_INTS
 from geodesic_core.tolerances import MOST_CROSSINGS
 
 ESTIMATES = {1: 0.03, 2: 0.01, 4: 0.005, 8: 0.002}

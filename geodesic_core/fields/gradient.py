@@ -5,9 +5,9 @@ import numpy as np
 from geodesic_core.arrays import Flags, Floats
 from geodesic_core.fields.path import located_path
 from geodesic_core.fields.sources import Nodes
+from geodesic_core.kernels.front.state import ENTRY_EDGE, NODE, PREDECESSOR
 from geodesic_core.kernels.mesh.half_edges import APEX, COS_LEFT, HEAD, LENGTH_LEFT, SIN_LEFT, TAIL
 from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep.state import ENTRY_EDGE, NODE, PREDECESSOR
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import ROUNDED_POSITION, SAME_PLACE
 

@@ -11,7 +11,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import BlockedSource, InvalidArgument, InvalidPoint, NoPath
-from geodesic_core.kernels.sweep.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
+from geodesic_core.kernels.front.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.canonical import half_edges_around, remedy
 from geodesic_core.mesh.curve import (

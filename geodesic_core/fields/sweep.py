@@ -10,12 +10,13 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import SLICE_SECONDS, Control
 from geodesic_core.errors import InternalError
 from geodesic_core.fields.sources import Nodes
+from geodesic_core.kernels.front import pruning, state
+from geodesic_core.kernels.front.bounds import Bounds, without_merging
+from geodesic_core.kernels.front.queues import RING_HEAD
+from geodesic_core.kernels.front.state import PREDECESSOR, Wavefront
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep import continuous_dijkstra, pruning, state, surface_points
-from geodesic_core.kernels.sweep.bounds import Bounds, without_merging
-from geodesic_core.kernels.sweep.queues import RING_HEAD
-from geodesic_core.kernels.sweep.state import PREDECESSOR, Wavefront
+from geodesic_core.kernels.sweep import continuous_dijkstra, surface_points
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 _FIRST_BUDGET = 1_000_000

@@ -17,6 +17,12 @@ from geodesic_core.fields.sources import nodes_of
 from geodesic_core.fields.sweep import run_sweep
 from geodesic_core.kernels.fast import state as fast_state
 from geodesic_core.kernels.fast.places import offer
+from geodesic_core.kernels.front import state
+from geodesic_core.kernels.front.bounds import exact_bounds, merging_bounds, with_parallel_windows
+from geodesic_core.kernels.front.pruning import least_to_start
+from geodesic_core.kernels.front.relaxation import precedence
+from geodesic_core.kernels.front.state import FIRST, FRESH, LAST, NO_SITES, SIZE, new_wavefront
+from geodesic_core.kernels.front.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.isolines.arcs import outer_arcs
 from geodesic_core.kernels.isolines.lines import united
 from geodesic_core.kernels.isolines.regions import (
@@ -45,16 +51,11 @@ from geodesic_core.kernels.paths import funnel
 from geodesic_core.kernels.paths.backtracing import Winners, is_on_path
 from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, pull_taut, shortened_part
 from geodesic_core.kernels.planar import Source, bisector, bracketed, distance
-from geodesic_core.kernels.sweep import continuous_dijkstra, state
-from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
+from geodesic_core.kernels.sweep import continuous_dijkstra
 from geodesic_core.kernels.sweep.merging import accuracy, directionality, merged
-from geodesic_core.kernels.sweep.pruning import least_to_start
 from geodesic_core.kernels.sweep.reach import reach_apex
-from geodesic_core.kernels.sweep.relaxation import precedence
-from geodesic_core.kernels.sweep.state import FIRST, FRESH, LAST, NO_SITES, SIZE, new_wavefront
 from geodesic_core.kernels.sweep.trim_list import trim_list
 from geodesic_core.kernels.sweep.trimming import leaves_gap
-from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.sweep.window_lists import put_window
 from geodesic_core.mesh.triangulation import triangulated
 from geodesic_core.search.landmarks import Landmarks

@@ -12,18 +12,8 @@ from functools import cache
 
 import numpy as np
 
-from geodesic_core.kernels.mesh.half_edges import (
-    APEX,
-    COS_LEFT,
-    HEAD,
-    LENGTH,
-    LENGTH_LEFT,
-    OPPOSITE,
-    SIN_LEFT,
-    TAIL,
-)
-from geodesic_core.kernels.sweep.queues import HEAP_SIZE, RING_HEAD, RING_SIZE
-from geodesic_core.kernels.sweep.state import (
+from geodesic_core.kernels.front.queues import HEAP_SIZE, RING_HEAD, RING_SIZE
+from geodesic_core.kernels.front.state import (
     ENTRY_EDGE,
     FAR,
     FIRST,
@@ -39,7 +29,17 @@ from geodesic_core.kernels.sweep.state import (
     SETTLED_VERTICES,
     SIZE,
 )
-from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
+from geodesic_core.kernels.front.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
+from geodesic_core.kernels.mesh.half_edges import (
+    APEX,
+    COS_LEFT,
+    HEAD,
+    LENGTH,
+    LENGTH_LEFT,
+    OPPOSITE,
+    SIN_LEFT,
+    TAIL,
+)
 from tests.support import zoo
 from tests.support.oracles import unfolding
 

@@ -27,9 +27,9 @@ from geodesic_core.kernels.fast.state import (
     PEAK,
     WON,
 )
+from geodesic_core.kernels.front.window import INTS, NEXT, WIDTH, Window, store_window
 from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
 from geodesic_core.kernels.mesh.half_edges import ROW
-from geodesic_core.kernels.sweep.window import INTS, NEXT, WIDTH, Window, store_window
 
 _LAST_BUCKET = 1e18  # far below the largest integer
 

@@ -17,6 +17,16 @@ from geodesic_core.kernels.fast.places import (
     relax,
 )
 from geodesic_core.kernels.fast.state import CROSSED, WON
+from geodesic_core.kernels.front.state import NEXT_SITE, NODE, SITE
+from geodesic_core.kernels.front.window import (
+    INTS,
+    Window,
+    distance_at,
+    emitted_window,
+    load_window,
+    reversed_window,
+    straight_distance,
+)
 from geodesic_core.kernels.jit import as_ints, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -33,16 +43,6 @@ from geodesic_core.kernels.mesh.half_edges import (
 )
 from geodesic_core.kernels.planar import hit_left
 from geodesic_core.kernels.sweep.spread import Side, left_of, right_of
-from geodesic_core.kernels.sweep.state import NEXT_SITE, NODE, SITE
-from geodesic_core.kernels.sweep.window import (
-    INTS,
-    Window,
-    distance_at,
-    emitted_window,
-    load_window,
-    reversed_window,
-    straight_distance,
-)
 from geodesic_core.kernels.sweep.window_lists import faces_beyond
 
 OFFERS = 4

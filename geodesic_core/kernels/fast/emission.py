@@ -5,6 +5,13 @@ from typing import Any
 
 from geodesic_core.kernels.fast.places import offer_over, relax
 from geodesic_core.kernels.fast.state import view_of
+from geodesic_core.kernels.front.state import (
+    FACE,
+    NODE,
+    SEGMENT,
+    SITE,
+)
+from geodesic_core.kernels.front.window import emitted_window
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -33,13 +40,6 @@ from geodesic_core.kernels.sweep.segments import (
     perpendicular_to,
     place_segment,
 )
-from geodesic_core.kernels.sweep.state import (
-    FACE,
-    NODE,
-    SEGMENT,
-    SITE,
-)
-from geodesic_core.kernels.sweep.window import emitted_window
 from geodesic_core.kernels.sweep.window_lists import faces_beyond
 from geodesic_core.tolerances import FLAT, SLANT
 

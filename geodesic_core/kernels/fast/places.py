@@ -5,6 +5,14 @@ from typing import Any
 
 from geodesic_core.kernels.fast.buckets import push
 from geodesic_core.kernels.fast.state import REACHED
+from geodesic_core.kernels.front.relaxation import precedence
+from geodesic_core.kernels.front.state import ENTRY_EDGE, PREDECESSOR, WINNER
+from geodesic_core.kernels.front.window import (
+    Window,
+    distance_at,
+    emitted_window,
+    reversed_window,
+)
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     AROUND,
@@ -16,14 +24,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     ROW,
     SEAM,
     TAIL,
-)
-from geodesic_core.kernels.sweep.relaxation import precedence
-from geodesic_core.kernels.sweep.state import ENTRY_EDGE, PREDECESSOR, WINNER
-from geodesic_core.kernels.sweep.window import (
-    Window,
-    distance_at,
-    emitted_window,
-    reversed_window,
 )
 from geodesic_core.tolerances import FAR_NEARER, MOST_AT_LARGE, TIE
 

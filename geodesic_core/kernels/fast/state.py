@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs, aligned_rows
+from geodesic_core.kernels.front.state import FACE, NEXT_SITE, WINNER, Sites
+from geodesic_core.kernels.front.window import WIDTH
 from geodesic_core.kernels.jit import kernel, pointers
 from geodesic_core.kernels.mesh.half_edges import Topology
-from geodesic_core.kernels.sweep.state import FACE, NEXT_SITE, WINNER, Sites
-from geodesic_core.kernels.sweep.window import WIDTH
 
 # Columns of a row besides those of `window`: one of float64, two of int32
 BUCKET = 5  # in which it is due, counted from distance 0

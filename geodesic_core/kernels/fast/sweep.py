@@ -23,11 +23,11 @@ from geodesic_core.kernels.fast.state import (
     WORK,
     view_of,
 )
+from geodesic_core.kernels.front.state import NODE, PREDECESSOR, SEGMENT, SITE, WINNER
+from geodesic_core.kernels.front.window import INTS, SIGMA, WIDTH
 from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
 from geodesic_core.kernels.mesh.half_edges import APEX, OUT_LEFT, OUT_RIGHT, ROW
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.sweep.state import NODE, PREDECESSOR, SEGMENT, SITE, WINNER
-from geodesic_core.kernels.sweep.window import INTS, SIGMA, WIDTH
 
 
 @kernel

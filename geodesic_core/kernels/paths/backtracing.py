@@ -21,6 +21,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.front.state import (
+    ENTRY_EDGE,
+    FACE,
+    LEFT,
+    LEFT_REFERENCE,
+    MERGE,
+    MERGE_INTS,
+    MERGED_ON,
+    NODE,
+    PREDECESSOR,
+    RIGHT,
+    RIGHT_REFERENCE,
+    SEGMENT,
+    SITE,
+    SPLIT,
+    WINNER,
+)
 from geodesic_core.kernels.jit import inlined, kernel, pointer, pointers
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -45,23 +62,6 @@ from geodesic_core.kernels.mesh.half_edges import (
 )
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.sweep.segments import distance_to_segment
-from geodesic_core.kernels.sweep.state import (
-    ENTRY_EDGE,
-    FACE,
-    LEFT,
-    LEFT_REFERENCE,
-    MERGE,
-    MERGE_INTS,
-    MERGED_ON,
-    NODE,
-    PREDECESSOR,
-    RIGHT,
-    RIGHT_REFERENCE,
-    SEGMENT,
-    SITE,
-    SPLIT,
-    WINNER,
-)
 from geodesic_core.tolerances import FORKS, GAP, ON_PATH, SAME_PLACE, TRIES, WIDEST_ERROR
 
 LAST_AT = 1024

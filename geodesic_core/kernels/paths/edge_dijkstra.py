@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Ints
+from geodesic_core.kernels.front.pruning import touch
+from geodesic_core.kernels.front.queues import HEAP_SIZE, pop_nearest, push_or_raise
+from geodesic_core.kernels.front.state import PREDECESSOR, SETTLED, WINNER, view_of
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import APEX, HEAD, LENGTH, LENGTH_LEFT, OUT_LEFT, ROW
-from geodesic_core.kernels.sweep.pruning import touch
-from geodesic_core.kernels.sweep.queues import HEAP_SIZE, pop_nearest, push_or_raise
-from geodesic_core.kernels.sweep.state import PREDECESSOR, SETTLED, WINNER, view_of
 from geodesic_core.tolerances import ASTAR_WEIGHT
 
 

@@ -6,35 +6,17 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
-from geodesic_core.kernels.jit import inlined, kernel, prefetch
-from geodesic_core.kernels.mesh.half_edges import (
-    APEX,
-    AROUND,
-    HEAD,
-    IRREGULAR,
-    OUT_LEFT,
-    OUT_RIGHT,
-    PINCHED,
-    ROW,
-    SEAM,
-    following,
-    previous,
-)
-from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.propagation import propagate_list
-from geodesic_core.kernels.sweep.pruning import touch
-from geodesic_core.kernels.sweep.pseudosources import emit_pseudosource, is_pseudosource
-from geodesic_core.kernels.sweep.queues import (
+from geodesic_core.kernels.front.bounds import merging
+from geodesic_core.kernels.front.pruning import touch
+from geodesic_core.kernels.front.queues import (
     HEAP_SIZE,
     RING_HEAD,
     RING_SIZE,
     pop_nearest,
     ring_pop,
 )
-from geodesic_core.kernels.sweep.relaxation import bound_vertex, relax_vertex
-from geodesic_core.kernels.sweep.segments import emit_segment
-from geodesic_core.kernels.sweep.state import (
+from geodesic_core.kernels.front.relaxation import bound_vertex, relax_vertex
+from geodesic_core.kernels.front.state import (
     ENTRY_EDGE,
     FAR,
     FRONT,
@@ -52,6 +34,24 @@ from geodesic_core.kernels.sweep.state import (
     WORK,
     view_of,
 )
+from geodesic_core.kernels.jit import inlined, kernel, prefetch
+from geodesic_core.kernels.mesh.half_edges import (
+    APEX,
+    AROUND,
+    HEAD,
+    IRREGULAR,
+    OUT_LEFT,
+    OUT_RIGHT,
+    PINCHED,
+    ROW,
+    SEAM,
+    following,
+    previous,
+)
+from geodesic_core.kernels.outcome import Outcome
+from geodesic_core.kernels.sweep.propagation import propagate_list
+from geodesic_core.kernels.sweep.pseudosources import emit_pseudosource, is_pseudosource
+from geodesic_core.kernels.sweep.segments import emit_segment
 from geodesic_core.kernels.sweep.surface_points import emit_site
 from geodesic_core.kernels.sweep.window_lists import faces_beyond, free_windows, queue_list
 

@@ -29,11 +29,8 @@ A recorded window is in the frame that runs from the lower vertex of the edge to
 
 from typing import Any
 
-from geodesic_core.kernels.jit import as_ints, kernel
-from geodesic_core.kernels.mesh.half_edges import AROUND, HEAD, LENGTH, ROW, TAIL
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.trimming import trim, wins_throughout, without
-from geodesic_core.kernels.sweep.window import (
+from geodesic_core.kernels.front.bounds import merging
+from geodesic_core.kernels.front.window import (
     INTS,
     NEXT,
     REFERENCE,
@@ -48,6 +45,9 @@ from geodesic_core.kernels.sweep.window import (
     reversed_window,
     store_window,
 )
+from geodesic_core.kernels.jit import as_ints, kernel
+from geodesic_core.kernels.mesh.half_edges import AROUND, HEAD, LENGTH, ROW, TAIL
+from geodesic_core.kernels.sweep.trimming import trim, wins_throughout, without
 from geodesic_core.tolerances import GAP, SLACK
 
 DEPTH = XI  # column of a crossing in an exact sweep: how many led to it since the pseudosource

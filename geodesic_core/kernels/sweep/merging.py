@@ -17,8 +17,8 @@ is chosen there.
 import math
 from typing import Any
 
+from geodesic_core.kernels.front.window import Window, distance_at
 from geodesic_core.kernels.jit import inlined
-from geodesic_core.kernels.sweep.window import Window, distance_at
 from geodesic_core.tolerances import GRAZING, LOCAL_SHARE, LOWER_BOUND
 
 

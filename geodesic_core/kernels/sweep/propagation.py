@@ -2,21 +2,8 @@
 
 from typing import Any
 
-from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
-from geodesic_core.kernels.mesh.half_edges import (
-    APEX,
-    COS_LEFT,
-    LENGTH_LEFT,
-    OUT_LEFT,
-    OUT_RIGHT,
-    ROW,
-    SIN_LEFT,
-)
-from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.reach import reach_apex
-from geodesic_core.kernels.sweep.spread import room_to_spread, spread
-from geodesic_core.kernels.sweep.state import (
+from geodesic_core.kernels.front.bounds import merging
+from geodesic_core.kernels.front.state import (
     FREE_SIZE,
     FRESH,
     LIST,
@@ -30,9 +17,22 @@ from geodesic_core.kernels.sweep.state import (
     SIZE,
     WORK,
 )
+from geodesic_core.kernels.front.window import INTS, NEXT, WIDTH
+from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
+from geodesic_core.kernels.mesh.half_edges import (
+    APEX,
+    COS_LEFT,
+    LENGTH_LEFT,
+    OUT_LEFT,
+    OUT_RIGHT,
+    ROW,
+    SIN_LEFT,
+)
+from geodesic_core.kernels.outcome import Outcome
+from geodesic_core.kernels.sweep.reach import reach_apex
+from geodesic_core.kernels.sweep.spread import room_to_spread, spread
 from geodesic_core.kernels.sweep.surface_points import reach_sites
 from geodesic_core.kernels.sweep.trim_list import trim_list
-from geodesic_core.kernels.sweep.window import INTS, NEXT, WIDTH
 from geodesic_core.kernels.sweep.window_lists import (
     free_windows,
     release_list,

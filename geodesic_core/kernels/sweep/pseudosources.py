@@ -3,6 +3,27 @@
 import math
 from typing import Any
 
+from geodesic_core.kernels.front.bounds import merging, source_weight
+from geodesic_core.kernels.front.pruning import may_pass
+from geodesic_core.kernels.front.relaxation import (
+    bound_vertex,
+    illuminate_vertex,
+    incoming_angle,
+    relax_vertex,
+)
+from geodesic_core.kernels.front.state import (
+    CREATED,
+    ENTRY_EDGE,
+    LIGHT,
+    LIT_FROM,
+    LIT_TO,
+    PREDECESSOR,
+    SENT_AT,
+    SENT_FROM,
+    SENT_TO,
+    WINNER,
+)
+from geodesic_core.kernels.front.window import emitted_window
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -23,27 +44,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     following,
     previous,
 )
-from geodesic_core.kernels.sweep.bounds import merging, source_weight
-from geodesic_core.kernels.sweep.pruning import may_pass
-from geodesic_core.kernels.sweep.relaxation import (
-    bound_vertex,
-    illuminate_vertex,
-    incoming_angle,
-    relax_vertex,
-)
-from geodesic_core.kernels.sweep.state import (
-    CREATED,
-    ENTRY_EDGE,
-    LIGHT,
-    LIT_FROM,
-    LIT_TO,
-    PREDECESSOR,
-    SENT_AT,
-    SENT_FROM,
-    SENT_TO,
-    WINNER,
-)
-from geodesic_core.kernels.sweep.window import emitted_window
 from geodesic_core.kernels.sweep.window_lists import (
     insert_sorted,
     put_window,

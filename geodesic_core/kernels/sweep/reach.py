@@ -3,17 +3,17 @@
 import math
 from typing import Any
 
-from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import APEX, LENGTH, ROW
-from geodesic_core.kernels.planar import distance
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.relaxation import (
+from geodesic_core.kernels.front.bounds import merging
+from geodesic_core.kernels.front.relaxation import (
     bound_vertex,
     illuminate_vertex,
     precedence,
     relax_vertex,
 )
-from geodesic_core.kernels.sweep.window import Window, load_window, straight_distance
+from geodesic_core.kernels.front.window import Window, load_window, straight_distance
+from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import APEX, LENGTH, ROW
+from geodesic_core.kernels.planar import distance
 from geodesic_core.tolerances import BEND, GAP
 
 

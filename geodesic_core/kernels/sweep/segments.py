@@ -8,6 +8,10 @@ sides. Distance to it is then exact: nearest to a point is an end, or the foot o
 import math
 from typing import Any, NamedTuple
 
+from geodesic_core.kernels.front.bounds import merging
+from geodesic_core.kernels.front.relaxation import bound_vertex, illuminate_vertex, relax_vertex
+from geodesic_core.kernels.front.state import FACE, NODE, SEGMENT, SEGMENT_END, SEGMENT_ENDS
+from geodesic_core.kernels.front.window import Window, emitted_window
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -20,10 +24,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     SIN_LEFT,
     weights_in_frame,
 )
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.relaxation import bound_vertex, illuminate_vertex, relax_vertex
-from geodesic_core.kernels.sweep.state import FACE, NODE, SEGMENT, SEGMENT_END, SEGMENT_ENDS
-from geodesic_core.kernels.sweep.window import Window, emitted_window
 from geodesic_core.kernels.sweep.window_lists import send_out
 from geodesic_core.tolerances import SLANT
 

@@ -2,6 +2,9 @@
 
 from typing import Any, NamedTuple
 
+from geodesic_core.kernels.front.bounds import merging
+from geodesic_core.kernels.front.state import CREATED, FIRST, LAST, LIST, SIZE
+from geodesic_core.kernels.front.window import INTS, NEXT, Window, at_sigma, load_window
 from geodesic_core.kernels.jit import as_ints, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -23,10 +26,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     previous,
 )
 from geodesic_core.kernels.planar import hit_left
-from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.reach import bent_distance, ray_to
-from geodesic_core.kernels.sweep.state import CREATED, FIRST, LAST, LIST, SIZE
-from geodesic_core.kernels.sweep.window import INTS, NEXT, Window, at_sigma, load_window
 from geodesic_core.kernels.sweep.window_lists import (
     faces_beyond,
     put_window,

@@ -10,28 +10,14 @@ import math
 from typing import Any
 
 from geodesic_core.arrays import Ints
-from geodesic_core.kernels.jit import kernel
-from geodesic_core.kernels.mesh.half_edges import (
-    APEX,
-    COS_LEFT,
-    LENGTH,
-    LENGTH_LEFT,
-    NO_FACE,
-    OPPOSITE,
-    ROW,
-    SIN_LEFT,
-    TAIL,
-    weights_in_frame,
-)
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.relaxation import (
+from geodesic_core.kernels.front.bounds import merging
+from geodesic_core.kernels.front.relaxation import (
     bound_vertex,
     illuminate_vertex,
     precedence,
     relax_vertex,
 )
-from geodesic_core.kernels.sweep.segments import distance_to_segment
-from geodesic_core.kernels.sweep.state import (
+from geodesic_core.kernels.front.state import (
     ENTRY_EDGE,
     FACE,
     LIST,
@@ -45,13 +31,27 @@ from geodesic_core.kernels.sweep.state import (
     WINNER,
     view_of,
 )
-from geodesic_core.kernels.sweep.window import (
+from geodesic_core.kernels.front.window import (
     Window,
     distance_at,
     emitted_window,
     load_window,
     straight_distance,
 )
+from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.mesh.half_edges import (
+    APEX,
+    COS_LEFT,
+    LENGTH,
+    LENGTH_LEFT,
+    NO_FACE,
+    OPPOSITE,
+    ROW,
+    SIN_LEFT,
+    TAIL,
+    weights_in_frame,
+)
+from geodesic_core.kernels.sweep.segments import distance_to_segment
 from geodesic_core.kernels.sweep.window_lists import send_out
 from geodesic_core.tolerances import BEND, FLAT, GAP
 

@@ -3,11 +3,8 @@
 import math
 from typing import Any, NamedTuple
 
-from geodesic_core.kernels.jit import as_ints, inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import HEAD, LENGTH, ROW, TAIL
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.merging import merged
-from geodesic_core.kernels.sweep.state import (
+from geodesic_core.kernels.front.bounds import merging
+from geodesic_core.kernels.front.state import (
     FIRST,
     LEFT,
     LEFT_REFERENCE,
@@ -22,8 +19,7 @@ from geodesic_core.kernels.sweep.state import (
     SPLIT,
     is_pruned,
 )
-from geodesic_core.kernels.sweep.trimming import leaves_gap, trim
-from geodesic_core.kernels.sweep.window import (
+from geodesic_core.kernels.front.window import (
     B0,
     B1,
     INTS,
@@ -37,6 +33,10 @@ from geodesic_core.kernels.sweep.window import (
     reaches,
     store_window,
 )
+from geodesic_core.kernels.jit import as_ints, inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import HEAD, LENGTH, ROW, TAIL
+from geodesic_core.kernels.sweep.merging import merged
+from geodesic_core.kernels.sweep.trimming import leaves_gap, trim
 from geodesic_core.tolerances import GAP, LOOSE_OVERLAP, OVERLAP, SLACK
 
 

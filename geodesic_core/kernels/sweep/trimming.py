@@ -1,8 +1,8 @@
 """Two windows that overlap on one edge: trimmed to where each is nearest (sections 3.3 and 3.4)."""
 
+from geodesic_core.kernels.front.window import Window, between, distance_at
 from geodesic_core.kernels.jit import inlined
 from geodesic_core.kernels.planar import Source, bisector, bracketed, distance
-from geodesic_core.kernels.sweep.window import Window, between, distance_at
 from geodesic_core.tolerances import DIVERGING
 
 

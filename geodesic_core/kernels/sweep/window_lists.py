@@ -2,25 +2,9 @@
 
 from typing import Any
 
-from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
-from geodesic_core.kernels.mesh.half_edges import (
-    AROUND,
-    HEAD,
-    IRREGULAR,
-    LENGTH,
-    OPPOSITE,
-    OUT_LEFT,
-    ROW,
-    TAIL,
-    following,
-)
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.irregular_edges import (
-    record_crossing,
-    trim_against_crossings,
-)
-from geodesic_core.kernels.sweep.queues import ring_push
-from geodesic_core.kernels.sweep.state import (
+from geodesic_core.kernels.front.bounds import merging
+from geodesic_core.kernels.front.queues import ring_push
+from geodesic_core.kernels.front.state import (
     CREATED,
     FIRST,
     FREE_FIRST,
@@ -33,7 +17,7 @@ from geodesic_core.kernels.sweep.state import (
     SETTLED,
     SIZE,
 )
-from geodesic_core.kernels.sweep.window import (
+from geodesic_core.kernels.front.window import (
     B0,
     INTS,
     NEXT,
@@ -43,6 +27,22 @@ from geodesic_core.kernels.sweep.window import (
     load_window,
     reversed_window,
     store_window,
+)
+from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
+from geodesic_core.kernels.mesh.half_edges import (
+    AROUND,
+    HEAD,
+    IRREGULAR,
+    LENGTH,
+    OPPOSITE,
+    OUT_LEFT,
+    ROW,
+    TAIL,
+    following,
+)
+from geodesic_core.kernels.sweep.irregular_edges import (
+    record_crossing,
+    trim_against_crossings,
 )
 
 

@@ -7,8 +7,9 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.fields import sweep
+from geodesic_core.kernels.front import state
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.sweep import continuous_dijkstra, state
+from geodesic_core.kernels.sweep import continuous_dijkstra
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.approximation import MERGING, exact_or_not, solve

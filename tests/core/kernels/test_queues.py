@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from geodesic_core.kernels.sweep.queues import (
+from geodesic_core.kernels.front.queues import (
     HEAP_SIZE,
     RING_SIZE,
     pop_nearest,
@@ -14,7 +14,7 @@ from geodesic_core.kernels.sweep.queues import (
     ring_pop,
     ring_push,
 )
-from geodesic_core.kernels.sweep.state import new_wavefront
+from geodesic_core.kernels.front.state import new_wavefront
 from tests.support import zoo
 from tests.support.invariants import check_heap
 from tests.support.stepping import topology_of, view_of_arrays

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels.sweep import state
+from geodesic_core.kernels.front import state
 from geodesic_core.search import target_sweep
 from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_points import EXACT, SAME, random_points

@@ -38,9 +38,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from geodesic_core.kernels.front.bounds import merging, source_weight
 from geodesic_core.kernels.jit import as_ints, inlined
 from geodesic_core.kernels.planar import distance
-from geodesic_core.kernels.sweep.bounds import merging, source_weight
 
 # Columns of a row, float64
 B0 = 0

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Counts, Flags, Floats, Ints, Longs, aligned_rows
+from geodesic_core.kernels.front.bounds import Bounds
+from geodesic_core.kernels.front.window import WIDTH
 from geodesic_core.kernels.jit import inlined, kernel, pointers
 from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, Topology
-from geodesic_core.kernels.sweep.bounds import Bounds
-from geodesic_core.kernels.sweep.window import WIDTH
 
 # Columns of Pool.lists, a row per half-edge
 SIZE = 0  # number of windows

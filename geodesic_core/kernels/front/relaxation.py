@@ -3,6 +3,19 @@
 import math
 from typing import Any
 
+from geodesic_core.kernels.front.bounds import merging
+from geodesic_core.kernels.front.pruning import touch
+from geodesic_core.kernels.front.queues import push_or_raise
+from geodesic_core.kernels.front.state import (
+    ENTRY_EDGE,
+    FAR,
+    LIGHT,
+    LIT_FROM,
+    LIT_TO,
+    PREDECESSOR,
+    SETTLED,
+    WINNER,
+)
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX_ANGLE,
@@ -13,19 +26,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     PINCHED,
     ROW,
     SIN_LEFT,
-)
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.pruning import touch
-from geodesic_core.kernels.sweep.queues import push_or_raise
-from geodesic_core.kernels.sweep.state import (
-    ENTRY_EDGE,
-    FAR,
-    LIGHT,
-    LIT_FROM,
-    LIT_TO,
-    PREDECESSOR,
-    SETTLED,
-    WINNER,
 )
 from geodesic_core.tolerances import SLACK, TIE
 

@@ -11,10 +11,8 @@ import math
 from typing import Any
 
 from geodesic_core.arrays import Flags, Floats, Ints, Singles
-from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL
-from geodesic_core.kernels.sweep.bounds import LANDMARKS
-from geodesic_core.kernels.sweep.state import (
+from geodesic_core.kernels.front.bounds import LANDMARKS
+from geodesic_core.kernels.front.state import (
     COUNTERS,
     ENTRY_EDGE,
     FACE,
@@ -33,6 +31,8 @@ from geodesic_core.kernels.sweep.state import (
     TOUCHED,
     is_pruned,
 )
+from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL
 from geodesic_core.tolerances import LANDMARK_ERROR, SINGLE_PRECISION
 
 # Stored distances from landmarks are lower bounds, rounded to single precision.
