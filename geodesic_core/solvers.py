@@ -971,8 +971,8 @@ def _solve_fast(
     starts, polylines, ends, exact = _as_question(mesh, sources, targets, bounds, control)
     sweep = FastSweep(exact, effort)
     front = sweep.run(control)
-    result = sweep.result_of(front, paths=retain == "paths")
-    stats = sweep.stats_of(front, time.perf_counter() - control.began)
+    result = exact.result_of(front, paths=retain == "paths", windows=False)
+    stats = stats_of(mesh, front, time.perf_counter() - control.began)
     promise = estimated_error(effort)
     return field_of(starts, polylines, ends, exact, sweep, promise, result, stats)
 

@@ -14,11 +14,12 @@ from geodesic_core.fields.sources import Nodes, nodes_of
 from geodesic_core.fields.sweep import share_of_vertices, sweep_nodes, winners_of
 from geodesic_core.kernels.front import state
 from geodesic_core.kernels.front.bounds import Bounds, with_parallel_windows
+from geodesic_core.kernels.front.counters import CREATED, PEAK, PROPAGATED
+from geodesic_core.kernels.front.relaxation import nearest_sources
 from geodesic_core.kernels.front.state import Wavefront
 from geodesic_core.kernels.isolines import face_windows
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep import continuous_dijkstra
 from geodesic_core.mesh.curve import Polyline
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -218,7 +219,7 @@ def all_winners(wave: Wavefront) -> Winners:
     """Return the data of paths of a sweep over all of a mesh, in memory of its own."""
     winners = winners_of(
         wave,
-        continuous_dijkstra.nearest_sources(
+        nearest_sources(
             wave.vertices.distance, wave.vertices.winner_ints, wave.vertices.source_index
         ),
     )
@@ -233,9 +234,7 @@ def peak_bytes(wave: Wavefront) -> int:
 
 def stats_of(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
     """Return the statistics of a sweep that has finished."""
-    created, kept, peak = (
-        int(wave.counters[i]) for i in (state.CREATED, state.PROPAGATED, state.PEAK)
-    )
+    created, kept, peak = (int(wave.counters[i]) for i in (CREATED, PROPAGATED, PEAK))
     return SweepStats.of(mesh, created, kept, peak, peak_bytes(wave), seconds)
 
 

@@ -49,11 +49,10 @@ from geodesic_core.kernels.front.bounds import (
     exact_bounds,
     merging_bounds,
 )
+from geodesic_core.kernels.front.counters import CREATED, TOUCHED
 from geodesic_core.kernels.front.state import (
-    CREATED,
     NO_SITES,
     PREDECESSOR,
-    TOUCHED,
     Sites,
     Wavefront,
     new_wavefront,

@@ -16,13 +16,16 @@ from geodesic_core.fields import fast_sweep
 from geodesic_core.fields.sources import nodes_of
 from geodesic_core.fields.sweep import run_sweep
 from geodesic_core.kernels.fast import state as fast_state
+from geodesic_core.kernels.fast.buckets import push
 from geodesic_core.kernels.fast.places import offer
 from geodesic_core.kernels.front import state
 from geodesic_core.kernels.front.bounds import exact_bounds, merging_bounds, with_parallel_windows
+from geodesic_core.kernels.front.counters import CREATED, FAR_BUCKET, FRESH
+from geodesic_core.kernels.front.pool import put_window
 from geodesic_core.kernels.front.pruning import least_to_start
 from geodesic_core.kernels.front.relaxation import precedence
-from geodesic_core.kernels.front.state import FIRST, FRESH, LAST, NO_SITES, SIZE, new_wavefront
-from geodesic_core.kernels.front.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
+from geodesic_core.kernels.front.state import FIRST, LAST, NO_SITES, SIZE, new_wavefront, view_of
+from geodesic_core.kernels.front.window import B0, B1, BUCKET, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.isolines.arcs import outer_arcs
 from geodesic_core.kernels.isolines.lines import united
 from geodesic_core.kernels.isolines.regions import (
@@ -56,7 +59,6 @@ from geodesic_core.kernels.sweep.merging import accuracy, directionality, merged
 from geodesic_core.kernels.sweep.reach import reach_apex
 from geodesic_core.kernels.sweep.trim_list import trim_list
 from geodesic_core.kernels.sweep.trimming import leaves_gap
-from geodesic_core.kernels.sweep.window_lists import put_window
 from geodesic_core.mesh.triangulation import triangulated
 from geodesic_core.search.landmarks import Landmarks
 from geodesic_core.tolerances import (
@@ -76,6 +78,7 @@ from geodesic_core.tolerances import (
     HALF_ULP,
     LANDMARK_ERROR,
     LARGEST_COORDINATE,
+    LAST_BUCKET,
     LOCAL_SHARE,
     LOOSE_OVERLAP,
     LOWER_BOUND,
@@ -717,19 +720,37 @@ def test_widest_error_is_the_most_that_is_used():
 @kernel
 def offer_to(topology, front, bounds, h, length, offered):
     """Offer a window to a half-edge that nothing has left by."""
-    offer(fast_state.view_of(topology, front, bounds), h, -1, length, offered)
+    offer(view_of(topology, front, bounds), h, -1, length, offered)
 
 
 def waiting(offers: int, sigma: float) -> int:
     """How many of some equal windows wait; they win no place, and all else known is 10.2 there."""
     square = gc.samples.plane(2)
     topology = topology_of(zoo.Case("square", square.vertices, square.faces))
-    front = fast_state.new_wavefront(topology, NO_SITES, 1, 0)
-    front.distance[:], front.values[:] = 10.0, 10.0
-    bounds = fast_state.FastBounds(math.inf, 1, 1.0, (), (), 0)
+    front = fast_state.new_wavefront(topology, NO_SITES, 1, 1.0, 0)
+    front.vertices.distance[:], front.places.values[:] = 10.0, 10.0
+    bounds = fast_state.fast_bounds(exact_bounds(math.inf))
     for _ in range(offers):
         offer_to(topology, front, bounds, 0, 1.0, window(0.1, 0.3, 0.2, 0.0, sigma))
-    return int(front.counters[fast_state.CREATED])
+    return int(front.counters[CREATED])
+
+
+@kernel
+def push_to(topology, front, bounds, h, pushed, key):
+    """Have a window wait to cross a half-edge."""
+    push(view_of(topology, front, bounds), h, pushed, 1, key)
+
+
+def test_last_bucket_is_that_of_all_windows_beyond():
+    topology = topology_of(zoo.SMALL["crags"])
+    front = fast_state.new_wavefront(topology, NO_SITES, 1, 1.0, 0)
+    bounds = fast_state.fast_bounds(exact_bounds(math.inf))
+    keys = np.array([0.5, 1.0, 2.0, 1e30]) * LAST_BUCKET
+    for key in keys:
+        push_to(topology, front, bounds, 0, window(0.0, 1.0, 0.0, 0.0, key), key)
+    due = front.pool.windows[: front.counters[FRESH], BUCKET]
+    np.testing.assert_array_equal(due, np.minimum(keys, LAST_BUCKET))
+    assert front.counters[FAR_BUCKET] == 0.5 * LAST_BUCKET
 
 
 @pytest.mark.parametrize(("share", "goes_on"), [(1.001, True), (0.999, False)])

@@ -12,21 +12,25 @@ from functools import cache
 
 import numpy as np
 
-from geodesic_core.kernels.front.queues import HEAP_SIZE, RING_HEAD, RING_SIZE
+from geodesic_core.kernels.front.counters import (
+    FREE_FIRST,
+    FREE_SIZE,
+    FRESH,
+    HEAP_SIZE,
+    PROPAGATED,
+    RING_HEAD,
+    RING_SIZE,
+    SETTLED_VERTICES,
+)
 from geodesic_core.kernels.front.state import (
     ENTRY_EDGE,
     FAR,
     FIRST,
-    FREE_FIRST,
-    FREE_SIZE,
-    FRESH,
     IN_RING,
     LAST,
     MARKS,
     PREDECESSOR,
-    PROPAGATED,
     SETTLED,
-    SETTLED_VERTICES,
     SIZE,
 )
 from geodesic_core.kernels.front.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY

@@ -8,16 +8,14 @@ all that it finds.
 """
 
 import math
-from typing import Any
 
 from geodesic_core.arrays import Flags, Floats, Ints, Singles
 from geodesic_core.kernels.front.bounds import LANDMARKS
+from geodesic_core.kernels.front.counters import COUNTERS, FAR_FIRST, FREE_FIRST, TOUCHED
 from geodesic_core.kernels.front.state import (
-    COUNTERS,
     ENTRY_EDGE,
     FACE,
     FAR,
-    FREE_FIRST,
     LIT_FROM,
     LIT_TO,
     MARKS,
@@ -28,11 +26,12 @@ from geodesic_core.kernels.front.state import (
     SENT_FROM,
     SENT_TO,
     SIZE,
-    TOUCHED,
+    View,
+    Wavefront,
     is_pruned,
 )
 from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL
+from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL, Topology
 from geodesic_core.tolerances import LANDMARK_ERROR, SINGLE_PRECISION
 
 # Stored distances from landmarks are lower bounds, rounded to single precision.
@@ -41,7 +40,7 @@ MOST = (1.0 + SINGLE_PRECISION) / (1.0 - LANDMARK_ERROR)
 
 
 @kernel
-def touch(wave: Any, v: int) -> None:
+def touch(wave: View, v: int) -> None:
     """Note that v is no longer in its first state, and bound the rest of a path from it.
 
     Modifies the list of touched vertices and the heuristic.
@@ -54,7 +53,7 @@ def touch(wave: Any, v: int) -> None:
 
 
 @kernel
-def lower_bound_to_target(wave: Any, v: int) -> float:
+def lower_bound_to_target(wave: View, v: int) -> float:
     """Lower bound of the distance from v to the end of a path.
 
     The value of an earlier sweep from there counts up to its ceiling. Had it pruned the path to
@@ -71,7 +70,7 @@ def lower_bound_to_target(wave: Any, v: int) -> float:
 
 
 @inlined
-def straight_to_start(wave: Any, v: int) -> float:
+def straight_to_start(wave: View, v: int) -> float:
     """Euclidean distance from v to the start."""
     mesh = wave.mesh
     x = mesh.positions[3 * v] - wave.bounds.pruning.position[0]
@@ -81,7 +80,7 @@ def straight_to_start(wave: Any, v: int) -> float:
 
 
 @kernel
-def least_to_start(wave: Any, v: int, straight: float) -> float:
+def least_to_start(wave: View, v: int, straight: float) -> float:
     """Lower bound of the distance from v to the start: straight, or by a landmark.
 
     The exact distance from a landmark is known to be from LEAST to MOST times the stored one. A
@@ -101,7 +100,7 @@ def least_to_start(wave: Any, v: int, straight: float) -> float:
 
 
 @kernel
-def steepest_to_start(wave: Any, v: int, straight: float) -> float:
+def steepest_to_start(wave: View, v: int, straight: float) -> float:
     """Bound of `least_to_start` at any point q, less the distance of v and q."""
     steepest = straight
     for i in range(wave.bounds.pruning.landmark_count):
@@ -133,7 +132,7 @@ def bound_landmarks(
 
 
 @inlined
-def may_pass(wave: Any, v: int) -> bool:
+def may_pass(wave: View, v: int) -> bool:
     """Whether a path of allowed length may pass v at its distance."""
     vertices = wave.vertices
     return (
@@ -143,7 +142,7 @@ def may_pass(wave: Any, v: int) -> bool:
 
 
 @kernel
-def forget(topology: Any, wavefront: Any) -> None:
+def forget(topology: Topology, wavefront: Wavefront) -> None:
     """Reset the wavefront to its first state, in time proportional to the vertices touched.
 
     What it is to retain stays marked.
@@ -187,11 +186,11 @@ def forget(topology: Any, wavefront: Any) -> None:
         vertices.winner_ints[node, ENTRY_EDGE] = vertices.winner_ints[node, PREDECESSOR] = -1
     for i in range(COUNTERS):
         wavefront.counters[i] = 0
-    wavefront.counters[FREE_FIRST] = -1
+    wavefront.counters[FREE_FIRST] = wavefront.counters[FAR_FIRST] = -1
 
 
 @kernel
-def mark_visited(topology: Any, distance: Floats, touched: Ints, visited: Flags) -> None:
+def mark_visited(topology: Topology, distance: Floats, touched: Ints, visited: Flags) -> None:
     """Mark the faces, in the caller's numbering, all of whose corners are reached.
 
     Modifies ``visited`` (F,).

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
 
@@ -105,6 +105,22 @@ def _compiled_ints(typingcontext: Any, rows: Any) -> Any:  # noqa: ARG001
         return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
 
     return types.CPointer(types.int32)(rows), codegen
+
+
+def rows_of(array: Any) -> Any:
+    """Return the number of rows of an array; of one that is `ABSENT` nothing of any size."""
+    return array.shape[0] if isinstance(array, np.ndarray) else ()
+
+
+@overload(rows_of)
+def _compiled_rows_of(array: Any) -> Callable[[Any], Any]:
+    def of_array(array: Any) -> Any:
+        return array.shape[0]
+
+    def of_absent(array: Any) -> Any:  # noqa: ARG001 - numba's signature
+        return ()
+
+    return of_array if isinstance(array, types.Array) else of_absent
 
 
 def _interpreted_prefetch(array: Any, index: int) -> None:

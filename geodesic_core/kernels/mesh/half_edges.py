@@ -143,3 +143,13 @@ def next_around(links: Ints, h: int) -> int:
     if links[h, OPPOSITE] == IRREGULAR:
         return links[h, AROUND] >> 1
     return links[h, OPPOSITE]
+
+
+@kernel
+def faces_beyond(links: Any, g: int) -> int:
+    """Return how many other faces the irregular edge of g has, by a raw pointer."""
+    count, h = 0, links[ROW * g + AROUND] >> 1
+    while h != g:
+        count += 1
+        h = links[ROW * h + AROUND] >> 1
+    return count

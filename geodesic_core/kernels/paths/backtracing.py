@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.front.segments import distance_to_segment
 from geodesic_core.kernels.front.state import (
     ENTRY_EDGE,
     FACE,
@@ -61,7 +62,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     weights_in_frame,
 )
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.sweep.segments import distance_to_segment
 from geodesic_core.tolerances import FORKS, GAP, ON_PATH, SAME_PLACE, TRIES, WIDEST_ERROR
 
 LAST_AT = 1024

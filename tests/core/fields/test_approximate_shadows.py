@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from geodesic_core.kernels.front.bounds import merging_bounds
-from geodesic_core.kernels.front.queues import HEAP_SIZE
+from geodesic_core.kernels.front.counters import HEAP_SIZE
 from geodesic_core.kernels.front.relaxation import bound_vertex, illuminate_vertex
 from geodesic_core.kernels.front.state import LIT_FROM, LIT_TO, SETTLED, new_wavefront, view_of
 from geodesic_core.kernels.front.window import B0, B1, SX, SY

@@ -6,11 +6,11 @@ import pytest
 import geodesic_core as gc
 from geodesic_core.control import Control
 from geodesic_core.fields.sweep import winners_of
+from geodesic_core.kernels.front.relaxation import nearest_sources
 from geodesic_core.kernels.front.state import ENTRY_EDGE, PREDECESSOR
 from geodesic_core.kernels.mesh.half_edges import APEX, OPPOSITE
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import trace_path
-from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources
 from tests.support import zoo
 from tests.support.stepping import finished, started, topology_of
 

@@ -9,7 +9,8 @@ import geodesic_core as gc
 from geodesic_core.control import Control
 from geodesic_core.kernels.front import state
 from geodesic_core.kernels.front.bounds import exact_bounds
-from geodesic_core.kernels.front.state import PREDECESSOR, TOUCHED
+from geodesic_core.kernels.front.counters import TOUCHED
+from geodesic_core.kernels.front.state import PREDECESSOR
 from geodesic_core.kernels.paths.edge_dijkstra import search_edges, vertices_to
 from geodesic_core.search.landmarks import Landmarks
 from geodesic_core.tolerances import ASTAR_WEIGHT

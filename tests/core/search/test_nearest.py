@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels.front import state
+from geodesic_core.kernels.front.counters import CREATED
 from geodesic_core.search import target_sweep
 from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_points import EXACT, SAME, random_points
@@ -104,7 +104,7 @@ def test_the_sweep_ends_at_the_last_of_the_nearest(monkeypatch):
 
     def counted(*arguments):
         wave = sweep_nodes(*arguments)
-        made.append(int(wave.counters[state.CREATED]))
+        made.append(int(wave.counters[CREATED]))
         return wave
 
     monkeypatch.setattr(target_sweep, "sweep_nodes", counted)
