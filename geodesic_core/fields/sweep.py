@@ -10,9 +10,9 @@ from geodesic_core.errors import InternalError
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.front import counters, pruning, state
 from geodesic_core.kernels.front.bounds import Bounds, without_merging
-from geodesic_core.kernels.front.state import PREDECESSOR, Wavefront
+from geodesic_core.kernels.front.state import PREDECESSOR, Merges, Wavefront
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.kernels.paths.backtracing import NO_END, Winners
 from geodesic_core.kernels.sweep import continuous_dijkstra, site_targets
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
@@ -133,20 +133,13 @@ def run_sweep(
 
 def winners_of(wave: Wavefront, nearest: Ints) -> Winners:
     """Return what backtracing needs of a sweep that has finished; ``nearest`` as in `Winners`."""
-    count, vertices = wave.counters[counters.MERGES], wave.vertices
+    count = wave.counters[counters.MERGES]
     return Winners(
         nearest=nearest,
-        distance=vertices.distance,
-        winner=vertices.winner,
-        winner_ints=vertices.winner_ints,
-        crossing=vertices.crossing,
-        reference=vertices.reference,
-        merges=wave.merges.floats[:count],
-        merge_ints=wave.merges.ints[:count],
-        site_ints=wave.sites.ints,
-        site_weights=wave.sites.weights,
-        piece_ints=wave.sites.segment_ints,
-        piece_ends=wave.sites.segment_ends,
+        vertices=state.found(wave.vertices._asdict()),
+        merges=Merges(wave.merges.floats[:count], wave.merges.ints[:count]),
+        sites=wave.sites,
+        target=NO_END,
     )
 
 

@@ -24,7 +24,17 @@ from geodesic_core.kernels.front.counters import CREATED, FAR_BUCKET, FRESH
 from geodesic_core.kernels.front.pool import put_window
 from geodesic_core.kernels.front.pruning import least_to_start
 from geodesic_core.kernels.front.relaxation import precedence
-from geodesic_core.kernels.front.state import FIRST, LAST, NO_SITES, SIZE, new_wavefront, view_of
+from geodesic_core.kernels.front.state import (
+    FIRST,
+    LAST,
+    NO_MERGES,
+    NO_SITES,
+    SIZE,
+    found,
+    new_vertices,
+    new_wavefront,
+    view_of,
+)
 from geodesic_core.kernels.front.window import B0, B1, BUCKET, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.isolines.arcs import outer_arcs
 from geodesic_core.kernels.isolines.lines import united
@@ -51,7 +61,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     TAIL,
 )
 from geodesic_core.kernels.paths import funnel
-from geodesic_core.kernels.paths.backtracing import Winners, is_on_path
+from geodesic_core.kernels.paths.backtracing import NO_END, Line, Winners, is_on_path
 from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, pull_taut, shortened_part
 from geodesic_core.kernels.planar import Source, bisector, bracketed, distance
 from geodesic_core.kernels.sweep import continuous_dijkstra
@@ -474,31 +484,21 @@ def test_on_path_is_the_longest_detour_through_a_vertex(scale):
     for share, taken in ((-1.0, True), (0.0, True), (0.5, True), (2.0, False)):
         distance = scale * np.array([3.0, 0.0])
         distance[beside] = here - reach + share * ON_PATH * distance[target]
-        assert is_on_path(winners(distance), beside, reach, here, target) == taken
-        assert not is_on_path(winners(distance, [0, 1]), beside, reach, here, target)
+        line = Line(0, distance[target], 1.0, 0.0)
+        assert is_on_path(winners(distance), beside, reach, here, line) == taken
+        assert not is_on_path(winners(distance, [0, 1]), beside, reach, here, line)
 
 
 def test_on_path_never_leads_away_from_the_source():
-    assert not is_on_path(winners(np.array([1.0, 1.0])), 1, 0.0, 1.0, 0)
+    line = Line(0, 1.0, 1.0, 0.0)
+    assert not is_on_path(winners(np.array([1.0, 1.0])), 1, 0.0, 1.0, line)
 
 
 def winners(distance, nearest=(0, 0)) -> Winners:
     """Two vertices at these distances from these sources."""
-    nothing, none = np.empty((0, 2)), np.empty((0, 2), np.int32)
-    return Winners(
-        np.array(nearest, np.int32),
-        distance,
-        nothing,
-        none,
-        nothing[:, 0].copy(),
-        none[:, 0].copy(),
-        nothing,
-        none,
-        NO_SITES.ints,
-        NO_SITES.weights,
-        NO_SITES.segment_ints,
-        NO_SITES.segment_ends,
-    )
+    vertices = new_vertices(len(distance))._replace(distance=distance)
+    found_there = found(vertices._asdict())
+    return Winners(np.array(nearest, np.int32), found_there, NO_MERGES, NO_SITES, NO_END)
 
 
 @SCALES
@@ -951,7 +951,7 @@ def test_tries_end_a_line_that_leads_nowhere():
     mesh, target = strip_with_fins(count), 2 * count + 1
     field = gc.exact_distance(mesh, 0)
     winners, v = field._winners.get(Control()), int(mesh.topology.inner_vertex[target])
-    winners.distance[v] = 0.0
+    winners.vertices.distance[v] = 0.0
     with pytest.raises(gc.errors.InternalError, match="left the surface"):
         field.path_to(target)
 

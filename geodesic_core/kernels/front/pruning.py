@@ -79,40 +79,35 @@ def straight_to_start(wave: View, v: int) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
-@kernel
+@inlined
 def least_to_start(wave: View, v: int, straight: float) -> float:
     """Lower bound of the distance from v to the start: straight, or by a landmark.
 
-    The exact distance from a landmark is known to be from LEAST to MOST times the stored one. A
-    landmark of another component tells nothing.
+    The exact distance from a landmark is known to be from LEAST to MOST times the stored one.
     """
-    least = straight
-    for i in range(wave.bounds.pruning.landmark_count):
-        if wave.bounds.pruning.least[i] == math.inf:
-            continue
-        here = wave.bounds.pruning.landmarks[LANDMARKS * v + i]
-        bound = max(
-            LEAST * here - wave.bounds.pruning.most[i], wave.bounds.pruning.least[i] - MOST * here
-        )
-        if bound > least:
-            least = bound
-    return least
+    return most_by_landmarks(wave, v, straight, LEAST, MOST)
+
+
+@inlined
+def steepest_to_start(wave: View, v: int, straight: float) -> float:
+    """Bound of `least_to_start` at any point q, less the distance of v and q."""
+    return most_by_landmarks(wave, v, straight, MOST, LEAST)
 
 
 @kernel
-def steepest_to_start(wave: View, v: int, straight: float) -> float:
-    """Bound of `least_to_start` at any point q, less the distance of v and q."""
-    steepest = straight
-    for i in range(wave.bounds.pruning.landmark_count):
-        if wave.bounds.pruning.least[i] == math.inf:
+def most_by_landmarks(wave: View, v: int, straight: float, beyond: float, behind: float) -> float:
+    """Return the most of ``straight`` and of what each landmark tells of the way to the start.
+
+    The stored distance of v counts ``beyond`` times where the landmark lies beyond the start, and
+    ``behind`` times where it lies behind v. A landmark of another component tells nothing.
+    """
+    pruning, most = wave.bounds.pruning, straight
+    for i in range(pruning.landmark_count):
+        if pruning.least[i] == math.inf:
             continue
-        here = wave.bounds.pruning.landmarks[LANDMARKS * v + i]
-        bound = max(
-            MOST * here - wave.bounds.pruning.most[i], wave.bounds.pruning.least[i] - LEAST * here
-        )
-        if bound > steepest:
-            steepest = bound
-    return steepest
+        here = pruning.landmarks[LANDMARKS * v + i]
+        most = max(most, beyond * here - pruning.most[i], pruning.least[i] - behind * here)
+    return most
 
 
 @kernel

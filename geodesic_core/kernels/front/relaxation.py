@@ -51,7 +51,7 @@ def record_winner(wave: View, node: int, via: int, sx: float, sy: float, root: i
     vertices.source_index[node] = vertices.source_index[root]
 
 
-@kernel
+@inlined
 def relax_node(
     wave: View,
     node: int,

@@ -6,8 +6,9 @@ sides. Distance to it is then exact: nearest to a point is an end, or the foot o
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from geodesic_core.arrays import Floats, Ints
 from geodesic_core.kernels.front.state import NODE, SEGMENT_END, SEGMENT_ENDS, View
 from geodesic_core.kernels.front.window import Window, emitted_window
 from geodesic_core.kernels.jit import kernel
@@ -21,7 +22,7 @@ from geodesic_core.kernels.mesh.half_edges import (
 
 
 @kernel
-def is_segment(ints: Any, node: int) -> bool:
+def is_segment(ints: Ints, node: int) -> bool:
     """Whether a node is a segment; ``ints`` are rows as of `Sites.segment_ints`."""
     return len(ints) > 0 and ints[0, NODE] <= node <= ints[-1, NODE]
 
@@ -40,7 +41,7 @@ class PlacedSegment(NamedTuple):
 
 
 @kernel
-def place_segment(geometry: Any, ends: Any, k: int, h: int) -> PlacedSegment:
+def place_segment(geometry: Floats, ends: Floats, k: int, h: int) -> PlacedSegment:
     """Return the segment of row k in the frame of h, of the same face."""
     px, py = weights_in_frame(geometry, ends, SEGMENT_ENDS * k, h)
     qx, qy = weights_in_frame(geometry, ends, SEGMENT_ENDS * k + SEGMENT_END, h)
@@ -52,7 +53,7 @@ def place_segment(geometry: Any, ends: Any, k: int, h: int) -> PlacedSegment:
 
 
 @kernel
-def is_off_edge(ends: Any, k: int, h: int) -> bool:
+def is_off_edge(ends: Floats, k: int, h: int) -> bool:
     """Whether the segment leaves the edge of h; by weights, as faces may have no area."""
     up = SEGMENT_ENDS * k + (h + 2) % 3
     return bool(max(ends[up], ends[up + SEGMENT_END]) > 0.0)
@@ -75,7 +76,7 @@ def parallel_window(
 
 @kernel
 def perpendicular_to(
-    geometry: Any, h: int, segment: PlacedSegment
+    geometry: Floats, h: int, segment: PlacedSegment
 ) -> tuple[bool, float, float, float]:
     """Return whether a segment has a foot for the apex of h, how far it is, and the way to it.
 
@@ -91,7 +92,9 @@ def perpendicular_to(
 
 
 @kernel
-def distance_to_segment(geometry: Any, ends: Any, k: int, h: int, x: float, y: float) -> float:
+def distance_to_segment(
+    geometry: Floats, ends: Floats, k: int, h: int, x: float, y: float
+) -> float:
     """Distance of the segment of row k from (x, y) in the frame of h, of the same face."""
     px, py = weights_in_frame(geometry, ends, SEGMENT_ENDS * k, h)
     qx, qy = weights_in_frame(geometry, ends, SEGMENT_ENDS * k + SEGMENT_END, h)

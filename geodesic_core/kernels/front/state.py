@@ -9,7 +9,8 @@ Windows wait in one of two ways. In most sweeps every half-edge has a singly lin
 that are to cross its face, ordered along the edge. A fast sweep has `Places` instead.
 """
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -363,6 +364,16 @@ def new_vertices(nodes: int) -> Vertices:
         upper=ABSENT,
         light=ABSENT,
     )
+
+
+FOUND = ("distance", "winner", "winner_ints", "crossing", "reference")
+"""What a sweep has found at its nodes, of all that `Vertices` hold."""
+
+
+def found(arrays: Mapping[str, Any]) -> Vertices:
+    """Return what a sweep has found, by name, without what only a running one needs."""
+    rest = dict.fromkeys(Vertices._fields, ABSENT)
+    return Vertices(**rest | {name: arrays[name] for name in FOUND})
 
 
 def _new_pool(topology: Topology, sites: Sites, windows: Flags | None) -> Pool:

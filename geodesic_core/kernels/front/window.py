@@ -55,6 +55,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from geodesic_core.arrays import Floats
 from geodesic_core.kernels.front.state import WIDTH, View, merging, source_weight
 from geodesic_core.kernels.jit import as_ints, inlined
 from geodesic_core.kernels.planar import distance
@@ -97,7 +98,7 @@ NO_WINDOW = Window(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0, 0.0, -1)
 
 
 @inlined
-def load_window(wave: View, rows: Any, i: int) -> Window:
+def load_window(wave: View, rows: Floats, i: int) -> Window:
     """Return the window of row i of the pool, or of scratch."""
     w, ints = WIDTH * i, as_ints(rows)
     root: Any = np.int64(ints[INTS * i + ROOT])  # one type, so that kernels are compiled once
@@ -119,7 +120,7 @@ def load_window(wave: View, rows: Any, i: int) -> Window:
 
 
 @inlined
-def store_window(wave: View, rows: Any, i: int, window: Window) -> None:
+def store_window(wave: View, rows: Floats, i: int, window: Window) -> None:
     """Write a window to row i. Modifies ``rows``."""
     w, ints = WIDTH * i, as_ints(rows)
     rows[w + B0], rows[w + B1] = window.b0, window.b1

@@ -31,10 +31,7 @@ def release_list(wave: View, h: int) -> None:
 
 @kernel
 def queue_list(wave: View, h: int) -> None:
-    """Put h into the ring, unless it has no windows or is there already.
-
-    Prefetching its rows ahead of its turn saves 7 % of an exact sweep, 18 % of a merging one.
-    """
+    """Put h into the ring, unless it has no windows or is there already; prefetch its rows."""
     mesh, pool = wave.mesh, wave.pool
     if pool.lists[LIST * h + SIZE] > 0 and not pool.lists[LIST * h + MARKS] & IN_RING:
         pool.lists[LIST * h + MARKS] |= IN_RING

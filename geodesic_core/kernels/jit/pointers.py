@@ -3,6 +3,7 @@
 With ``NUMBA_DISABLE_JIT=1`` they are flat views, and the kernels plain Python.
 """
 
+import hashlib
 from collections.abc import Callable
 from typing import Any
 
@@ -46,7 +47,11 @@ def _type_of_pointers(group: Any) -> Any:
         parts: Any = group
         pointers = [_type_of_pointers(part) for part in parts]
         from_types: Any = types.BaseTuple.from_types
-        return from_types(pointers, parts.instance_class)
+        kind = from_types(pointers, parts.instance_class)
+        # Symbols spell out the types of arguments: of a large group, half of a compiled kernel.
+        digest = hashlib.sha256(", ".join(map(str, pointers)).encode()).hexdigest()[:16]
+        kind.name = f"{parts.instance_class.__name__}_{digest}"
+        return kind
     return group
 
 

@@ -3,8 +3,6 @@
 Dijkstra's search, directed by the lower bounds of `pruning` (A*).
 """
 
-from typing import Any
-
 import numpy as np
 
 from geodesic_core.arrays import Ints
@@ -71,7 +69,7 @@ def relax(wave: View, v: int, u: int, length: float) -> None:
 
 
 @kernel
-def vertices_to(predecessor: Any, end: int) -> Ints:
+def vertices_to(predecessor: Ints, end: int) -> Ints:
     """Return the vertices of the path that was found, from ``end`` back to its beginning."""
     count, v = 1, end
     while predecessor[v] >= 0:
