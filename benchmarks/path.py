@@ -19,7 +19,7 @@ from benchmarks.tables import Section, rated
 from benchmarks.timing import timed
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.fields.path import SearchStep, length_of
-from geodesic_core.kernels.sweep.bounds import LANDMARKS
+from geodesic_core.kernels.front.bounds import LANDMARKS
 from geodesic_core.tolerances import LANDMARK_ERROR
 
 try:

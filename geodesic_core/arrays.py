@@ -12,6 +12,9 @@ Longs: TypeAlias = NDArray[np.int64]
 Flags: TypeAlias = NDArray[np.uint8]
 Counts: TypeAlias = NDArray[np.uint16]
 
+ABSENT: Any = ()
+"""In place of an array that some kind of sweep has no use for: a type of no size."""
+
 CACHE_LINE = 64  # bytes
 
 

@@ -38,7 +38,7 @@ def _exact() -> None:
     mesh = _mesh()
     exact_distance(mesh, 0, targets=[_INSIDE])
     field = exact_distance(mesh, 0, retain="windows")
-    field.distance_at(_INSIDE)
+    field.path_to(_INSIDE)
     field.path_to(8)
     mesh.report  # noqa: B018 - computed on access
     TriangleMesh(mesh.vertices, mesh.faces, merge=1e-9)

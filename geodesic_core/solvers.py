@@ -29,8 +29,8 @@ from geodesic_core.fields.sources import (
     each_of,
 )
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.kernels.front.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.kernels.jit.cache import sources_digest
-from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.curve import Polyline
 from geodesic_core.mesh.surface_point import Point, Points, Source, Sources, SurfacePoint
@@ -741,8 +741,8 @@ def _solve_fast(
     starts, polylines, ends, exact = _as_question(mesh, sources, targets, bounds, control)
     sweep = FastSweep(exact, effort)
     front = sweep.run(control)
-    result = sweep.result_of(front, paths=retain == "paths")
-    stats = sweep.stats_of(front, time.perf_counter() - control.began)
+    result = exact.result_of(front, paths=retain == "paths", windows=False)
+    stats = stats_of(mesh, front, time.perf_counter() - control.began)
     promise = estimated_error(effort)
     return field_of(starts, polylines, ends, exact, sweep, promise, result, stats)
 

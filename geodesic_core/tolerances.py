@@ -343,3 +343,7 @@ far more, and time grows by 2 %.
 MOST_AT_LARGE = 4
 """Windows without a place that a half-edge passes on in a fast sweep: they may split without end.
 """
+
+LAST_BUCKET = 1e18
+"""Number of the bucket that all windows share whose distances are beyond it: integers end at 9e18.
+"""

@@ -23,11 +23,11 @@ from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.borders import lines, outlines, territories
 from geodesic_core.kernels.borders.outlines import Pieces
 from geodesic_core.kernels.borders.territories import Territories
+from geodesic_core.kernels.front.state import FACE
 from geodesic_core.kernels.isolines.face_windows import FaceWindows, face_windows_of
 from geodesic_core.kernels.isolines.lines import Field
 from geodesic_core.kernels.isolines.thinning import thin_lines
 from geodesic_core.kernels.mesh.half_edges import TAIL
-from geodesic_core.kernels.sweep.state import FACE
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import LEVEL, PIECE
 

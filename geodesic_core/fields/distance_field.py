@@ -34,11 +34,17 @@ from geodesic_core.fields.point_query import (
     find_nearest_source,
     with_target,
 )
-from geodesic_core.fields.repeatable_sweep import Lazy, RepeatableSweep, SweepResult, SweepStats
+from geodesic_core.fields.repeatable_sweep import (
+    Lazy,
+    RepeatableSweep,
+    SweepResult,
+    SweepStats,
+    arrays_of,
+)
 from geodesic_core.fields.sources import Nodes, component_of, disconnected
+from geodesic_core.kernels.front.bounds import exact_bounds, merging_bounds, with_parallel_windows
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
 from geodesic_core.mesh.curve import (
     Polyline,
     polylines_from_arrays,
@@ -148,7 +154,7 @@ class DistanceField:
             sweep,
             FastSweep(sweep, int(arrays["effort"])) if "effort" in arrays else None,
             ErrorBound(of_type, float(arrays["promised"]), kind),
-            SweepResult.from_arrays(arrays),
+            SweepResult.from_arrays(arrays, sweep.nodes.sites),
             SweepStats.of(mesh, created, kept, peak, peak_bytes, seconds),
         )
         if foreign := arrays.keys() - field.arrays().keys():
@@ -306,9 +312,9 @@ class DistanceField:
     @property
     def nbytes(self) -> int:
         """Memory held, bytes, without the mesh; it grows by what later calls find."""
-        result, later = self._result, self._winners_and_windows
+        result, later, winners = self._result, self._winners_and_windows, self._winners.value
         arrays: list[Any] = [result.distance, self.distances, self.nearest_source]
-        arrays += self._winners.value or ()
+        arrays += [] if winners is None else arrays_of(winners).values()
         for windows in (result.windows, later.value[1] if later and later.value else None):
             arrays += windows or ()
         return sum(array.nbytes for array in arrays)
@@ -679,7 +685,7 @@ class DistanceField:
         distance, windows = self._result.distance, self._result.windows
         if self._fast is not None and self._winners_and_windows is not None:
             winners, windows = self._winners_and_windows.get(control.for_part(0, 2))
-            distance, control = winners.distance, control.for_part(1, 2)
+            distance, control = winners.vertices.distance, control.for_part(1, 2)
         elif windows is None:
             windows = self._windows_at(within, control.for_part(0, 2))
             control = control.for_part(1, 2)
@@ -754,7 +760,7 @@ class DistanceField:
             if kept is not None:
                 winners, windows = kept
                 borders = borders_of(
-                    sweep, windows, winners.distance, winners.nearest, error, control
+                    sweep, windows, winners.vertices.distance, winners.nearest, error, control
                 )
             else:
                 borders = swept_borders(sweep, self._result.nearest, error, control)
@@ -776,11 +782,11 @@ class DistanceField:
 
         That of a fast sweep may be shorter: it goes on with what was found later.
         """
-        distance = float(winners.distance[node])
+        distance, source = winners.reached(node)
         path = traced_path(self.mesh, winners, nodes, node, EXACT)
-        start = self.sources[winners.nearest[node]].start_distance
+        start = self.sources[source].start_distance
         excess = start + path.length - distance
-        is_fast, exact = len(winners.crossing) > 0, not self._sweep.bounds.merging
+        is_fast, exact = len(winners.vertices.crossing) > 0, not self._sweep.bounds.merging
         most = rounding_of(self.mesh, distance)
         if (excess < -most and not is_fast) or (exact and excess > most):
             raise InternalError(

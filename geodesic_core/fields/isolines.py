@@ -13,12 +13,12 @@ from geodesic_core.control import Control, in_slices
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.path import length_of
 from geodesic_core.fields.sources import Nodes
+from geodesic_core.kernels.front.state import FACE, NODE
 from geodesic_core.kernels.isolines import lines as kernels
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.isolines.lines import Chains, Cuts, Field
 from geodesic_core.kernels.isolines.thinning import thin_lines
 from geodesic_core.kernels.mesh.half_edges import LENGTH, LENGTH_LEFT, TAIL
-from geodesic_core.kernels.sweep.state import FACE, NODE
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import FINEST_CHORD, LEVEL, PIECE
 from geodesic_core.validation import is_index, is_number

@@ -279,11 +279,8 @@ def located_path(
         if node < len(mesh.vertices):
             continue
         segment = nodes_of_sweep.segment(node)
-        if segment is None:
-            point, points[i] = nodes_of_sweep.site(node)
-        else:
-            point = foot_on(mesh, segment, points[1])
-            points[i] = mesh.position_from_origin(point)
+        point = nodes_of_sweep.site(node) if segment is None else foot_on(mesh, segment, points[1])
+        points[i] = mesh.position_from_origin(point)
         faces[i], weights[i] = point.face_index, point.barycentric
         vertices[i] = -1 if point.vertex_index is None else point.vertex_index
     between = np.empty(count - 1, np.int32)

@@ -13,16 +13,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Floats
+from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.fields.path import EXACT, GeodesicPath, reversed_path, traced_path
 from geodesic_core.fields.sources import Nodes, corners_of, nodes_of
 from geodesic_core.fields.sweep import sweep_nodes, winners_of
+from geodesic_core.kernels.front import state
+from geodesic_core.kernels.front.bounds import Bounds, exact_bounds, pruning_toward
 from geodesic_core.kernels.isolines.face_windows import FaceWindows, Reach, reach_point
-from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep import state
-from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, pruning_toward
-from geodesic_core.kernels.sweep.state import SITE
+from geodesic_core.kernels.mesh.half_edges import point_in_frame
+from geodesic_core.kernels.paths.backtracing import End, Winners
 from geodesic_core.mesh.curve import weights_by_face
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -39,6 +39,17 @@ class Arrival(NamedTuple):
     reach: Reach
 
 
+class _Known(NamedTuple):
+    """What `reach_point` reads of a sweep, as it calls it."""
+
+    nearest: Ints
+    distance: Floats
+    site_ints: Ints
+    site_weights: Floats
+    piece_ints: Ints
+    piece_ends: Floats
+
+
 def arrival_at(
     mesh: TriangleMesh,
     winners: Winners,
@@ -48,8 +59,17 @@ def arrival_at(
     max_distance: float,
 ) -> Arrival:
     """Return the shortest arrival at a canonical point; O(windows of its faces)."""
+    sites = winners.sites
+    known = _Known(
+        winners.nearest,
+        winners.vertices.distance,
+        sites.ints,
+        sites.weights,
+        sites.segment_ints,
+        sites.segment_ends,
+    )
     reaches = (
-        reach_point(mesh.topology, winners, windows, nodes.first_target, face, np.array(weights))
+        reach_point(mesh.topology, known, windows, nodes.first_target, face, np.array(weights))
         for face, weights in weights_by_face(mesh, point).items()
     )
     best = min(reaches, key=lambda reach: reach[0])
@@ -62,28 +82,23 @@ def arrival_at(
 def with_target(
     mesh: TriangleMesh, winners: Winners, nodes: Nodes, point: SurfacePoint, arrival: Arrival
 ) -> tuple[Winners, Nodes, int]:
-    """Return winners and nodes with one more node, at the point, and its number; O(V)."""
-    node, reach = len(winners.distance), arrival.reach
-    faces = weights_by_face(mesh, point)
-    rows = np.array([(node, face, -1) for face in faces], np.int32).reshape(-1, SITE)
-    return (
-        winners._replace(
-            nearest=np.append(winners.nearest, np.int32(arrival.source)),
-            distance=np.append(winners.distance, arrival.distance),
-            winner=np.vstack([winners.winner, [reach.sx, reach.sy]]),
-            winner_ints=np.vstack(
-                [winners.winner_ints, np.array([reach.entry_edge, reach.predecessor], np.int32)]
-            ),
-            site_ints=np.vstack([winners.site_ints, rows]),
-            site_weights=np.vstack([winners.site_weights, list(faces.values())]),
-        ),
-        replace(
-            nodes,
-            points=(*nodes.points, point),
-            positions=np.vstack([nodes.positions, mesh.position_from_origin(point)]),
-        ),
-        node,
+    """Return winners and nodes with one more node, at the point, and its number; O(1)."""
+    node, reach = len(winners.vertices.distance), arrival.reach
+    weights = weights_by_face(mesh, point)[reach.entry_edge // 3]
+    x, y = point_in_frame(mesh.topology.geometry, reach.entry_edge, np.array(weights))
+    target = End(
+        node=node,
+        distance=arrival.distance,
+        source=arrival.source,
+        entry_edge=reach.entry_edge,
+        x=x,
+        y=y,
+        sx=reach.sx,
+        sy=reach.sy,
+        reference=-1 - reach.predecessor,
+        crossing=math.nan,
     )
+    return winners._replace(target=target), replace(nodes, added=(point,)), node
 
 
 class NearestSource(NamedTuple):

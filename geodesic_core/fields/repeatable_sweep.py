@@ -12,12 +12,14 @@ from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.fields.sources import Nodes, nodes_of
 from geodesic_core.fields.sweep import share_of_vertices, sweep_nodes, winners_of
+from geodesic_core.kernels.front import state
+from geodesic_core.kernels.front.bounds import Bounds, with_parallel_windows
+from geodesic_core.kernels.front.counters import CREATED, PEAK, PROPAGATED
+from geodesic_core.kernels.front.relaxation import nearest_sources
+from geodesic_core.kernels.front.state import FOUND, Merges, Sites, Wavefront, found
 from geodesic_core.kernels.isolines import face_windows
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
-from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep import continuous_dijkstra, state
-from geodesic_core.kernels.sweep.bounds import Bounds, with_parallel_windows
-from geodesic_core.kernels.sweep.state import Wavefront
+from geodesic_core.kernels.paths.backtracing import NO_END, Winners
 from geodesic_core.mesh.curve import Polyline
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -110,11 +112,12 @@ class SweepResult(NamedTuple):
     """Windows of all faces"""
 
     @classmethod
-    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]]) -> "SweepResult":
-        """Return the result that these `arrays` hold."""
+    def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], sites: Sites) -> "SweepResult":
+        """Return the result that these `arrays` hold, of a sweep with these sites."""
         winners = windows = None
         if "winner" in arrays:
-            winners = Winners(**{name: arrays[name] for name in Winners._fields})
+            merges = Merges(arrays["merges"], arrays["merge_ints"])
+            winners = Winners(arrays["nearest"], found(arrays), merges, sites, NO_END)
         if "windows" in arrays:
             windows = FaceWindows(**{name: arrays[name] for name in FaceWindows._fields})
         return cls(arrays["distance"], arrays["nearest"], winners, windows)
@@ -122,9 +125,8 @@ class SweepResult(NamedTuple):
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return all arrays by name, those of winners and windows among them."""
         arrays: dict[str, NDArray[Any]] = {"distance": self.distance, "nearest": self.nearest}
-        for group in (self.winners, self.windows):
-            arrays |= {} if group is None else group._asdict()
-        return arrays
+        arrays |= {} if self.winners is None else arrays_of(self.winners)
+        return arrays | ({} if self.windows is None else self.windows._asdict())
 
 
 @dataclass(frozen=True)
@@ -215,14 +217,19 @@ class RepeatableSweep:
 
 def all_winners(wave: Wavefront) -> Winners:
     """Return the data of paths of a sweep over all of a mesh, in memory of its own."""
-    winners = winners_of(
-        wave,
-        continuous_dijkstra.nearest_sources(
-            wave.vertices.distance, wave.vertices.winner_ints, wave.vertices.source_index
-        ),
-    )
+    vertices = wave.vertices
+    nearest = nearest_sources(vertices.distance, vertices.winner_ints, vertices.source_index)
+    winners = winners_of(wave, nearest)
     # A copy holds the merges without the room for more.
-    return winners._replace(merges=winners.merges.copy(), merge_ints=winners.merge_ints.copy())
+    merges = Merges(winners.merges.floats.copy(), winners.merges.ints.copy())
+    return winners._replace(merges=merges)
+
+
+def arrays_of(winners: Winners) -> dict[str, NDArray[Any]]:
+    """Return the data of paths by name, without the sites, which the question tells."""
+    vertices = {name: getattr(winners.vertices, name) for name in FOUND}
+    merges, merge_ints = winners.merges
+    return {"nearest": winners.nearest, **vertices, "merges": merges, "merge_ints": merge_ints}
 
 
 def peak_bytes(wave: Wavefront) -> int:
@@ -232,9 +239,7 @@ def peak_bytes(wave: Wavefront) -> int:
 
 def stats_of(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
     """Return the statistics of a sweep that has finished."""
-    created, kept, peak = (
-        int(wave.counters[i]) for i in (state.CREATED, state.PROPAGATED, state.PEAK)
-    )
+    created, kept, peak = (int(wave.counters[i]) for i in (CREATED, PROPAGATED, PEAK))
     return SweepStats.of(mesh, created, kept, peak, peak_bytes(wave), seconds)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import BlockedSource, InvalidArgument, InvalidPoint, NoPath
-from geodesic_core.kernels.sweep.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
+from geodesic_core.kernels.front.state import NO_SITES, NODE, SEGMENT, SEGMENT_ENDS, SITE, Sites
 from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.canonical import half_edges_around, remedy
 from geodesic_core.mesh.curve import (
@@ -42,14 +42,14 @@ class Nodes:
     """First row of a target among those of the sites"""
     points: tuple[SurfacePoint, ...]
     """Points that became sites, in the order of their nodes"""
-    positions: Floats
-    """(sites, 3), mesh units from the mesh's origin"""
     segments: tuple[SegmentInFace, ...]
     """Segments of curves, in the order of their nodes, each in one of its faces"""
     first_segment: int
     """Node of the first segment"""
     components: tuple[int, ...]
     """Connected components with a source"""
+    added: tuple[SurfacePoint, ...] = ()
+    """Points that became nodes after the sweep, numbered after all others"""
 
     @property
     def has_site_targets(self) -> bool:
@@ -61,13 +61,12 @@ class Nodes:
         rank = node - self.first_segment
         return self.segments[rank] if 0 <= rank < len(self.segments) else None
 
-    def site(self, node: int) -> tuple[SurfacePoint, Floats]:
-        """Return the point of a node that is neither vertex nor segment, and its position."""
-        # Points added after a sweep come behind its segments.
+    def site(self, node: int) -> SurfacePoint:
+        """Return the point of a node that is neither vertex nor segment."""
         rank = node - self.first_segment
-        segments = len(self.segments)
-        rank += self.sites.nodes - segments - (segments if rank >= 0 else 0)
-        return self.points[rank], self.positions[rank]
+        if rank < 0:
+            return self.points[len(self.points) + rank]
+        return self.added[rank - len(self.segments)]
 
 
 @dataclass(frozen=True)
@@ -203,7 +202,6 @@ def nodes_of(
         ),
         first_target=first_target,
         points=tuple(sited),
-        positions=np.array([mesh.position_from_origin(p) for p in watched(sited)]).reshape(-1, 3),
         segments=tuple(parts[0] for _, parts in segments),
         first_segment=first_segment,
         components=tuple({component_of(mesh, line[0]) for line in watched(sources)}),

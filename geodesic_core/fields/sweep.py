@@ -4,18 +4,16 @@ import math
 import time
 from collections.abc import Callable
 
-import numpy as np
-
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import SLICE_SECONDS, Control
 from geodesic_core.errors import InternalError
 from geodesic_core.fields.sources import Nodes
+from geodesic_core.kernels.front import counters, pruning, state
+from geodesic_core.kernels.front.bounds import Bounds, without_merging
+from geodesic_core.kernels.front.state import PREDECESSOR, Merges, Wavefront
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.kernels.sweep import continuous_dijkstra, pruning, state, surface_points
-from geodesic_core.kernels.sweep.bounds import Bounds, without_merging
-from geodesic_core.kernels.sweep.queues import RING_HEAD
-from geodesic_core.kernels.sweep.state import PREDECESSOR, Wavefront
+from geodesic_core.kernels.paths.backtracing import NO_END, Winners
+from geodesic_core.kernels.sweep import continuous_dijkstra, site_targets
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 _FIRST_BUDGET = 1_000_000
@@ -69,10 +67,10 @@ def sweep_nodes(
             topology, wave, nodes.sources, nodes.source_indices, start_distances, bounds
         )
         if nodes.has_site_targets:
-            surface_points.watch_sites(wave.sites.ints, wave.pool.lists, nodes.first_target)
+            site_targets.watch_sites(wave.sites.ints, wave.pool.lists, nodes.first_target)
         wave, outcome = run_sweep(mesh, wave, bounds, control, share, limit_of)
         if nodes.has_site_targets and outcome == Outcome.FINISHED:
-            surface_points.reach_sites_inside(topology, wave, bounds, nodes.first_target)
+            continuous_dijkstra.reach_sites_inside(topology, wave, bounds, nodes.first_target)
         return wave, outcome
 
     wave, outcome = sweep(wave, bounds)
@@ -81,7 +79,7 @@ def sweep_nodes(
         wave, outcome = sweep(wave, without_merging(bounds))
         wave.vertices.reference[:] = -1 - wave.vertices.winner_ints[:, PREDECESSOR]
     if outcome == Outcome.RUNAWAY:
-        half_edge = wave.queues.ring[wave.counters[RING_HEAD]]
+        half_edge = wave.queues.ring[wave.counters[counters.RING_HEAD]]
         raise InternalError(
             f"the sweep does not end: its windows go in circles through face "
             f"{topology.outer_face[half_edge // 3]}; please report this mesh, and use "
@@ -119,7 +117,7 @@ def run_sweep(
         outcome = continuous_dijkstra.advance(mesh.topology, wave, bounds, left)
         took = time.perf_counter() - began
         if outcome in _GROW:
-            left -= int(wave.counters[state.WORK])  # slices do not depend on the room there was
+            left -= int(wave.counters[counters.WORK])  # slices do not depend on the room there was
             wave = _GROW[outcome](wave)
             control.check_memory(state.bytes_of(wave))
             continue
@@ -135,20 +133,13 @@ def run_sweep(
 
 def winners_of(wave: Wavefront, nearest: Ints) -> Winners:
     """Return what backtracing needs of a sweep that has finished; ``nearest`` as in `Winners`."""
-    count = wave.counters[state.MERGES]
+    count = wave.counters[counters.MERGES]
     return Winners(
         nearest=nearest,
-        distance=wave.vertices.distance,
-        winner=wave.vertices.winner,
-        winner_ints=wave.vertices.winner_ints,
-        crossing=np.empty(0),
-        reference=wave.vertices.reference,
-        merges=wave.pool.merges[:count],
-        merge_ints=wave.pool.merge_ints[:count],
-        site_ints=wave.sites.ints,
-        site_weights=wave.sites.weights,
-        piece_ints=wave.sites.segment_ints,
-        piece_ends=wave.sites.segment_ends,
+        vertices=state.found(wave.vertices._asdict()),
+        merges=Merges(wave.merges.floats[:count], wave.merges.ints[:count]),
+        sites=wave.sites,
+        target=NO_END,
     )
 
 
@@ -156,8 +147,8 @@ def share_of_vertices(reachable: int, limit: float) -> Callable[[Wavefront], flo
     """Return the share done as a function of the state: of the vertices, or of a limit."""
 
     def share(wave: Wavefront) -> float:
-        done = float(wave.counters[state.SETTLED_VERTICES]) / reachable
-        if math.isfinite(limit) and wave.counters[0] > 0:
+        done = float(wave.counters[counters.SETTLED_VERTICES]) / reachable
+        if math.isfinite(limit) and wave.counters[counters.HEAP_SIZE] > 0:
             done = max(
                 done, float(wave.vertices.distance[wave.queues.heap[0]]) / limit if limit else 1.0
             )

@@ -11,14 +11,14 @@ from geodesic_core.arrays import Floats, Ints, Singles, aligned_rows
 from geodesic_core.control import Control
 from geodesic_core.fields.sources import nodes_of
 from geodesic_core.fields.sweep import sweep_nodes
-from geodesic_core.kernels.sweep import state
-from geodesic_core.kernels.sweep.bounds import (
+from geodesic_core.kernels.front import state
+from geodesic_core.kernels.front.bounds import (
     LANDMARKS,
     PruningBounds,
     merging_bounds,
     pruning_toward,
 )
-from geodesic_core.kernels.sweep.pruning import bound_landmarks
+from geodesic_core.kernels.front.pruning import bound_landmarks
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import LANDMARK_ERROR
 

@@ -41,26 +41,25 @@ from geodesic_core.fields.path import (
 from geodesic_core.fields.repeatable_sweep import RepeatableSweep
 from geodesic_core.fields.sources import Nodes, corners_of, nodes_of
 from geodesic_core.fields.sweep import sweep_nodes, winners_of
-from geodesic_core.kernels.mesh.half_edges import LENGTH
-from geodesic_core.kernels.paths import edge_dijkstra, funnel
-from geodesic_core.kernels.sweep import pruning, state
-from geodesic_core.kernels.sweep.bounds import (
+from geodesic_core.kernels.front import pruning, state
+from geodesic_core.kernels.front.bounds import (
     LANDMARKS,
     Bounds,
     PruningBounds,
     exact_bounds,
     merging_bounds,
 )
-from geodesic_core.kernels.sweep.state import (
-    CREATED,
+from geodesic_core.kernels.front.counters import CREATED, TOUCHED
+from geodesic_core.kernels.front.state import (
     NO_SITES,
     PREDECESSOR,
-    TOUCHED,
     Sites,
     Wavefront,
     new_wavefront,
     with_sites,
 )
+from geodesic_core.kernels.mesh.half_edges import LENGTH
+from geodesic_core.kernels.paths import edge_dijkstra, funnel
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.landmarks import Landmarks

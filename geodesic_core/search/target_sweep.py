@@ -9,16 +9,10 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.fields.sources import Ends
 from geodesic_core.fields.sweep import share_of_vertices, sweep_nodes
-from geodesic_core.kernels.sweep import pruning, state
-from geodesic_core.kernels.sweep.bounds import exact_bounds
-from geodesic_core.kernels.sweep.state import (
-    NO_SITES,
-    TOUCHED,
-    Sites,
-    Wavefront,
-    new_wavefront,
-    with_sites,
-)
+from geodesic_core.kernels.front import pruning, state
+from geodesic_core.kernels.front.bounds import exact_bounds
+from geodesic_core.kernels.front.counters import TOUCHED
+from geodesic_core.kernels.front.state import NO_SITES, Sites, Wavefront, new_wavefront, with_sites
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import SEARCH_SLACK
 

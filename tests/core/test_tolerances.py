@@ -16,7 +16,26 @@ from geodesic_core.fields import fast_sweep
 from geodesic_core.fields.sources import nodes_of
 from geodesic_core.fields.sweep import run_sweep
 from geodesic_core.kernels.fast import state as fast_state
+from geodesic_core.kernels.fast.buckets import push
 from geodesic_core.kernels.fast.places import offer
+from geodesic_core.kernels.front import state
+from geodesic_core.kernels.front.bounds import exact_bounds, merging_bounds, with_parallel_windows
+from geodesic_core.kernels.front.counters import CREATED, FAR_BUCKET, FRESH
+from geodesic_core.kernels.front.pool import put_window
+from geodesic_core.kernels.front.pruning import least_to_start
+from geodesic_core.kernels.front.relaxation import precedence
+from geodesic_core.kernels.front.state import (
+    FIRST,
+    LAST,
+    NO_MERGES,
+    NO_SITES,
+    SIZE,
+    found,
+    new_vertices,
+    new_wavefront,
+    view_of,
+)
+from geodesic_core.kernels.front.window import B0, B1, BUCKET, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.isolines.arcs import outer_arcs
 from geodesic_core.kernels.isolines.lines import united
 from geodesic_core.kernels.isolines.regions import (
@@ -42,20 +61,14 @@ from geodesic_core.kernels.mesh.half_edges import (
     TAIL,
 )
 from geodesic_core.kernels.paths import funnel
-from geodesic_core.kernels.paths.backtracing import Winners, is_on_path
+from geodesic_core.kernels.paths.backtracing import NO_END, Line, Winners, is_on_path
 from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, pull_taut, shortened_part
 from geodesic_core.kernels.planar import Source, bisector, bracketed, distance
-from geodesic_core.kernels.sweep import continuous_dijkstra, state
-from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
+from geodesic_core.kernels.sweep import continuous_dijkstra
 from geodesic_core.kernels.sweep.merging import accuracy, directionality, merged
-from geodesic_core.kernels.sweep.pruning import least_to_start
 from geodesic_core.kernels.sweep.reach import reach_apex
-from geodesic_core.kernels.sweep.relaxation import precedence
-from geodesic_core.kernels.sweep.state import FIRST, FRESH, LAST, NO_SITES, SIZE, new_wavefront
 from geodesic_core.kernels.sweep.trim_list import trim_list
 from geodesic_core.kernels.sweep.trimming import leaves_gap
-from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
-from geodesic_core.kernels.sweep.window_lists import put_window
 from geodesic_core.mesh.triangulation import triangulated
 from geodesic_core.search.landmarks import Landmarks
 from geodesic_core.tolerances import (
@@ -75,6 +88,7 @@ from geodesic_core.tolerances import (
     HALF_ULP,
     LANDMARK_ERROR,
     LARGEST_COORDINATE,
+    LAST_BUCKET,
     LOCAL_SHARE,
     LOOSE_OVERLAP,
     LOWER_BOUND,
@@ -470,31 +484,21 @@ def test_on_path_is_the_longest_detour_through_a_vertex(scale):
     for share, taken in ((-1.0, True), (0.0, True), (0.5, True), (2.0, False)):
         distance = scale * np.array([3.0, 0.0])
         distance[beside] = here - reach + share * ON_PATH * distance[target]
-        assert is_on_path(winners(distance), beside, reach, here, target) == taken
-        assert not is_on_path(winners(distance, [0, 1]), beside, reach, here, target)
+        line = Line(0, distance[target], 1.0, 0.0)
+        assert is_on_path(winners(distance), beside, reach, here, line) == taken
+        assert not is_on_path(winners(distance, [0, 1]), beside, reach, here, line)
 
 
 def test_on_path_never_leads_away_from_the_source():
-    assert not is_on_path(winners(np.array([1.0, 1.0])), 1, 0.0, 1.0, 0)
+    line = Line(0, 1.0, 1.0, 0.0)
+    assert not is_on_path(winners(np.array([1.0, 1.0])), 1, 0.0, 1.0, line)
 
 
 def winners(distance, nearest=(0, 0)) -> Winners:
     """Two vertices at these distances from these sources."""
-    nothing, none = np.empty((0, 2)), np.empty((0, 2), np.int32)
-    return Winners(
-        np.array(nearest, np.int32),
-        distance,
-        nothing,
-        none,
-        nothing[:, 0].copy(),
-        none[:, 0].copy(),
-        nothing,
-        none,
-        NO_SITES.ints,
-        NO_SITES.weights,
-        NO_SITES.segment_ints,
-        NO_SITES.segment_ends,
-    )
+    vertices = new_vertices(len(distance))._replace(distance=distance)
+    found_there = found(vertices._asdict())
+    return Winners(np.array(nearest, np.int32), found_there, NO_MERGES, NO_SITES, NO_END)
 
 
 @SCALES
@@ -716,19 +720,37 @@ def test_widest_error_is_the_most_that_is_used():
 @kernel
 def offer_to(topology, front, bounds, h, length, offered):
     """Offer a window to a half-edge that nothing has left by."""
-    offer(fast_state.view_of(topology, front, bounds), h, -1, length, offered)
+    offer(view_of(topology, front, bounds), h, -1, length, offered)
 
 
 def waiting(offers: int, sigma: float) -> int:
     """How many of some equal windows wait; they win no place, and all else known is 10.2 there."""
     square = gc.samples.plane(2)
     topology = topology_of(zoo.Case("square", square.vertices, square.faces))
-    front = fast_state.new_wavefront(topology, NO_SITES, 1, 0)
-    front.distance[:], front.values[:] = 10.0, 10.0
-    bounds = fast_state.FastBounds(math.inf, 1, 1.0, (), (), 0)
+    front = fast_state.new_wavefront(topology, NO_SITES, 1, 1.0, 0)
+    front.vertices.distance[:], front.places.values[:] = 10.0, 10.0
+    bounds = fast_state.fast_bounds(exact_bounds(math.inf))
     for _ in range(offers):
         offer_to(topology, front, bounds, 0, 1.0, window(0.1, 0.3, 0.2, 0.0, sigma))
-    return int(front.counters[fast_state.CREATED])
+    return int(front.counters[CREATED])
+
+
+@kernel
+def push_to(topology, front, bounds, h, pushed, key):
+    """Have a window wait to cross a half-edge."""
+    push(view_of(topology, front, bounds), h, pushed, 1, key)
+
+
+def test_last_bucket_is_that_of_all_windows_beyond():
+    topology = topology_of(zoo.SMALL["crags"])
+    front = fast_state.new_wavefront(topology, NO_SITES, 1, 1.0, 0)
+    bounds = fast_state.fast_bounds(exact_bounds(math.inf))
+    keys = np.array([0.5, 1.0, 2.0, 1e30]) * LAST_BUCKET
+    for key in keys:
+        push_to(topology, front, bounds, 0, window(0.0, 1.0, 0.0, 0.0, key), key)
+    due = front.pool.windows[: front.counters[FRESH], BUCKET]
+    np.testing.assert_array_equal(due, np.minimum(keys, LAST_BUCKET))
+    assert front.counters[FAR_BUCKET] == 0.5 * LAST_BUCKET
 
 
 @pytest.mark.parametrize(("share", "goes_on"), [(1.001, True), (0.999, False)])
@@ -929,7 +951,7 @@ def test_tries_end_a_line_that_leads_nowhere():
     mesh, target = strip_with_fins(count), 2 * count + 1
     field = gc.exact_distance(mesh, 0)
     winners, v = field._winners.get(Control()), int(mesh.topology.inner_vertex[target])
-    winners.distance[v] = 0.0
+    winners.vertices.distance[v] = 0.0
     with pytest.raises(gc.errors.InternalError, match="left the surface"):
         field.path_to(target)
 

@@ -12,6 +12,28 @@ from functools import cache
 
 import numpy as np
 
+from geodesic_core.kernels.front.counters import (
+    FREE_FIRST,
+    FREE_SIZE,
+    FRESH,
+    HEAP_SIZE,
+    PROPAGATED,
+    RING_HEAD,
+    RING_SIZE,
+    SETTLED_VERTICES,
+)
+from geodesic_core.kernels.front.state import (
+    ENTRY_EDGE,
+    FAR,
+    FIRST,
+    IN_RING,
+    LAST,
+    MARKS,
+    PREDECESSOR,
+    SETTLED,
+    SIZE,
+)
+from geodesic_core.kernels.front.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
     COS_LEFT,
@@ -22,24 +44,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     SIN_LEFT,
     TAIL,
 )
-from geodesic_core.kernels.sweep.queues import HEAP_SIZE, RING_HEAD, RING_SIZE
-from geodesic_core.kernels.sweep.state import (
-    ENTRY_EDGE,
-    FAR,
-    FIRST,
-    FREE_FIRST,
-    FREE_SIZE,
-    FRESH,
-    IN_RING,
-    LAST,
-    MARKS,
-    PREDECESSOR,
-    PROPAGATED,
-    SETTLED,
-    SETTLED_VERTICES,
-    SIZE,
-)
-from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY
 from tests.support import zoo
 from tests.support.oracles import unfolding
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.kernels.front import pruning, state
+from geodesic_core.kernels.front.bounds import PruningBounds, exact_bounds
 from geodesic_core.kernels.paths import edge_dijkstra
-from geodesic_core.kernels.sweep import pruning, state
-from geodesic_core.kernels.sweep.bounds import PruningBounds, exact_bounds
 from geodesic_core.search.landmarks import Landmarks
 from tests.support import zoo
 from tests.support.certificates import LENGTH, check_path

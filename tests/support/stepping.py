@@ -6,11 +6,8 @@ from collections.abc import Iterator
 import numpy as np
 
 import geodesic_core as gc
-from geodesic_core.kernels.mesh.half_edges import Topology
-from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.sweep import continuous_dijkstra
-from geodesic_core.kernels.sweep.bounds import exact_bounds
-from geodesic_core.kernels.sweep.state import (
+from geodesic_core.kernels.front.bounds import exact_bounds
+from geodesic_core.kernels.front.state import (
     View,
     Wavefront,
     new_wavefront,
@@ -18,7 +15,10 @@ from geodesic_core.kernels.sweep.state import (
     with_larger_pool,
     with_larger_scratch,
 )
-from geodesic_core.kernels.sweep.window import Window
+from geodesic_core.kernels.front.window import Window
+from geodesic_core.kernels.mesh.half_edges import Topology
+from geodesic_core.kernels.outcome import Outcome
+from geodesic_core.kernels.sweep import continuous_dijkstra
 from tests.support import zoo
 
 WHOLE = 1 << 60

@@ -14,6 +14,8 @@ import numpy as np
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.borders import envelopes
 from geodesic_core.kernels.borders.bisectors import BISECTOR, Regions, bisectors_within
+from geodesic_core.kernels.front.state import FACE, NODE
+from geodesic_core.kernels.front.window import ROOT
 from geodesic_core.kernels.isolines.arcs import ROWS, copy_rows, with_room
 from geodesic_core.kernels.isolines.regions import (
     CX,
@@ -36,8 +38,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     half_edge_in_face,
     next_around,
 )
-from geodesic_core.kernels.sweep.state import FACE, NODE
-from geodesic_core.kernels.sweep.window import ROOT
 from geodesic_core.tolerances import CROSSING, GAP, LEVEL, PIECE
 
 

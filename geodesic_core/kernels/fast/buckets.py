@@ -7,68 +7,59 @@ mean edge to two.
 """
 
 import math
-from typing import Any
 
-from geodesic_core.kernels.fast.state import (
-    BUCKET,
-    BUCKET_ENDS,
-    BUCKETS,
+from geodesic_core.kernels.fast.state import BUCKET_ENDS, BUCKETS, FIRST, LAST
+from geodesic_core.kernels.front.counters import (
     CREATED,
     CURRENT,
     FAR_BUCKET,
     FAR_FIRST,
-    FIRST,
-    FREE_FIRST,
     FREE_SIZE,
     FRESH,
-    HALF_EDGE,
-    IN_RING,
-    LAST,
+    IN_BUCKETS,
     PEAK,
-    WON,
 )
+from geodesic_core.kernels.front.pool import put_window
+from geodesic_core.kernels.front.state import WIDTH, View
+from geodesic_core.kernels.front.window import BUCKET, HALF_EDGE, INTS, NEXT, WON, Window
 from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
 from geodesic_core.kernels.mesh.half_edges import ROW
-from geodesic_core.kernels.sweep.window import INTS, NEXT, WIDTH, Window, store_window
-
-_LAST_BUCKET = 1e18  # far below the largest integer
+from geodesic_core.tolerances import LAST_BUCKET
 
 
 @inlined
-def push(wave: Any, h: int, window: Window, won: int, key: float) -> None:
+def push(wave: View, h: int, window: Window, won: int, key: float) -> None:
     """Have a window wait to cross h, by its least distance ``key``. Modifies pool and buckets."""
-    front = wave.front
-    ints, counters = as_ints(front.windows), front.counters
-    slot = counters[FREE_FIRST]
-    if slot >= 0:
-        counters[FREE_FIRST] = ints[INTS * slot + NEXT]
-        counters[FREE_SIZE] -= 1
-    else:
-        slot = counters[FRESH]
-        counters[FRESH] = slot + 1
+    rows, counters = wave.pool.windows, wave.counters
+    slot, ints = put_window(wave, window), as_ints(rows)
     counters[CREATED] += 1
     counters[PEAK] = max(counters[PEAK], counters[FRESH] - counters[FREE_SIZE])
-    store_window(wave, front.windows, slot, window)
     ints[INTS * slot + HALF_EDGE], ints[INTS * slot + WON] = h, won
     if h >= 0:  # it comes up long after: to wait for memory then took a third of the sweep
         prefetch(wave.mesh.links, ROW * h)
         prefetch(wave.mesh.geometry, ROW * h)
-    due = math.floor(min(key * wave.bounds.buckets_per_unit, _LAST_BUCKET))
-    bucket = max(int(due), counters[CURRENT])
+    due = math.floor(min(key * wave.places.buckets_per_unit, LAST_BUCKET))
+    rows[WIDTH * slot + BUCKET] = due
+    enqueue(wave, slot, max(int(due), counters[CURRENT]))
+
+
+@inlined
+def enqueue(wave: View, slot: int, bucket: int) -> None:
+    """Put a window into a bucket of the ring, or into the chain of those beyond it."""
+    counters = wave.counters
     if bucket < counters[CURRENT] + BUCKETS:
         append(wave, slot, bucket)
         return
-    front.windows[WIDTH * slot + BUCKET] = due
-    ints[INTS * slot + NEXT] = counters[FAR_FIRST]
+    as_ints(wave.pool.windows)[INTS * slot + NEXT] = counters[FAR_FIRST]
     if counters[FAR_FIRST] < 0 or bucket < counters[FAR_BUCKET]:
         counters[FAR_BUCKET] = bucket
     counters[FAR_FIRST] = slot
 
 
 @inlined
-def append(wave: Any, slot: int, bucket: int) -> None:
+def append(wave: View, slot: int, bucket: int) -> None:
     """Append a row to a bucket of the ring."""
-    ints, buckets = as_ints(wave.front.windows), wave.front.buckets
+    ints, buckets = as_ints(wave.pool.windows), wave.places.buckets
     row = BUCKET_ENDS * (bucket & (BUCKETS - 1))
     ints[INTS * slot + NEXT] = -1
     last = buckets[row + LAST]
@@ -77,19 +68,18 @@ def append(wave: Any, slot: int, bucket: int) -> None:
     else:
         buckets[row + FIRST] = slot
     buckets[row + LAST] = slot
-    wave.front.counters[IN_RING] += 1
+    wave.counters[IN_BUCKETS] += 1
 
 
 @inlined
-def first_waiting(wave: Any) -> int:
+def first_waiting(wave: View) -> int:
     """Return the row of the window to cross next, -1 if none waits. Moves the ring on."""
-    front = wave.front
-    counters = front.counters
-    while counters[IN_RING] > 0 or counters[FAR_FIRST] >= 0:
+    counters = wave.counters
+    while counters[IN_BUCKETS] > 0 or counters[FAR_FIRST] >= 0:
         is_due = counters[FAR_FIRST] >= 0 and counters[FAR_BUCKET] <= counters[CURRENT]
-        if is_due or counters[IN_RING] == 0:
+        if is_due or counters[IN_BUCKETS] == 0:
             take_in_far(wave)
-        slot = front.buckets[BUCKET_ENDS * (counters[CURRENT] & (BUCKETS - 1)) + FIRST]
+        slot = wave.places.buckets[BUCKET_ENDS * (counters[CURRENT] & (BUCKETS - 1)) + FIRST]
         if slot >= 0:
             return int(slot)
         counters[CURRENT] += 1
@@ -97,50 +87,25 @@ def first_waiting(wave: Any) -> int:
 
 
 @kernel
-def take_in_far(wave: Any) -> None:
+def take_in_far(wave: View) -> None:
     """Move the windows of the chain that are within the ring now into it. Modifies both."""
-    front = wave.front
-    ints, counters = as_ints(front.windows), front.counters
-    if counters[IN_RING] == 0:
+    rows, counters = wave.pool.windows, wave.counters
+    if counters[IN_BUCKETS] == 0:
         counters[CURRENT] = max(counters[CURRENT], counters[FAR_BUCKET])
     slot = counters[FAR_FIRST]
     counters[FAR_FIRST] = -1
     while slot >= 0:
-        after = int(ints[INTS * slot + NEXT])
-        bucket = max(int(front.windows[WIDTH * slot + BUCKET]), counters[CURRENT])
-        if bucket < counters[CURRENT] + BUCKETS:
-            append(wave, slot, bucket)
-        else:
-            if counters[FAR_FIRST] < 0 or bucket < counters[FAR_BUCKET]:
-                counters[FAR_BUCKET] = bucket
-            ints[INTS * slot + NEXT] = counters[FAR_FIRST]
-            counters[FAR_FIRST] = slot
+        after = int(as_ints(rows)[INTS * slot + NEXT])
+        enqueue(wave, slot, max(int(rows[WIDTH * slot + BUCKET]), counters[CURRENT]))
         slot = after
 
 
 @inlined
-def pop(wave: Any, slot: int) -> None:
+def pop(wave: View, slot: int) -> None:
     """Take the first window, of row ``slot``, out of the current bucket; its row stays in use."""
-    front = wave.front
-    row = BUCKET_ENDS * (front.counters[CURRENT] & (BUCKETS - 1))
-    after = as_ints(front.windows)[INTS * slot + NEXT]
-    front.buckets[row + FIRST] = after
+    row = BUCKET_ENDS * (wave.counters[CURRENT] & (BUCKETS - 1))
+    after = as_ints(wave.pool.windows)[INTS * slot + NEXT]
+    wave.places.buckets[row + FIRST] = after
     if after < 0:
-        front.buckets[row + LAST] = -1
-    front.counters[IN_RING] -= 1
-
-
-@inlined
-def free(wave: Any, slot: int) -> None:
-    """Give a row back to the pool."""
-    front = wave.front
-    as_ints(front.windows)[INTS * slot + NEXT] = front.counters[FREE_FIRST]
-    front.counters[FREE_FIRST] = slot
-    front.counters[FREE_SIZE] += 1
-
-
-@inlined
-def room(wave: Any) -> int:
-    """Return how many rows of the pool are free."""
-    counters = wave.front.counters
-    return int(wave.sizes.windows - counters[FRESH] + counters[FREE_SIZE])
+        wave.places.buckets[row + LAST] = -1
+    wave.counters[IN_BUCKETS] -= 1

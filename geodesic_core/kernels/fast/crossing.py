@@ -7,16 +7,23 @@ paths that exist: the best of them wins a place, or several, and the rest is dro
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from geodesic_core.kernels.fast.places import (
-    AT_LARGE,
-    distance_along,
-    offer_end,
-    offer_over,
-    relax,
+from geodesic_core.kernels.fast.places import AT_LARGE, distance_along, offer_end, offer_over, relax
+from geodesic_core.kernels.front.counters import PROPAGATED
+from geodesic_core.kernels.front.sides import Side, left_of, right_of
+from geodesic_core.kernels.front.state import NEXT_SITE, NODE, SITE, View
+from geodesic_core.kernels.front.window import (
+    INTS,
+    WON,
+    Window,
+    distance_at,
+    emitted_window,
+    load_window,
+    reversed_window,
+    seen_over,
+    straight_distance,
 )
-from geodesic_core.kernels.fast.state import CROSSED, WON
 from geodesic_core.kernels.jit import as_ints, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -27,23 +34,12 @@ from geodesic_core.kernels.mesh.half_edges import (
     OUT_RIGHT,
     ROW,
     TAIL,
+    faces_beyond,
     following,
     previous,
     weights_in_frame,
 )
 from geodesic_core.kernels.planar import hit_left
-from geodesic_core.kernels.sweep.spread import Side, left_of, right_of
-from geodesic_core.kernels.sweep.state import NEXT_SITE, NODE, SITE
-from geodesic_core.kernels.sweep.window import (
-    INTS,
-    Window,
-    distance_at,
-    emitted_window,
-    load_window,
-    reversed_window,
-    straight_distance,
-)
-from geodesic_core.kernels.sweep.window_lists import faces_beyond
 
 OFFERS = 4
 """Windows offered to an edge, at most"""
@@ -62,11 +58,11 @@ class Corners(NamedTuple):
 
 
 @inlined
-def is_live(wave: Any, h: int, window: Window, won: int) -> bool:
+def is_live(wave: View, h: int, window: Window, won: int) -> bool:
     """Whether a window is still the nearest at a place that it won."""
     if won & AT_LARGE:
         return True
-    values, places = wave.front.values, wave.bounds.places
+    values, places = wave.places.values, wave.places.per_edge
     step = wave.mesh.geometry[ROW * h + LENGTH] / places
     for k in range(places):
         if won >> k & 1:
@@ -77,33 +73,33 @@ def is_live(wave: Any, h: int, window: Window, won: int) -> bool:
 
 
 @inlined
-def room_to_cross(wave: Any, h: int) -> int:
+def room_to_cross(wave: View, h: int) -> int:
     """Return how many windows a crossing of the face of h may make, at most."""
     links, room = wave.mesh.links, 2 * OFFERS + VERTICES
     if links[ROW * h + OUT_LEFT] == IRREGULAR:
-        room += OFFERS * faces_beyond(wave, previous(h))
+        room += OFFERS * faces_beyond(links, previous(h))
     if links[ROW * h + OUT_RIGHT] == IRREGULAR:
-        room += OFFERS * faces_beyond(wave, following(h))
+        room += OFFERS * faces_beyond(links, following(h))
     return room
 
 
 @inlined
-def cross(wave: Any, h: int, slot: int) -> None:
+def cross(wave: View, h: int, slot: int) -> None:
     """Send the window of a row, if it is live, over the face of h. Modifies the wavefront."""
-    mesh, front = wave.mesh, wave.front
-    window = load_window(wave, front.windows, slot)
-    if not is_live(wave, h, window, as_ints(front.windows)[INTS * slot + WON]):
+    mesh, rows, distance = wave.mesh, wave.pool.windows, wave.vertices.distance
+    window = load_window(wave, rows, slot)
+    if not is_live(wave, h, window, as_ints(rows)[INTS * slot + WON]):
         return
-    front.counters[CROSSED] += 1
+    wave.counters[PROPAGATED] += 1
     left, right = left_of(wave, h), right_of(wave, h)
     tail, head = int(mesh.links[ROW * h + TAIL]), int(mesh.links[ROW * h + HEAD])
     apex = int(mesh.links[ROW * h + APEX])
     ax, ay = left.cosine * left.length, left.sine * left.length
     x = ray_through(window, ax, ay)
     reach(wave, apex, h, window, ax, ay, x)
-    relax(wave, apex, front.distance[tail] + left.length, h, 0.0, 0.0, tail, 0.0)
+    relax(wave, apex, distance[tail] + left.length, h, 0.0, 0.0, tail, 0.0)
     far_end = right.start
-    relax(wave, apex, front.distance[head] + right.length, h, far_end, 0.0, head, far_end)
+    relax(wave, apex, distance[head] + right.length, h, far_end, 0.0, head, far_end)
     if wave.sizes.first_site > 0:
         reach_sites(wave, h, window)
     send_over(wave, window, left, previous(h), x, far_end, Corners(tail, apex, head))
@@ -119,7 +115,7 @@ def ray_through(window: Window, ax: float, ay: float) -> float:
 
 
 @inlined
-def reach(wave: Any, node: int, h: int, window: Window, ax: float, ay: float, x: float) -> None:
+def reach(wave: View, node: int, h: int, window: Window, ax: float, ay: float, x: float) -> None:
     """Offer a node at (ax, ay) the path through a window, bent at its end where it must.
 
     ``x`` is where its ray to that point crosses the edge.
@@ -133,10 +129,10 @@ def reach(wave: Any, node: int, h: int, window: Window, ax: float, ay: float, x:
 
 
 @kernel
-def reach_sites(wave: Any, h: int, window: Window) -> None:
+def reach_sites(wave: View, h: int, window: Window) -> None:
     """Offer the sites in the face of h the path through a window. Modifies their nodes."""
-    mesh, sites = wave.mesh, wave.front.sites
-    k = int(wave.front.first_site[h // 3])
+    mesh, sites = wave.mesh, wave.sites
+    k = int(wave.places.first_site[h // 3])
     while k >= 0:
         x, y = weights_in_frame(mesh.geometry, sites.weights, 3 * k, h)
         node = int(sites.ints[SITE * k + NODE])
@@ -146,7 +142,7 @@ def reach_sites(wave: Any, h: int, window: Window) -> None:
 
 @inlined
 def send_over(
-    wave: Any,
+    wave: View,
     window: Window,
     side: Side,
     g: int,
@@ -168,27 +164,25 @@ def send_over(
     if x > window.b1:
         u1 = hit_left(window.b1, window.sy, depth, side.sine, side.length, window.weight)
     if u1 > u0:
-        sigma, root = window.sigma, window.root
-        lit = Window(u0, u1, along, depth, sigma, window.weight, root, 0.0, window.reference)
-        offer_side(wave, side, g, lit)
+        offer_side(wave, side, g, seen_over(window, u0, u1, along, depth))
     near, apex, far = corners
     if side.out >= 0:
         offer_end(wave, side.out, g, side.length, near, not side.is_right)
         offer_end(wave, side.out, g, side.length, apex, side.is_right)
     else:
-        ends = wave.front.distance[near], wave.front.distance[apex]
+        ends = wave.vertices.distance[near], wave.vertices.distance[apex]
         offer_side(
             wave, side, g, emitted_window(wave, 0.0, side.length, 0.0, 0.0, ends[0], near, 0.0)
         )
         place = side.length
         offer_side(wave, side, g, emitted_window(wave, 0.0, place, place, 0.0, ends[1], apex, 0.0))
     if x > window.b1 and window.b1 == length:
-        sx, sy, sigma = length * side.cosine, -length * side.sine, wave.front.distance[far]
+        sx, sy, sigma = length * side.cosine, -length * side.sine, wave.vertices.distance[far]
         offer_side(wave, side, g, emitted_window(wave, 0.0, side.length, sx, sy, sigma, far, 0.0))
 
 
 @inlined
-def offer_side(wave: Any, side: Side, g: int, window: Window) -> None:
+def offer_side(wave: View, side: Side, g: int, window: Window) -> None:
     """Offer a window, as seen from the end of the side g at which that begins, across it."""
     if side.is_right:  # the half-edge across begins at the apex
         window = reversed_window(window, side.length)

@@ -13,13 +13,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints, Longs, aligned_rows
+from geodesic_core.kernels.front.counters import RETAINED_ROWS
+from geodesic_core.kernels.front.relaxation import precedence
+from geodesic_core.kernels.front.segments import distance_to_segment, is_segment
+from geodesic_core.kernels.front.sites import way_through
+from geodesic_core.kernels.front.state import FACE, NODE, WIDTH, Wavefront
+from geodesic_core.kernels.front.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY, Window
 from geodesic_core.kernels.jit import inlined, kernel, pointer
 from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL, point_in_frame
-from geodesic_core.kernels.sweep.relaxation import precedence
-from geodesic_core.kernels.sweep.segments import distance_to_segment, is_segment
-from geodesic_core.kernels.sweep.state import FACE, NODE, RETAINED_ROWS, Wavefront
-from geodesic_core.kernels.sweep.surface_points import way_through
-from geodesic_core.kernels.sweep.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY, WIDTH, Window
 from geodesic_core.tolerances import GAP
 
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.kernels.front.window import B0, B1, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.isolines.arcs import (
     ARC,
     END,
@@ -43,7 +44,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     next_around,
 )
 from geodesic_core.kernels.planar import distance
-from geodesic_core.kernels.sweep.window import B0, B1, ROOT, SIGMA, SX, SY
 from geodesic_core.tolerances import CROSSING, LEVEL, PIECE
 
 

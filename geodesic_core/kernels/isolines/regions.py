@@ -22,11 +22,11 @@ from typing import Any
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.front.state import FACE, NODE, SEGMENT_END
+from geodesic_core.kernels.front.window import ROOT, Window, reaches
 from geodesic_core.kernels.isolines.face_windows import retained_window
 from geodesic_core.kernels.jit import borrowed, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL, half_edge_in_face, point_in_frame
-from geodesic_core.kernels.sweep.state import FACE, NODE, SEGMENT_END
-from geodesic_core.kernels.sweep.window import ROOT, Window, reaches
 from geodesic_core.tolerances import BEHIND, GAP, LEVEL
 
 # Columns of a front, with which a region begins

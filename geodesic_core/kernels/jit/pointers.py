@@ -3,6 +3,7 @@
 With ``NUMBA_DISABLE_JIT=1`` they are flat views, and the kernels plain Python.
 """
 
+import hashlib
 from collections.abc import Callable
 from typing import Any
 
@@ -10,7 +11,7 @@ import numba
 import numpy as np
 from llvmlite import ir
 from numba.core import cgutils, types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, overload
 from numpy.typing import NDArray
 
 
@@ -46,7 +47,11 @@ def _type_of_pointers(group: Any) -> Any:
         parts: Any = group
         pointers = [_type_of_pointers(part) for part in parts]
         from_types: Any = types.BaseTuple.from_types
-        return from_types(pointers, parts.instance_class)
+        kind = from_types(pointers, parts.instance_class)
+        # Symbols spell out the types of arguments: of a large group, half of a compiled kernel.
+        digest = hashlib.sha256(", ".join(map(str, pointers)).encode()).hexdigest()[:16]
+        kind.name = f"{parts.instance_class.__name__}_{digest}"
+        return kind
     return group
 
 
@@ -105,6 +110,22 @@ def _compiled_ints(typingcontext: Any, rows: Any) -> Any:  # noqa: ARG001
         return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
 
     return types.CPointer(types.int32)(rows), codegen
+
+
+def rows_of(array: Any) -> Any:
+    """Return the number of rows of an array; of one that is `ABSENT` nothing of any size."""
+    return array.shape[0] if isinstance(array, np.ndarray) else ()
+
+
+@overload(rows_of)
+def _compiled_rows_of(array: Any) -> Callable[[Any], Any]:
+    def of_array(array: Any) -> Any:
+        return array.shape[0]
+
+    def of_absent(array: Any) -> Any:  # noqa: ARG001 - numba's signature
+        return ()
+
+    return of_array if isinstance(array, types.Array) else of_absent
 
 
 def _interpreted_prefetch(array: Any, index: int) -> None:

@@ -24,7 +24,7 @@ Vertices and faces have inner numbers, see `build`. `Topology` holds the way bac
 its place in its face.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.kernels.jit import kernel
@@ -114,7 +114,7 @@ def point_in_frame(geometry: Floats, h: int, weights: Floats) -> tuple[float, fl
 
 
 @kernel
-def weights_in_frame(geometry: Any, weights: Any, first: int, h: int) -> tuple[float, float]:
+def weights_in_frame(geometry: Floats, weights: Floats, first: int, h: int) -> tuple[float, float]:
     """Position as `point_in_frame` has it, by raw pointers; the weights begin at ``first``."""
     row, i = ROW * h, h % 3
     along, up = weights[first + (i + 1) % 3], weights[first + (i + 2) % 3]
@@ -143,3 +143,13 @@ def next_around(links: Ints, h: int) -> int:
     if links[h, OPPOSITE] == IRREGULAR:
         return links[h, AROUND] >> 1
     return links[h, OPPOSITE]
+
+
+@kernel
+def faces_beyond(links: Ints, g: int) -> int:
+    """Return how many other faces the irregular edge of g has, by a raw pointer."""
+    count, h = 0, links[ROW * g + AROUND] >> 1
+    while h != g:
+        count += 1
+        h = links[ROW * h + AROUND] >> 1
+    return count

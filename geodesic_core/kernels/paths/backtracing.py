@@ -21,6 +21,27 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.front.segments import distance_to_segment
+from geodesic_core.kernels.front.state import (
+    ENTRY_EDGE,
+    FACE,
+    LEFT,
+    LEFT_REFERENCE,
+    MERGE,
+    MERGE_INTS,
+    MERGED_ON,
+    NODE,
+    PREDECESSOR,
+    RIGHT,
+    RIGHT_REFERENCE,
+    SEGMENT,
+    SITE,
+    SPLIT,
+    WINNER,
+    Merges,
+    Sites,
+    Vertices,
+)
 from geodesic_core.kernels.jit import inlined, kernel, pointer, pointers
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -39,52 +60,60 @@ from geodesic_core.kernels.mesh.half_edges import (
     SIN_LEFT,
     SIN_RIGHT,
     TAIL,
+    Topology,
     following,
     previous,
     weights_in_frame,
 )
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.sweep.segments import distance_to_segment
-from geodesic_core.kernels.sweep.state import (
-    ENTRY_EDGE,
-    FACE,
-    LEFT,
-    LEFT_REFERENCE,
-    MERGE,
-    MERGE_INTS,
-    MERGED_ON,
-    NODE,
-    PREDECESSOR,
-    RIGHT,
-    RIGHT_REFERENCE,
-    SEGMENT,
-    SITE,
-    SPLIT,
-    WINNER,
-)
 from geodesic_core.tolerances import FORKS, GAP, ON_PATH, SAME_PLACE, TRIES, WIDEST_ERROR
 
 LAST_AT = 1024
 """Half-edges that a walk remembers to have crossed, about; a power of two."""
 
 
+class End(NamedTuple):
+    """A node that a line of the path ends at, and the window that it was reached by."""
+
+    node: int
+    distance: float
+    """Distance from the source, mesh units"""
+    source: int
+    """Index of the nearest source"""
+    entry_edge: int
+    """-1 at a source: no line ends there"""
+    x: float
+    """Position in the frame of the entry edge"""
+    y: float
+    sx: float
+    """The pseudosource, in the same frame"""
+    sy: float
+    reference: int
+    """As in `window`: -1 - the node of the pseudosource where nothing was merged"""
+    crossing: float
+    """Where the path crosses the entry edge; NaN where a straight line or nothing crosses it"""
+
+
+NO_END = End(-1, math.inf, -1, -1, 0.0, 0.0, 0.0, 0.0, 0, math.nan)
+
+
 class Winners(NamedTuple):
-    """The results of a sweep that backtracing reads; all but the first are its `Wavefront`'s."""
+    """The results of a sweep that backtracing reads."""
 
     nearest: Ints
     """(N,): index of the nearest source, by node; -1 where unreached"""
-    distance: Floats
-    winner: Floats
-    winner_ints: Ints
-    crossing: Floats
-    """As in `fast.state.Wavefront`; empty after other sweeps, of straight lines"""
-    reference: Ints
-    merges: Floats
-    merge_ints: Ints
-    site_ints: Ints
-    site_weights: Floats
-    piece_ints: Ints
-    piece_ends: Floats
+    vertices: Vertices
+    """Without what only a running sweep needs"""
+    merges: Merges
+    sites: Sites
+    target: End
+    """One more node, found after the sweep; `NO_END` for none"""
+
+    def reached(self, node: int) -> tuple[float, int]:
+        """Return the distance of a node, and the index of its nearest source."""
+        if node == self.target.node:
+            return self.target.distance, self.target.source
+        return float(self.vertices.distance[node]), int(self.nearest[node])
 
 
 class View(NamedTuple):
@@ -94,10 +123,8 @@ class View(NamedTuple):
     long.
     """
 
-    mesh: Any
-    """A `Topology` of pointers"""
-    winners: Any
-    """`Winners` of pointers"""
+    mesh: Topology
+    winners: Winners
     vertex_count: int
     site_rows: int
     segment_rows: int
@@ -109,8 +136,8 @@ class View(NamedTuple):
 class Line(NamedTuple):
     """A straight line of the path: the part that is fixed while it is walked."""
 
-    end: int
-    """The node at which the walk begins"""
+    source: int
+    """Index of the nearest source of the node at which the walk begins"""
     length: float
     """Distance of that node from the source, mesh units"""
     sw: float
@@ -159,9 +186,9 @@ class Sight(NamedTuple):
 class Trail(NamedTuple):
     """The path so far, filled from its end, as raw pointers but for the last; see `trace_path`."""
 
-    nodes: Any
-    parameters: Any
-    faces: Any
+    nodes: Ints
+    parameters: Floats
+    faces: Ints
     room: int
     last_at: Ints
     """(LAST_AT,): by half-edge, modulo LAST_AT: which node of the path lay on it last. Anything
@@ -179,8 +206,8 @@ class Forks(NamedTuple):
 
 @kernel
 def trace_path(
-    topology: Any,
-    winners: Any,
+    topology: Topology,
+    winners: Winners,
     target: int,
     nodes: Ints,
     parameters: Floats,
@@ -198,40 +225,67 @@ def trace_path(
     trail = Trail(pointer(nodes), pointer(parameters), pointer(faces), len(nodes), last_at)
     forks = Forks(np.empty((FORKS, 5)), np.empty((FORKS, 4), np.int32))
     nodes[0], parameters[0] = -1 - target, 0.0
-    count, v = 1, target
-    while winners.winner_ints[v, ENTRY_EDGE] >= 0:
-        outcome, count, v = trace_line(view, v, trail, forks, count)
+    count, end = 1, end_at(view, target)
+    while end.entry_edge >= 0:
+        outcome, count, v = trace_line(view, end, trail, forks, count)
         if outcome != Outcome.FINISHED:
             return outcome, count
         if count >= len(nodes):
             return Outcome.PATH_FULL, count
         nodes[count], parameters[count] = -1 - v, 0.0
-        count += 1
+        count, end = count + 1, end_at(view, v)
     return Outcome.FINISHED, count
 
 
 @kernel
-def view_of(topology: Any, winners: Any) -> View:
+def view_of(topology: Topology, winners: Winners) -> View:
     """Return the View of a mesh and of winners, which the caller must hold meanwhile."""
     return View(
         pointers(topology),
         pointers(winners),
         len(topology.total_angle),
-        len(winners.site_ints),
-        len(winners.piece_ints),
-        len(winners.reference) > 0,
-        len(winners.crossing) > 0,
+        len(winners.sites.ints),
+        len(winners.sites.segment_ints),
+        len(winners.vertices.reference) > 0,
+        len(winners.vertices.crossing) > 0,
     )
 
 
 @kernel
-def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[Outcome, int, int]:
-    """Trace the line that ends at node v; return (outcome, number of nodes, its first node).
+def end_at(view: View, v: int) -> End:
+    """Return node v as the end of a line."""
+    winners, vertices = view.winners, view.winners.vertices
+    if v == winners.target.node:
+        return winners.target
+    m = as_int64(vertices.winner_ints[WINNER * v + ENTRY_EDGE])
+    reference = -1 - as_int64(vertices.winner_ints[WINNER * v + PREDECESSOR])
+    if view.merging:
+        reference = as_int64(vertices.reference[v])
+    x, y = target_in_frame(view, v, m) if m >= 0 else (0.0, 0.0)
+    return End(
+        as_int64(v),
+        vertices.distance[v],
+        as_int64(winners.nearest[v]),
+        m,
+        x,
+        y,
+        vertices.winner[2 * v],
+        vertices.winner[2 * v + 1],
+        reference,
+        vertices.crossing[v] if view.bends else math.nan,
+    )
+
+
+@kernel
+def trace_line(
+    view: View, end: End, trail: Trail, forks: Forks, count: int
+) -> tuple[Outcome, int, int]:
+    """Trace the line to its end; return (outcome, number of nodes, its first node).
 
     Appends to ``trail``; ``forks`` is scratch memory.
     """
     open_forks = 0
-    line, walk, start = jump_to_window(view, v, count)
+    line, walk, start = jump_to_window(view, end, count)
     trail.faces[count - 1] = walk.half_edge // 3
     if start >= 0:
         return Outcome.FINISHED, count, start
@@ -271,27 +325,22 @@ def trace_line(view: Any, v: int, trail: Any, forks: Any, count: int) -> tuple[O
 
 
 @kernel
-def jump_to_window(view: Any, v: int, count: int) -> tuple[Line, Walk, int]:
-    """Begin the line that ends at node v, on the half-edge that its winning window crossed last.
+def jump_to_window(view: View, end: End, count: int) -> tuple[Line, Walk, int]:
+    """Begin the line to its end, on the half-edge that the winning window crossed last.
 
     Returns as well the node where the line begins, if that is in the same face; else -1.
     """
-    mesh, winners = view.mesh, view.winners
-    m = as_int64(winners.winner_ints[WINNER * v + ENTRY_EDGE])
-    reference = -1 - as_int64(winners.winner_ints[WINNER * v + PREDECESSOR])
-    if view.merging:
-        reference = as_int64(winners.reference[v])
-    root, distance = pseudosource_of(reference), winners.distance[v]
+    mesh, winners, m, root = view.mesh, view.winners, end.entry_edge, pseudosource_of(end.reference)
     length = mesh.geometry[ROW * m + LENGTH]
-    sx, sy = winners.winner[2 * v], winners.winner[2 * v + 1]
+    ax, ay, sx, sy, distance = end.x, end.y, end.sx, end.sy, end.distance
     sw = 0.0 if is_segment(view, root) else 1.0
     slack = (WIDEST_ERROR if view.merging else SAME_PLACE) * distance
-    ax, ay = target_in_frame(view, v, m)
+    line = Line(end.source, distance, sw, slack)
     rise = sw * ay - sy
     x = (sx * ay - ax * sy) / rise if rise > 0.0 else sx
     x = min(max(x, 0.0), length)
-    if view.bends and not math.isnan(winners.crossing[v]):
-        x = winners.crossing[v]
+    if not math.isnan(end.crossing):
+        x = end.crossing
     walked = math.hypot(ax - x, ay)
     sigma = distance - walked
     if sw > 0.0:
@@ -299,12 +348,12 @@ def jump_to_window(view: Any, v: int, count: int) -> tuple[Line, Walk, int]:
     start, tail, head = -1, mesh.links[ROW * m + TAIL], mesh.links[ROW * m + HEAD]
     if row_in_face(view, root, m // 3) >= 0 or segment_in_face(view, root, m // 3) >= 0:
         start = root
-    elif tail == root or is_on_path(winners, tail, math.hypot(ax, ay), distance, v):
+    elif tail == root or is_on_path(winners, tail, math.hypot(ax, ay), distance, line):
         start = as_int64(tail)
-    elif head == root or is_on_path(winners, head, math.hypot(ax - length, ay), distance, v):
+    elif head == root or is_on_path(winners, head, math.hypot(ax - length, ay), distance, line):
         start = as_int64(head)
-    walk = Walk(m, x, sx, sy, sigma, walked, reference, as_int64(count), -1)
-    return Line(as_int64(v), distance, sw, slack), walk, start
+    walk = Walk(m, x, sx, sy, sigma, walked, end.reference, as_int64(count), -1)
+    return line, walk, start
 
 
 @inlined
@@ -320,9 +369,9 @@ def pseudosource_of(reference: int) -> int:
 
 
 @inlined
-def unmerge(view: Any, walk: Walk) -> Walk:
+def unmerge(view: View, walk: Walk) -> Walk:
     """Undo the merges on the half-edge of a walk: go on with the window that covered x (4.3)."""
-    merges, merge_ints = view.winners.merges, view.winners.merge_ints
+    merges, merge_ints = view.winners.merges
     reference, sx, sy, sigma = walk.reference, walk.sx, walk.sy, walk.sigma
     while reference >= 0 and merge_ints[MERGE_INTS * reference + MERGED_ON] == walk.half_edge:
         is_left = walk.x <= merges[MERGE * reference + SPLIT]
@@ -344,7 +393,7 @@ def unmerge(view: Any, walk: Walk) -> Walk:
 
 
 @kernel
-def next_face(links: Any, m: int, after: int) -> tuple[int, bool]:
+def next_face(links: Ints, m: int, after: int) -> tuple[int, bool]:
     """Half-edge across that of m, and whether it runs the same way; -1 if there is none.
 
     Across an irregular edge it is the first, or the one that follows ``after``.
@@ -365,12 +414,12 @@ def next_face(links: Any, m: int, after: int) -> tuple[int, bool]:
 
 
 @kernel
-def nearer_end(view: Any, line: Line, walk: Walk) -> int:
+def nearer_end(view: View, line: Line, walk: Walk) -> int:
     """End of a boundary edge that the path goes on by, where rounding led its line over the edge.
 
     It is the end that lies nearer to the source on the way; -1 if it is farther than the line's.
     """
-    distance, row = view.winners.distance, ROW * walk.half_edge
+    distance, row = view.winners.vertices.distance, ROW * walk.half_edge
     tail, head = view.mesh.links[row + TAIL], view.mesh.links[row + HEAD]
     to_head = view.mesh.geometry[row + LENGTH] - walk.x
     end = tail if distance[tail] + walk.x <= distance[head] + to_head else head
@@ -378,7 +427,7 @@ def nearer_end(view: Any, line: Line, walk: Walk) -> int:
 
 
 @inlined
-def enter(view: Any, line: Line, walk: Walk, h: int, same: bool) -> Walk:
+def enter(view: View, line: Line, walk: Walk, h: int, same: bool) -> Walk:
     """Turn to the face across the edge, in the frame of its half-edge h; add a node."""
     length, x, sx = view.mesh.geometry[ROW * walk.half_edge + LENGTH], walk.x, walk.sx
     if not same:
@@ -389,7 +438,7 @@ def enter(view: Any, line: Line, walk: Walk, h: int, same: bool) -> Walk:
 
 
 @inlined
-def look_ahead(view: Any, line: Line, walk: Walk) -> Sight:
+def look_ahead(view: View, line: Line, walk: Walk) -> Sight:
     """Return the apex of the face ahead, and how far it and the pseudosource are."""
     geometry, row, x = view.mesh.geometry, ROW * walk.half_edge, walk.x
     ax = geometry[row + COS_LEFT] * geometry[row + LENGTH_LEFT]
@@ -404,7 +453,7 @@ def look_ahead(view: Any, line: Line, walk: Walk) -> Sight:
 
 
 @inlined
-def append_node(view: Any, trail: Any, walk: Walk, first: int) -> bool:
+def append_node(view: View, trail: Trail, walk: Walk, first: int) -> bool:
     """Append the walk's point to ``trail``; return whether the line, whose first is given, winds.
 
     In a face that the path did not come from, a line may wind about a tip without end, and fork at
@@ -422,7 +471,7 @@ def append_node(view: Any, trail: Any, walk: Walk, first: int) -> bool:
 
 
 @inlined
-def is_too_far(view: Any, line: Line, walk: Walk, sight: Sight) -> bool:
+def is_too_far(view: View, line: Line, walk: Walk, sight: Sight) -> bool:
     """Whether a line through this face contradicts a distance.
 
     It is longer than the distance of its end, or a shorter way to the apex than the apex's distance
@@ -430,17 +479,18 @@ def is_too_far(view: Any, line: Line, walk: Walk, sight: Sight) -> bool:
     """
     if walk.walked + sight.distance > line.length + line.slack:
         return True
-    return view.winners.distance[sight.apex] > sight.distance + sight.to_apex + line.slack
+    return view.winners.vertices.distance[sight.apex] > sight.distance + sight.to_apex + line.slack
 
 
 @kernel
-def start_in_face(view: Any, line: Line, walk: Walk, sight: Sight, is_certain: bool) -> int:
+def start_in_face(view: View, line: Line, walk: Walk, sight: Sight, is_certain: bool) -> int:
     """Node of the face ahead at which the line begins; -1 if it goes on.
 
     After a fork it is not certain that the path came through this face. Then its pseudosource must
     be where it was unfolded to.
     """
-    distance, h, root = view.winners.distance, walk.half_edge, pseudosource_of(walk.reference)
+    h, root, winners = walk.half_edge, pseudosource_of(walk.reference), view.winners
+    distance = winners.vertices.distance
     length = view.mesh.geometry[ROW * h + LENGTH]
     most = math.inf if is_certain else sight.to_source
     most = most * (1.0 + SAME_PLACE) + GAP * length
@@ -450,30 +500,30 @@ def start_in_face(view: Any, line: Line, walk: Walk, sight: Sight, is_certain: b
             return root
     k = segment_in_face(view, root, h // 3)
     if k >= 0:
-        off = distance_to_segment(view.mesh.geometry, view.winners.piece_ends, k, h, walk.x, 0.0)
+        ends = winners.sites.segment_ends
+        off = distance_to_segment(view.mesh.geometry, ends, k, h, walk.x, 0.0)
         if is_certain or distance[root] + off <= walk.sigma + SAME_PLACE * length:
             return root
     is_root = sight.apex == root and sight.to_apex <= most
-    if is_root or is_on_path(view.winners, sight.apex, sight.to_apex, sight.distance, line.end):
+    if is_root or is_on_path(winners, sight.apex, sight.to_apex, sight.distance, line):
         return sight.apex
     return -1
 
 
 @kernel
-def is_on_path(winners: Any, u: int, reach: float, here: float, target: int) -> bool:
-    """Whether a path to ``target`` that is at distance ``here``, ``reach`` from u, meets u.
+def is_on_path(winners: Winners, u: int, reach: float, here: float, line: Line) -> bool:
+    """Whether a line that is at distance ``here``, ``reach`` from u, meets u.
 
     A vertex that is nearest to another source may lie as near: the path goes on past it.
     """
-    distance = winners.distance
-    if winners.nearest[u] != winners.nearest[target]:
+    distance, most = winners.vertices.distance, here + ON_PATH * line.length
+    if winners.nearest[u] != line.source:
         return False
-    allowed = here + ON_PATH * distance[target]
-    return distance[u] + reach <= allowed and distance[u] < distance[target]
+    return distance[u] + reach <= most and distance[u] < line.length
 
 
 @inlined
-def side_of_apex(view: Any, line: Line, walk: Walk, sight: Sight) -> tuple[bool, bool]:
+def side_of_apex(view: View, line: Line, walk: Walk, sight: Sight) -> tuple[bool, bool]:
     """Return (whether the pseudosource is left of the apex, whether only rounding says so).
 
     The latter happens in faces of no area.
@@ -488,7 +538,7 @@ def side_of_apex(view: Any, line: Line, walk: Walk, sight: Sight) -> tuple[bool,
 
 
 @kernel
-def leave(view: Any, line: Line, walk: Walk, is_left: bool) -> Walk:
+def leave(view: View, line: Line, walk: Walk, is_left: bool) -> Walk:
     """Hop over the face ahead, to its left or its right edge.
 
     The right edge is left as the left one is, in the mirror.
@@ -529,23 +579,23 @@ def cross_edge(
 
 
 @inlined
-def is_past_start(view: Any, line: Line, walk: Walk) -> bool:
+def is_past_start(view: View, line: Line, walk: Walk) -> bool:
     """Whether the walk has gone beyond the pseudosource, which was not in the face just left.
 
     Where merges are still to be undone on the edge ahead, it has not. A pseudosource on the edge
     itself may be beyond, behind any number of faces of no area.
     """
     m, reference = walk.half_edge, walk.reference
-    if reference >= 0 and view.winners.merge_ints[MERGE_INTS * reference + MERGED_ON] == m:
+    if reference >= 0 and view.winners.merges.ints[MERGE_INTS * reference + MERGED_ON] == m:
         return False
     close = SAME_PLACE * view.mesh.geometry[ROW * m + LENGTH]
     if line.sw == 0.0:
-        return walk.sigma - view.winners.distance[pseudosource_of(reference)] < -close
+        return walk.sigma - view.winners.vertices.distance[pseudosource_of(reference)] < -close
     return -walk.sy < -close
 
 
 @kernel
-def push_fork(forks: Any, size: int, walk: Walk, after: int) -> int:
+def push_fork(forks: Forks, size: int, walk: Walk, after: int) -> int:
     """Store a walk that may go on otherwise, into the faces that follow ``after``.
 
     Writes row ``size`` of ``forks``; returns the new size.
@@ -559,7 +609,7 @@ def push_fork(forks: Any, size: int, walk: Walk, after: int) -> int:
 
 
 @kernel
-def walk_at_fork(forks: Any, i: int) -> Walk:
+def walk_at_fork(forks: Forks, i: int) -> Walk:
     """Return the walk of row i of ``forks``."""
     floats, ints = forks.floats, forks.ints
     return Walk(
@@ -576,11 +626,11 @@ def walk_at_fork(forks: Any, i: int) -> Walk:
 
 
 @kernel
-def row_in_face(view: Any, node: int, face: int) -> int:
+def row_in_face(view: View, node: int, face: int) -> int:
     """Row of a site in a face; -1 where it is not in that face, or no site."""
-    if view.site_rows == 0 or node < view.winners.site_ints[NODE]:
+    if view.site_rows == 0 or node < view.winners.sites.ints[NODE]:
         return -1
-    ints = view.winners.site_ints
+    ints = view.winners.sites.ints
     for k in range(view.site_rows):
         if ints[SITE * k + NODE] == node and ints[SITE * k + FACE] == face:
             return k
@@ -588,17 +638,17 @@ def row_in_face(view: Any, node: int, face: int) -> int:
 
 
 @inlined
-def is_segment(view: Any, node: int) -> bool:
+def is_segment(view: View, node: int) -> bool:
     """Whether a node is a segment of a curve."""
-    rows, ints = view.segment_rows, view.winners.piece_ints
+    rows, ints = view.segment_rows, view.winners.sites.segment_ints
     return rows > 0 and ints[NODE] <= node <= ints[SEGMENT * (rows - 1) + NODE]
 
 
 @kernel
-def segment_in_face(view: Any, node: int, face: int) -> int:
+def segment_in_face(view: View, node: int, face: int) -> int:
     """Row of a segment in a face; -1 where it is not in that face, or no segment."""
     if is_segment(view, node):
-        ints = view.winners.piece_ints
+        ints = view.winners.sites.segment_ints
         for k in range(view.segment_rows):
             if ints[SEGMENT * k + NODE] == node and ints[SEGMENT * k + FACE] == face:
                 return k
@@ -606,11 +656,11 @@ def segment_in_face(view: Any, node: int, face: int) -> int:
 
 
 @kernel
-def target_in_frame(view: Any, node: int, h: int) -> tuple[float, float]:
+def target_in_frame(view: View, node: int, h: int) -> tuple[float, float]:
     """Position of a node in the frame of h: of the apex, or of a site in the face."""
     geometry, row = view.mesh.geometry, ROW * h
     if node < view.vertex_count:
         reach = geometry[row + LENGTH_LEFT]
         return geometry[row + COS_LEFT] * reach, geometry[row + SIN_LEFT] * reach
     k = row_in_face(view, node, h // 3)
-    return weights_in_frame(geometry, view.winners.site_weights, 3 * k, h)
+    return weights_in_frame(geometry, view.winners.sites.weights, 3 * k, h)

@@ -3,21 +3,31 @@
 Dijkstra's search, directed by the lower bounds of `pruning` (A*).
 """
 
-from typing import Any
-
 import numpy as np
 
 from geodesic_core.arrays import Ints
+from geodesic_core.kernels.front.bounds import Bounds
+from geodesic_core.kernels.front.counters import HEAP_SIZE
+from geodesic_core.kernels.front.pruning import touch
+from geodesic_core.kernels.front.queues import pop_nearest, push_or_raise
+from geodesic_core.kernels.front.state import PREDECESSOR, SETTLED, WINNER, View, Wavefront, view_of
 from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import APEX, HEAD, LENGTH, LENGTH_LEFT, OUT_LEFT, ROW
-from geodesic_core.kernels.sweep.pruning import touch
-from geodesic_core.kernels.sweep.queues import HEAP_SIZE, pop_nearest, push_or_raise
-from geodesic_core.kernels.sweep.state import PREDECESSOR, SETTLED, WINNER, view_of
+from geodesic_core.kernels.mesh.half_edges import (
+    APEX,
+    HEAD,
+    LENGTH,
+    LENGTH_LEFT,
+    OUT_LEFT,
+    ROW,
+    Topology,
+)
 from geodesic_core.tolerances import ASTAR_WEIGHT
 
 
 @kernel
-def search_edges(topology: Any, wavefront: Any, bounds: Any, begin: int, end: int) -> None:
+def search_edges(
+    topology: Topology, wavefront: Wavefront, bounds: Bounds, begin: int, end: int
+) -> None:
     """Search from ``begin`` until ``end`` is settled.
 
     Modifies the distances, PREDECESSOR, status and heap of ``wavefront``.
@@ -41,7 +51,7 @@ def search_edges(topology: Any, wavefront: Any, bounds: Any, begin: int, end: in
 
 
 @inlined
-def relax(wave: Any, v: int, u: int, length: float) -> None:
+def relax(wave: View, v: int, u: int, length: float) -> None:
     """Offer u the path over v, unless u is settled.
 
     By the weight of the heuristic a settled vertex may not have its shortest path. To settle it
@@ -59,7 +69,7 @@ def relax(wave: Any, v: int, u: int, length: float) -> None:
 
 
 @kernel
-def vertices_to(predecessor: Any, end: int) -> Ints:
+def vertices_to(predecessor: Ints, end: int) -> Ints:
     """Return the vertices of the path that was found, from ``end`` back to its beginning."""
     count, v = 1, end
     while predecessor[v] >= 0:

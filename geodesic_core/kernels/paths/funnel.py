@@ -24,6 +24,7 @@ from geodesic_core.kernels.mesh.half_edges import (
     SEAM,
     SIN_LEFT,
     TAIL,
+    Topology,
     following,
     previous,
 )
@@ -39,7 +40,7 @@ _SPARE_PORTALS = 256
 
 
 @kernel
-def shortened(topology: Any, path: Ints) -> float:
+def shortened(topology: Topology, path: Ints) -> float:
     """Shorten a path along edges, given by its vertices; return its length, mesh units."""
     length = 0.0
     begin = 0
@@ -55,7 +56,7 @@ def shortened(topology: Any, path: Ints) -> float:
 
 
 @kernel
-def shortened_part(topology: Any, path: Ints, sides: Any) -> float:
+def shortened_part(topology: Topology, path: Ints, sides: Any) -> float:
     """Shorten a part of a path that has a strip of faces beside it all along; return its length."""
     strip, size = strip_along(topology, path, sides)
     room = len(strip)
@@ -80,7 +81,7 @@ def shortened_part(topology: Any, path: Ints, sides: Any) -> float:
 
 
 @kernel
-def straight(topology: Any, v: int, u: int) -> float:
+def straight(topology: Topology, v: int, u: int) -> float:
     """Euclidean distance of two vertices."""
     square = 0.0
     for axis in range(3):
@@ -90,7 +91,7 @@ def straight(topology: Any, v: int, u: int) -> float:
 
 
 @inlined
-def corner_toward(topology: Any, v: int, u: int, column: int) -> int:
+def corner_toward(topology: Topology, v: int, u: int, column: int) -> int:
     """Corner at v whose HEAD or APEX is u, or -1."""
     for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
         if topology.links[topology.corners[c], column] == u:
@@ -99,7 +100,7 @@ def corner_toward(topology: Any, v: int, u: int, column: int) -> int:
 
 
 @kernel
-def side_to_pass(topology: Any, before: int, v: int, after: int) -> int:
+def side_to_pass(topology: Topology, before: int, v: int, after: int) -> int:
     """Side of v with the lesser angle between two of its neighbours; one without a hole.
 
     At the end of an irregular edge there are more than two sides. Then it is NEITHER.
@@ -114,7 +115,7 @@ def side_to_pass(topology: Any, before: int, v: int, after: int) -> int:
 
 
 @kernel
-def angle_on_right(topology: Any, before: int, v: int, after: int) -> float:
+def angle_on_right(topology: Topology, before: int, v: int, after: int) -> float:
     """Angle at v from one neighbour counter-clockwise to another; infinite if a hole lies there."""
     angle = 0.0
     h = corner_toward(topology, v, before, HEAD)
@@ -129,7 +130,7 @@ def angle_on_right(topology: Any, before: int, v: int, after: int) -> float:
 
 
 @kernel
-def strip_along(topology: Any, path: Ints, sides: Any) -> tuple[Ints, int]:
+def strip_along(topology: Topology, path: Ints, sides: Any) -> tuple[Ints, int]:
     """Return the portals of a strip along a path, with room for more, and their number."""
     links = topology.links
     room = _SPARE_PORTALS
@@ -162,7 +163,7 @@ def strip_along(topology: Any, path: Ints, sides: Any) -> tuple[Ints, int]:
 
 
 @kernel
-def unfold_strip(topology: Any, strip: Ints, size: int, ends: Floats) -> None:
+def unfold_strip(topology: Topology, strip: Ints, size: int, ends: Floats) -> None:
     """Unfold a strip into the plane: fill ``ends`` with rows of left x, y and right x, y.
 
     Row i is portal i, and the last row the vertex at the end. The vertex at the start, before the
@@ -278,7 +279,7 @@ def pull_taut(
 
 @kernel
 def around_bends(
-    topology: Any,
+    topology: Topology,
     strip: Ints,
     size: int,
     bends: Ints,
@@ -322,7 +323,7 @@ def around_bends(
 
 @kernel
 def pass_beyond(
-    topology: Any,
+    topology: Topology,
     strip: Ints,
     first: int,
     last: int,

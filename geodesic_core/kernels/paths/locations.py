@@ -1,10 +1,10 @@
 """Locations: the nodes of a traced path as points of the surface, in the caller's numbering."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from geodesic_core.arrays import Floats, Ints, Longs
 from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, next_around
+from geodesic_core.kernels.mesh.half_edges import HEAD, TAIL, Topology, next_around
 
 
 class Locations(NamedTuple):
@@ -22,7 +22,7 @@ class Locations(NamedTuple):
 
 @kernel
 def locate_nodes(
-    topology: Any, faces: Ints, nodes: Ints, parameters: Floats, locations: Any
+    topology: Topology, faces: Ints, nodes: Ints, parameters: Floats, locations: Locations
 ) -> None:
     """Fill ``locations`` with the points of nodes as `backtracing.trace_path` has them.
 
@@ -42,7 +42,7 @@ def locate_nodes(
 
 
 @inlined
-def locate_vertex(topology: Any, faces: Ints, v: int, locations: Any, i: int) -> None:
+def locate_vertex(topology: Topology, faces: Ints, v: int, locations: Locations, i: int) -> None:
     """Fill row i of ``locations``, whose weights are 0, with inner vertex v."""
     lowest = -1
     for c in range(topology.first_corner[v], topology.first_corner[v + 1]):
@@ -57,7 +57,9 @@ def locate_vertex(topology: Any, faces: Ints, v: int, locations: Any, i: int) ->
 
 
 @inlined
-def locate_on_edge(topology: Any, faces: Ints, h: int, t: float, locations: Any, i: int) -> None:
+def locate_on_edge(
+    topology: Topology, faces: Ints, h: int, t: float, locations: Locations, i: int
+) -> None:
     """Fill row i of ``locations``, whose weights are 0, with the point at share t along h."""
     links, positions, outer_face = topology.links, topology.positions, topology.outer_face
     u, w = links[h, TAIL], links[h, HEAD]
@@ -73,7 +75,7 @@ def locate_on_edge(topology: Any, faces: Ints, h: int, t: float, locations: Any,
 
 
 @kernel
-def corner_of(topology: Any, faces: Ints, face: int, v: int) -> int:
+def corner_of(topology: Topology, faces: Ints, face: int, v: int) -> int:
     """Return the corner of the caller's face that inner vertex v is."""
     for k in range(2):
         if topology.inner_vertex[faces[face, k]] == v:
@@ -82,7 +84,7 @@ def corner_of(topology: Any, faces: Ints, face: int, v: int) -> int:
 
 
 @kernel
-def drop_repeats(outer_face: Ints, crossed: Ints, locations: Any, between: Ints) -> int:
+def drop_repeats(outer_face: Ints, crossed: Ints, locations: Locations, between: Ints) -> int:
     """Move the locations that differ from the one before to the front; return how many they are.
 
     A path through a vertex meets several edges at the same point. ``crossed`` holds the inner faces

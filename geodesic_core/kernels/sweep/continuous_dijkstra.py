@@ -1,11 +1,33 @@
 """The continuous-Dijkstra loop (section 3.4), resumable in slices."""
 
 import math
-from typing import Any
-
-import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.front.bounds import Bounds
+from geodesic_core.kernels.front.counters import (
+    HEAP_SIZE,
+    RING_HEAD,
+    RING_SIZE,
+    SETTLED_VERTICES,
+    WORK,
+)
+from geodesic_core.kernels.front.pool import free_windows
+from geodesic_core.kernels.front.pruning import touch
+from geodesic_core.kernels.front.queues import pop_nearest, ring_pop
+from geodesic_core.kernels.front.sites import reach_inside, start_from
+from geodesic_core.kernels.front.state import (
+    FAR,
+    FRONT,
+    IN_RING,
+    LIST,
+    MARKS,
+    SETTLED,
+    SIZE,
+    View,
+    Wavefront,
+    view_of,
+)
+from geodesic_core.kernels.front.window_lists import queue_list
 from geodesic_core.kernels.jit import inlined, kernel, prefetch
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -17,88 +39,46 @@ from geodesic_core.kernels.mesh.half_edges import (
     PINCHED,
     ROW,
     SEAM,
+    Topology,
+    faces_beyond,
     following,
     previous,
 )
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.sweep.bounds import merging
+from geodesic_core.kernels.sweep.delivery import DELIVERY
 from geodesic_core.kernels.sweep.propagation import propagate_list
-from geodesic_core.kernels.sweep.pruning import touch
 from geodesic_core.kernels.sweep.pseudosources import emit_pseudosource, is_pseudosource
-from geodesic_core.kernels.sweep.queues import (
-    HEAP_SIZE,
-    RING_HEAD,
-    RING_SIZE,
-    pop_nearest,
-    ring_pop,
-)
-from geodesic_core.kernels.sweep.relaxation import bound_vertex, relax_vertex
-from geodesic_core.kernels.sweep.segments import emit_segment
-from geodesic_core.kernels.sweep.state import (
-    ENTRY_EDGE,
-    FAR,
-    FRONT,
-    IN_RING,
-    LIST,
-    MARKS,
-    NODE,
-    PREDECESSOR,
-    SEGMENT,
-    SETTLED,
-    SETTLED_VERTICES,
-    SITE,
-    SIZE,
-    WINNER,
-    WORK,
-    view_of,
-)
-from geodesic_core.kernels.sweep.surface_points import emit_site
-from geodesic_core.kernels.sweep.window_lists import faces_beyond, free_windows, queue_list
 
 WORK_OF_VERTEX = 30  # units, as in `propagation`
 
 
 @kernel
 def start_sweep(
-    topology: Any,
-    wavefront: Any,
+    topology: Topology,
+    wavefront: Wavefront,
     sources: Ints,
     source_indices: Ints,
     start_distances: Floats,
-    bounds: Any,
+    bounds: Bounds,
 ) -> None:
     """Reach the nodes of the sources; sites and segments among them emit their windows.
 
-    ``source_indices`` (N,) are the sources that the nodes ``sources`` (N,) belong to, of which each
-    has a start distance, mesh units. Modifies the wavefront.
+    Arguments as in `start_from`. Modifies the wavefront.
     """
     wave = view_of(topology, wavefront, bounds)
-    vertices, sites = wave.vertices, wave.sites
-    for i in range(len(sources)):
-        v, start = sources[i], start_distances[source_indices[i]]
-        if start >= vertices.distance[v]:
-            continue
-        vertices.source_index[v] = source_indices[i]
-        if v < wave.sizes.vertices:
-            if merging(wave):
-                bound_vertex(wave, v, start)
-            relax_vertex(wave, v, start, -1, 0.0, 0.0, v, -1 - v)
-        else:
-            vertices.distance[v], vertices.winner_ints[WINNER * v + PREDECESSOR] = (
-                start,
-                v,
-            )
-    for k in range(wave.sizes.sites):
-        if vertices.distance[sites.ints[SITE * k + NODE]] < math.inf:
-            emit_site(wave, k)
-    if len(wave.bounds.parallel) > 0:
-        for k in range(wave.sizes.segments):
-            if vertices.distance[sites.segment_ints[SEGMENT * k + NODE]] < math.inf:
-                emit_segment(wave, k)
+    start_from(wave, sources, source_indices, start_distances, DELIVERY)
 
 
 @kernel
-def advance(topology: Any, wavefront: Any, bounds: Any, budget: int) -> Outcome:
+def reach_sites_inside(
+    topology: Topology, wavefront: Wavefront, bounds: Bounds, first: int
+) -> None:
+    """Offer the sites from row ``first`` on the paths that cross no edge, after the sweep."""
+    reach_inside(view_of(topology, wavefront, bounds), first, DELIVERY)
+
+
+@kernel
+def advance(topology: Topology, wavefront: Wavefront, bounds: Bounds, budget: int) -> Outcome:
     """Run the sweep for a slice of about ``budget`` units of 10 ns; return its outcome (3.4).
 
     Lists in the ring come first; then, again and again, the nearest vertex is settled and the ring
@@ -122,7 +102,7 @@ def advance(topology: Any, wavefront: Any, bounds: Any, budget: int) -> Outcome:
 
 
 @kernel
-def settle_nearest(wave: Any) -> Outcome:
+def settle_nearest(wave: View) -> Outcome:
     """Settle the nearest vertex: emit its windows, queue the lists around it.
 
     Modifies the vertex, its neighbours and their lists.
@@ -163,7 +143,7 @@ def settle_nearest(wave: Any) -> Outcome:
 
 
 @kernel
-def room_to_emit(wave: Any, v: int) -> int:
+def room_to_emit(wave: View, v: int) -> int:
     """Return how many windows v may emit, at most."""
     mesh = wave.mesh
     first, last = mesh.first_corner[v], mesh.first_corner[v + 1]
@@ -172,12 +152,12 @@ def room_to_emit(wave: Any, v: int) -> int:
         for c in range(first, last):
             h = mesh.corners[c]
             if mesh.links[ROW * h + OUT_RIGHT] == IRREGULAR:
-                room += 2 * faces_beyond(wave, following(h))
+                room += 2 * faces_beyond(mesh.links, following(h))
     return room
 
 
 @kernel
-def queue_lists_beyond(wave: Any, g: int) -> None:
+def queue_lists_beyond(wave: View, g: int) -> None:
     """Queue the lists beyond the irregular edge of g whose far vertex is in front, or settled."""
     mesh = wave.mesh
     h = mesh.links[ROW * g + AROUND] >> 1
@@ -188,8 +168,8 @@ def queue_lists_beyond(wave: Any, g: int) -> None:
 
 
 @inlined
-def prefetch_around(wave: Any, v: int) -> None:
-    """Prefetch the rows around the vertex that will probably be next: saves 3 to 6 % of a sweep."""
+def prefetch_around(wave: View, v: int) -> None:
+    """Prefetch the rows around the vertex that will probably be next."""
     mesh, heap = wave.mesh, wave.queues.heap
     for i in range(1, min(5, wave.counters[HEAP_SIZE])):
         prefetch(mesh.corners, mesh.first_corner[heap[i]])
@@ -201,7 +181,7 @@ def prefetch_around(wave: Any, v: int) -> None:
 
 
 @kernel
-def mark_front(wave: Any, v: int) -> None:
+def mark_front(wave: View, v: int) -> None:
     """Mark v as a neighbour of a settled vertex. Modifies its status."""
     vertices = wave.vertices
     if vertices.status[v] == FAR:
@@ -211,7 +191,7 @@ def mark_front(wave: Any, v: int) -> None:
 
 
 @kernel
-def drain(wave: Any, budget: int) -> Outcome:
+def drain(wave: View, budget: int) -> Outcome:
     """Propagate the lists in the ring, and those that they queue, until it is empty."""
     while wave.counters[RING_SIZE] > 0:
         if wave.counters[WORK] >= budget:
@@ -223,25 +203,3 @@ def drain(wave: Any, budget: int) -> Outcome:
         ring_pop(wave)
         wave.pool.lists[LIST * h + MARKS] &= ~IN_RING
     return Outcome.FINISHED
-
-
-@kernel
-def nearest_sources(distance: Floats, winner_ints: Ints, source_index: Ints) -> Ints:
-    """Return for each node at a finite distance the index of its source; for others -1.
-
-    Follow pseudosources to the source at the end of the sweep, since one may have changed its own
-    source after it emitted. O(N).
-    """
-    result = np.full(len(distance), -1, np.int32)
-    for start in range(len(distance)):
-        if distance[start] == math.inf:
-            continue
-        v = start
-        while result[v] < 0 and winner_ints[v, ENTRY_EDGE] >= 0:
-            v = winner_ints[v, PREDECESSOR]
-        found = result[v] if result[v] >= 0 else source_index[v]
-        v = start
-        while result[v] < 0:
-            result[v] = found
-            v = winner_ints[v, PREDECESSOR]
-    return result

@@ -27,18 +27,12 @@ they were longer by ξ, and doubled at every edge.
 A recorded window is in the frame that runs from the lower vertex of the edge to the higher.
 """
 
-from typing import Any
-
-from geodesic_core.kernels.jit import as_ints, kernel
-from geodesic_core.kernels.mesh.half_edges import AROUND, HEAD, LENGTH, ROW, TAIL
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.trimming import trim, wins_throughout, without
-from geodesic_core.kernels.sweep.window import (
+from geodesic_core.kernels.front.state import View, merging
+from geodesic_core.kernels.front.window import (
+    DEPTH,
     INTS,
     NEXT,
     REFERENCE,
-    WIDTH,
-    XI,
     Window,
     at_sigma,
     between,
@@ -48,13 +42,14 @@ from geodesic_core.kernels.sweep.window import (
     reversed_window,
     store_window,
 )
+from geodesic_core.kernels.jit import as_ints, kernel
+from geodesic_core.kernels.mesh.half_edges import AROUND, HEAD, LENGTH, ROW, TAIL
+from geodesic_core.kernels.sweep.trimming import trim, wins_throughout, without
 from geodesic_core.tolerances import GAP, SLACK
-
-DEPTH = XI  # column of a crossing in an exact sweep: how many led to it since the pseudosource
 
 
 @kernel
-def trim_against_crossings(wave: Any, g: int, window: Window) -> tuple[bool, Window]:
+def trim_against_crossings(wave: View, g: int, window: Window) -> tuple[bool, Window]:
     """Trim a window that is to go over the irregular edge of g to where it is nearest so far.
 
     Return whether anything is left, and it. O(windows in the crossing history), mostly.
@@ -66,7 +61,7 @@ def trim_against_crossings(wave: Any, g: int, window: Window) -> tuple[bool, Win
 
 
 @kernel
-def nearest_part(wave: Any, g: int, window: Window, surely: bool) -> tuple[bool, Window]:
+def nearest_part(wave: View, g: int, window: Window, surely: bool) -> tuple[bool, Window]:
     """Return whether a window is nearest so far anywhere on the irregular edge of g, and that part.
 
     With ``surely``, earlier windows count with the most that they may fall short by.
@@ -102,7 +97,7 @@ def nearest_part(wave: Any, g: int, window: Window, surely: bool) -> tuple[bool,
 
 
 @kernel
-def record_crossing(wave: Any, g: int, slot: int, window: Window) -> None:
+def record_crossing(wave: View, g: int, slot: int, window: Window) -> None:
     """Put a window, which takes the slot, in the crossing history of the irregular edge of g."""
     mesh, pool = wave.mesh, wave.pool
     name = lowest_half_edge(wave, g)
@@ -110,13 +105,13 @@ def record_crossing(wave: Any, g: int, slot: int, window: Window) -> None:
         window = reversed_window(window, mesh.geometry[ROW * g + LENGTH])
     store_window(wave, pool.windows, slot, window)
     if not merging(wave):
-        pool.windows[WIDTH * slot + DEPTH] = depth_of(wave, window.reference) + 1.0
+        as_ints(pool.windows)[INTS * slot + DEPTH] = depth_of(wave, window.reference) + 1
     as_ints(pool.windows)[INTS * slot + NEXT] = pool.crossings[name]
     pool.crossings[name] = slot
 
 
 @kernel
-def has_crossed(wave: Any, window: Window, crossing: int) -> bool:
+def has_crossed(wave: View, window: Window, crossing: int) -> bool:
     """Whether a crossing is one of those that led to a window. O(crossings between them)."""
     rows, depth = as_ints(wave.pool.windows), depth_of(wave, crossing)
     last = window.reference
@@ -126,16 +121,13 @@ def has_crossed(wave: Any, window: Window, crossing: int) -> bool:
 
 
 @kernel
-def depth_of(wave: Any, crossing: int) -> float:
-    """Return how many crossings led to one, itself included; 0 of none (< 0)."""
-    if crossing < 0:
-        return 0.0
-    depth: float = wave.pool.windows[WIDTH * crossing + DEPTH]
-    return depth
+def depth_of(wave: View, crossing: int) -> int:
+    """Return how many crossings since the pseudosource led to one, itself included; 0 of none."""
+    return int(as_ints(wave.pool.windows)[INTS * crossing + DEPTH]) if crossing >= 0 else 0
 
 
 @kernel
-def cut_by(wave: Any, window: Window, earlier: Window) -> Window:
+def cut_by(wave: View, window: Window, earlier: Window) -> Window:
     """Return the part of a window that wins against an earlier one: ties as between sources."""
     source_index = wave.vertices.source_index
     slack = -SLACK if source_index[window.root] < source_index[earlier.root] else SLACK
@@ -166,7 +158,7 @@ def is_no_nearer(lo: float, hi: float, window: Window, earlier: Window, slack: f
 
 
 @kernel
-def lowest_half_edge(wave: Any, g: int) -> int:
+def lowest_half_edge(wave: View, g: int) -> int:
     """Return the half-edge by which the irregular edge of g is known."""
     mesh = wave.mesh
     lowest, h = g, mesh.links[ROW * g + AROUND] >> 1

@@ -15,10 +15,10 @@ is chosen there.
 """
 
 import math
-from typing import Any
 
+from geodesic_core.kernels.front.state import View
+from geodesic_core.kernels.front.window import Window, changed, distance_at
 from geodesic_core.kernels.jit import inlined
-from geodesic_core.kernels.sweep.window import Window, distance_at
 from geodesic_core.tolerances import GRAZING, LOCAL_SHARE, LOWER_BOUND
 
 
@@ -71,7 +71,7 @@ def shortfall(window: Window, whole: Window) -> float:
 
 
 @inlined
-def accuracy(wave: Any, xi: float, local: float, nearest: float) -> bool:
+def accuracy(wave: View, xi: float, local: float, nearest: float) -> bool:
     """Whether the accumulated error ξ' and this merge's own are within bounds.
 
     ``nearest`` is the least distance over the merged window: what holds there holds throughout.
@@ -108,7 +108,7 @@ def pseudosource_between(w0: Window, w1: Window) -> tuple[bool, float, float, fl
 
 
 @inlined
-def may_merge(wave: Any, w0: Window, w1: Window, nearest: float) -> bool:
+def may_merge(wave: View, w0: Window, w1: Window, nearest: float) -> bool:
     """Whether two windows may be accurate enough as one, for ``nearest`` as in `accuracy`.
 
     Half of all pairs fail here already, before the conic costs anything.
@@ -122,7 +122,7 @@ def may_merge(wave: Any, w0: Window, w1: Window, nearest: float) -> bool:
 
 
 @inlined
-def merged(wave: Any, w0: Window, w1: Window) -> tuple[bool, Window]:
+def merged(wave: View, w0: Window, w1: Window) -> tuple[bool, Window]:
     """Merge w0 and w1, which meet or overlap; return whether they can be, and the merged window.
 
     Its root and reference are those of w0.
@@ -133,7 +133,7 @@ def merged(wave: Any, w0: Window, w1: Window) -> tuple[bool, Window]:
     exists, sx, sy, sigma = pseudosource_between(w0, w1)
     if not exists:
         return False, w0
-    whole = Window(w0.b0, w1.b1, sx, sy, sigma, 1.0, w0.root, 0.0, w0.reference)
+    whole = changed(w0, w0.b0, w1.b1, sx, sy, sigma, 0.0, w0.reference)
     # The distances at the ends are kept; where the windows meet, and at the stationary points,
     # they are not.
     meets0 = distance_at(w0, w0.b1) - distance_at(whole, w0.b1)
@@ -148,4 +148,4 @@ def merged(wave: Any, w0: Window, w1: Window) -> tuple[bool, Window]:
     xi = max(w0.xi + most0, w1.xi + most1)
     if not accuracy(wave, xi, max(most0, most1), nearest):
         return False, w0
-    return True, Window(w0.b0, w1.b1, sx, sy, sigma, 1.0, w0.root, xi, w0.reference)
+    return True, changed(w0, w0.b0, w1.b1, sx, sy, sigma, xi, w0.reference)

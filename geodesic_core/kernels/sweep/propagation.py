@@ -1,7 +1,27 @@
 """The windows of one half-edge propagated across its face (section 3.2)."""
 
-from typing import Any
-
+from geodesic_core.kernels.front.counters import (
+    FREE_SIZE,
+    FRESH,
+    MERGES,
+    PEAK,
+    PROPAGATED,
+    RETAINED_ROWS,
+    WORK,
+)
+from geodesic_core.kernels.front.pool import free_windows
+from geodesic_core.kernels.front.state import (
+    LIST,
+    MARKS,
+    RETAINED,
+    SITE_SHIFT,
+    SIZE,
+    WIDTH,
+    View,
+    merging,
+)
+from geodesic_core.kernels.front.window import INTS, NEXT
+from geodesic_core.kernels.front.window_lists import release_list
 from geodesic_core.kernels.jit import as_ints, inlined, kernel, prefetch
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -13,30 +33,10 @@ from geodesic_core.kernels.mesh.half_edges import (
     SIN_LEFT,
 )
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.sweep.bounds import merging
 from geodesic_core.kernels.sweep.reach import reach_apex
+from geodesic_core.kernels.sweep.site_targets import reach_sites
 from geodesic_core.kernels.sweep.spread import room_to_spread, spread
-from geodesic_core.kernels.sweep.state import (
-    FREE_SIZE,
-    FRESH,
-    LIST,
-    MARKS,
-    MERGES,
-    PEAK,
-    PROPAGATED,
-    RETAINED,
-    RETAINED_ROWS,
-    SITE_SHIFT,
-    SIZE,
-    WORK,
-)
-from geodesic_core.kernels.sweep.surface_points import reach_sites
 from geodesic_core.kernels.sweep.trim_list import trim_list
-from geodesic_core.kernels.sweep.window import INTS, NEXT, WIDTH
-from geodesic_core.kernels.sweep.window_lists import (
-    free_windows,
-    release_list,
-)
 from geodesic_core.tolerances import MOST_RUNS, RUNS
 
 # Units of work, of about 10 ns
@@ -45,7 +45,7 @@ WORK_OF_WINDOW = 4
 
 
 @kernel
-def propagate_list(wave: Any, h: int) -> Outcome:
+def propagate_list(wave: View, h: int) -> Outcome:
     """Propagate the windows of h across its face: trim, reach the apex, spread (section 3.2).
 
     Return an outcome; unless it is FINISHED nothing has changed, and the caller may call again.
@@ -82,7 +82,7 @@ def propagate_list(wave: Any, h: int) -> Outcome:
 
 
 @inlined
-def room_to_propagate(wave: Any, h: int, size: int) -> Outcome:
+def room_to_propagate(wave: View, h: int, size: int) -> Outcome:
     """Return FINISHED if there is room to propagate ``size`` windows of h, else what is full."""
     if room_to_spread(wave, h, size) > free_windows(wave):
         return Outcome.POOL_FULL
@@ -100,7 +100,7 @@ def room_to_propagate(wave: Any, h: int, size: int) -> Outcome:
 
 
 @kernel
-def retain_windows(wave: Any, h: int, count: int) -> None:
+def retain_windows(wave: View, h: int, count: int) -> None:
     """Retain the windows of scratch, which are those that cross the face of h.
 
     Modifies the retained windows.

@@ -1,8 +1,24 @@
 """Pseudosources: windows that a vertex emits, as a source or where shortest paths bend (3.2)."""
 
 import math
-from typing import Any
 
+from geodesic_core.kernels.front.pruning import may_pass
+from geodesic_core.kernels.front.relaxation import incoming_angle
+from geodesic_core.kernels.front.state import (
+    ENTRY_EDGE,
+    LIGHT,
+    LIT_FROM,
+    LIT_TO,
+    PREDECESSOR,
+    SENT_AT,
+    SENT_FROM,
+    SENT_TO,
+    WINNER,
+    View,
+    merging,
+    source_weight,
+)
+from geodesic_core.kernels.front.window import emitted_window
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -10,7 +26,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     COS_RIGHT,
     FANS,
     HEAD,
-    IRREGULAR,
     LENGTH,
     LENGTH_LEFT,
     LENGTH_RIGHT,
@@ -23,38 +38,12 @@ from geodesic_core.kernels.mesh.half_edges import (
     following,
     previous,
 )
-from geodesic_core.kernels.sweep.bounds import merging, source_weight
-from geodesic_core.kernels.sweep.pruning import may_pass
-from geodesic_core.kernels.sweep.relaxation import (
-    bound_vertex,
-    illuminate_vertex,
-    incoming_angle,
-    relax_vertex,
-)
-from geodesic_core.kernels.sweep.state import (
-    CREATED,
-    ENTRY_EDGE,
-    LIGHT,
-    LIT_FROM,
-    LIT_TO,
-    PREDECESSOR,
-    SENT_AT,
-    SENT_FROM,
-    SENT_TO,
-    WINNER,
-)
-from geodesic_core.kernels.sweep.window import emitted_window
-from geodesic_core.kernels.sweep.window_lists import (
-    insert_sorted,
-    put_window,
-    queue_if_due,
-    send_across,
-)
+from geodesic_core.kernels.sweep.delivery import reach_straight, send_out
 from geodesic_core.tolerances import FLAT, SECTOR_MARGIN
 
 
 @kernel
-def is_pseudosource(wave: Any, v: int) -> bool:
+def is_pseudosource(wave: View, v: int) -> bool:
     """Whether shortest paths may bend at v (or start there), within the limit."""
     vertices = wave.vertices
     bends = wave.mesh.flags[v] != 0 or vertices.winner_ints[WINNER * v + ENTRY_EDGE] < 0
@@ -62,7 +51,7 @@ def is_pseudosource(wave: Any, v: int) -> bool:
 
 
 @kernel
-def emit_pseudosource(wave: Any, v: int) -> None:
+def emit_pseudosource(wave: View, v: int) -> None:
     """Emit windows from v: all around a source, else into the shadow behind v.
 
     At a saddle no straight path through a neighbourhood of v reaches the shadow: the directions
@@ -89,7 +78,7 @@ def emit_pseudosource(wave: Any, v: int) -> None:
 
 
 @kernel
-def emit_shadows(wave: Any, v: int) -> None:
+def emit_shadows(wave: View, v: int) -> None:
     """Emit into the shadows of all directions that v is lit from, but for those emitted before.
 
     Modifies the light of v.
@@ -113,7 +102,7 @@ def emit_shadows(wave: Any, v: int) -> None:
 
 
 @kernel
-def emit_around(wave: Any, v: int) -> None:
+def emit_around(wave: View, v: int) -> None:
     """Emit into every face at v."""
     mesh = wave.mesh
     for c in range(mesh.first_corner[v], mesh.first_corner[v + 1]):
@@ -125,7 +114,7 @@ def emit_around(wave: Any, v: int) -> None:
 
 
 @kernel
-def corner_end(wave: Any, v: int, c: int) -> float:
+def corner_end(wave: View, v: int, c: int) -> float:
     """Angle at which the corner at c of the corners ends in the unfolded fan of v."""
     mesh = wave.mesh
     end: float = mesh.total_angle[v]
@@ -135,7 +124,7 @@ def corner_end(wave: Any, v: int, c: int) -> float:
 
 
 @kernel
-def emit_between(wave: Any, v: int, lo: float, hi: float) -> None:
+def emit_between(wave: View, v: int, lo: float, hi: float) -> None:
     """Emit between two angles of the unfolded fan, which at an inner vertex closes to a circle."""
     mesh = wave.mesh
     if hi <= lo:
@@ -159,43 +148,24 @@ def emit_between(wave: Any, v: int, lo: float, hi: float) -> None:
 
 
 @kernel
-def relax_edge_ahead(wave: Any, v: int, h: int) -> None:
+def relax_edge_ahead(wave: View, v: int, h: int) -> None:
     """Offer the head of h, which leaves v, the straight path along it."""
     mesh = wave.mesh
     before = previous(h)  # its apex is the head of h, and it ends at v
-    place = mesh.geometry[ROW * before + LENGTH]
-    relax_edge(
-        wave,
-        v,
-        mesh.links[ROW * h + HEAD],
-        mesh.geometry[ROW * h + LENGTH],
-        before,
-        place,
-    )
+    reach, place = mesh.geometry[ROW * h + LENGTH], mesh.geometry[ROW * before + LENGTH]
+    reach_straight(wave, mesh.links[ROW * h + HEAD], reach, before, place, 0.0, v)
 
 
 @kernel
-def relax_last_edge(wave: Any, v: int, h: int) -> None:
+def relax_last_edge(wave: View, v: int, h: int) -> None:
     """Offer the path along the last edge of an open fan: from the tail of h to its apex."""
     mesh = wave.mesh
     reach = mesh.geometry[ROW * h + LENGTH_LEFT]
-    relax_edge(wave, v, mesh.links[ROW * h + APEX], reach, h, 0.0)
+    reach_straight(wave, mesh.links[ROW * h + APEX], reach, h, 0.0, 0.0, v)
 
 
 @kernel
-def relax_edge(wave: Any, v: int, u: int, reach: float, via: int, place: float) -> None:
-    """Offer u the path along the edge from v, which lies at ``place`` on the half-edge ``via``."""
-    vertices = wave.vertices
-    distance = vertices.distance[v] + reach
-    if merging(wave):
-        bound_vertex(wave, u, vertices.upper[v] + reach)
-        if wave.mesh.flags[u]:
-            illuminate_vertex(wave, u, distance, via, place, 0.0, 1.0)
-    relax_vertex(wave, u, distance, via, place, 0.0, v, -1 - v)
-
-
-@kernel
-def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) -> None:
+def emit_sector(wave: View, v: int, h: int, lo: float, hi: float, widest: float) -> None:
     """Emit the window of v that crosses the face of h, its corner at v, between two angles.
 
     The angles are measured from h; the part outside of the corner is cut off.
@@ -222,17 +192,12 @@ def emit_sector(wave: Any, v: int, h: int, lo: float, hi: float, widest: float) 
     sigma, xi = vertices.distance[v], 0.0
     if merging(wave):
         xi = vertices.upper[v] - sigma
-    slot = put_window(wave, emitted_window(wave, b0, b1, sx, sy, sigma, v, xi))
-    wave.counters[CREATED] += 1
-    if across == IRREGULAR:
-        send_across(wave, following(h), slot)
-        return
-    insert_sorted(wave, across, slot)
-    queue_if_due(wave, across, mesh.links[row + HEAD], mesh.links[row + APEX])
+    window = emitted_window(wave, b0, b1, sx, sy, sigma, v, xi)
+    send_out(wave, across, following(h), window)
 
 
 @kernel
-def along_far_edge(wave: Any, h: int, angle: float) -> float:
+def along_far_edge(wave: View, h: int, angle: float) -> float:
     """Place on the far edge, from the head of h, of the ray from the tail of h at ``angle``."""
     mesh = wave.mesh
     row = ROW * h

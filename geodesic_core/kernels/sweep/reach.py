@@ -1,19 +1,18 @@
 """The apex of a face, reached over the windows of one half-edge (section 3.2)."""
 
 import math
-from typing import Any
 
-from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import APEX, LENGTH, ROW
-from geodesic_core.kernels.planar import distance
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.relaxation import (
+from geodesic_core.kernels.front.relaxation import (
     bound_vertex,
     illuminate_vertex,
     precedence,
-    relax_vertex,
+    relax_node,
 )
-from geodesic_core.kernels.sweep.window import Window, load_window, straight_distance
+from geodesic_core.kernels.front.state import View, merging
+from geodesic_core.kernels.front.window import Window, load_window, straight_distance
+from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import APEX, LENGTH, ROW
+from geodesic_core.kernels.planar import distance
 from geodesic_core.tolerances import BEND, GAP
 
 
@@ -24,7 +23,7 @@ def ray_to(window: Window, x: float, y: float) -> tuple[float, float]:
 
 
 @inlined
-def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int, float, float]:
+def reach_apex(wave: View, h: int, count: int, ax: float, ay: float) -> tuple[int, float, float]:
     """Reach the apex, at (ax, ay), by the nearest window of scratch; return three values.
 
     They are the window's index; its crossing, where its shortest path to the apex passes the
@@ -62,13 +61,13 @@ def reach_apex(wave: Any, h: int, count: int, ax: float, ay: float) -> tuple[int
         if mesh.flags[v]:
             illuminate_apex(wave, h, count, nearest, ax, ay, best)
     surcharge = 1.0 if is_covered else 1.0 + BEND
-    relax_vertex(wave, v, best * surcharge, h, window.sx, window.sy, window.root, window.reference)
+    relax_node(wave, v, best * surcharge, h, window.sx, window.sy, window.root, window.reference)
     return nearest, crossing, best if is_covered else math.inf
 
 
 @inlined
 def nearest_bent(
-    wave: Any, last_left: int, first_right: int, ax: float, ay: float
+    wave: View, last_left: int, first_right: int, ax: float, ay: float
 ) -> tuple[int, float, float]:
     """Return the nearer of two windows beside the apex, its distance bent at its end, and that end.
 
@@ -88,7 +87,7 @@ def nearest_bent(
 
 @kernel
 def illuminate_apex(
-    wave: Any, h: int, count: int, nearest: int, ax: float, ay: float, best: float
+    wave: View, h: int, count: int, nearest: int, ax: float, ay: float, best: float
 ) -> None:
     """Note from where the windows of scratch light the apex: a saddle, or on the boundary.
 

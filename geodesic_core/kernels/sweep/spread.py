@@ -1,53 +1,31 @@
 """The windows of one half-edge sent on to the two other edges of its face (section 3.2)."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from geodesic_core.kernels.front.counters import CREATED
+from geodesic_core.kernels.front.pool import put_window
+from geodesic_core.kernels.front.sides import Side, left_of, right_of
+from geodesic_core.kernels.front.state import FIRST, LAST, LIST, SIZE, View, merging
+from geodesic_core.kernels.front.window import INTS, NEXT, Window, at_sigma, load_window, seen_over
+from geodesic_core.kernels.front.window_lists import queue_if_due
 from geodesic_core.kernels.jit import as_ints, inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
-    COS_LEFT,
-    COS_RIGHT,
     HEAD,
     IRREGULAR,
-    LENGTH,
-    LENGTH_LEFT,
-    LENGTH_RIGHT,
     NO_FACE,
     OUT_LEFT,
     OUT_RIGHT,
     ROW,
-    SIN_LEFT,
-    SIN_RIGHT,
     TAIL,
+    faces_beyond,
     following,
     previous,
 )
 from geodesic_core.kernels.planar import hit_left
-from geodesic_core.kernels.sweep.bounds import merging
+from geodesic_core.kernels.sweep.delivery import send_across
 from geodesic_core.kernels.sweep.reach import bent_distance, ray_to
-from geodesic_core.kernels.sweep.state import CREATED, FIRST, LAST, LIST, SIZE
-from geodesic_core.kernels.sweep.window import INTS, NEXT, Window, at_sigma, load_window
-from geodesic_core.kernels.sweep.window_lists import (
-    faces_beyond,
-    put_window,
-    queue_if_due,
-    send_across,
-)
 from geodesic_core.tolerances import OVERLAP
-
-
-class Side(NamedTuple):
-    """One of the two other edges of a face, as seen from the end of the half-edge it starts at."""
-
-    out: int
-    """The half-edge across it, or NO_FACE, or IRREGULAR"""
-    length: float
-    cosine: float
-    """Of the angle between it and the half-edge"""
-    sine: float
-    start: float
-    """Place of that end on the half-edge: 0 on the left, its length on the right"""
-    is_right: bool
 
 
 class Chain(NamedTuple):
@@ -62,7 +40,7 @@ NO_CHAIN = Chain(-1, -1, 0)
 
 
 @inlined
-def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: float) -> None:
+def spread(wave: View, h: int, count: int, nearest: int, crossing: float, least: float) -> None:
     """Send the windows of scratch on to the two other edges of the face.
 
     Shortest paths do not cross: what lies left of the path to the apex goes left, what lies right
@@ -101,34 +79,6 @@ def spread(wave: Any, h: int, count: int, nearest: int, crossing: float, least: 
 
 
 @inlined
-def left_of(wave: Any, h: int) -> Side:
-    """Return the edge from the tail of h to its apex."""
-    geometry, row = wave.mesh.geometry, ROW * h
-    return Side(
-        wave.mesh.links[row + OUT_LEFT],
-        geometry[row + LENGTH_LEFT],
-        geometry[row + COS_LEFT],
-        geometry[row + SIN_LEFT],
-        0.0,
-        False,
-    )
-
-
-@inlined
-def right_of(wave: Any, h: int) -> Side:
-    """Return the edge from the head of h to its apex."""
-    geometry, row = wave.mesh.geometry, ROW * h
-    return Side(
-        wave.mesh.links[row + OUT_RIGHT],
-        geometry[row + LENGTH_RIGHT],
-        geometry[row + COS_RIGHT],
-        geometry[row + SIN_RIGHT],
-        geometry[row + LENGTH],
-        True,
-    )
-
-
-@inlined
 def seen_from(window: Window, x: float, y: float) -> Window:
     """Return the window with σ as a frame that begins at (x, y) has it: another if parallel."""
     if window.weight == 0.0:
@@ -137,7 +87,7 @@ def seen_from(window: Window, x: float, y: float) -> Window:
 
 
 @inlined
-def send_over_edge(wave: Any, chain: Chain, side: Side, window: Window, covers: bool) -> Chain:
+def send_over_edge(wave: View, chain: Chain, side: Side, window: Window, covers: bool) -> Chain:
     """Send what a window lights of an edge over it; return the chain, which it may lengthen.
 
     The right edge is seen in the mirror, from where the half-edge ends. ``covers`` says that the
@@ -160,12 +110,7 @@ def send_over_edge(wave: Any, chain: Chain, side: Side, window: Window, covers: 
     if side.is_right:  # from the apex on; in this order, which fixes how it rounds
         along = side.length * weight - offset * side.cosine - sy * side.sine
         u0, u1 = side.length - u1, side.length - u0
-    slot = put_window(
-        wave,
-        Window(
-            u0, u1, along, depth, window.sigma, weight, window.root, window.xi, window.reference
-        ),
-    )
+    slot = put_window(wave, seen_over(window, u0, u1, along, depth))
     if chain.size == 0:
         return Chain(slot, slot, 1)
     as_ints(wave.pool.windows)[INTS * chain.last + NEXT] = slot
@@ -173,7 +118,7 @@ def send_over_edge(wave: Any, chain: Chain, side: Side, window: Window, covers: 
 
 
 @inlined
-def deliver_left(wave: Any, h: int, chain: Chain) -> None:
+def deliver_left(wave: View, h: int, chain: Chain) -> None:
     """Put a chain before the list across the left edge, for it comes in at the tail; queue that.
 
     Modifies the list.
@@ -194,7 +139,7 @@ def deliver_left(wave: Any, h: int, chain: Chain) -> None:
 
 
 @inlined
-def deliver_right(wave: Any, h: int, chain: Chain) -> None:
+def deliver_right(wave: View, h: int, chain: Chain) -> None:
     """Put a chain after the list across the right edge, for it comes in at the head; queue that.
 
     Modifies the list.
@@ -215,7 +160,7 @@ def deliver_right(wave: Any, h: int, chain: Chain) -> None:
 
 
 @kernel
-def is_beaten(wave: Any, window: Window, nearest: int, crossing: float, b: float) -> bool:
+def is_beaten(wave: View, window: Window, nearest: int, crossing: float, b: float) -> bool:
     """Whether a window is nowhere nearest between the nearest path to the apex and b.
 
     That path, of the window ``nearest``, crosses the edge at ``crossing``; ``window`` covers it,
@@ -239,7 +184,7 @@ def is_beaten(wave: Any, window: Window, nearest: int, crossing: float, b: float
 
 
 @kernel
-def send_chain(wave: Any, g: int, chain: Chain) -> None:
+def send_chain(wave: View, g: int, chain: Chain) -> None:
     """Move the windows of a chain over the irregular edge of g."""
     slot = chain.first
     for _ in range(chain.size):
@@ -249,12 +194,12 @@ def send_chain(wave: Any, g: int, chain: Chain) -> None:
 
 
 @kernel
-def room_to_spread(wave: Any, h: int, size: int) -> int:
+def room_to_spread(wave: View, h: int, size: int) -> int:
     """Return how many windows may be made of ``size`` that cross the face of h, at most."""
     links = wave.mesh.links
     room = 2 * size
     if links[ROW * h + OUT_LEFT] == IRREGULAR:
-        room += size * faces_beyond(wave, previous(h))
+        room += size * faces_beyond(wave.mesh.links, previous(h))
     if links[ROW * h + OUT_RIGHT] == IRREGULAR:
-        room += size * faces_beyond(wave, following(h))
+        room += size * faces_beyond(wave.mesh.links, following(h))
     return room

@@ -1,13 +1,10 @@
 """The list of one half-edge trimmed, filtered and, in a merging sweep, merged (3.3, 3.4, 4.1)."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from geodesic_core.kernels.jit import as_ints, inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import HEAD, LENGTH, ROW, TAIL
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.merging import merged
-from geodesic_core.kernels.sweep.state import (
+from geodesic_core.kernels.front.counters import MERGES
+from geodesic_core.kernels.front.state import (
     FIRST,
     LEFT,
     LEFT_REFERENCE,
@@ -15,28 +12,33 @@ from geodesic_core.kernels.sweep.state import (
     MERGE,
     MERGE_INTS,
     MERGED_ON,
-    MERGES,
     RIGHT,
     RIGHT_REFERENCE,
     SIZE,
     SPLIT,
+    WIDTH,
+    View,
     is_pruned,
+    merging,
 )
-from geodesic_core.kernels.sweep.trimming import leaves_gap, trim
-from geodesic_core.kernels.sweep.window import (
+from geodesic_core.kernels.front.window import (
     B0,
     B1,
     INTS,
     NEXT,
     NO_WINDOW,
-    WIDTH,
     Window,
     between,
     is_within,
     load_window,
     reaches,
+    referring_to,
     store_window,
 )
+from geodesic_core.kernels.jit import as_ints, inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import HEAD, LENGTH, ROW, TAIL
+from geodesic_core.kernels.sweep.merging import merged
+from geodesic_core.kernels.sweep.trimming import leaves_gap, trim
 from geodesic_core.tolerances import GAP, LOOSE_OVERLAP, OVERLAP, SLACK
 
 
@@ -56,7 +58,7 @@ class EdgeLimits(NamedTuple):
 
 
 @inlined
-def limits_of(wave: Any, h: int) -> EdgeLimits:
+def limits_of(wave: View, h: int) -> EdgeLimits:
     """Return the measures for the half-edge h.
 
     The filters of Xin and Wang (2009) drop windows that a path along the edge beats, or that no
@@ -82,7 +84,7 @@ def limits_of(wave: Any, h: int) -> EdgeLimits:
 
 
 @inlined
-def trim_list(wave: Any, h: int) -> int:
+def trim_list(wave: View, h: int) -> int:
     """Copy the list of h to scratch, trimmed against each other; return how many are left.
 
     Filters apply at both ends of the list only, where nearly all that they find lies. Modifies
@@ -118,7 +120,7 @@ def trim_list(wave: Any, h: int) -> int:
 
 @inlined
 def trim_against_earlier(
-    wave: Any, limits: EdgeLimits, last: Window, new: Window, count: int
+    wave: View, limits: EdgeLimits, last: Window, new: Window, count: int
 ) -> tuple[Window, Window, int]:
     """Trim a window and those in scratch that overlap it, from the last one on.
 
@@ -141,7 +143,7 @@ def trim_against_earlier(
 
 
 @inlined
-def without_covered_tail(wave: Any, from_head: float, count: int) -> int:
+def without_covered_tail(wave: View, from_head: float, count: int) -> int:
     """Return how many windows of scratch are left, less those at its end beyond ``from_head``."""
     while count > 0:
         window = load_window(wave, wave.pool.scratch, count - 1)
@@ -152,7 +154,7 @@ def without_covered_tail(wave: Any, from_head: float, count: int) -> int:
 
 
 @inlined
-def merge_into(wave: Any, h: int, last: Window, new: Window) -> tuple[bool, Window]:
+def merge_into(wave: View, h: int, last: Window, new: Window) -> tuple[bool, Window]:
     """Merge the window ``new`` into the last one of h, if both are of one source and it is allowed.
 
     Return whether they are merged, and what the last one is then. Modifies the record of merges.
@@ -165,30 +167,24 @@ def merge_into(wave: Any, h: int, last: Window, new: Window) -> tuple[bool, Wind
     is_merged, whole = merged(wave, last, new)
     if not is_merged:
         return False, last
-    reference = record_merge(wave, h, last, new)
-    return True, Window(
-        whole.b0, whole.b1, whole.sx, whole.sy, whole.sigma, 1.0, whole.root, whole.xi, reference
-    )
+    return True, referring_to(whole, record_merge(wave, h, last, new))
 
 
 @kernel
-def record_merge(wave: Any, h: int, last: Window, new: Window) -> int:
+def record_merge(wave: View, h: int, last: Window, new: Window) -> int:
     """Record that ``new`` is merged into ``last``, if paths are wanted (4.3); return the reference.
 
     Modifies the record of merges.
     """
-    pool = wave.pool
+    floats, ints = wave.merges
     if wave.sizes.merges == 0:
         return last.reference
     record = wave.counters[MERGES]
     wave.counters[MERGES] = record + 1
     m, i = MERGE * record, MERGE_INTS * record
-    pool.merges[m + SPLIT] = last.b1
-    pool.merges[m + LEFT], pool.merges[m + LEFT + 1] = last.sx, last.sy
-    pool.merges[m + LEFT + 2] = last.sigma
-    pool.merges[m + RIGHT], pool.merges[m + RIGHT + 1] = new.sx, new.sy
-    pool.merges[m + RIGHT + 2] = new.sigma
-    pool.merge_ints[i + MERGED_ON] = h
-    pool.merge_ints[i + LEFT_REFERENCE] = last.reference
-    pool.merge_ints[i + RIGHT_REFERENCE] = new.reference
+    floats[m + SPLIT] = last.b1
+    floats[m + LEFT], floats[m + LEFT + 1], floats[m + LEFT + 2] = last.sx, last.sy, last.sigma
+    floats[m + RIGHT], floats[m + RIGHT + 1], floats[m + RIGHT + 2] = new.sx, new.sy, new.sigma
+    ints[i + MERGED_ON] = h
+    ints[i + LEFT_REFERENCE], ints[i + RIGHT_REFERENCE] = last.reference, new.reference
     return record

@@ -1,8 +1,8 @@
 """Two windows that overlap on one edge: trimmed to where each is nearest (sections 3.3 and 3.4)."""
 
+from geodesic_core.kernels.front.window import Window, between, distance_at
 from geodesic_core.kernels.jit import inlined
 from geodesic_core.kernels.planar import Source, bisector, bracketed, distance
-from geodesic_core.kernels.sweep.window import Window, between, distance_at
 from geodesic_core.tolerances import DIVERGING
 
 
@@ -44,21 +44,16 @@ def trim(p: Window, c: Window, least: float, least_uneven: float) -> tuple[Windo
     """Trim the windows p and c of one edge to where each is nearest; return both.
 
     A window that loses everything comes back empty (its ends equal). Overlaps of at most ``least``
-    stay; of windows of different σ, of at most ``least_uneven``. Equal windows: p wins.
+    stay; of windows of different σ, of at most ``least_uneven``. Equal windows: p wins. Half of a
+    sweep is spent here; decision 21 tells what was tried.
     """
-    # Half of the sweep is spent here, on branches that no predictor foresees. Tried: one root per
-    # end instead of two, from squared distances (no gain); the quadratic first, the ends only where
-    # it has no root (7 % slower on horse97k); lo by a branch, which does not wait for the trim
-    # before as max() does (16 % faster on icosphere 6, 2 to 4 % slower on scans); a return of
-    # windows from each case, which the compiler makes such a branch of (16 % faster, 6 % slower);
-    # the cut at x as a function of both cases (2 to 3 % slower on both).
     p0, p1, c0, c1 = p.b0, p.b1, c.b0, c.b1
     lo, hi = max(p0, c0), min(p1, c1)
     if hi - lo <= (least if p.sigma == c.sigma else least_uneven):
         return p, c
     if p.sigma == c.sigma and p.weight * c.weight == 1.0:
         # Mostly two images of one pseudosource: their bisector is a straight line, and squares of
-        # distances compare as well. Saves four roots and a division, 15 % of the sweep.
+        # distances compare as well.
         x0, x1 = p.sx - lo, c.sx - lo
         lead_lo = (x1 - x0) * (x1 + x0) + (c.sy - p.sy) * (c.sy + p.sy)  # of p; linear in x
         slope = 2.0 * (x0 - x1)

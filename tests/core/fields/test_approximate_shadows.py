@@ -5,14 +5,14 @@ import math
 import numpy as np
 import pytest
 
+from geodesic_core.kernels.front.bounds import merging_bounds
+from geodesic_core.kernels.front.counters import HEAP_SIZE
+from geodesic_core.kernels.front.relaxation import bound_vertex, illuminate_vertex
+from geodesic_core.kernels.front.state import LIT_FROM, LIT_TO, SETTLED, new_wavefront, view_of
+from geodesic_core.kernels.front.window import B0, B1, SX, SY
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import COS_LEFT, LENGTH_LEFT, SIN_LEFT, following
-from geodesic_core.kernels.sweep.bounds import merging_bounds
 from geodesic_core.kernels.sweep.pseudosources import emit_shadows
-from geodesic_core.kernels.sweep.queues import HEAP_SIZE
-from geodesic_core.kernels.sweep.relaxation import bound_vertex, illuminate_vertex
-from geodesic_core.kernels.sweep.state import LIT_FROM, LIT_TO, SETTLED, new_wavefront, view_of
-from geodesic_core.kernels.sweep.window import B0, B1, SX, SY
 from geodesic_core.tolerances import SECTOR_MARGIN
 from tests.support import zoo
 from tests.support.invariants import windows_of

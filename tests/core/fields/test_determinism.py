@@ -7,8 +7,10 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.fields import sweep
+from geodesic_core.kernels.front import state
+from geodesic_core.kernels.front.state import Merges
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.sweep import continuous_dijkstra, state
+from geodesic_core.kernels.sweep import continuous_dijkstra
 from tests.conftest import WITHOUT_JIT
 from tests.support import zoo
 from tests.support.approximation import MERGING, exact_or_not, solve
@@ -106,17 +108,13 @@ def test_growing_changes_nothing(name, error, monkeypatch):
 
     def cramped(*args, **kwargs):
         wave = allocate(*args, **kwargs)
-        paths = 1 if len(wave.pool.merges) else 0
-        return with_pool(
-            wave,
-            windows=np.empty((1, 8)),
-            scratch=np.empty((1, 8)),
-            merges=np.empty((paths, state.MERGE)),
-            merge_ints=np.empty((paths, state.MERGE_INTS), np.int32),
-        )
+        paths = 1 if len(wave.merges.floats) else 0
+        merges = Merges(*(array[:paths].copy() for array in wave.merges))
+        wave = wave._replace(merges=merges)
+        return with_pool(wave, windows=np.empty((1, 8)), scratch=np.empty((1, 8)))
 
     def counted(wave):
-        grown.append(len(wave.pool.merges))
+        grown.append(len(wave.merges.floats))
         return more_merges(wave)
 
     allocate, more_merges = state.new_wavefront, state.with_more_merges

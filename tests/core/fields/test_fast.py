@@ -7,12 +7,12 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.fields import fast_sweep
-from geodesic_core.kernels.fast import state
 from tests.conftest import WITHOUT_JIT
 from tests.support import expected, zoo
 from tests.support.approximation import MERGING, some_sources
 from tests.support.certificates import check_path
 from tests.support.meshes import mesh_of
+from tests.support.stepping import with_pool
 
 EFFORTS = (1, 2) if WITHOUT_JIT else (1, 2, 4, 8)
 each_effort = pytest.mark.parametrize("effort", EFFORTS)
@@ -181,12 +181,12 @@ def test_the_same_to_the_bit_whatever_the_slices_and_the_room(effort, monkeypatc
     mesh = mesh_of(MERGING["ring"])
     whole = gc.fast_distance(mesh, 3, effort)
 
-    def crowded(topology, sites, places, first_target):
-        front = new_wavefront(topology, sites, places, first_target)
-        return front._replace(windows=front.windows[:40].copy())
+    def crowded(*arguments):
+        wave = new_wavefront(*arguments)
+        return with_pool(wave, windows=wave.pool.windows[:40].copy())
 
-    new_wavefront = state.new_wavefront
-    monkeypatch.setattr(state, "new_wavefront", crowded)
+    new_wavefront = fast_sweep.new_wavefront
+    monkeypatch.setattr(fast_sweep, "new_wavefront", crowded)
     monkeypatch.setattr(fast_sweep, "_FIRST_BUDGET", 1)
     monkeypatch.setattr(fast_sweep, "_SMALLEST_BUDGET", 1)
     monkeypatch.setattr(fast_sweep, "SLICE_SECONDS", 0.0)

@@ -6,11 +6,11 @@ import pytest
 import geodesic_core as gc
 from geodesic_core.control import Control
 from geodesic_core.fields.sweep import winners_of
+from geodesic_core.kernels.front.relaxation import nearest_sources
+from geodesic_core.kernels.front.state import ENTRY_EDGE, PREDECESSOR
 from geodesic_core.kernels.mesh.half_edges import APEX, OPPOSITE
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import trace_path
-from geodesic_core.kernels.sweep.continuous_dijkstra import nearest_sources
-from geodesic_core.kernels.sweep.state import ENTRY_EDGE, PREDECESSOR
 from tests.support import zoo
 from tests.support.stepping import finished, started, topology_of
 
@@ -82,7 +82,7 @@ def test_a_lost_line_is_an_internal_error():
     field = gc.exact_distance(mesh, 0)
     _, wave, v = broken("jittered_grid")
     for name in ("winner", "winner_ints", "distance"):
-        getattr(field._winners.get(Control()), name)[:] = getattr(wave.vertices, name)
+        getattr(field._winners.get(Control()).vertices, name)[:] = getattr(wave.vertices, name)
     with pytest.raises(gc.errors.InternalError, match="left the surface"):
         field.path_to(int(mesh.topology.outer_vertex[v]))
 

@@ -7,10 +7,11 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.control import Control
+from geodesic_core.kernels.front import state
+from geodesic_core.kernels.front.bounds import exact_bounds
+from geodesic_core.kernels.front.counters import TOUCHED
+from geodesic_core.kernels.front.state import PREDECESSOR
 from geodesic_core.kernels.paths.edge_dijkstra import search_edges, vertices_to
-from geodesic_core.kernels.sweep import state
-from geodesic_core.kernels.sweep.bounds import exact_bounds
-from geodesic_core.kernels.sweep.state import PREDECESSOR, TOUCHED
 from geodesic_core.search.landmarks import Landmarks
 from geodesic_core.tolerances import ASTAR_WEIGHT
 from tests.conftest import WITHOUT_JIT

@@ -82,7 +82,7 @@ def test_an_edit_of_any_source_changes_the_digest(copied, name):
 
 def test_a_new_name_changes_the_digest(copied):
     before = sources_digest()
-    (copied / "sweep" / "queues.py").rename(copied / "sweep" / "heap.py")
+    (copied / "front" / "queues.py").rename(copied / "front" / "heap.py")
     assert sources_digest() != before
 
 

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from geodesic_core.kernels.sweep.bounds import merging_bounds
+from geodesic_core.kernels.front.bounds import merging_bounds
+from geodesic_core.kernels.front.state import new_wavefront
 from geodesic_core.kernels.sweep.merging import (
     accuracy,
     continuity,
@@ -18,7 +19,6 @@ from geodesic_core.kernels.sweep.merging import (
     shortfall,
     visibility,
 )
-from geodesic_core.kernels.sweep.state import new_wavefront
 from geodesic_core.kernels.sweep.trimming import leaves_gap
 from geodesic_core.tolerances import LOCAL_SHARE
 from tests.support import zoo

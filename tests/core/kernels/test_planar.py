@@ -7,8 +7,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from geodesic_core.kernels.front.window import reaches
 from geodesic_core.kernels.planar import bisector, hit_left
-from geodesic_core.kernels.sweep.window import reaches
 from tests.support.stepping import window
 
 shares = st.floats(0, 1)

@@ -8,10 +8,10 @@ import pytest
 import geodesic_core as gc
 from geodesic_core.control import Control
 from geodesic_core.fields.sweep import run_sweep
-from geodesic_core.kernels.paths import edge_dijkstra
-from geodesic_core.kernels.sweep import continuous_dijkstra, state
-from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds
-from geodesic_core.kernels.sweep.pruning import (
+from geodesic_core.kernels.front import state
+from geodesic_core.kernels.front.bounds import exact_bounds, merging_bounds
+from geodesic_core.kernels.front.counters import TOUCHED
+from geodesic_core.kernels.front.pruning import (
     forget,
     least_to_start,
     lower_bound_to_target,
@@ -19,7 +19,9 @@ from geodesic_core.kernels.sweep.pruning import (
     may_pass,
     steepest_to_start,
 )
-from geodesic_core.kernels.sweep.state import MARKS, SIZE, TOUCHED, new_wavefront
+from geodesic_core.kernels.front.state import MARKS, SIZE, new_wavefront
+from geodesic_core.kernels.paths import edge_dijkstra
+from geodesic_core.kernels.sweep import continuous_dijkstra
 from geodesic_core.search.landmarks import Landmarks
 from tests.conftest import WITHOUT_JIT
 from tests.support import expected, zoo

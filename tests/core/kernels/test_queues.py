@@ -6,15 +6,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from geodesic_core.kernels.sweep.queues import (
-    HEAP_SIZE,
-    RING_SIZE,
-    pop_nearest,
-    push_or_raise,
-    ring_pop,
-    ring_push,
-)
-from geodesic_core.kernels.sweep.state import new_wavefront
+from geodesic_core.kernels.front.counters import HEAP_SIZE, RING_SIZE
+from geodesic_core.kernels.front.queues import pop_nearest, push_or_raise, ring_pop, ring_push
+from geodesic_core.kernels.front.state import new_wavefront
 from tests.support import zoo
 from tests.support.invariants import check_heap
 from tests.support.stepping import topology_of, view_of_arrays

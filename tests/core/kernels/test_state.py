@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from geodesic_core.kernels.front.counters import COUNTERS, WORK
 from geodesic_core.kernels.outcome import Outcome
 from tests.support import zoo
 from tests.support.invariants import Watch, exact_by_euclid, exact_by_unfolding
@@ -160,4 +161,5 @@ def test_growing_changes_nothing(name):
         Outcome.SCRATCH_FULL,
     }
     assert state_of(wave) == state_of(whole)
-    np.testing.assert_array_equal(wave.counters[:10], whole.counters[:10])
+    rest = np.arange(COUNTERS) != WORK  # which counts a slice alone
+    np.testing.assert_array_equal(wave.counters[rest], whole.counters[rest])

@@ -7,7 +7,7 @@ import pytest
 
 import geodesic_core as gc
 from geodesic_core.control import Control
-from geodesic_core.kernels.sweep.bounds import LANDMARKS
+from geodesic_core.kernels.front.bounds import LANDMARKS
 from geodesic_core.search.landmarks import Landmarks
 from geodesic_core.tolerances import LANDMARK_ERROR
 from tests.conftest import WITHOUT_JIT

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.kernels.sweep import state
+from geodesic_core.kernels.front.counters import CREATED
 from geodesic_core.search import target_sweep
 from tests.core.fields.test_points import EXACT, SAME, random_points
 from tests.support import zoo
@@ -103,7 +103,7 @@ def test_the_sweep_ends_at_the_last_of_the_nearest(monkeypatch):
 
     def counted(*arguments):
         wave = sweep_nodes(*arguments)
-        made.append(int(wave.counters[state.CREATED]))
+        made.append(int(wave.counters[CREATED]))
         return wave
 
     monkeypatch.setattr(target_sweep, "sweep_nodes", counted)

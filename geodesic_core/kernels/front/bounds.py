@@ -1,12 +1,11 @@
 """The bounds of a sweep: its limit, the errors granted to merging, and pruning (section 5)."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Singles
-from geodesic_core.kernels.jit import inlined
+from geodesic_core.arrays import ABSENT, Floats, Singles
 
 LANDMARKS = 16  # of a mesh, at most: a cache line of distances per vertex
 
@@ -54,6 +53,9 @@ def pruning_toward(
 NO_PRUNING = pruning_toward(np.zeros(3), math.inf)
 """The bounds of a sweep that is not pruned."""
 
+ABSENT_PRUNING = PruningBounds(*[ABSENT] * len(PruningBounds._fields))
+"""The bounds of a sweep that is never pruned, whose kernels carry nothing of it."""
+
 
 class Bounds(NamedTuple):
     """All limits of a sweep."""
@@ -97,17 +99,3 @@ def without_merging(bounds: Bounds) -> Bounds:
 def with_parallel_windows(bounds: Bounds, first_segment: int) -> Bounds:
     """Return the bounds of the same sweep from curves whose segments are the nodes from there."""
     return bounds._replace(parallel=(1,), first_segment=first_segment)
-
-
-@inlined
-def merging(wave: Any) -> bool:
-    """Whether the sweep merges windows; known when it is compiled."""
-    return len(wave.bounds.merging) > 0
-
-
-@inlined
-def source_weight(wave: Any, root: int) -> float:
-    """SW of a window with this root: 0 for a parallel one, which comes from a segment, else 1."""
-    if len(wave.bounds.parallel) > 0 and root >= wave.bounds.first_segment:
-        return 0.0
-    return 1.0

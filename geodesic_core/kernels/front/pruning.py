@@ -8,18 +8,14 @@ all that it finds.
 """
 
 import math
-from typing import Any
 
 from geodesic_core.arrays import Flags, Floats, Ints, Singles
-from geodesic_core.kernels.jit import inlined, kernel
-from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL
-from geodesic_core.kernels.sweep.bounds import LANDMARKS
-from geodesic_core.kernels.sweep.state import (
-    COUNTERS,
+from geodesic_core.kernels.front.bounds import LANDMARKS
+from geodesic_core.kernels.front.counters import COUNTERS, FAR_FIRST, FREE_FIRST, TOUCHED
+from geodesic_core.kernels.front.state import (
     ENTRY_EDGE,
     FACE,
     FAR,
-    FREE_FIRST,
     LIT_FROM,
     LIT_TO,
     MARKS,
@@ -30,9 +26,12 @@ from geodesic_core.kernels.sweep.state import (
     SENT_FROM,
     SENT_TO,
     SIZE,
-    TOUCHED,
+    View,
+    Wavefront,
     is_pruned,
 )
+from geodesic_core.kernels.jit import inlined, kernel
+from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, TAIL, Topology
 from geodesic_core.tolerances import LANDMARK_ERROR, SINGLE_PRECISION
 
 # Stored distances from landmarks are lower bounds, rounded to single precision.
@@ -41,7 +40,7 @@ MOST = (1.0 + SINGLE_PRECISION) / (1.0 - LANDMARK_ERROR)
 
 
 @kernel
-def touch(wave: Any, v: int) -> None:
+def touch(wave: View, v: int) -> None:
     """Note that v is no longer in its first state, and bound the rest of a path from it.
 
     Modifies the list of touched vertices and the heuristic.
@@ -54,7 +53,7 @@ def touch(wave: Any, v: int) -> None:
 
 
 @kernel
-def lower_bound_to_target(wave: Any, v: int) -> float:
+def lower_bound_to_target(wave: View, v: int) -> float:
     """Lower bound of the distance from v to the end of a path.
 
     The value of an earlier sweep from there counts up to its ceiling. Had it pruned the path to
@@ -71,7 +70,7 @@ def lower_bound_to_target(wave: Any, v: int) -> float:
 
 
 @inlined
-def straight_to_start(wave: Any, v: int) -> float:
+def straight_to_start(wave: View, v: int) -> float:
     """Euclidean distance from v to the start."""
     mesh = wave.mesh
     x = mesh.positions[3 * v] - wave.bounds.pruning.position[0]
@@ -80,40 +79,35 @@ def straight_to_start(wave: Any, v: int) -> float:
     return math.sqrt(x * x + y * y + z * z)
 
 
-@kernel
-def least_to_start(wave: Any, v: int, straight: float) -> float:
+@inlined
+def least_to_start(wave: View, v: int, straight: float) -> float:
     """Lower bound of the distance from v to the start: straight, or by a landmark.
 
-    The exact distance from a landmark is known to be from LEAST to MOST times the stored one. A
-    landmark of another component tells nothing.
+    The exact distance from a landmark is known to be from LEAST to MOST times the stored one.
     """
-    least = straight
-    for i in range(wave.bounds.pruning.landmark_count):
-        if wave.bounds.pruning.least[i] == math.inf:
-            continue
-        here = wave.bounds.pruning.landmarks[LANDMARKS * v + i]
-        bound = max(
-            LEAST * here - wave.bounds.pruning.most[i], wave.bounds.pruning.least[i] - MOST * here
-        )
-        if bound > least:
-            least = bound
-    return least
+    return most_by_landmarks(wave, v, straight, LEAST, MOST)
+
+
+@inlined
+def steepest_to_start(wave: View, v: int, straight: float) -> float:
+    """Bound of `least_to_start` at any point q, less the distance of v and q."""
+    return most_by_landmarks(wave, v, straight, MOST, LEAST)
 
 
 @kernel
-def steepest_to_start(wave: Any, v: int, straight: float) -> float:
-    """Bound of `least_to_start` at any point q, less the distance of v and q."""
-    steepest = straight
-    for i in range(wave.bounds.pruning.landmark_count):
-        if wave.bounds.pruning.least[i] == math.inf:
+def most_by_landmarks(wave: View, v: int, straight: float, beyond: float, behind: float) -> float:
+    """Return the most of ``straight`` and of what each landmark tells of the way to the start.
+
+    The stored distance of v counts ``beyond`` times where the landmark lies beyond the start, and
+    ``behind`` times where it lies behind v. A landmark of another component tells nothing.
+    """
+    pruning, most = wave.bounds.pruning, straight
+    for i in range(pruning.landmark_count):
+        if pruning.least[i] == math.inf:
             continue
-        here = wave.bounds.pruning.landmarks[LANDMARKS * v + i]
-        bound = max(
-            MOST * here - wave.bounds.pruning.most[i], wave.bounds.pruning.least[i] - LEAST * here
-        )
-        if bound > steepest:
-            steepest = bound
-    return steepest
+        here = pruning.landmarks[LANDMARKS * v + i]
+        most = max(most, beyond * here - pruning.most[i], pruning.least[i] - behind * here)
+    return most
 
 
 @kernel
@@ -133,7 +127,7 @@ def bound_landmarks(
 
 
 @inlined
-def may_pass(wave: Any, v: int) -> bool:
+def may_pass(wave: View, v: int) -> bool:
     """Whether a path of allowed length may pass v at its distance."""
     vertices = wave.vertices
     return (
@@ -143,7 +137,7 @@ def may_pass(wave: Any, v: int) -> bool:
 
 
 @kernel
-def forget(topology: Any, wavefront: Any) -> None:
+def forget(topology: Topology, wavefront: Wavefront) -> None:
     """Reset the wavefront to its first state, in time proportional to the vertices touched.
 
     What it is to retain stays marked.
@@ -187,11 +181,11 @@ def forget(topology: Any, wavefront: Any) -> None:
         vertices.winner_ints[node, ENTRY_EDGE] = vertices.winner_ints[node, PREDECESSOR] = -1
     for i in range(COUNTERS):
         wavefront.counters[i] = 0
-    wavefront.counters[FREE_FIRST] = -1
+    wavefront.counters[FREE_FIRST] = wavefront.counters[FAR_FIRST] = -1
 
 
 @kernel
-def mark_visited(topology: Any, distance: Floats, touched: Ints, visited: Flags) -> None:
+def mark_visited(topology: Topology, distance: Floats, touched: Ints, visited: Flags) -> None:
     """Mark the faces, in the caller's numbering, all of whose corners are reached.
 
     Modifies ``visited`` (F,).

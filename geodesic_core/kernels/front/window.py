@@ -28,9 +28,26 @@ pseudosource lies at infinity: in homogeneous coordinates (sx, sy, weight), with
 (sx, sy) the unit vector against the rays. Its distance function is linear:
 D(x, y) = sigma - sx x - sy y, where sigma belongs to the frame's origin and may be negative.
 
-In memory a window is a row of eight float64, half a dozen of them in use and the rest int32, in a
-pool where its number is its *slot*; kernels read and write whole windows, as values. The weight is
-not stored, since the root tells it.
+In memory a window is a row of eight float64, the last two of them four int32, in a pool where its
+number is its *slot*; kernels read and write whole windows, as values. The weight is not stored,
+since the root tells it. What a column holds depends on the kind of sweep:
+
+=======  =================  =================  ==================================================
+column   exact              merging            fast
+=======  =================  =================  ==================================================
+0 to 4   B0 … SIGMA         B0 … SIGMA         B0 … SIGMA
+5        free               XI                 BUCKET: in which it is due, counted from distance 0
+int 12   REFERENCE          REFERENCE          HALF_EDGE: that it is to cross; -1 - v where vertex
+                                               v is to emit all around, from SIGMA
+int 13   free; DEPTH of a   free               WON: bits of the places at which it was the nearest
+         crossing
+int 14   NEXT               NEXT               NEXT
+int 15   ROOT               ROOT               ROOT
+=======  =================  =================  ==================================================
+
+NEXT is the slot of the next window of the same list or bucket, or of the next free one, -1 at the
+end; of a recorded crossing the one before; of a retained window its half-edge. A merging sweep and
+a fast one have no float64 to spare, a fast one no int32.
 """
 
 import math
@@ -38,9 +55,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from geodesic_core.arrays import Floats
+from geodesic_core.kernels.front.state import WIDTH, View, merging, source_weight
 from geodesic_core.kernels.jit import as_ints, inlined
 from geodesic_core.kernels.planar import distance
-from geodesic_core.kernels.sweep.bounds import merging, source_weight
 
 # Columns of a row, float64
 B0 = 0
@@ -49,11 +67,14 @@ SX = 2
 SY = 3
 SIGMA = 4
 XI = 5
-WIDTH = 8  # columns in all
+BUCKET = 5
 
 # Columns of a row, int32
 REFERENCE = 12
-NEXT = 14  # slot of the next window of the same list (or of the next free slot), -1 at the end
+HALF_EDGE = 12
+DEPTH = 13
+WON = 13
+NEXT = 14
 ROOT = 15
 INTS = 16  # columns in all
 
@@ -77,7 +98,7 @@ NO_WINDOW = Window(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0, 0.0, -1)
 
 
 @inlined
-def load_window(wave: Any, rows: Any, i: int) -> Window:
+def load_window(wave: View, rows: Floats, i: int) -> Window:
     """Return the window of row i of the pool, or of scratch."""
     w, ints = WIDTH * i, as_ints(rows)
     root: Any = np.int64(ints[INTS * i + ROOT])  # one type, so that kernels are compiled once
@@ -99,7 +120,7 @@ def load_window(wave: Any, rows: Any, i: int) -> Window:
 
 
 @inlined
-def store_window(wave: Any, rows: Any, i: int, window: Window) -> None:
+def store_window(wave: View, rows: Floats, i: int, window: Window) -> None:
     """Write a window to row i. Modifies ``rows``."""
     w, ints = WIDTH * i, as_ints(rows)
     rows[w + B0], rows[w + B1] = window.b0, window.b1
@@ -113,7 +134,7 @@ def store_window(wave: Any, rows: Any, i: int, window: Window) -> None:
 
 @inlined
 def emitted_window(
-    wave: Any, b0: float, b1: float, sx: float, sy: float, sigma: float, root: int, xi: float
+    wave: View, b0: float, b1: float, sx: float, sy: float, sigma: float, root: int, xi: float
 ) -> Window:
     """Return a window as the pseudosource ``root`` emits it, with nothing merged into it."""
     node: Any = np.int64(root)
@@ -121,51 +142,44 @@ def emitted_window(
 
 
 @inlined
+def changed(
+    window: Window,
+    b0: float,
+    b1: float,
+    sx: float,
+    sy: float,
+    sigma: float,
+    xi: float,
+    reference: int,
+) -> Window:
+    """Return the window with all but its root changed."""
+    return Window(b0, b1, sx, sy, sigma, window.weight, window.root, xi, reference)
+
+
+@inlined
+def seen_over(window: Window, b0: float, b1: float, sx: float, sy: float) -> Window:
+    """Return the window as it goes on over another edge, in the frame of the half-edge there."""
+    return changed(window, b0, b1, sx, sy, window.sigma, window.xi, window.reference)
+
+
+@inlined
 def between(window: Window, b0: float, b1: float) -> Window:
     """Return the window with other ends."""
-    return Window(
-        b0,
-        b1,
-        window.sx,
-        window.sy,
-        window.sigma,
-        window.weight,
-        window.root,
-        window.xi,
-        window.reference,
-    )
+    return seen_over(window, b0, b1, window.sx, window.sy)
 
 
 @inlined
 def at_sigma(window: Window, sigma: float) -> Window:
     """Return the window with another σ."""
-    return Window(
-        window.b0,
-        window.b1,
-        window.sx,
-        window.sy,
-        sigma,
-        window.weight,
-        window.root,
-        window.xi,
-        window.reference,
-    )
+    b0, b1, sx, sy = window.b0, window.b1, window.sx, window.sy
+    return changed(window, b0, b1, sx, sy, sigma, window.xi, window.reference)
 
 
 @inlined
-def after_crossing(window: Window, crossing: int) -> Window:
-    """Return the window as it goes on from an irregular edge, in an exact sweep."""
-    return Window(
-        window.b0,
-        window.b1,
-        window.sx,
-        window.sy,
-        window.sigma,
-        window.weight,
-        window.root,
-        window.xi,
-        crossing,
-    )
+def referring_to(window: Window, reference: int) -> Window:
+    """Return the window with another reference: to a merge, or to the last crossing."""
+    b0, b1, sx, sy = window.b0, window.b1, window.sx, window.sy
+    return changed(window, b0, b1, sx, sy, window.sigma, window.xi, reference)
 
 
 @inlined
@@ -174,17 +188,8 @@ def reversed_window(window: Window, length: float) -> Window:
     sigma = window.sigma
     if window.weight != 1.0:  # it belongs to the origin, which is at the other end
         sigma -= window.sx * length
-    return Window(
-        length - window.b1,
-        length - window.b0,
-        length * window.weight - window.sx,
-        window.sy,
-        sigma,
-        window.weight,
-        window.root,
-        window.xi,
-        window.reference,
-    )
+    b0, b1, sx = length - window.b1, length - window.b0, length * window.weight - window.sx
+    return changed(window, b0, b1, sx, window.sy, sigma, window.xi, window.reference)
 
 
 @inlined

@@ -1,8 +1,24 @@
 """Relaxation of vertices: least distances, and in a merging sweep their bounds and their light."""
 
 import math
-from typing import Any
 
+import numpy as np
+
+from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.front.pruning import touch
+from geodesic_core.kernels.front.queues import push_or_raise
+from geodesic_core.kernels.front.state import (
+    ENTRY_EDGE,
+    FAR,
+    LIGHT,
+    LIT_FROM,
+    LIT_TO,
+    PREDECESSOR,
+    SETTLED,
+    WINNER,
+    View,
+    merging,
+)
 from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX_ANGLE,
@@ -13,19 +29,6 @@ from geodesic_core.kernels.mesh.half_edges import (
     PINCHED,
     ROW,
     SIN_LEFT,
-)
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.pruning import touch
-from geodesic_core.kernels.sweep.queues import push_or_raise
-from geodesic_core.kernels.sweep.state import (
-    ENTRY_EDGE,
-    FAR,
-    LIGHT,
-    LIT_FROM,
-    LIT_TO,
-    PREDECESSOR,
-    SETTLED,
-    WINNER,
 )
 from geodesic_core.tolerances import SLACK, TIE
 
@@ -38,34 +41,48 @@ def precedence(distance: float, source: int, known: float, known_source: int) ->
     return source < known_source
 
 
-@kernel
-def relax_vertex(
-    wave: Any, v: int, distance: float, via: int, sx: float, sy: float, root: int, reference: int
-) -> None:
-    """Offer v a distance and the window that gives it; queue v if it is the least so far.
-
-    Of equal distances that of the lower source wins. Modifies the vertex and the heap.
-    """
+@inlined
+def record_winner(wave: View, node: int, via: int, sx: float, sy: float, root: int) -> None:
+    """Note the window that wins a node: it crossed ``via``, from its pseudosource at (sx, sy)."""
     vertices = wave.vertices
-    known = vertices.distance[v]
-    if not precedence(distance, vertices.source_index[root], known, vertices.source_index[v]):
+    vertices.winner[2 * node], vertices.winner[2 * node + 1] = sx, sy
+    vertices.winner_ints[WINNER * node + ENTRY_EDGE] = via
+    vertices.winner_ints[WINNER * node + PREDECESSOR] = root
+    vertices.source_index[node] = vertices.source_index[root]
+
+
+@inlined
+def relax_node(
+    wave: View,
+    node: int,
+    distance: float,
+    via: int,
+    sx: float,
+    sy: float,
+    root: int,
+    reference: int,
+) -> None:
+    """Offer a node a distance and the window that gives it; queue a vertex if it is the least.
+
+    Of equal distances that of the lower source wins. Modifies the node and the heap.
+    """
+    vertices, is_vertex = wave.vertices, node < wave.sizes.vertices
+    known = vertices.distance[node]
+    if not precedence(distance, vertices.source_index[root], known, vertices.source_index[node]):
         return
-    if known == math.inf and vertices.status[v] == FAR:
-        touch(wave, v)
-    vertices.winner[2 * v] = sx
-    vertices.winner[2 * v + 1] = sy
-    vertices.winner_ints[WINNER * v + ENTRY_EDGE] = via
-    vertices.winner_ints[WINNER * v + PREDECESSOR] = root
-    vertices.source_index[v] = vertices.source_index[root]
+    if is_vertex and known == math.inf and vertices.status[node] == FAR:
+        touch(wave, node)
+    record_winner(wave, node, via, sx, sy, root)
     if merging(wave):
-        vertices.reference[v] = reference
+        vertices.reference[node] = reference
     if distance < known:
-        vertices.distance[v] = distance
-        push_or_raise(wave.queues, wave.counters, v, distance)
+        vertices.distance[node] = distance
+        if is_vertex:
+            push_or_raise(wave.queues, wave.counters, node, distance)
 
 
 @kernel
-def bound_vertex(wave: Any, v: int, upper: float) -> None:
+def bound_vertex(wave: View, v: int, upper: float) -> None:
     """Note an upper bound of the exact distance of v. Modifies the bound and the light of v."""
     vertices = wave.vertices
     if upper < vertices.upper[v]:
@@ -81,7 +98,7 @@ def bound_vertex(wave: Any, v: int, upper: float) -> None:
 
 @kernel
 def illuminate_vertex(
-    wave: Any, v: int, distance: float, via: int, sx: float, sy: float, sw: float
+    wave: View, v: int, distance: float, via: int, sx: float, sy: float, sw: float
 ) -> None:
     """Note the direction in which v sees a pseudosource that reaches it at ``distance``.
 
@@ -110,7 +127,7 @@ def illuminate_vertex(
 
 
 @kernel
-def incoming_angle(wave: Any, via: int, sx: float, sy: float, sw: float) -> float:
+def incoming_angle(wave: View, via: int, sx: float, sy: float, sw: float) -> float:
     """Angle, in its unfolded fan, at which the apex of a half-edge sees a pseudosource.
 
     The pseudosource is at (sx, sy, sw) in the frame of the half-edge ``via``.
@@ -127,3 +144,25 @@ def incoming_angle(wave: Any, via: int, sx: float, sy: float, sw: float) -> floa
     turn = math.atan2(ex * dy - ey * dx, ex * dx + ey * dy)
     start: float = mesh.geometry[row + APEX_ANGLE]
     return start + max(turn, 0.0)
+
+
+@kernel
+def nearest_sources(distance: Floats, winner_ints: Ints, source_index: Ints) -> Ints:
+    """Return for each node at a finite distance the index of its source; for others -1.
+
+    Follow pseudosources to the source at the end of the sweep, since one may have changed its own
+    source after it emitted. O(N).
+    """
+    result = np.full(len(distance), -1, np.int32)
+    for start in range(len(distance)):
+        if distance[start] == math.inf:
+            continue
+        v = start
+        while result[v] < 0 and winner_ints[v, ENTRY_EDGE] >= 0:
+            v = winner_ints[v, PREDECESSOR]
+        found = result[v] if result[v] >= 0 else source_index[v]
+        v = start
+        while result[v] < 0:
+            result[v] = found
+            v = winner_ints[v, PREDECESSOR]
+    return result

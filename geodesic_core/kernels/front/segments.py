@@ -1,4 +1,4 @@
-"""Segments of curves as sources: the parallel windows they emit, and the corners they reach.
+"""Segments of curves as sources: their parallel windows, and distances from them.
 
 A segment has a node of its own and a row for each face that it lies in: several where it runs along
 an edge. Its ends are sources of their own; it adds the rays that leave it at right angles, on both
@@ -6,30 +6,23 @@ sides. Distance to it is then exact: nearest to a point is an end, or the foot o
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from geodesic_core.arrays import Floats, Ints
+from geodesic_core.kernels.front.state import NODE, SEGMENT_END, SEGMENT_ENDS, View
+from geodesic_core.kernels.front.window import Window, emitted_window
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
-    APEX,
     COS_LEFT,
-    LENGTH,
     LENGTH_LEFT,
-    NO_FACE,
-    OPPOSITE,
     ROW,
     SIN_LEFT,
     weights_in_frame,
 )
-from geodesic_core.kernels.sweep.bounds import merging
-from geodesic_core.kernels.sweep.relaxation import bound_vertex, illuminate_vertex, relax_vertex
-from geodesic_core.kernels.sweep.state import FACE, NODE, SEGMENT, SEGMENT_END, SEGMENT_ENDS
-from geodesic_core.kernels.sweep.window import Window, emitted_window
-from geodesic_core.kernels.sweep.window_lists import send_out
-from geodesic_core.tolerances import SLANT
 
 
 @kernel
-def is_segment(ints: Any, node: int) -> bool:
+def is_segment(ints: Ints, node: int) -> bool:
     """Whether a node is a segment; ``ints`` are rows as of `Sites.segment_ints`."""
     return len(ints) > 0 and ints[0, NODE] <= node <= ints[-1, NODE]
 
@@ -48,23 +41,7 @@ class PlacedSegment(NamedTuple):
 
 
 @kernel
-def emit_segment(wave: Any, k: int) -> None:
-    """Send the parallel windows of the segment of row k over the edges of its face.
-
-    Reach the corners of the face. Modifies lists and vertices.
-    """
-    node = wave.sites.segment_ints[SEGMENT * k + NODE]
-    face = wave.sites.segment_ints[SEGMENT * k + FACE]
-    ends = wave.sites.segment_ends
-    for h in range(3 * face, 3 * face + 3):
-        segment = place_segment(wave.mesh.geometry, ends, k, h)
-        if segment.dx > SLANT and is_off_edge(ends, k, h):
-            emit_parallel_window(wave, node, h, segment)
-        reach_corner(wave, node, h, segment)
-
-
-@kernel
-def place_segment(geometry: Any, ends: Any, k: int, h: int) -> PlacedSegment:
+def place_segment(geometry: Floats, ends: Floats, k: int, h: int) -> PlacedSegment:
     """Return the segment of row k in the frame of h, of the same face."""
     px, py = weights_in_frame(geometry, ends, SEGMENT_ENDS * k, h)
     qx, qy = weights_in_frame(geometry, ends, SEGMENT_ENDS * k + SEGMENT_END, h)
@@ -76,24 +53,15 @@ def place_segment(geometry: Any, ends: Any, k: int, h: int) -> PlacedSegment:
 
 
 @kernel
-def is_off_edge(ends: Any, k: int, h: int) -> bool:
+def is_off_edge(ends: Floats, k: int, h: int) -> bool:
     """Whether the segment leaves the edge of h; by weights, as faces may have no area."""
     up = SEGMENT_ENDS * k + (h + 2) % 3
     return bool(max(ends[up], ends[up + SEGMENT_END]) > 0.0)
 
 
 @kernel
-def emit_parallel_window(wave: Any, node: int, h: int, segment: PlacedSegment) -> None:
-    """Send the parallel window that leaves a segment over the edge of h, for dx > 0."""
-    length = wave.mesh.geometry[ROW * h + LENGTH]
-    window = parallel_window(wave, wave.vertices.distance[node], node, length, segment)
-    if wave.mesh.links[ROW * h + OPPOSITE] != NO_FACE and window.b1 > window.b0:
-        send_out(wave, h, window)
-
-
-@kernel
 def parallel_window(
-    wave: Any, start: float, node: int, length: float, segment: PlacedSegment
+    wave: View, start: float, node: int, length: float, segment: PlacedSegment
 ) -> Window:
     """Return the parallel window of a segment at distance ``start``, as the face across sees it.
 
@@ -107,23 +75,8 @@ def parallel_window(
 
 
 @kernel
-def reach_corner(wave: Any, node: int, h: int, segment: PlacedSegment) -> None:
-    """Offer the apex of h the perpendicular to a segment, if its foot is on it."""
-    is_foot, reach, sx, sy = perpendicular_to(wave.mesh.geometry, h, segment)
-    if not is_foot:
-        return
-    distance = wave.vertices.distance[node] + reach
-    apex = wave.mesh.links[ROW * h + APEX]
-    if merging(wave):
-        bound_vertex(wave, apex, distance)
-        if wave.mesh.flags[apex]:
-            illuminate_vertex(wave, apex, distance, h, sx, sy, 0.0)
-    relax_vertex(wave, apex, distance, h, sx, sy, node, -1 - node)
-
-
-@kernel
 def perpendicular_to(
-    geometry: Any, h: int, segment: PlacedSegment
+    geometry: Floats, h: int, segment: PlacedSegment
 ) -> tuple[bool, float, float, float]:
     """Return whether a segment has a foot for the apex of h, how far it is, and the way to it.
 
@@ -139,7 +92,9 @@ def perpendicular_to(
 
 
 @kernel
-def distance_to_segment(geometry: Any, ends: Any, k: int, h: int, x: float, y: float) -> float:
+def distance_to_segment(
+    geometry: Floats, ends: Floats, k: int, h: int, x: float, y: float
+) -> float:
     """Distance of the segment of row k from (x, y) in the frame of h, of the same face."""
     px, py = weights_in_frame(geometry, ends, SEGMENT_ENDS * k, h)
     qx, qy = weights_in_frame(geometry, ends, SEGMENT_ENDS * k + SEGMENT_END, h)

@@ -2,22 +2,25 @@
 
 Each group is a named tuple of arrays. `Wavefront` holds those that change in a sweep. A kernel that
 is called from Python takes the mesh, the wavefront and the bounds and makes them a `View`: the same
-groups, with pointers in place of arrays. So each field is defined once, in its group.
+groups, with pointers in place of arrays. So each field is defined once, in its group, for all kinds
+of sweep. What a kind has no use for is `ABSENT`: kernels compiled for it do not carry it.
 
-Lists of windows: every half-edge has a singly linked list of the windows that wait to cross its
-face, ordered along the edge. Rows come from a pool with a last-in-first-out free list, so that
-the rows in use stay within a cache's reach.
+Windows wait in one of two ways. In most sweeps every half-edge has a singly linked list of those
+that are to cross its face, ordered along the edge. A fast sweep has `Places` instead.
 """
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from geodesic_core.arrays import Counts, Flags, Floats, Ints, Longs, aligned_rows
-from geodesic_core.kernels.jit import inlined, kernel, pointers
+from geodesic_core.arrays import ABSENT, Counts, Flags, Floats, Ints, Longs, aligned_rows
+from geodesic_core.kernels.front.bounds import Bounds
+from geodesic_core.kernels.front.counters import new_counters
+from geodesic_core.kernels.jit import inlined, kernel, pointers, rows_of
 from geodesic_core.kernels.mesh.half_edges import PINCHED, SEAM, Topology
-from geodesic_core.kernels.sweep.bounds import Bounds
-from geodesic_core.kernels.sweep.window import WIDTH
+
+WIDTH = 8  # columns of a row of windows, float64: a cache line
 
 # Columns of Pool.lists, a row per half-edge
 SIZE = 0  # number of windows
@@ -60,7 +63,7 @@ SENT_TO = 3
 SENT_AT = 4  # and the vertex's distance then; infinite before
 LIGHT = 5
 
-# Columns of Pool.merges (float64) and merge_ints (int32), a row per merge
+# Columns of Merges.floats and Merges.ints, a row per merge
 SPLIT = 0  # position on the half-edge: left of it the first window counts, right of it the second
 LEFT = 1  # SX, SY, SIGMA of the first window
 RIGHT = 4  # of the second
@@ -69,20 +72,6 @@ MERGED_ON = 0  # half-edge
 LEFT_REFERENCE = 1  # reference of the first window before; see `window`
 RIGHT_REFERENCE = 2
 MERGE_INTS = 3
-
-# Counters (after the queues' three)
-FREE_FIRST = 3  # free list
-FREE_SIZE = 4
-FRESH = 5  # rows of the pool from here on were never used
-SETTLED_VERTICES = 6
-CREATED = 7  # windows, in all
-PROPAGATED = 8  # windows that survived trimming
-PEAK = 9  # windows alive at once, at most
-WORK = 10  # done in this slice, about 10 ns each
-MERGES = 11  # recorded for backtracing
-TOUCHED = 12  # vertices
-RETAINED_ROWS = 13  # of Pool.retained
-COUNTERS = 16
 
 
 class Sites(NamedTuple):
@@ -114,7 +103,7 @@ NO_SITES = Sites(
 
 
 class Queues(NamedTuple):
-    """The heap of vertices and the ring of half-edges; see `queues`."""
+    """The heap of vertices and the ring of half-edges, see `queues`; ABSENT from a fast sweep."""
 
     heap: Ints
     """(V,): vertices, the first HEAP_SIZE of them in use"""
@@ -127,10 +116,11 @@ class Queues(NamedTuple):
 
 
 class Pool(NamedTuple):
-    """All windows: in lists, being propagated, retained, and the record of their merges."""
+    """All windows: those that wait, in rows with a free list; those in scratch; those retained."""
 
     windows: Floats
-    """(P, 8): the rows of the lists, see `window`"""
+    """(P, 8): those that wait, see `window`"""
+    # The following are ABSENT from a fast sweep.
     lists: Ints
     """(3F, 4): SIZE, FIRST, LAST, MARKS"""
     scratch: Floats
@@ -143,10 +133,35 @@ class Pool(NamedTuple):
     half-edge; -1 at the end; empty where there are none"""
     runs: Counts
     """(3F,): how often the half-edge's list was propagated"""
-    merges: Floats
-    """(M, 7): SPLIT, LEFT, RIGHT; empty unless the sweep merges and paths are wanted"""
-    merge_ints: Ints
+
+
+class Merges(NamedTuple):
+    """The record of merges; empty unless the sweep merges and paths are wanted."""
+
+    floats: Floats
+    """(M, 7): SPLIT, LEFT, RIGHT"""
+    ints: Ints
     """(M, 3): MERGED_ON, LEFT_REFERENCE, RIGHT_REFERENCE"""
+
+
+class Places(NamedTuple):
+    """Where the windows of a fast sweep are compared, and where they wait; ABSENT from others.
+
+    Each half-edge has K places, points at equal distances.
+    """
+
+    values: Floats
+    """(3F, K): least distance offered at each place of a half-edge"""
+    at_large: Flags
+    """(3F,): windows that went on without a place"""
+    buckets: Ints
+    """(BUCKETS, 2): see `buckets`"""
+    first_site: Ints
+    """(F,): row of the first site to reach in a face, -1 for none; or empty"""
+    per_edge: int
+    """K: 1 to 8"""
+    buckets_per_unit: float
+    """1 / width of a bucket, mesh units"""
 
 
 class Vertices(NamedTuple):
@@ -160,6 +175,12 @@ class Vertices(NamedTuple):
     """(N, 2): ENTRY_EDGE, PREDECESSOR"""
     source_index: Ints
     """(N,): index of the source that the node had its distance from when it was last improved"""
+    crossing: Floats
+    """(N,): where the path to the node crosses its ENTRY_EDGE, mesh units from the tail; NaN where
+    it begins in the same face and crosses none; empty but in fast sweeps, for lines are straight"""
+    reference: Ints
+    """(N,): REFERENCE of the winning window; empty unless the sweep merges"""
+    # The following are ABSENT from a fast sweep.
     status: Flags
     """(V,): FAR, FRONT or SETTLED"""
     touched: Ints
@@ -171,8 +192,6 @@ class Vertices(NamedTuple):
     """(V,): upper bound of the exact distance"""
     light: Floats
     """(V, 5): LIT_FROM, LIT_TO, SENT_FROM, SENT_TO, SENT_AT"""
-    reference: Ints
-    """(N,): REFERENCE of the winning window"""
 
 
 class Wavefront(NamedTuple):
@@ -180,14 +199,26 @@ class Wavefront(NamedTuple):
 
     queues: Queues
     pool: Pool
+    places: Places
     vertices: Vertices
+    merges: Merges
     sites: Sites
     counters: Longs
-    """(COUNTERS,): HEAP_SIZE … RETAINED_ROWS"""
+    """(COUNTERS,): see `counters`"""
+
+
+def _new_merges(count: int) -> Merges:
+    return Merges(np.empty((count, MERGE)), np.empty((count, MERGE_INTS), np.int32))
+
+
+NO_MERGES = _new_merges(0)
+NO_POOL = Pool(*[ABSENT] * len(Pool._fields))
+NO_QUEUES = Queues(*[ABSENT] * len(Queues._fields))
+NO_PLACES = Places(*[ABSENT] * len(Places._fields))
 
 
 class Sizes(NamedTuple):
-    """Rows of arrays, which a pointer does not tell."""
+    """Rows of arrays, which a pointer does not tell; ABSENT where the array is."""
 
     vertices: int
     ring: int
@@ -200,6 +231,7 @@ class Sizes(NamedTuple):
     known: int
     sites: int
     segments: int
+    first_site: int
 
 
 class View(NamedTuple):
@@ -208,53 +240,73 @@ class View(NamedTuple):
     mesh: Topology
     queues: Queues
     pool: Pool
+    places: Places
     vertices: Vertices
+    merges: Merges
     sites: Sites
-    counters: Any
+    counters: Longs
     bounds: Bounds
     sizes: Sizes
 
 
 @inlined
-def sizes_of(topology: Any, wavefront: Any, bounds: Any) -> Any:
+def sizes_of(topology: Topology, wavefront: Wavefront, bounds: Bounds) -> Sizes:
     """Return the Sizes of two groups of arrays."""
     pool, sites = wavefront.pool, wavefront.sites
     return Sizes(
-        vertices=topology.total_angle.shape[0],
-        ring=wavefront.queues.ring.shape[0],
-        windows=pool.windows.shape[0],
-        scratch=pool.scratch.shape[0],
-        retained=pool.retained.shape[0],
-        crossings=pool.crossings.shape[0],
-        merges=pool.merges.shape[0],
-        heuristic=wavefront.vertices.heuristic.shape[0],
-        known=bounds.pruning.known.shape[0],
-        sites=sites.ints.shape[0],
-        segments=sites.segment_ints.shape[0],
+        vertices=rows_of(topology.total_angle),
+        ring=rows_of(wavefront.queues.ring),
+        windows=rows_of(pool.windows),
+        scratch=rows_of(pool.scratch),
+        retained=rows_of(pool.retained),
+        crossings=rows_of(pool.crossings),
+        merges=rows_of(wavefront.merges.floats),
+        heuristic=rows_of(wavefront.vertices.heuristic),
+        known=rows_of(bounds.pruning.known),
+        sites=rows_of(sites.ints),
+        segments=rows_of(sites.segment_ints),
+        first_site=rows_of(wavefront.places.first_site),
     )
 
 
 @kernel
-def view_of(topology: Any, wavefront: Any, bounds: Any) -> Any:
+def view_of(topology: Topology, wavefront: Wavefront, bounds: Bounds) -> View:
     """Return the View of groups of arrays, which the caller must hold meanwhile."""
-    return pointers(
+    view: View = pointers(
         View(
             topology,
             wavefront.queues,
             wavefront.pool,
+            wavefront.places,
             wavefront.vertices,
+            wavefront.merges,
             wavefront.sites,
             wavefront.counters,
             bounds,
             sizes_of(topology, wavefront, bounds),
         )
     )
+    return view
 
 
 @inlined
-def is_pruned(wave: Any) -> bool:
+def merging(wave: View) -> bool:
+    """Whether the sweep merges windows; known when it is compiled."""
+    return len(wave.bounds.merging) > 0
+
+
+@inlined
+def source_weight(wave: View, root: int) -> float:
+    """SW of a window with this root: 0 for a parallel one, which comes from a segment, else 1."""
+    if len(wave.bounds.parallel) > 0 and root >= wave.bounds.first_segment:
+        return 0.0
+    return 1.0
+
+
+@inlined
+def is_pruned(wave: View) -> bool:
     """Whether the sweep looks for paths of limited length only (section 5)."""
-    return bool(wave.sizes.heuristic > 0)
+    return wave.sizes.heuristic > 0
 
 
 def new_wavefront(
@@ -274,8 +326,6 @@ def new_wavefront(
     vertices, half_edges = len(topology.total_angle), len(topology.links)
     nodes = vertices + sites.nodes
     merged_vertices, merged_nodes = (vertices, nodes) if merges else (0, 0)
-    counters = np.zeros(COUNTERS, np.int64)
-    counters[FREE_FIRST] = -1
     return Wavefront(
         queues=Queues(
             heap=np.empty(vertices, np.int32),
@@ -283,25 +333,50 @@ def new_wavefront(
             heap_place=np.full(vertices, -1, np.int32),
             ring=np.empty(half_edges, np.int32),
         ),
-        pool=_new_pool(topology, sites, paths, windows),
-        vertices=Vertices(
-            distance=np.full(nodes, np.inf),
-            winner=np.empty((nodes, 2)),
-            winner_ints=np.full((nodes, WINNER), -1, np.int32),
-            source_index=np.zeros(nodes, np.int32),
+        pool=_new_pool(topology, sites, windows),
+        places=NO_PLACES,
+        vertices=new_vertices(nodes)._replace(
+            reference=np.full(merged_nodes, -1, np.int32),
             status=np.zeros(vertices, np.uint8),
             touched=np.empty(vertices, np.int32),
             heuristic=np.empty(vertices if pruned else 0),
             upper=np.full(merged_vertices, np.inf),
             light=np.tile([1.0, -1.0, 1.0, -1.0, np.inf], (merged_vertices, 1)),
-            reference=np.full(merged_nodes, -1, np.int32),
         ),
+        merges=_new_merges(1024) if paths else NO_MERGES,
         sites=sites._replace(ints=sites.ints.copy()),
-        counters=counters,
+        counters=new_counters(),
     )
 
 
-def _new_pool(topology: Topology, sites: Sites, paths: bool, windows: Flags | None) -> Pool:
+def new_vertices(nodes: int) -> Vertices:
+    """Allocate what any sweep tells of its nodes, nothing reached yet; the rest is absent."""
+    return Vertices(
+        distance=np.full(nodes, np.inf),
+        winner=np.zeros((nodes, 2)),
+        winner_ints=np.full((nodes, WINNER), -1, np.int32),
+        source_index=np.zeros(nodes, np.int32),
+        crossing=np.empty(0),
+        reference=np.empty(0, np.int32),
+        status=ABSENT,
+        touched=ABSENT,
+        heuristic=ABSENT,
+        upper=ABSENT,
+        light=ABSENT,
+    )
+
+
+FOUND = ("distance", "winner", "winner_ints", "crossing", "reference")
+"""What a sweep has found at its nodes, of all that `Vertices` hold."""
+
+
+def found(arrays: Mapping[str, Any]) -> Vertices:
+    """Return what a sweep has found, by name, without what only a running one needs."""
+    rest = dict.fromkeys(Vertices._fields, ABSENT)
+    return Vertices(**rest | {name: arrays[name] for name in FOUND})
+
+
+def _new_pool(topology: Topology, sites: Sites, windows: Flags | None) -> Pool:
     half_edges = len(topology.links)
     irregular = bool((topology.flags & (SEAM | PINCHED)).any())
     lists = np.zeros((half_edges, LIST), np.int32)
@@ -314,8 +389,6 @@ def _new_pool(topology: Topology, sites: Sites, paths: bool, windows: Flags | No
         retained=aligned_rows(0 if windows is None else 4096, WIDTH, np.float64),
         crossings=np.full(half_edges if irregular else 0, -1, np.int32),
         runs=np.zeros(half_edges, np.uint16),
-        merges=np.empty((1024 if paths else 0, MERGE)),
-        merge_ints=np.empty((1024 if paths else 0, MERGE_INTS), np.int32),
     )
 
 
@@ -326,37 +399,37 @@ def with_sites(wave: Wavefront, sites: Sites) -> Wavefront:
 
 def with_larger_pool(wave: Wavefront) -> Wavefront:
     """Return the wavefront with twice the windows."""
-    windows = wave.pool.windows
-    larger = aligned_rows(2 * len(windows), WIDTH, np.float64)
-    larger[: len(windows)] = windows
-    return wave._replace(pool=wave.pool._replace(windows=larger))
+    return wave._replace(pool=wave.pool._replace(windows=_doubled(wave.pool.windows)))
 
 
 def with_larger_scratch(wave: Wavefront) -> Wavefront:
     """Return the wavefront with room for lists twice as long."""
-    larger = aligned_rows(2 * len(wave.pool.scratch), WIDTH, np.float64)
-    return wave._replace(pool=wave.pool._replace(scratch=larger))
+    return wave._replace(pool=wave.pool._replace(scratch=_doubled(wave.pool.scratch)))
 
 
 def with_more_retained(wave: Wavefront) -> Wavefront:
     """Return the wavefront with room to retain twice the windows."""
-    retained = wave.pool.retained
-    larger = aligned_rows(2 * len(retained), WIDTH, np.float64)
-    larger[: len(retained)] = retained
-    return wave._replace(pool=wave.pool._replace(retained=larger))
+    return wave._replace(pool=wave.pool._replace(retained=_doubled(wave.pool.retained)))
 
 
 def with_more_merges(wave: Wavefront) -> Wavefront:
     """Return the wavefront with room for twice the merges."""
-    count = len(wave.pool.merges)
-    merges, merge_ints = np.empty((2 * count, MERGE)), np.empty((2 * count, MERGE_INTS), np.int32)
-    merges[:count], merge_ints[:count] = wave.pool.merges, wave.pool.merge_ints
-    return wave._replace(pool=wave.pool._replace(merges=merges, merge_ints=merge_ints))
+    count = len(wave.merges.floats)
+    larger = _new_merges(2 * count)
+    larger.floats[:count], larger.ints[:count] = wave.merges
+    return wave._replace(merges=larger)
+
+
+def _doubled(windows: Floats) -> Floats:
+    """Return rows of windows with room for as many more."""
+    larger = aligned_rows(2 * len(windows), WIDTH, np.float64)
+    larger[: len(windows)] = windows
+    return larger
 
 
 def bytes_of(wave: Wavefront) -> int:
-    """Memory of the state. A small search asks twice: to look for arrays took 3 % of its time."""
-    sites = wave.sites
-    own = wave.counters, sites.ints, sites.weights, sites.segment_ints, sites.segment_ends
-    groups = wave.queues, wave.pool, wave.vertices, own
-    return sum([array.nbytes for group in groups for array in group])
+    """Memory of the state."""
+    *groups, counters = wave
+    return counters.nbytes + sum(
+        part.nbytes for group in groups for part in group if isinstance(part, np.ndarray)
+    )

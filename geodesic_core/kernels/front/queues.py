@@ -5,13 +5,10 @@ vertex v, or -1; keys lie beside the vertices, where a comparison finds them in 
 the lower vertex, so that the order never depends on history.
 """
 
-from typing import Any
-
+from geodesic_core.arrays import Longs
+from geodesic_core.kernels.front.counters import HEAP_SIZE, RING_HEAD, RING_SIZE
+from geodesic_core.kernels.front.state import Queues, View
 from geodesic_core.kernels.jit import kernel
-
-HEAP_SIZE = 0  # counters, shared with the sweep
-RING_HEAD = 1
-RING_SIZE = 2
 
 _ARITY = 4
 
@@ -23,7 +20,7 @@ def precedes(key: float, v: int, other_key: float, u: int) -> bool:
 
 
 @kernel
-def push_or_raise(queues: Any, counters: Any, v: int, key: float) -> None:
+def push_or_raise(queues: Queues, counters: Longs, v: int, key: float) -> None:
     """Put v into the heap, or move it up after its key has decreased. Modifies the heap.
 
     It takes no more of the view than it needs: a search along edges took twice as long when all of
@@ -46,7 +43,7 @@ def push_or_raise(queues: Any, counters: Any, v: int, key: float) -> None:
 
 
 @kernel
-def pop_nearest(queues: Any, counters: Any) -> int:
+def pop_nearest(queues: Queues, counters: Longs) -> int:
     """Remove and return the nearest vertex; the heap must not be empty. Modifies the heap."""
     nearest = queues.heap[0]
     queues.heap_place[nearest] = -1
@@ -80,7 +77,7 @@ def pop_nearest(queues: Any, counters: Any) -> int:
 
 
 @kernel
-def ring_push(wave: Any, h: int) -> None:
+def ring_push(wave: View, h: int) -> None:
     """Append half-edge h; the ring has room for every half-edge once. Modifies the ring."""
     i = wave.counters[RING_HEAD] + wave.counters[RING_SIZE]
     if i >= wave.sizes.ring:
@@ -90,7 +87,7 @@ def ring_push(wave: Any, h: int) -> None:
 
 
 @kernel
-def ring_pop(wave: Any) -> int:
+def ring_pop(wave: View) -> int:
     """Remove and return the oldest half-edge; the ring must not be empty. Modifies the ring."""
     head = wave.counters[RING_HEAD]
     h = wave.queues.ring[head]

@@ -1,0 +1,1 @@
+"""What all sweeps share: windows and their pool, vertices, sites, segments, queues and bounds."""
