@@ -12,11 +12,11 @@ import geodesic_core as gc
 from benchmarks.inputs import Inputs
 from benchmarks.tables import Section, rated
 from geodesic_core.control import Control
+from geodesic_core.fields.methods import Method, sweep_of
 from geodesic_core.search.plan import Plan
-from geodesic_core.search.rows import Method, Rows, rows_of
+from geodesic_core.search.rows import Rows, rows_of
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import available_cores, share_out
-from geodesic_core.solvers import row_solver
 
 VERTICES = 32_492
 """As many as surfaces of a brain hemisphere often have"""
@@ -51,8 +51,8 @@ def run(_inputs: Inputs, _runs: int) -> Section:
 
     rows = []
     for name in get_args(Method):
-        solve = row_solver(mesh, name, relative_error=1e-3, absolute_error=None, effort=2)
-        make = partial(rows_of, plan.ends, math.inf, solve, partial(TargetSweep, mesh))
+        sweep = sweep_of(mesh, name, relative_error=1e-3)
+        make = partial(rows_of, mesh, plan.ends, math.inf, sweep, partial(TargetSweep, mesh))
         one_s, all_s = (_seconds(plan, sweeps, make, n) for n in (1, cores))
         whole = plan.sweeps / len(sweeps) * one_s
         limit = AT_MOST_S if name == "exact" else None

@@ -21,8 +21,8 @@ from geodesic_core.fields.borders import Border
 from geodesic_core.fields.distance_field import DistanceField
 from geodesic_core.fields.isolines import Isoline, resolve_chord_error, spaced_levels
 from geodesic_core.fields.path import ErrorBound, GeodesicPath, SearchStep
-from geodesic_core.fields.repeatable_sweep import SweepStats
 from geodesic_core.fields.stored_field import load_field
+from geodesic_core.fields.sweep_result import Retain, SweepStats
 from geodesic_core.io.as_mesh import as_mesh
 from geodesic_core.io.label import load_label, load_label_vertices
 from geodesic_core.io.load import load_mesh
@@ -33,7 +33,6 @@ from geodesic_core.mesh.surface_point import Curve, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.nearest import Nearest
 from geodesic_core.solvers import (
-    Retain,
     Solver,
     approximate_distance,
     distance_matrix,

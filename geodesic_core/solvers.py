@@ -5,52 +5,37 @@ Each is a function of a mesh or of a `Solver`, and the method of the same name.
 
 from __future__ import annotations  # help() shows the names of types, not what they stand for
 
-import math
-import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
-from geodesic_core.errors import InvalidArgument, NoPath
-from geodesic_core.fields.distance_field import DistanceField, field_of
-from geodesic_core.fields.fast_sweep import FastSweep, estimated_error
-from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, joined, length_of
-from geodesic_core.fields.repeatable_sweep import RepeatableSweep, stats_of
-from geodesic_core.fields.sources import (
-    as_sources,
-    component_of,
-    disconnected,
-    each_of,
-)
+from geodesic_core.errors import NoPath
+from geodesic_core.fields.distance_field import DistanceField, solve
+from geodesic_core.fields.methods import Effort, Method, promise_of, sweep_of
+from geodesic_core.fields.path import ErrorBound, GeodesicPath, joined, length_of
+from geodesic_core.fields.question import Question
+from geodesic_core.fields.sources import component_of, disconnected, each_of
+from geodesic_core.fields.sweep_result import Retain
+from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
-from geodesic_core.kernels.front.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.mesh.barriers import with_barriers
-from geodesic_core.mesh.curve import Polyline
-from geodesic_core.mesh.surface_point import Point, Points, Source, Sources, SurfacePoint
+from geodesic_core.mesh.surface_point import Point, Points, Sources, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.matrix import Layout, find_matrix
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
-from geodesic_core.search.rows import Method, Solve
 from geodesic_core.search.workspace import Workspace
-from geodesic_core.tolerances import AT_LIMIT, WIDEST_ERROR
-from geodesic_core.validation import as_limit, check_choice, is_index, is_number
+from geodesic_core.tolerances import AT_LIMIT
+from geodesic_core.validation import as_limit, check_choice
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-Retain = Literal["distances", "paths", "windows"]
-"""Contents of a field in memory: each word includes the ones before it."""
-
-Effort = Literal[1, 2, 4, 8]
-"""Places of a half-edge at which a fast sweep compares windows"""
 
 
 def exact_distance(
@@ -126,9 +111,8 @@ def exact_distance(
     [0, 0, 0, 1]
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    bounds = exact_bounds(as_limit(max_distance))
-    surface, control = _surface_of(mesh, barriers, control)
-    return _solve(surface, sources, targets, bounds, EXACT, retain, control)
+    question, control = _ask(mesh, sources, targets, max_distance, barriers, control)
+    return solve(ExactSweep(question), retain, control)
 
 
 def approximate_distance(
@@ -194,10 +178,9 @@ def approximate_distance(
     True
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    errors = _as_errors(relative_error, absolute_error)
-    limit = as_limit(max_distance)
-    surface, control = _surface_of(mesh, barriers, control)
-    return _solve_within(surface, sources, targets, limit, retain, control, errors=errors)
+    question, control = _ask(mesh, sources, targets, max_distance, barriers, control)
+    sweep = sweep_of(question.mesh, "approximate", relative_error, absolute_error)
+    return solve(sweep(question), retain, control)
 
 
 def fast_distance(
@@ -260,11 +243,10 @@ def fast_distance(
     True
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
-    places = _as_effort(effort)
     check_choice("retain", retain, ("distances", "paths"))
-    limit = as_limit(max_distance)
-    surface, control = _surface_of(mesh, barriers, control)
-    return _solve_fast(surface, sources, targets, limit, retain, control, effort=places)
+    question, control = _ask(mesh, sources, targets, max_distance, barriers, control)
+    sweep = sweep_of(question.mesh, "fast", effort=effort)
+    return solve(sweep(question), retain, control)
 
 
 def error_bound(
@@ -308,12 +290,7 @@ def error_bound(
     >>> gc.error_bound(mesh, "fast", effort=8)
     ErrorBound(type='relative', value=0.002, kind='estimated')
     """
-    check_choice("method", method, get_args(Method))
-    if method == "exact":
-        return EXACT
-    if method == "fast":
-        return estimated_error(_as_effort(effort))
-    return _bound_within(as_mesh(mesh), *_as_errors(relative_error, absolute_error))
+    return promise_of(as_mesh(mesh), method, relative_error, absolute_error, effort)
 
 
 def shortest_path(
@@ -479,10 +456,10 @@ def distance_matrix(
     """
     control = Control(progress, cancel, deadline_s, memory_limit)
     workspace, control = _workspace_of(mesh, barriers, control)
-    solve = row_solver(workspace.mesh, method, relative_error, absolute_error, effort)
+    sweep = sweep_of(workspace.mesh, method, relative_error, absolute_error, effort)
     with workspace.held(control):
         return find_matrix(
-            workspace, solve, sources, targets, max_distance, layout, threads, control
+            workspace, sweep, sources, targets, max_distance, layout, threads, control
         )
 
 
@@ -666,122 +643,18 @@ def _shortest_through(
     return legs[0] if len(legs) == 1 else joined(legs)
 
 
-def row_solver(
-    mesh: TriangleMesh,
-    method: Method,
-    relative_error: float | None,
-    absolute_error: float | None,
-    effort: Effort,
-) -> Solve | None:
-    """Return the function that solves a row of a matrix; None where rows are exact.
-
-    Raises
-    ------
-    InvalidArgument
-        An argument that the method takes is out of its domain.
-    """
-    check_choice("method", method, get_args(Method))
-    solve: Callable[..., DistanceField]
-    if method == "fast":
-        solve = partial(_solve_fast, mesh, effort=_as_effort(effort))
-    elif method == "approximate":
-        errors = _as_errors(relative_error, absolute_error)
-        if mesh.is_rough:
-            return None
-        solve = partial(_solve_within, mesh, errors=errors)
-    else:
-        return None
-    return lambda source, targets, limit, control: solve(
-        source, targets, limit, "distances", control
-    )
-
-
-def _solve_within(
-    mesh: TriangleMesh,
+def _ask(
+    mesh: MeshLike | Solver,
     sources: Sources,
     targets: Points,
-    limit: float,
-    retain: Retain,
+    max_distance: float | None,
+    barriers: Iterable[int],
     control: Control,
-    *,
-    errors: tuple[float, float],
-) -> DistanceField:
-    """Return the field within a relative and an absolute error."""
-    relative, absolute = errors
-    bounds = (
-        exact_bounds(limit)
-        if mesh.is_rough
-        else merging_bounds(limit, min(relative, WIDEST_ERROR), absolute)
-    )
-    promise = _bound_within(mesh, relative, absolute)
-    return _solve(mesh, sources, targets, bounds, promise, retain, control)
-
-
-def _bound_within(mesh: TriangleMesh, relative: float, absolute: float) -> ErrorBound:
-    """Return what a sweep within both errors promises."""
-    if mesh.is_rough:
-        return EXACT
-    if math.isfinite(relative):
-        return ErrorBound("relative", min(relative, WIDEST_ERROR), "guaranteed")
-    return ErrorBound("absolute", absolute, "guaranteed")
-
-
-def _solve_fast(
-    mesh: TriangleMesh,
-    sources: Sources,
-    targets: Points,
-    limit: float,
-    retain: Retain,
-    control: Control,
-    *,
-    effort: int,
-) -> DistanceField:
-    """Return the field of a fast sweep."""
-    bounds = exact_bounds(limit)
-    starts, polylines, ends, exact = _as_question(mesh, sources, targets, bounds, control)
-    sweep = FastSweep(exact, effort)
-    front = sweep.run(control)
-    result = exact.result_of(front, paths=retain == "paths", windows=False)
-    stats = stats_of(mesh, front, time.perf_counter() - control.began)
-    promise = estimated_error(effort)
-    return field_of(starts, polylines, ends, exact, sweep, promise, result, stats)
-
-
-def _solve(
-    mesh: TriangleMesh,
-    sources: Sources,
-    targets: Points,
-    bounds: Bounds,
-    promise: ErrorBound,
-    retain: Retain,
-    control: Control,
-) -> DistanceField:
-    """Check the arguments, sweep, and return the field with what it is to retain."""
-    check_choice("retain", retain, get_args(Retain))
-    paths, windows = retain != "distances", retain == "windows"
-    starts, polylines, ends, sweep = _as_question(mesh, sources, targets, bounds, control)
-    wave = sweep.run(control, paths=paths, windows=sweep.all_faces if windows else None)
-    result = sweep.result_of(wave, paths=paths, windows=windows)
-    stats = stats_of(mesh, wave, time.perf_counter() - control.began)
-    return field_of(starts, polylines, ends, sweep, None, promise, result, stats)
-
-
-def _as_question(
-    mesh: TriangleMesh,
-    sources: Sources,
-    targets: Points,
-    bounds: Bounds,
-    control: Control,
-) -> tuple[tuple[Source, ...], tuple[Polyline, ...], tuple[SurfacePoint, ...], RepeatableSweep]:
-    """Check sources and targets; return them, canonical points included, and their sweep."""
-    starts, polylines = as_sources(mesh, sources, control)
-    ends = tuple(
-        mesh.point(point, f"target {i}")
-        for i, point in enumerate(control.watched(each_of(targets, "target")))
-    )
-    distances = np.array([start.start_distance for start in starts])
-    sweep = RepeatableSweep.between(mesh, polylines, distances, ends, bounds, control)
-    return starts, polylines, ends, sweep
+) -> tuple[Question, Control]:
+    """Return the question of a call, and a control that counts the memory of its barriers."""
+    limit = as_limit(max_distance)
+    surface, control = _surface_of(mesh, barriers, control)
+    return Question.of(surface, sources, targets, limit, control), control
 
 
 def _as_stops(
@@ -803,26 +676,3 @@ def _as_stops(
             message = f"{here} and {there} are in different connected components"
             raise disconnected(mesh, message, here, there)
     return stops
-
-
-def _as_errors(relative: float | None, absolute: float | None) -> tuple[float, float]:
-    if relative is None and absolute is None:
-        raise InvalidArgument("relative_error and absolute_error are both None; give at least one")
-    if relative is not None and not (is_number(relative) and 0.0 < relative < 1.0):
-        raise InvalidArgument(
-            f"relative_error is {relative!r}; it must be a number above 0 and below 1"
-        )
-    if absolute is not None and not (
-        is_number(absolute) and absolute > 0.0 and math.isfinite(absolute)
-    ):
-        raise InvalidArgument(f"absolute_error is {absolute!r}; it must be a finite number above 0")
-    return (
-        math.inf if relative is None else float(relative),
-        math.inf if absolute is None else float(absolute),
-    )
-
-
-def _as_effort(effort: Effort) -> int:
-    if not is_index(effort) or effort not in get_args(Effort):
-        raise InvalidArgument(f"effort is {effort!r}; it must be 1, 2, 4 or 8")
-    return int(effort)

@@ -18,8 +18,9 @@ from geodesic_core.fields.isolines import (
     starts_of,
 )
 from geodesic_core.fields.path import length_of
-from geodesic_core.fields.repeatable_sweep import RepeatableSweep, all_winners
 from geodesic_core.fields.sources import Nodes
+from geodesic_core.fields.sweep_result import all_winners
+from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.kernels.borders import lines, outlines, territories
 from geodesic_core.kernels.borders.outlines import Pieces
 from geodesic_core.kernels.borders.territories import Territories
@@ -28,6 +29,7 @@ from geodesic_core.kernels.isolines.face_windows import FaceWindows, face_window
 from geodesic_core.kernels.isolines.lines import Field
 from geodesic_core.kernels.isolines.thinning import thin_lines
 from geodesic_core.kernels.mesh.half_edges import TAIL
+from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import LEVEL, PIECE
 
@@ -74,7 +76,7 @@ class Border:
 
 
 def swept_borders(
-    sweep: RepeatableSweep, nearest: Ints, chord_error: float, control: Control
+    sweep: ExactSweep, nearest: Ints, chord_error: float, control: Control
 ) -> list[Border]:
     """Return the borders of an exact sweep, which is run for the windows near them.
 
@@ -85,20 +87,13 @@ def swept_borders(
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
-    mesh, faces = sweep.mesh, _faces_of_several(sweep.mesh, sweep.nodes, nearest)
+    mesh, nodes = sweep.question.mesh, sweep.question.nodes
+    faces = _faces_of_several(mesh, nodes, nearest)
     while True:
         faces = _with_rings(mesh, faces, RINGS)
-        wave = sweep.run(control.for_part(0, 2), windows=faces)
+        wave = sweep.run_for(control.for_part(0, 2), windows=faces)
         control = control.for_part(1, 2)
-        drawn = _Drawing(
-            mesh,
-            face_windows_of(wave),
-            wave.vertices.distance,
-            all_winners(wave).nearest,
-            sweep,
-            faces,
-            chord_error,
-        )
+        drawn = _Drawing(sweep, all_winners(wave), face_windows_of(wave), faces, chord_error)
         part = control.for_part(0, 2)
         borders = drawn.borders(part)
         if borders is not None:
@@ -108,16 +103,15 @@ def swept_borders(
 
 
 def borders_of(
-    sweep: RepeatableSweep,
+    sweep: ExactSweep,
+    winners: Winners,
     windows: FaceWindows,
-    distances: Floats,
-    nearest: Ints,
     chord_error: float,
     control: Control,
 ) -> list[Border]:
     """Return the borders of an exact sweep that retained all windows.
 
-    ``distances`` and ``nearest`` are by node. O(windows), and O(n³) for n windows that are nearest
+    O(windows), and O(n³) for n windows that are nearest
     somewhere in a face, in each face that borders cross.
 
     Raises
@@ -125,7 +119,7 @@ def borders_of(
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says; what the lines are drawn from counts as memory of the call.
     """
-    drawing = _Drawing(sweep.mesh, windows, distances, nearest, sweep, sweep.all_faces, chord_error)
+    drawing = _Drawing(sweep, winners, windows, sweep.all_faces, chord_error)
     found = drawing.borders(control)
     return [] if found is None else found  # all faces have their windows
 
@@ -135,21 +129,20 @@ class _Drawing:
 
     def __init__(
         self,
-        mesh: TriangleMesh,
+        sweep: ExactSweep,
+        winners: Winners,
         windows: FaceWindows,
-        distances: Floats,
-        nearest: Ints,
-        sweep: RepeatableSweep,
         faces: Flags,
         chord_error: float,
     ) -> None:
         self.faces = faces.copy()
         """Faces that borders may pass; `borders` sets those that they pass, too"""
-        self._mesh, self._nearest, self._chord_error = mesh, nearest, chord_error
-        self._field: Field = field_of_windows(windows, distances, sweep.nodes)
+        question, distances = sweep.question, winners.vertices.distance
+        self._mesh, self._nearest, self._chord_error = question.mesh, winners.nearest, chord_error
+        self._field: Field = field_of_windows(windows, distances, question.nodes)
         # At its very limit the sweep is cut off by rounding: lines stay clear of that.
-        self._limit = sweep.bounds.max_distance * (1.0 - 3.0 * LEVEL)
-        self._nbytes = bytes_of([(*windows, distances, nearest)])
+        self._limit = question.max_distance * (1.0 - 3.0 * LEVEL)
+        self._nbytes = bytes_of([(*windows, distances, winners.nearest)])
 
     def borders(self, control: Control) -> list[Border] | None:
         """Return the borders; None where they leave the faces whose windows are there."""

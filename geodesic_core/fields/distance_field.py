@@ -1,11 +1,12 @@
 """Distance fields: the results of the solvers."""
 
-import math
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -13,7 +14,7 @@ from numpy.typing import DTypeLike, NDArray
 from geodesic_core import plotting
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
-from geodesic_core.errors import InternalError, InvalidArgument, NoPath
+from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.fields.borders import Border, borders_of, swept_borders
 from geodesic_core.fields.fast_sweep import FastSweep
 from geodesic_core.fields.field_file import SHOWN, write_field_file
@@ -22,38 +23,27 @@ from geodesic_core.fields.isolines import (
     Drawing,
     Isoline,
     as_levels,
-    crossed_faces,
     resolve_chord_error,
     spaced_levels,
 )
-from geodesic_core.fields.path import EXACT, ErrorBound, GeodesicPath, rounding_of, traced_path
-from geodesic_core.fields.point_query import (
-    Arrival,
-    NearestSource,
-    arrival_at,
-    find_nearest_source,
-    with_target,
-)
-from geodesic_core.fields.repeatable_sweep import (
-    Lazy,
-    RepeatableSweep,
+from geodesic_core.fields.path import ErrorBound, GeodesicPath
+from geodesic_core.fields.point_query import PointQueries
+from geodesic_core.fields.question import Question
+from geodesic_core.fields.sources import disconnected
+from geodesic_core.fields.sweep_result import (
+    Retain,
     SweepResult,
     SweepStats,
     arrays_of,
+    stats_of,
 )
-from geodesic_core.fields.sources import Nodes, component_of, disconnected
-from geodesic_core.kernels.front.bounds import exact_bounds, merging_bounds, with_parallel_windows
+from geodesic_core.fields.sweeps import ExactSweep, MergingSweep, Sweep
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
-from geodesic_core.kernels.paths.backtracing import Winners
-from geodesic_core.mesh.curve import (
-    Polyline,
-    polylines_from_arrays,
-    polylines_to_arrays,
-)
-from geodesic_core.mesh.surface_point import Curve, Point, Source, SurfacePoint
+from geodesic_core.mesh.surface_point import Point, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.reprs import as_table
 from geodesic_core.tolerances import LEVEL
+from geodesic_core.validation import check_choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,14 +79,7 @@ class DistanceField:
     """(V,) int32 index into ``sources``; -1 where unreachable; ties to the lowest."""
     error_bound: ErrorBound
     stats: SweepStats
-    _polylines: tuple[Polyline, ...]
-    """Canonical points of each source"""
-    _targets: tuple[SurfacePoint, ...]
-    """Targets of the sweep, canonical"""
-    _sweep: RepeatableSweep
-    """The sweep; of a fast field, the exact one of the same question"""
-    _fast: FastSweep | None
-    """The sweep of a fast field"""
+    _sweep: Sweep
     _result: SweepResult
 
     @classmethod
@@ -134,28 +117,12 @@ class DistanceField:
         >>> again.path_to(3).length == field.path_to(3).length
         True
         """
-        polylines = polylines_from_arrays("source", arrays)
-        targets = tuple(point for (point,) in polylines_from_arrays("target", arrays))
-        starts = arrays["start_distances"]
-        sources = tuple(
-            Source(line[0] if len(line) == 1 else Curve(line), start)
-            for line, start in zip(polylines, starts.tolist(), strict=True)
-        )
-        limit, *errors = arrays["limits"].tolist()
-        bounds = merging_bounds(limit, *errors) if errors else exact_bounds(limit)
-        of_type, kind = arrays["promise"].tolist()
+        question = Question.from_arrays(mesh, arrays)
         created, kept, peak, peak_bytes = arrays["counts"].tolist()
-        seconds = float(arrays["seconds"])
-        sweep = RepeatableSweep.between(mesh, polylines, starts, targets, bounds, Control())
         field = field_of(
-            sources,
-            polylines,
-            targets,
-            sweep,
-            FastSweep(sweep, int(arrays["effort"])) if "effort" in arrays else None,
-            ErrorBound(of_type, float(arrays["promised"]), kind),
-            SweepResult.from_arrays(arrays, sweep.nodes.sites),
-            SweepStats.of(mesh, created, kept, peak, peak_bytes, seconds),
+            sweep_from_arrays(question, arrays),
+            SweepResult.from_arrays(arrays, question.nodes.sites),
+            SweepStats.of(mesh, created, kept, peak, peak_bytes, float(arrays["seconds"])),
         )
         if foreign := arrays.keys() - field.arrays().keys():
             raise InvalidArgument(
@@ -180,17 +147,11 @@ class DistanceField:
         >>> field.arrays()["distance"].round(3).tolist()  # in the order of the topology
         [0.0, 1.0, 1.0, 1.414]
         """
-        bounds, stats, promise = self._sweep.bounds, self.stats, self.error_bound
-        errors = [bounds.relative_error, bounds.absolute_error] if bounds.merging else []
+        stats = self.stats
         counts = stats.windows_created, stats.windows_kept, stats.windows_peak, stats.peak_bytes
         return {
-            **polylines_to_arrays("source", self._polylines),
-            **polylines_to_arrays("target", [(target,) for target in self._targets]),
-            "start_distances": self._sweep.start_distances,
-            "limits": np.array([bounds.max_distance, *errors]),
-            "promise": np.array([promise.type, promise.kind]),
-            "promised": np.array(promise.value),
-            **({} if self._fast is None else {"effort": np.array(self._fast.effort)}),
+            **self._sweep.question.arrays(),
+            **self._sweep.arrays(),
             **self._result.arrays(),
             "counts": np.array(counts, np.int64),
             "seconds": np.array(stats.seconds),
@@ -276,8 +237,8 @@ class DistanceField:
         """
         with plotting.picture(screenshot, "DistanceField.plot") as plotter:
             plotting.draw_distances(plotter, self.to_pyvista())
-            at = [self.mesh.position(point) for line in self._polylines for point in line]
-            plotting.draw_points(plotter, np.array(at))
+            points = chain.from_iterable(self._sweep.question.polylines)
+            plotting.draw_points(plotter, np.array([self.mesh.position(each) for each in points]))
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         """Return `distances`, as numpy asks for them: ``numpy.asarray(field)``."""
@@ -312,45 +273,15 @@ class DistanceField:
     @property
     def nbytes(self) -> int:
         """Memory held, bytes, without the mesh; it grows by what later calls find."""
-        result, later, winners = self._result, self._winners_and_windows, self._winners.value
-        arrays: list[Any] = [result.distance, self.distances, self.nearest_source]
-        arrays += [] if winners is None else arrays_of(winners).values()
-        for windows in (result.windows, later.value[1] if later and later.value else None):
-            arrays += windows or ()
-        return sum(array.nbytes for array in arrays)
+        held: list[Any] = [self.distances, self.nearest_source, *self._result.arrays().values()]
+        winners, exact = self._points.winners.value, self._points.exact.value
+        held += [] if winners is None else arrays_of(winners).values()
+        held += [] if exact is None else exact[1]
+        return sum({id(array): array.nbytes for array in held}.values())
 
     @cached_property
-    def _node_of(self) -> Mapping[SurfacePoint, int]:
-        """Nodes of the targets."""
-        return dict(zip(self._targets, self._sweep.nodes.targets.tolist(), strict=True))
-
-    @cached_property
-    def _winners(self) -> Lazy[Winners]:
-        """Data of paths to vertices and targets, swept for again if not retained."""
-        return Lazy((self._fast or self._sweep).find_winners, self._result.winners)
-
-    @property
-    def _exact_sweep(self) -> RepeatableSweep:
-        """The sweep of the same question that merges nothing."""
-        bounds = self._sweep.bounds
-        if not bounds.merging:
-            return self._sweep
-        exact = exact_bounds(bounds.max_distance)
-        if bounds.parallel:
-            exact = with_parallel_windows(exact, bounds.first_segment)
-        return replace(self._sweep, bounds=exact)
-
-    @cached_property
-    def _winners_and_windows(self) -> Lazy[tuple[Winners, FaceWindows]] | None:
-        """Data by which any point is found exactly; None where a search back from it finds it."""
-        sweep, bounds, result = self._sweep, self._sweep.bounds, self._result
-        if result.winners is not None and result.windows is not None and not bounds.merging:
-            return Lazy(sweep.find_winners_and_windows, (result.winners, result.windows))
-        if bounds.parallel:  # a sweep back from a point ends at points, not on curves
-            return Lazy(self._exact_sweep.find_winners_and_windows)
-        if self._fast is not None:  # its distances are no lower bounds, which a search back needs
-            return Lazy(sweep.find_winners_and_windows)
-        return None
+    def _points(self) -> PointQueries:
+        return PointQueries(self._sweep, self._result)
 
     def distance_at(
         self,
@@ -398,13 +329,7 @@ class DistanceField:
         0.559017
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        location = self.mesh.point(point)
-        node = self._node(location)
-        if node is not None:
-            return float(self._result.distance[node])
-        if self._winners_and_windows is None:
-            return self._nearest_to(location, control).distance
-        return self._arrival_at(location, *self._winners_and_windows.get(control)).distance
+        return self._points.distance_at(self.mesh.point(point), control)
 
     def nearest_source_at(
         self,
@@ -446,13 +371,7 @@ class DistanceField:
         1
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        location = self.mesh.point(point)
-        node = self._node(location)
-        if node is not None:
-            return int(self._result.nearest[node])
-        if self._winners_and_windows is None:
-            return self._nearest_to(location, control).source
-        return self._arrival_at(location, *self._winners_and_windows.get(control)).source
+        return self._points.nearest_source_at(self.mesh.point(point), control)
 
     def path_to(
         self,
@@ -501,24 +420,11 @@ class DistanceField:
         [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        location = self.mesh.point(target, "target")
-        node = self._node(location)
-        if node is not None:
-            if math.isinf(self._result.distance[node]):
-                raise self._no_path(location)
-            return self._traced(location, self._winners.get(control), self._sweep.nodes, node)
-        if self._winners_and_windows is None:
-            path = self._nearest_to(location, control).path
-            if path is None:
-                raise self._no_path(location)
-            return path()
-        winners, windows = self._winners_and_windows.get(control)
-        arrival = self._arrival_at(location, winners, windows)
-        if arrival.source < 0:
-            raise self._no_path(location)
-        return self._traced(
-            location, *with_target(self.mesh, winners, self._sweep.nodes, location, arrival)
-        )
+        point = self.mesh.point(target, "target")
+        path = self._points.path_to(point, control)
+        if path is None:
+            raise self._no_path(point)
+        return path
 
     @cached_property
     def gradient(self) -> Floats:
@@ -538,7 +444,8 @@ class DistanceField:
         >>> field.gradient.round(3).tolist()[1:]
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.707, 0.707, 0.0]]
         """
-        return gradient_at_vertices(self.mesh, self._winners.get(Control()), self._sweep.nodes)
+        winners = self._points.winners.get(Control())
+        return gradient_at_vertices(self.mesh, winners, self._sweep.question.nodes)
 
     def levels(self, count: int) -> Floats:
         """Return levels for `isolines`, evenly spaced between 0 and the largest finite distance.
@@ -683,16 +590,12 @@ class DistanceField:
             yield from ([] for _ in levels)
             return
         distance, windows = self._result.distance, self._result.windows
-        if self._fast is not None and self._winners_and_windows is not None:
-            winners, windows = self._winners_and_windows.get(control.for_part(0, 2))
-            distance, control = winners.vertices.distance, control.for_part(1, 2)
-        elif windows is None:
-            windows = self._windows_at(within, control.for_part(0, 2))
+        if windows is None:
+            distance, windows = self._windows_at(within, control.for_part(0, 2))
             control = control.for_part(1, 2)
         parts = 1 + len(levels)
-        drawing = Drawing(
-            self.mesh, windows, distance, self._sweep.nodes, control.for_part(0, parts)
-        )
+        nodes = self._sweep.question.nodes
+        drawing = Drawing(self.mesh, windows, distance, nodes, control.for_part(0, parts))
         for i, level in enumerate(levels):
             part = control.for_part(1 + i, parts)
             reached = level <= self.max_distance
@@ -753,111 +656,75 @@ class DistanceField:
         [(0, 1), (0, 2), (1, 2)]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        error, sweep = resolve_chord_error(self.mesh, chord_error), self._exact_sweep
+        error, exact = resolve_chord_error(self.mesh, chord_error), self._points.exact.value
         borders: list[Border] = []
         if len(self.sources) > 1:
-            kept = self._winners_and_windows.value if self._winners_and_windows else None
-            if kept is not None:
-                winners, windows = kept
-                borders = borders_of(
-                    sweep, windows, winners.vertices.distance, winners.nearest, error, control
-                )
-            else:
+            sweep = self._sweep.exact
+            if exact is None:
                 borders = swept_borders(sweep, self._result.nearest, error, control)
+            else:
+                borders = borders_of(sweep, *exact, error, control)
         if control.progress is not None:
             control.progress(1.0)
         return borders
 
-    def _windows_at(self, levels: Sequence[float], control: Control) -> FaceWindows:
-        """Return the windows of all faces that some levels may pass."""
-        if self._sweep.bounds.merging:
-            return self._sweep.find_windows(self._sweep.all_faces, control)
-        faces = crossed_faces(self.mesh, self._result.distance, self.max_distance, levels)
-        return self._sweep.find_windows(faces, control)
-
-    def _traced(
-        self, target: SurfacePoint, winners: Winners, nodes: Nodes, node: int
-    ) -> GeodesicPath:
-        """Return the path to a node, whose length must be the distance in the field.
-
-        That of a fast sweep may be shorter: it goes on with what was found later.
-        """
-        distance, source = winners.reached(node)
-        path = traced_path(self.mesh, winners, nodes, node, EXACT)
-        start = self.sources[source].start_distance
-        excess = start + path.length - distance
-        is_fast, exact = len(winners.vertices.crossing) > 0, not self._sweep.bounds.merging
-        most = rounding_of(self.mesh, distance)
-        if (excess < -most and not is_fast) or (exact and excess > most):
-            raise InternalError(
-                f"the path to {target} has length {path.length}, but the field says "
-                f"{distance - start}; please report this mesh"
-            )
-        if is_fast:
-            return replace(path, error_bound=self.error_bound)
-        if exact:
-            return path
-        share = max(excess, 0.0) / distance if distance > most else 0.0
-        return replace(path, error_bound=ErrorBound("relative", share, "guaranteed"))
-
-    def _node(self, location: SurfacePoint) -> int | None:
-        if location.vertex_index is not None:
-            return int(self.mesh.topology.inner_vertex[location.vertex_index])
-        return self._node_of.get(location)
-
-    def _arrival_at(
-        self, location: SurfacePoint, winners: Winners, windows: FaceWindows
-    ) -> Arrival:
-        """Return the arrival of windows at a point."""
-        nodes = self._sweep.nodes
-        return arrival_at(self.mesh, winners, windows, nodes, location, self.max_distance)
-
-    def _nearest_to(self, location: SurfacePoint, control: Control) -> NearestSource:
-        sweep, starts = self._sweep, [line[0] for line in self._polylines]
-        return find_nearest_source(
-            self.mesh,
-            starts,
-            sweep.start_distances,
-            self._result.distance,
-            sweep.bounds,
-            location,
-            control,
-        )
+    def _windows_at(self, levels: Sequence[float], control: Control) -> tuple[Floats, FaceWindows]:
+        """Sweep for distances by node, and the windows of all faces that some levels may pass."""
+        sweep, distance = self._sweep.drawn, self._result.distance
+        if sweep is not None:
+            return distance, sweep.find_windows(sweep.faces_passed(distance, levels), control)
+        winners, windows = self._points.exact.get(control)
+        return winners.vertices.distance, windows
 
     def _no_path(self, target: SurfacePoint) -> NoPath:
-        sources = [line[0] for line in self._polylines]
-        if component_of(self.mesh, target) in {component_of(self.mesh, p) for p in sources}:
+        if self._sweep.question.connects(target):
             return NoPath(
                 f"{target} is farther than max_distance = {self.max_distance:g} from every source",
                 "beyond_max_distance",
             )
         message = f"{target} is in another connected component than every source"
+        sources = [line[0] for line in self._sweep.question.polylines]
         return disconnected(self.mesh, message, target, *sources)
 
 
-def field_of(
-    sources: tuple[Source, ...],
-    polylines: tuple[Polyline, ...],
-    targets: tuple[SurfacePoint, ...],
-    sweep: RepeatableSweep,
-    fast: FastSweep | None,
-    promise: ErrorBound,
-    result: SweepResult,
-    stats: SweepStats,
-) -> DistanceField:
+def field_of(sweep: Sweep, result: SweepResult, stats: SweepStats) -> DistanceField:
     """Return the field of a sweep and its result."""
-    inner = sweep.mesh.topology.inner_vertex
+    question = sweep.question
+    inner = question.mesh.topology.inner_vertex
     return DistanceField(
-        mesh=sweep.mesh,
-        sources=sources,
-        max_distance=sweep.bounds.max_distance,
+        mesh=question.mesh,
+        sources=question.sources,
+        max_distance=question.max_distance,
         distances=result.distance[inner],
         nearest_source=result.nearest[inner],
-        error_bound=promise,
+        error_bound=sweep.promise,
         stats=stats,
-        _polylines=polylines,
-        _targets=targets,
         _sweep=sweep,
-        _fast=fast,
         _result=result,
     )
+
+
+def sweep_from_arrays(question: Question, arrays: Mapping[str, NDArray[Any]]) -> Sweep:
+    """Return the sweep that its own arrays tell, see `Sweep.arrays`."""
+    if "effort" in arrays:
+        return FastSweep(question, int(arrays["effort"]))
+    if "errors" in arrays:
+        return MergingSweep(question, *arrays["errors"].tolist())
+    return ExactSweep(question)
+
+
+def solve(sweep: Sweep, retain: Retain, control: Control) -> DistanceField:
+    """Run a sweep, and return the field with what it is to retain.
+
+    Raises
+    ------
+    InvalidArgument
+        It cannot retain that.
+    Cancelled, DeadlineExceeded, MemoryLimitExceeded
+        As the control says.
+    """
+    check_choice("retain", retain, get_args(Retain))
+    wave = sweep.run(control, retain)
+    seconds = time.perf_counter() - control.began
+    stats = stats_of(sweep.question.mesh, wave, seconds)
+    return field_of(sweep, SweepResult.of(wave, retain), stats)

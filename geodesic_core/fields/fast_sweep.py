@@ -1,21 +1,26 @@
-"""Fast sweeps, run to their end: distances that are lengths of paths, with an estimated error."""
+"""Fast sweeps: distances that are lengths of paths, with an estimated error."""
 
-import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from geodesic_core.control import SLICE_SECONDS, Control
+from geodesic_core.arrays import Floats
+from geodesic_core.control import Control
 from geodesic_core.errors import InternalError
 from geodesic_core.fields.path import ErrorBound
-from geodesic_core.fields.repeatable_sweep import RepeatableSweep, all_winners
+from geodesic_core.fields.question import Question
+from geodesic_core.fields.sweep import Engine, run_sweep
+from geodesic_core.fields.sweep_result import Retain
+from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.kernels.fast import sweep
 from geodesic_core.kernels.fast.state import fast_bounds, new_wavefront
-from geodesic_core.kernels.front.counters import REACHED, WORK
+from geodesic_core.kernels.front.bounds import exact_bounds, with_parallel_windows
+from geodesic_core.kernels.front.counters import REACHED
 from geodesic_core.kernels.front.state import Wavefront, bytes_of, with_larger_pool
 from geodesic_core.kernels.mesh.half_edges import LENGTH
 from geodesic_core.kernels.outcome import Outcome
-from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.tolerances import MOST_CROSSINGS
 
 ESTIMATES = {1: 0.03, 2: 0.01, 4: 0.005, 8: 0.002}
@@ -25,31 +30,45 @@ In 19 of 20 fields that were measured, 99 of 100 vertices lie within; see docs/a
 """
 
 _FIRST_BUDGET = 50_000
-_SMALLEST_BUDGET = 1_000
 _SAMPLES = 1024
 """Edges whose mean length is the width of a bucket, about: it hardly matters"""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FastSweep:
-    """A fast sweep that can be run any number of times, with the same result to the bit."""
+    """A sweep that keeps a window only where it is nearest at one of some places of its edge."""
 
-    exact: RepeatableSweep
-    """The same question for an exact sweep"""
+    question: Question
     effort: int
+    """Number of places of a half-edge"""
 
-    def run(self, control: Control) -> Wavefront:
-        """Return the state after the sweep.
+    @property
+    def promise(self) -> ErrorBound:
+        """The estimated error."""
+        return estimated(self.effort)
+
+    @property
+    def exact(self) -> ExactSweep:
+        """The exact sweep of the same question."""
+        return ExactSweep(self.question)
+
+    @property
+    def drawn(self) -> None:
+        """None: its windows do not cover the faces."""
+
+    def run(self, control: Control, retain: Retain = "distances") -> Wavefront:  # noqa: ARG002
+        """Return the state after the sweep, always with the data of paths; see `Sweep.run`.
 
         Raises
         ------
-        Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As the control says.
         InternalError
             If it crosses more than `MOST_CROSSINGS` windows per half-edge: else it might never end.
         """
-        mesh, nodes, starts = self.exact.mesh, self.exact.nodes, self.exact.start_distances
-        topology, bounds = mesh.topology, fast_bounds(self.exact.bounds)
+        question = self.question
+        mesh, nodes, bounds = question.mesh, question.nodes, exact_bounds(question.max_distance)
+        if question.has_curves:
+            bounds = with_parallel_windows(bounds, nodes.first_segment)
+        topology, limits = mesh.topology, fast_bounds(bounds)
         wave = new_wavefront(
             topology, nodes.sites, self.effort, self._bucket_width, nodes.first_target
         )
@@ -57,44 +76,48 @@ class FastSweep:
             wave = with_larger_pool(wave)
         control.check_memory(bytes_of(wave))
         control.checkpoint(0.0)
-        sweep.start_sweep(topology, wave, nodes.sources, nodes.source_indices, starts, bounds)
-        reachable = max(int(np.isin(mesh.components, nodes.components).sum()), 1)
-        budget, outcome, left = _FIRST_BUDGET, Outcome.RUNNING, MOST_CROSSINGS * len(topology.links)
-        while outcome != Outcome.FINISHED:
-            control.checkpoint(min(float(wave.counters[REACHED]) / reachable, 1.0))
-            began = time.perf_counter()
-            outcome = sweep.advance(topology, wave, bounds, budget)
-            took = time.perf_counter() - began
-            left -= int(wave.counters[WORK])
-            if outcome != Outcome.FINISHED and left < 0:
-                raise InternalError(
-                    "the sweep does not end: its windows go in circles; please report this mesh, "
-                    "and use exact_distance for it"
-                )
-            if outcome == Outcome.POOL_FULL:
-                wave = with_larger_pool(wave)
-                control.check_memory(bytes_of(wave))
-            elif outcome == Outcome.RUNNING:
-                faster = min(max(SLICE_SECONDS / took, 0.5), 2.0)
-                budget = max(int(budget * faster), _SMALLEST_BUDGET)
+        starts = question.start_distances
+        sweep.start_sweep(topology, wave, nodes.sources, nodes.source_indices, starts, limits)
+        reachable = max(question.reachable, 1)
+        engine = Engine(sweep.advance, _FIRST_BUDGET, MOST_CROSSINGS * len(topology.links))
+        wave, outcome = run_sweep(
+            mesh,
+            wave,
+            limits,
+            control,
+            lambda wave: min(float(wave.counters[REACHED]) / reachable, 1.0),
+            engine=engine,
+        )
+        if outcome == Outcome.RUNAWAY:
+            raise InternalError(
+                "the sweep does not end: its windows go in circles; please report this mesh, and "
+                "use exact_distance for it"
+            )
         if nodes.has_site_targets:
-            sweep.reach_sites_inside(topology, wave, bounds, nodes.first_target)
-        wave.vertices.distance[wave.vertices.distance > bounds.max_distance] = np.inf
+            sweep.reach_sites_inside(topology, wave, limits, nodes.first_target)
+        wave.vertices.distance[wave.vertices.distance > question.max_distance] = np.inf
         if control.progress is not None:
             control.progress(1.0)
         return wave
 
-    def find_winners(self, control: Control) -> Winners:
-        """Run the sweep for the data of paths."""
-        return all_winners(self.run(control))
+    def most(self, distances: Floats) -> None:
+        """Return None: the distances may be too long."""
+
+    def error_of_path(self, excess: float, distance: float, rounding: float) -> ErrorBound:  # noqa: ARG002
+        """Return the estimate, for any length: a path follows what was found after its distance."""
+        return self.promise
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the effort."""
+        return {"effort": np.array(self.effort)}
 
     @property
     def _bucket_width(self) -> float:
         """Width of a bucket, mesh units."""
-        lengths = self.exact.mesh.topology.geometry[:, LENGTH]
+        lengths = self.question.mesh.topology.geometry[:, LENGTH]
         return float(lengths[:: max(len(lengths) // _SAMPLES, 1)].mean())
 
 
-def estimated_error(effort: int) -> ErrorBound:
-    """Return the estimated error of the distances of fast sweeps."""
+def estimated(effort: int) -> ErrorBound:
+    """Return the estimated error of fast distances."""
     return ErrorBound("relative", ESTIMATES[effort], "estimated")

@@ -7,19 +7,29 @@ around the answer is swept.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
-from geodesic_core.fields.path import EXACT, GeodesicPath, reversed_path, traced_path
+from geodesic_core.errors import InternalError
+from geodesic_core.fields.path import (
+    EXACT,
+    GeodesicPath,
+    reversed_path,
+    rounding_of,
+    traced_path,
+)
+from geodesic_core.fields.question import Question
 from geodesic_core.fields.sources import Nodes, corners_of, nodes_of
 from geodesic_core.fields.sweep import sweep_nodes, winners_of
+from geodesic_core.fields.sweep_result import SweepResult, all_winners
+from geodesic_core.fields.sweeps import ExactSweep, Sweep
 from geodesic_core.kernels.front import state
-from geodesic_core.kernels.front.bounds import Bounds, exact_bounds, pruning_toward
+from geodesic_core.kernels.front.bounds import exact_bounds, pruning_toward
 from geodesic_core.kernels.isolines.face_windows import FaceWindows, Reach, reach_point
 from geodesic_core.kernels.mesh.half_edges import point_in_frame
 from geodesic_core.kernels.paths.backtracing import End, Winners
@@ -28,15 +38,7 @@ from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import SEARCH_SLACK, TIE
 
-
-class Arrival(NamedTuple):
-    """Arrival of windows at a point that is no vertex."""
-
-    distance: float
-    """Mesh units; infinite where the point is not reached"""
-    source: int
-    """Index of the nearest source; -1 where the point is not reached"""
-    reach: Reach
+T = TypeVar("T")
 
 
 class _Known(NamedTuple):
@@ -50,16 +52,25 @@ class _Known(NamedTuple):
     piece_ends: Floats
 
 
+class NearestSource(NamedTuple):
+    """The source nearest to a point, its exact distance, and how to trace the path from there."""
+
+    source: int
+    """Index into the sources of the field; -1 where there is no path"""
+    distance: float
+    """Mesh units, the source's start distance counted; infinite where there is no path"""
+    path: Callable[[], GeodesicPath] | None
+    """Traces the path; None where there is none"""
+
+
+NOT_REACHED = NearestSource(-1, math.inf, None)
+
+
 def arrival_at(
-    mesh: TriangleMesh,
-    winners: Winners,
-    windows: FaceWindows,
-    nodes: Nodes,
-    point: SurfacePoint,
-    max_distance: float,
-) -> Arrival:
-    """Return the shortest arrival at a canonical point; O(windows of its faces)."""
-    sites = winners.sites
+    sweep: ExactSweep, winners: Winners, windows: FaceWindows, point: SurfacePoint
+) -> NearestSource:
+    """Return the source nearest to a point, by the windows of its faces; O(windows)."""
+    mesh, nodes, sites = sweep.question.mesh, sweep.question.nodes, winners.sites
     known = _Known(
         winners.nearest,
         winners.vertices.distance,
@@ -72,24 +83,27 @@ def arrival_at(
         reach_point(mesh.topology, known, windows, nodes.first_target, face, np.array(weights))
         for face, weights in weights_by_face(mesh, point).items()
     )
-    best = min(reaches, key=lambda reach: reach[0])
-    reach = Reach(*best)
-    if math.isinf(reach.distance) or reach.distance > max_distance:
-        return Arrival(math.inf, -1, reach)
-    return Arrival(reach.distance, int(winners.nearest[reach.predecessor]), reach)
+    reach = Reach(*min(reaches, key=lambda reach: reach[0]))
+    if math.isinf(reach.distance) or reach.distance > sweep.question.max_distance:
+        return NOT_REACHED
+    source = int(winners.nearest[reach.predecessor])
+
+    def path() -> GeodesicPath:
+        end = _end_of(mesh, point, reach, source, len(winners.vertices.distance))
+        reached = winners._replace(target=end)
+        return checked_path(sweep, reached, replace(nodes, added=(point,)), end.node)
+
+    return NearestSource(source, reach.distance, path)
 
 
-def with_target(
-    mesh: TriangleMesh, winners: Winners, nodes: Nodes, point: SurfacePoint, arrival: Arrival
-) -> tuple[Winners, Nodes, int]:
-    """Return winners and nodes with one more node, at the point, and its number; O(1)."""
-    node, reach = len(winners.vertices.distance), arrival.reach
+def _end_of(mesh: TriangleMesh, point: SurfacePoint, reach: Reach, source: int, node: int) -> End:
+    """Return a point that windows reach as one more node, of the given number."""
     weights = weights_by_face(mesh, point)[reach.entry_edge // 3]
     x, y = point_in_frame(mesh.topology.geometry, reach.entry_edge, np.array(weights))
-    target = End(
+    return End(
         node=node,
-        distance=arrival.distance,
-        source=arrival.source,
+        distance=reach.distance,
+        source=source,
         entry_edge=reach.entry_edge,
         x=x,
         y=y,
@@ -98,59 +112,140 @@ def with_target(
         reference=-1 - reach.predecessor,
         crossing=math.nan,
     )
-    return winners._replace(target=target), replace(nodes, added=(point,)), node
 
 
-class NearestSource(NamedTuple):
-    """The source nearest to a point, its exact distance, and how to trace the path from there."""
+class Lazy(Generic[T]):
+    """A value that is there already, or is found by the first call that is not stopped."""
 
-    source: int
-    """Index into the sources of the field; -1 where there is no path"""
-    distance: float
-    """Mesh units, the source's start distance counted; infinite where there is no path"""
-    path: Callable[[], GeodesicPath] | None
-    """Traces the path; None where there is none"""
+    def __init__(self, find: Callable[[Control], T], value: T | None = None) -> None:
+        self._find = find
+        self._value = value
+
+    @property
+    def value(self) -> T | None:
+        """The value; None until it is found."""
+        return self._value
+
+    def get(self, control: Control) -> T:
+        """Return the value, found under ``control`` if it is not there.
+
+        Raises
+        ------
+        GeodesicError
+            As finding it does; the next call tries again.
+        """
+        if self._value is None:
+            self._value = self._find(control)
+        return self._value
+
+
+class PointQueries:
+    """Points of the surface, asked of the result of a sweep; what is swept again is retained."""
+
+    def __init__(self, sweep: Sweep, result: SweepResult) -> None:
+        self._sweep, self._result = sweep, result
+        self.winners = Lazy(
+            lambda control: all_winners(sweep.run(control, "paths")), result.winners
+        )
+        """Data of paths to vertices and targets"""
+        both = None
+        if sweep.exact is sweep and result.winners is not None and result.windows is not None:
+            both = result.winners, result.windows
+        self.exact = Lazy(sweep.exact.find_winners_and_windows, both)
+        """Data by which any point is found exactly"""
+
+    def distance_at(self, point: SurfacePoint, control: Control) -> float:
+        """Return the distance of a canonical point, infinite where it is not reached."""
+        node = self._sweep.question.node(point)
+        if node is not None:
+            return float(self._result.distance[node])
+        return self._found(point, control).distance
+
+    def nearest_source_at(self, point: SurfacePoint, control: Control) -> int:
+        """Return the index of the source nearest to a canonical point; -1 for none."""
+        node = self._sweep.question.node(point)
+        if node is not None:
+            return int(self._result.nearest[node])
+        return self._found(point, control).source
+
+    def path_to(self, point: SurfacePoint, control: Control) -> GeodesicPath | None:
+        """Return the path to a canonical point; None where it is not reached."""
+        node = self._sweep.question.node(point)
+        if node is None:
+            path = self._found(point, control).path
+            return None if path is None else path()
+        if math.isinf(self._result.distance[node]):
+            return None
+        nodes = self._sweep.question.nodes
+        return checked_path(self._sweep, self.winners.get(control), nodes, node)
+
+    def _found(self, point: SurfacePoint, control: Control) -> NearestSource:
+        """Return the source nearest to a point that is no node.
+
+        A sweep back from the point ends at points, not on curves, and needs lower bounds.
+        """
+        least = self._result.distance
+        if self.exact.value is None and not self._sweep.question.has_curves:
+            most = self._sweep.most(least)
+            if most is not None:
+                return find_nearest_source(self._sweep.question, least, most, point, control)
+        return arrival_at(self._sweep.exact, *self.exact.get(control), point)
+
+
+def checked_path(sweep: Sweep, winners: Winners, nodes: Nodes, node: int) -> GeodesicPath:
+    """Return the path to a node, whose length must go with the node's distance.
+
+    Raises
+    ------
+    InternalError
+        It does not.
+    """
+    mesh = sweep.question.mesh
+    distance, source = winners.reached(node)
+    path = traced_path(mesh, winners, nodes, node, EXACT)
+    start = float(sweep.question.start_distances[source])
+    error = sweep.error_of_path(
+        start + path.length - distance, distance, rounding_of(mesh, distance)
+    )
+    if error is None:
+        raise InternalError(
+            f"the path to {path.locations[-1]} has length {path.length}, but the field says "
+            f"{distance - start}; please report this mesh"
+        )
+    return path if error == EXACT else replace(path, error_bound=error)
 
 
 def find_nearest_source(
-    mesh: TriangleMesh,
-    sources: Sequence[SurfacePoint],
-    start_distances: Floats,
-    known: Floats,
-    bounds: Bounds,
-    point: SurfacePoint,
-    control: Control,
+    question: Question, least: Floats, most: Floats, point: SurfacePoint, control: Control
 ) -> NearestSource:
-    """Return the nearest source of a field whose vertices have the distances ``known``.
+    """Return the source nearest to a point, by a sweep back from it.
 
-    ``bounds`` are those of the field. ``known`` is by inner vertex; more values may follow. O(faces
-    in the strip), and O(V + F) for memory.
+    ``least`` and ``most`` bound the exact distances of the inner vertices; more values may follow.
+    O(faces in the strip), and O(V + F) for memory.
 
     Raises
     ------
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As in `run_sweep`.
     """
-    nodes = nodes_of(mesh, [(point,)], sources, control)
+    mesh, limit, starts = question.mesh, question.max_distance, question.start_distances
+    nodes = nodes_of(mesh, [(point,)], [line[0] for line in question.polylines], control)
     corners, reaches = corners_of(mesh, point)
-    least = known[: len(mesh.vertices)]
-    upper = float((_most(least[corners], bounds) + reaches).min())
-    upper = min(
-        upper, _within_face(mesh, sources, start_distances, point, control), bounds.max_distance
-    )
+    upper = float((most[corners] + reaches).min())
+    upper = min(upper, _within_face(question, point, control), limit)
     if math.isinf(upper):
-        return NearestSource(-1, math.inf, None)
+        return NOT_REACHED
     # A vertex beyond the limit of the field is at least as far as that.
-    rest = np.minimum(least, bounds.max_distance)
+    rest = np.minimum(least[: len(mesh.vertices)], limit)
     pruning_bounds = pruning_toward(np.zeros(3), upper * (1.0 + SEARCH_SLACK), rest)
     wave = state.new_wavefront(mesh.topology, nodes.sites, pruned=True)
     control.check_memory(state.bytes_of(wave))
     backward = exact_bounds(math.inf, pruning_bounds)
     wave = sweep_nodes(mesh, wave, nodes, np.zeros(1), backward, control, lambda _: 0.0)
-    totals = wave.vertices.distance[nodes.targets] + start_distances
+    totals = wave.vertices.distance[nodes.targets] + starts
     distance = float(totals.min())
-    if distance > bounds.max_distance:
-        return NearestSource(-1, math.inf, None)
+    if distance > limit:
+        return NOT_REACHED
     nearest = int(np.flatnonzero(totals <= distance * (1.0 + TIE))[0])
 
     def path() -> GeodesicPath:
@@ -161,21 +256,11 @@ def find_nearest_source(
     return NearestSource(nearest, float(totals[nearest]), path)
 
 
-def _most(least: Floats, bounds: Bounds) -> Floats:
-    """Return the largest distances that these values of a field allow."""
-    if not bounds.merging:
-        return least
-    return np.minimum(least / (1.0 - bounds.relative_error), least + bounds.absolute_error)
-
-
-def _within_face(
-    mesh: TriangleMesh,
-    sources: Sequence[SurfacePoint],
-    starts: Floats,
-    point: SurfacePoint,
-    control: Control,
-) -> float:
+def _within_face(question: Question, point: SurfacePoint, control: Control) -> float:
     """Return the length of the straight path to the nearest source in the face of a point."""
+    mesh = question.mesh
+    sources = [line[0] for line in question.polylines]
+    starts = question.start_distances
     position = mesh.position_from_origin(point)
     return min(
         (

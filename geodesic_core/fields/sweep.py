@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Callable
+from typing import NamedTuple
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import SLICE_SECONDS, Control
@@ -11,12 +12,14 @@ from geodesic_core.fields.sources import Nodes
 from geodesic_core.kernels.front import counters, pruning, state
 from geodesic_core.kernels.front.bounds import Bounds, without_merging
 from geodesic_core.kernels.front.state import PREDECESSOR, Merges, Wavefront
+from geodesic_core.kernels.mesh.half_edges import Topology
 from geodesic_core.kernels.outcome import Outcome
 from geodesic_core.kernels.paths.backtracing import NO_END, Winners
 from geodesic_core.kernels.sweep import continuous_dijkstra, site_targets
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 _FIRST_BUDGET = 1_000_000
+_SMALLEST_BUDGET = 1_000
 
 _FIRST_LIMITED_BUDGET = 10_000
 _LIMITED_GROWTH = 1.25
@@ -31,6 +34,16 @@ _GROW: dict[Outcome, Callable[[Wavefront], Wavefront]] = {
     Outcome.MERGES_FULL: state.with_more_merges,
 }
 """How a wavefront grows where a sweep ended for want of room."""
+
+
+class Engine(NamedTuple):
+    """How a sweep advances."""
+
+    advance: Callable[[Topology, Wavefront, Bounds, int], Outcome]
+    """Kernel that does a slice of work, of a given budget"""
+    first_budget: int
+    most_work: float = math.inf
+    """Work after which the sweep counts as one that never ends"""
 
 
 def sweep_nodes(
@@ -95,6 +108,7 @@ def run_sweep(
     control: Control,
     share_done: Callable[[Wavefront], float],
     limit_of: Callable[[Wavefront], float] | None = None,
+    engine: Engine | None = None,
 ) -> tuple[Wavefront, Outcome]:
     """Run a sweep that has started to its end; return its state, which may have grown.
 
@@ -102,22 +116,28 @@ def run_sweep(
 
     ``share_done`` tells how much of the call is done. ``limit_of`` tells, from what is known so
     far, how far the sweep still has to look: never farther than ``bounds``. It is asked after fixed
-    amounts of work, so that the sweep stays the same to the bit.
+    amounts of work, so that the sweep stays the same to the bit. The ``engine`` is that of
+    continuous Dijkstra by default.
 
     Raises
     ------
     Cancelled, DeadlineExceeded, MemoryLimitExceeded
         As the control says.
     """
-    budget = _FIRST_BUDGET if limit_of is None else _FIRST_LIMITED_BUDGET
-    left, outcome = budget, Outcome.RUNNING
+    engine = engine or Engine(continuous_dijkstra.advance, _FIRST_BUDGET)
+    budget = engine.first_budget if limit_of is None else _FIRST_LIMITED_BUDGET
+    left, outcome, done = budget, Outcome.RUNNING, 0
     while outcome not in (Outcome.FINISHED, Outcome.RUNAWAY):
         control.checkpoint(share_done(wave))
         began = time.perf_counter()
-        outcome = continuous_dijkstra.advance(mesh.topology, wave, bounds, left)
+        outcome = engine.advance(mesh.topology, wave, bounds, left)
         took = time.perf_counter() - began
+        work = int(wave.counters[counters.WORK])
+        done += work
+        if outcome != Outcome.FINISHED and done > engine.most_work:
+            return wave, Outcome.RUNAWAY
         if outcome in _GROW:
-            left -= int(wave.counters[counters.WORK])  # slices do not depend on the room there was
+            left -= work  # slices do not depend on the room there was
             wave = _GROW[outcome](wave)
             control.check_memory(state.bytes_of(wave))
             continue
@@ -126,7 +146,8 @@ def run_sweep(
             bounds = bounds._replace(max_distance=limit)
             budget = min(int(_LIMITED_GROWTH * budget), _FIRST_BUDGET)
         elif outcome == Outcome.RUNNING:
-            budget = int(budget * min(max(SLICE_SECONDS / took, 0.5), 2.0))
+            faster = min(max(SLICE_SECONDS / took, 0.5), 2.0)
+            budget = max(int(budget * faster), _SMALLEST_BUDGET)
         left = budget
     return wave, Outcome(outcome)
 

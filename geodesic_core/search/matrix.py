@@ -13,12 +13,14 @@ from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument, NoPath
 from geodesic_core.extras import extra
+from geodesic_core.fields.methods import SweepOf
 from geodesic_core.fields.sources import as_points, component_of, ends_of
+from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.mesh.surface_point import Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.plan import Plan
-from geodesic_core.search.rows import Rows, Solve, rows_of
+from geodesic_core.search.rows import Rows, rows_of
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import as_threads, share_within_memory
 from geodesic_core.search.workspace import Workspace
@@ -38,7 +40,7 @@ Measured: a sweep costs as much as 7 searches on a scan of 10⁵ faces, as 20 wh
 
 def find_matrix(
     workspace: Workspace,
-    solve: Solve | None,
+    sweep_of: SweepOf,
     sources: Points,
     targets: Points | None,
     max_distance: float | None,
@@ -48,7 +50,7 @@ def find_matrix(
 ) -> "Floats | csr_array":
     """Return a matrix, see `geodesic_core.distance_matrix`.
 
-    Its distances are those of the fields of ``solve``; where it is None, they are exact.
+    Its distances are those of the sweep of a method.
     """
     mesh, limit = workspace.mesh, as_limit(max_distance)
     check_choice("layout", layout, get_args(Layout))
@@ -59,7 +61,7 @@ def find_matrix(
     if layout == "pairs":
         if targets is None:
             raise InvalidArgument("pairs need targets, one for each source")
-        table = _Pairs(mesh, starts, stops, SWEEP_FROM if solve is None else 1, control)
+        table = _Pairs(mesh, starts, stops, SWEEP_FROM if sweep_of is ExactSweep else 1, control)
     elif layout == "dense":
         control.check_memory(8 * len(starts) * len(stops))
         table = _Dense(Plan.of(mesh, starts, stops, control, in_order=False))
@@ -74,7 +76,7 @@ def find_matrix(
             table.values[i] = _searched(finder, starts[i], stops[i], limit, part)
         rest = control.for_part(few, parts, table.sweeps).holding(finder.nbytes)
     if table.sweeps:
-        make = partial(rows_of, table.ends, limit, solve)
+        make = partial(rows_of, mesh, table.ends, limit, sweep_of)
         rows = map(make, chain([workspace.target_sweep], repeat(partial(TargetSweep, mesh))))
         share_within_memory(
             table.sweeps, rows, partial(_sweep, table), most, rest, held=lambda: table.nbytes

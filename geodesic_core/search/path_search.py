@@ -38,9 +38,10 @@ from geodesic_core.fields.path import (
     rounding_of,
     traced_path,
 )
-from geodesic_core.fields.repeatable_sweep import RepeatableSweep
+from geodesic_core.fields.question import Question
 from geodesic_core.fields.sources import Nodes, corners_of, nodes_of
 from geodesic_core.fields.sweep import sweep_nodes, winners_of
+from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.kernels.front import pruning, state
 from geodesic_core.kernels.front.bounds import (
     LANDMARKS,
@@ -140,9 +141,10 @@ class PathSearch:
     def _is_within(self, leg: "_Leg") -> bool:
         """Tell whether a vertex is within the limit for fields, whose sums round differently."""
         control = replace(leg.control.holding(self.nbytes), progress=None)
-        start, end, bounds = leg.start.point, leg.end.point, exact_bounds(leg.limit)
-        sweep = RepeatableSweep.between(self.mesh, [(start,)], np.zeros(1), [end], bounds, control)
-        return math.isfinite(sweep.run(control).vertices.distance[sweep.nodes.targets[0]])
+        ends = leg.start.point, leg.end.point
+        question = Question.of(self.mesh, *ends, leg.limit, control)
+        distance = ExactSweep(question).run(control).vertices.distance
+        return math.isfinite(distance[question.nodes.targets[0]])
 
     def _search(self, leg: "_Leg") -> GeodesicPath:
         if leg.straight > leg.longest:

@@ -1,24 +1,22 @@
 """Rows of a table: the distances from one source to some targets, by each method."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
-from geodesic_core.fields.distance_field import DistanceField
+from geodesic_core.fields.distance_field import DistanceField, solve
+from geodesic_core.fields.methods import SweepOf
+from geodesic_core.fields.question import Question
 from geodesic_core.fields.sources import Ends
-from geodesic_core.mesh.surface_point import SurfacePoint
+from geodesic_core.fields.sweeps import ExactSweep
+from geodesic_core.mesh.surface_point import Points, SurfacePoint
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.target_sweep import TargetSweep
-
-Method = Literal["exact", "approximate", "fast"]
-
-Solve = Callable[[SurfacePoint, Sequence[SurfacePoint], float, Control], DistanceField]
-"""Function that returns the field of a source up to a limit; its sweep also finds some points in
-faces"""
 
 
 class Rows(Protocol):
@@ -59,16 +57,17 @@ class ExactRows:
 
 @dataclass(frozen=True)
 class FieldRows:
-    """Rows of an approximate or a fast solver, by a field for each."""
+    """Rows of an approximate or a fast method, by a field for each."""
 
+    mesh: TriangleMesh
     ends: Ends
     limit: float
-    solve: Solve
+    sweep_of: SweepOf
 
     @cached_property
     def nbytes(self) -> int:
         """Memory of the state of a sweep, bytes, as one that ends at once shows; it may grow."""
-        return self.solve(self.ends.sources[0], (), 0.0, Control()).stats.peak_bytes
+        return self._field(self.ends.sources[0], (), 0.0, Control()).stats.peak_bytes
 
     @cached_property
     def _vertices(self) -> Ints:
@@ -81,16 +80,26 @@ class FieldRows:
         vertices = self._vertices[targets]
         others = np.flatnonzero(vertices < 0)
         points = [self.ends.targets[target] for target in targets[others]]
-        field = self.solve(self.ends.sources[source], points, self.limit, control)
+        field = self._field(self.ends.sources[source], points, self.limit, control)
         row = field.distances[vertices]
         row[others] = [field.distance_at(point) for point in points]
         return row
 
+    def _field(
+        self, source: SurfacePoint, targets: Points, limit: float, control: Control
+    ) -> DistanceField:
+        question = Question.of(self.mesh, source, targets, limit, control)
+        return solve(self.sweep_of(question), "distances", control)
+
 
 def rows_of(
-    ends: Ends, limit: float, solve: Solve | None, target_sweep: Callable[[], TargetSweep]
+    mesh: TriangleMesh,
+    ends: Ends,
+    limit: float,
+    sweep_of: SweepOf,
+    target_sweep: Callable[[], TargetSweep],
 ) -> Rows:
-    """Return a solver of rows: by the fields of ``solve``, exactly where it is None."""
-    if solve is None:
+    """Return a solver of rows, by the sweep of a method; ``target_sweep`` is for exact ones."""
+    if sweep_of is ExactSweep:
         return ExactRows(ends, limit, target_sweep())
-    return FieldRows(ends, limit, solve)
+    return FieldRows(mesh, ends, limit, sweep_of)

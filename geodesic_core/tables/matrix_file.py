@@ -22,17 +22,18 @@ from numpy.typing import NDArray
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
+from geodesic_core.fields.methods import Effort, Method, SweepOf, promise_of, sweep_of
 from geodesic_core.fields.path import ErrorBound
 from geodesic_core.fields.sources import as_points
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.kernels.jit.cache import sources_digest
 from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.surface_point import Point, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.plan import Plan
-from geodesic_core.search.rows import Method, Rows, Solve, rows_of
+from geodesic_core.search.rows import Rows, rows_of
 from geodesic_core.search.target_sweep import TargetSweep
 from geodesic_core.search.threads import as_threads, share_within_memory
-from geodesic_core.solvers import Effort, error_bound, kernel_digest, row_solver
 from geodesic_core.tables import dense, sparse
 from geodesic_core.tables.blocks import Blocks
 from geodesic_core.tables.formats import (
@@ -174,14 +175,8 @@ def write_matrix(
         raise InvalidArgument(f"{path} is a folder that may hold other data: choose another name")
     require(suffix)
     mesh, control = with_barriers(as_mesh(mesh), barriers, control)
-    solve = row_solver(mesh, method, relative_error, absolute_error, effort)
-    bound = error_bound(
-        mesh,
-        method,
-        relative_error=relative_error,
-        absolute_error=absolute_error,
-        effort=effort,
-    )
+    method_sweep = sweep_of(mesh, method, relative_error, absolute_error, effort)
+    bound = promise_of(mesh, method, relative_error, absolute_error, effort)
     starts, rows = _points(mesh, sources, "source", control)
     stops, columns = (None, rows) if targets is None else _points(mesh, targets, "target", control)
     plan = Plan.of(mesh, starts, stops, control, in_order=suffix in SPARSE)
@@ -200,10 +195,10 @@ def write_matrix(
         "error_bound": asdict(bound),
         "max_distance": None if math.isinf(limit) else limit,
         "dtype": dtype,
-        "kernels": kernel_digest(),
+        "kernels": sources_digest(),
     }
     make = dense if suffix in DENSE else sparse
-    sweep = _Sweep(mesh, plan, limit, solve, np.dtype(dtype), make)
+    sweep = _Sweep(mesh, plan, limit, method_sweep, np.dtype(dtype), make)
     blocks = Blocks.beside(path)
     with blocks.open(facts):
         swept = sweep.run(blocks, most, control)
@@ -254,7 +249,7 @@ class _Sweep:
     mesh: TriangleMesh
     plan: Plan
     limit: float
-    solve: Solve | None
+    sweep_of: SweepOf
     dtype: np.dtype[Any]
     layout: ModuleType
 
@@ -298,7 +293,12 @@ class _Sweep:
             put(sweep, rows.distances(sweep, self.plan.targets_of(sweep), control))
 
         make = partial(
-            rows_of, self.plan.ends, self.limit, self.solve, partial(TargetSweep, self.mesh)
+            rows_of,
+            self.mesh,
+            self.plan.ends,
+            self.limit,
+            self.sweep_of,
+            partial(TargetSweep, self.mesh),
         )
         states = (make() for _ in repeat(None))
         try:

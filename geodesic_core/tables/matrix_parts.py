@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.control import Control
+from geodesic_core.fields.methods import Effort, Method, sweep_of
 from geodesic_core.fields.sources import as_points
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.mesh.surface_point import Point
 from geodesic_core.search.plan import Plan, block_rows
-from geodesic_core.search.rows import Method, rows_of
+from geodesic_core.search.rows import rows_of
 from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.solvers import Effort, row_solver
 from geodesic_core.tables import dense, sparse
 from geodesic_core.tables.formats import write_npy, write_npz
 from geodesic_core.validation import as_limit, check_choice
@@ -92,7 +92,8 @@ class MatrixParts:
         check_choice("dtype", dtype, ("float64", "float32"))
         control = Control(cancel=cancel)
         self._mesh = as_mesh(mesh)
-        self._solve = row_solver(self._mesh, method, relative_error, absolute_error, effort)
+        errors = relative_error, absolute_error
+        self._sweep_of = sweep_of(self._mesh, method, *errors, effort)
         self._limit = as_limit(max_distance)
         self._dtype = np.dtype(dtype)
         starts = as_points(self._mesh, sources, "source", control)
@@ -182,7 +183,9 @@ class MatrixParts:
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
         plan, sweeps = self._plan, self._plan.rows_of(part)
-        rows = rows_of(plan.ends, self._limit, self._solve, partial(TargetSweep, self._mesh))
+        mesh = self._mesh
+        make = partial(TargetSweep, mesh)
+        rows = rows_of(mesh, plan.ends, self._limit, self._sweep_of, make)
         control = control.holding(8 * len(sweeps) * plan.width)
         found = {
             sweep: rows.distances(

@@ -950,7 +950,7 @@ def test_tries_end_a_line_that_leads_nowhere():
     count = TRIES // 4
     mesh, target = strip_with_fins(count), 2 * count + 1
     field = gc.exact_distance(mesh, 0)
-    winners, v = field._winners.get(Control()), int(mesh.topology.inner_vertex[target])
+    winners, v = field._points.winners.get(Control()), int(mesh.topology.inner_vertex[target])
     winners.vertices.distance[v] = 0.0
     with pytest.raises(gc.errors.InternalError, match="left the surface"):
         field.path_to(target)

@@ -10,7 +10,7 @@ from starlette.testclient import TestClient
 import geodesic_core as gc
 from app.queries import IsolinesQuery
 from app.store.meshes import OpenMesh
-from geodesic_core.fields.repeatable_sweep import RepeatableSweep
+from geodesic_core.fields.sweeps import WholeSweep
 from tests.support.service import check_problem, context, serving, stored_mesh, upload_sample
 
 INSIDE = {"face": 40, "barycentric": [0.2, 0.3, 0.5]}
@@ -135,9 +135,9 @@ def test_the_grant_is_in_force_throughout(
     request = IsolinesQuery.model.model_validate({"sources": [INSIDE], "count": 4, **method})
     query = IsolinesQuery("m", IsolinesQuery.normalized(request))
     watched: list[dict[str, Any]] = []
-    run, checks = RepeatableSweep.run, 0
+    run, checks = WholeSweep.run_for, 0
 
-    def watch(sweep: RepeatableSweep, control: Any, **keep: Any) -> Any:
+    def watch(sweep: WholeSweep, control: Any, **keep: Any) -> Any:
         watched.append({"cancel": control.cancel, "memory_limit": control.memory_limit})
         return run(sweep, control, **keep)
 
@@ -146,7 +146,7 @@ def test_the_grant_is_in_force_throughout(
         checks += 1
         return checks == stop_at
 
-    monkeypatch.setattr(RepeatableSweep, "run", watch)
+    monkeypatch.setattr(WholeSweep, "run_for", watch)
     stop_at = -1
     query.answer(opened, context(cancel, memory=10**9))
 

@@ -22,7 +22,8 @@ from app.store.folder_meshes import FolderMeshes
 from app.store.mesh_catalog import MeshCatalog
 from app.store.meshes import MeshStore
 from app.store.ownership import owned
-from geodesic_core.fields import fast_sweep, repeatable_sweep
+from geodesic_core.fields.fast_sweep import FastSweep
+from geodesic_core.fields.sweeps import WholeSweep
 from tests.support.against import ClusterClient, is_against_cluster, serving_cluster
 from tests.support.processes import workers_of
 from tests.support.waiting import LONG_S, wait_until
@@ -188,11 +189,14 @@ def check_problem(response: Any, status: int, code: str) -> dict[str, Any]:
 def sweeps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Grows by one with each sweep."""
     ran: list[int] = []
-    for kind in (repeatable_sweep.RepeatableSweep, fast_sweep.FastSweep):
 
-        def counted(self: Any, *arguments: Any, run: Any = kind.run, **options: Any) -> Any:
+    def counted(run: Callable[..., Any]) -> Callable[..., Any]:
+        def count_and_run(*arguments: Any, **options: Any) -> Any:
             ran.append(1)
-            return run(self, *arguments, **options)
+            return run(*arguments, **options)
 
-        monkeypatch.setattr(kind, "run", counted)
+        return count_and_run
+
+    monkeypatch.setattr(WholeSweep, "run_for", counted(WholeSweep.run_for))
+    monkeypatch.setattr(FastSweep, "run", counted(FastSweep.run))
     return ran

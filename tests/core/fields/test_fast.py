@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
-from geodesic_core.fields import fast_sweep
+from geodesic_core.fields import fast_sweep, sweep
 from tests.conftest import WITHOUT_JIT
 from tests.support import expected, zoo
 from tests.support.approximation import MERGING, some_sources
@@ -188,8 +188,8 @@ def test_the_same_to_the_bit_whatever_the_slices_and_the_room(effort, monkeypatc
     new_wavefront = fast_sweep.new_wavefront
     monkeypatch.setattr(fast_sweep, "new_wavefront", crowded)
     monkeypatch.setattr(fast_sweep, "_FIRST_BUDGET", 1)
-    monkeypatch.setattr(fast_sweep, "_SMALLEST_BUDGET", 1)
-    monkeypatch.setattr(fast_sweep, "SLICE_SECONDS", 0.0)
+    monkeypatch.setattr(sweep, "_SMALLEST_BUDGET", 1)
+    monkeypatch.setattr(sweep, "SLICE_SECONDS", 0.0)
     sliced = gc.fast_distance(mesh, 3, effort)
     assert sliced.stats.windows_created == whole.stats.windows_created
     for name, array in whole.arrays().items():

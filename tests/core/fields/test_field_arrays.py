@@ -88,7 +88,7 @@ def test_it_needs_no_sweep_for_what_the_first_one_knew(monkeypatch: pytest.Monke
     def never(*_: Any, **__: Any) -> Any:
         raise AssertionError("a sweep")
 
-    monkeypatch.setattr("geodesic_core.fields.repeatable_sweep.sweep_nodes", never)
+    monkeypatch.setattr("geodesic_core.fields.sweeps.sweep_nodes", never)
     for arrays in kept:
         field = gc.DistanceField.from_arrays(MESH, arrays)
         field.distance_at(POINTS[1])

@@ -81,8 +81,9 @@ def test_a_lost_line_is_an_internal_error():
     mesh = gc.TriangleMesh(case.vertices, case.faces)
     field = gc.exact_distance(mesh, 0)
     _, wave, v = broken("jittered_grid")
+    vertices = field._points.winners.get(Control()).vertices
     for name in ("winner", "winner_ints", "distance"):
-        getattr(field._winners.get(Control()).vertices, name)[:] = getattr(wave.vertices, name)
+        getattr(vertices, name)[:] = getattr(wave.vertices, name)
     with pytest.raises(gc.errors.InternalError, match="left the surface"):
         field.path_to(int(mesh.topology.outer_vertex[v]))
 

@@ -1,30 +1,24 @@
-"""Repeatable sweeps: from some sources over all of a mesh, run again for what was not retained."""
+"""Results of a sweep over all of a mesh: distances, data of paths, windows, and statistics."""
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Generic, NamedTuple, Self, TypeVar
+from typing import Any, Literal, NamedTuple, Self
 
-import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Flags, Floats, Ints
-from geodesic_core.control import Control
-from geodesic_core.fields.sources import Nodes, nodes_of
-from geodesic_core.fields.sweep import share_of_vertices, sweep_nodes, winners_of
+from geodesic_core.arrays import Floats, Ints
+from geodesic_core.fields.sweep import winners_of
 from geodesic_core.kernels.front import state
-from geodesic_core.kernels.front.bounds import Bounds, with_parallel_windows
 from geodesic_core.kernels.front.counters import CREATED, PEAK, PROPAGATED
 from geodesic_core.kernels.front.relaxation import nearest_sources
 from geodesic_core.kernels.front.state import FOUND, Merges, Sites, Wavefront, found
 from geodesic_core.kernels.isolines import face_windows
 from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import NO_END, Winners
-from geodesic_core.mesh.curve import Polyline
-from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
-T = TypeVar("T")
+Retain = Literal["distances", "paths", "windows"]
+"""Contents of a field in memory: each word includes the ones before it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,6 +106,17 @@ class SweepResult(NamedTuple):
     """Windows of all faces"""
 
     @classmethod
+    def of(cls, wave: Wavefront, retain: Retain) -> "SweepResult":
+        """Return the result of a sweep that has finished, in memory of its own."""
+        winners = all_winners(wave)
+        return cls(
+            wave.vertices.distance,
+            winners.nearest,
+            winners if retain != "distances" else None,
+            face_windows.face_windows_of(wave) if retain == "windows" else None,
+        )
+
+    @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray[Any]], sites: Sites) -> "SweepResult":
         """Return the result that these `arrays` hold, of a sweep with these sites."""
         winners = windows = None
@@ -127,92 +132,6 @@ class SweepResult(NamedTuple):
         arrays: dict[str, NDArray[Any]] = {"distance": self.distance, "nearest": self.nearest}
         arrays |= {} if self.winners is None else arrays_of(self.winners)
         return arrays | ({} if self.windows is None else self.windows._asdict())
-
-
-@dataclass(frozen=True)
-class RepeatableSweep:
-    """A sweep that can be run any number of times, with the same result to the bit."""
-
-    mesh: TriangleMesh
-    nodes: Nodes
-    start_distances: Floats
-    bounds: Bounds
-
-    @classmethod
-    def between(
-        cls,
-        mesh: TriangleMesh,
-        sources: Sequence[Polyline],
-        start_distances: Floats,
-        targets: Sequence[SurfacePoint],
-        bounds: Bounds,
-        control: Control,
-    ) -> "RepeatableSweep":
-        """Return the sweep from canonical points and curves that also reaches some targets.
-
-        Raises
-        ------
-        Cancelled, DeadlineExceeded
-            As the control says.
-        """
-        nodes = nodes_of(mesh, sources, targets, control)
-        if nodes.segments:
-            bounds = with_parallel_windows(bounds, nodes.first_segment)
-        return cls(mesh, nodes, start_distances, bounds)
-
-    @property
-    def all_faces(self) -> Flags:
-        """Flags (F,), by inner face, that are all set."""
-        return np.ones(len(self.mesh.topology.links) // 3, np.bool_)
-
-    def run(
-        self, control: Control, *, paths: bool = False, windows: Flags | None = None
-    ) -> Wavefront:
-        """Return the state after the sweep, with the data of paths and the windows of some faces.
-
-        Raises
-        ------
-        Cancelled, DeadlineExceeded, MemoryLimitExceeded
-            As in `run_sweep`; the memory of `face_windows_of` counts as well.
-        """
-        mesh, limit, merges = self.mesh, self.bounds.max_distance, bool(self.bounds.merging)
-        wave = state.new_wavefront(
-            mesh.topology, self.nodes.sites, merges=merges, paths=merges and paths, windows=windows
-        )
-        control.check_memory(state.bytes_of(wave))
-        reachable = int(np.isin(mesh.components, self.nodes.components).sum())
-        share = share_of_vertices(reachable, limit)
-        wave = sweep_nodes(
-            mesh, wave, self.nodes, self.start_distances, self.bounds, control, share
-        )
-        control.check_memory(peak_bytes(wave))
-        wave.vertices.distance[wave.vertices.distance > limit] = math.inf
-        if control.progress is not None:
-            control.progress(1.0)
-        return wave
-
-    def result_of(self, wave: Wavefront, *, paths: bool, windows: bool) -> SweepResult:
-        """Return the result of a `run`, in memory of its own."""
-        winners = all_winners(wave)
-        return SweepResult(
-            wave.vertices.distance,
-            winners.nearest,
-            winners if paths else None,
-            face_windows.face_windows_of(wave) if windows else None,
-        )
-
-    def find_winners(self, control: Control) -> Winners:
-        """Run the sweep for the data of paths."""
-        return all_winners(self.run(control, paths=True))
-
-    def find_windows(self, faces: Flags, control: Control) -> FaceWindows:
-        """Run the sweep for the windows of some inner faces, flags (F,)."""
-        return face_windows.face_windows_of(self.run(control, windows=faces))
-
-    def find_winners_and_windows(self, control: Control) -> tuple[Winners, FaceWindows]:
-        """Run the sweep for the data of paths and for all windows."""
-        wave = self.run(control, paths=True, windows=self.all_faces)
-        return all_winners(wave), face_windows.face_windows_of(wave)
 
 
 def all_winners(wave: Wavefront) -> Winners:
@@ -241,28 +160,3 @@ def stats_of(mesh: TriangleMesh, wave: Wavefront, seconds: float) -> SweepStats:
     """Return the statistics of a sweep that has finished."""
     created, kept, peak = (int(wave.counters[i]) for i in (CREATED, PROPAGATED, PEAK))
     return SweepStats.of(mesh, created, kept, peak, peak_bytes(wave), seconds)
-
-
-class Lazy(Generic[T]):
-    """A value that is there already, or is found by the first call that is not stopped."""
-
-    def __init__(self, find: Callable[[Control], T], value: T | None = None) -> None:
-        self._find = find
-        self._value = value
-
-    @property
-    def value(self) -> T | None:
-        """The value; None until it is found."""
-        return self._value
-
-    def get(self, control: Control) -> T:
-        """Return the value, found under ``control`` if it is not there.
-
-        Raises
-        ------
-        GeodesicError
-            As finding it does; the next call tries again.
-        """
-        if self._value is None:
-            self._value = self._find(control)
-        return self._value
