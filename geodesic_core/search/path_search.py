@@ -252,10 +252,10 @@ class PathSearch:
     def _run(
         self, wave: Wavefront, nodes: Nodes, bounds: Bounds, control: Control, share: float
     ) -> Wavefront:
-        before, size = wave.pool, state.bytes_of(wave)
+        before, size = wave, state.bytes_of(wave)
         control = control.holding(self.nbytes - size)
         wave = sweep_nodes(self.mesh, wave, nodes, np.zeros(1), bounds, control, lambda _: share)
-        if wave.pool is not before:  # it has grown
+        if wave is not before:  # it has grown
             self._state_bytes += state.bytes_of(wave) - size
         return wave
 

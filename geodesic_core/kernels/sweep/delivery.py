@@ -7,7 +7,7 @@ from geodesic_core.kernels.front.sites import Delivery
 from geodesic_core.kernels.front.state import View, merging, source_weight
 from geodesic_core.kernels.front.window import Window, load_window, referring_to, reversed_window
 from geodesic_core.kernels.front.window_lists import insert_sorted, queue_if_due
-from geodesic_core.kernels.jit import kernel
+from geodesic_core.kernels.jit import inlined, kernel
 from geodesic_core.kernels.mesh.half_edges import (
     AROUND,
     HEAD,
@@ -48,7 +48,7 @@ def reach_straight(
     relax_node(wave, node, distance, via, sx, sy, root, -1 - root)
 
 
-@kernel
+@inlined
 def send_out(wave: View, out: int, g: int, window: Window) -> None:
     """Send a window that leaves a face by its half-edge g to ``out``, across that edge.
 

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import geodesic_core as gc
+from geodesic_core.control import Control
 from geodesic_core.errors import MemoryLimitExceeded, NoPath
+from geodesic_core.fields.point_query import with_target
 from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_points import SAME, random_points
 from tests.support import zoo
@@ -121,3 +123,16 @@ def test_points_of_an_approximate_field_mean_the_same_whether_it_kept_windows_or
         if target.vertex_index is None:
             expected = exact.distance_at(target)
             assert field.distance_at(target) == pytest.approx(expected, rel=SAME)
+
+
+@pytest.mark.jit
+def test_a_point_is_added_without_a_copy():
+    field = kept_field(gc.samples.plane(8), 0)
+    location = gc.SurfacePoint.face(3, (0.2, 0.3, 0.5))
+    winners, windows = field._winners_and_windows.get(Control())
+    arrival = field._arrival_at(location, winners, windows)
+    added, nodes, node = with_target(field.mesh, winners, field._sweep.nodes, location, arrival)
+    assert added.vertices is winners.vertices
+    assert added.sites is winners.sites
+    assert nodes.site(node) == location
+    assert added.reached(node) == (field.distance_at(location), 0)

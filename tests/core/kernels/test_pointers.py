@@ -6,8 +6,13 @@ import numba
 import numpy as np
 import pytest
 
-from geodesic_core.kernels.jit import borrowed, pointer
-from geodesic_core.kernels.jit.pointers import _interpreted_borrowed, _interpreted_pointer
+from geodesic_core.arrays import ABSENT
+from geodesic_core.kernels.jit import borrowed, pointer, rows_of
+from geodesic_core.kernels.jit.pointers import (
+    _interpreted_borrowed,
+    _interpreted_pointer,
+    _type_of_pointers,
+)
 
 
 class Pair(NamedTuple):
@@ -40,6 +45,24 @@ def test_a_pointer_writes_through():
     assert array[1, 2] == 42.0
     _interpreted_pointer(array)[0] = 7.0
     assert array[0, 0] == 7.0
+
+
+def test_rows_are_counted_but_of_what_is_absent():
+    @numba.njit
+    def rows_in(pair):
+        return rows_of(pair.rows)
+
+    for pair, rows in ((Pair(np.ones((3, 2)), 1.0), 3), (Pair(ABSENT, 1.0), ABSENT)):
+        assert rows_in(pair) == rows_of(pair.rows) == rows
+
+
+def test_groups_of_pointers_have_short_names_of_their_own():
+    """By which the compiler tells the versions of a kernel apart."""
+    arrays = np.ones((3, 2)), np.ones(3, np.int32), ABSENT
+    groups = [Group(Pair(rows, 1.0), ids) for rows in arrays for ids in arrays]
+    names = {str(_type_of_pointers(numba.typeof(group))) for group in groups}
+    assert len(names) == len(groups)
+    assert max(map(len, names)) < 30
 
 
 def scale_a_row(group):
