@@ -37,8 +37,8 @@ from geodesic_core.fields.point_query import (
 )
 from geodesic_core.fields.repeatable_sweep import Lazy, RepeatableSweep, SweepResult, SweepStats
 from geodesic_core.fields.sources import Nodes, component_of, disconnected
-from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.kernels.retained.face_windows import FaceWindows
 from geodesic_core.kernels.sweep.bounds import exact_bounds, merging_bounds, with_parallel_windows
 from geodesic_core.mesh.curve import (
     Polyline,
@@ -47,7 +47,7 @@ from geodesic_core.mesh.curve import (
 )
 from geodesic_core.mesh.surface_point import Curve, Point, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import LEVEL
+from geodesic_core.tolerances import CUT_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -681,7 +681,7 @@ class DistanceField:
         self, levels: Sequence[float], chord_error: float, control: Control
     ) -> Iterator[list[Isoline]]:
         # At its very limit the sweep is cut off by rounding: a line stays clear of that.
-        highest = self.max_distance * (1.0 - 3.0 * LEVEL)
+        highest = self.max_distance * (1.0 - CUT_OFF)
         within = [min(level, highest) for level in levels if level <= self.max_distance]
         if not within:
             yield from ([] for _ in levels)

@@ -18,8 +18,8 @@ from geodesic_core.control import Control
 from geodesic_core.fields.path import EXACT, GeodesicPath, reversed_path, traced_path
 from geodesic_core.fields.sources import Nodes, corners_of, nodes_of
 from geodesic_core.fields.sweep import sweep_nodes, winners_of
-from geodesic_core.kernels.isolines.face_windows import FaceWindows, Reach, reach_point
 from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.kernels.retained.face_windows import FaceWindows, Reach, reach_point
 from geodesic_core.kernels.sweep import state
 from geodesic_core.kernels.sweep.bounds import Bounds, exact_bounds, pruning_toward
 from geodesic_core.kernels.sweep.state import SITE

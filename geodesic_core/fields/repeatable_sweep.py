@@ -12,9 +12,9 @@ from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.fields.sources import Nodes, nodes_of
 from geodesic_core.fields.sweep import share_of_vertices, sweep_nodes, winners_of
-from geodesic_core.kernels.isolines import face_windows
-from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.kernels.retained import face_windows
+from geodesic_core.kernels.retained.face_windows import FaceWindows
 from geodesic_core.kernels.sweep import continuous_dijkstra, state
 from geodesic_core.kernels.sweep.bounds import Bounds, with_parallel_windows
 from geodesic_core.kernels.sweep.state import Wavefront
