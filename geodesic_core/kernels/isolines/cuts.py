@@ -1,4 +1,4 @@
-"""Where a level passes: its arcs in faces, the stretches of edges within it, and its crossings.
+"""Cuts of a level: its arcs in faces, the stretches of edges within it, and its crossings.
 
 Arcs are cut out in every face that the level may pass (`arcs`). Each face also has the stretches of
 its edges that it holds to be within the level. The stretches of all faces of an edge, united, give

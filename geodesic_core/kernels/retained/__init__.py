@@ -1,1 +1,1 @@
-"""What a sweep retained: its windows by face, and the regions of a face that they reach."""
+"""Retained windows of a sweep, by face, and the regions of a face that they reach."""
