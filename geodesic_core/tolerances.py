@@ -286,6 +286,20 @@ CROSSING = 1e-11
 PIECE = 1e-9
 """Share of a level below which a piece of its isoline is left out: rounding, at ends of arcs."""
 
+CUT_OFF = 3e-12
+"""Share of ``max_distance`` that isolines and borders stay below it: rounding.
+
+At its very limit a sweep is cut off by rounding. Three times `LEVEL`, so that a line with its
+tolerance is still within the limit.
+"""
+
+PARALLEL = 1e-6
+"""Sine of an angle below which the rays of two windows count as parallel.
+
+Where such rays meet is not sure enough. So a cheap test, whether one of the windows is nearer
+everywhere, is given up; this costs time only.
+"""
+
 FINEST_CHORD = 1e-9
 """Share of the bounding box's diagonal that a chord error must have at least.
 

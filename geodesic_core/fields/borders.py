@@ -8,30 +8,31 @@ from typing import Any
 
 import numpy as np
 
-from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.control import Control, in_slices
 from geodesic_core.fields.isolines import (
     Arrays,
     bytes_of,
-    field_of_windows,
     joined,
+    retained_sweep,
     starts_of,
 )
 from geodesic_core.fields.path import length_of
 from geodesic_core.fields.sources import Nodes
 from geodesic_core.fields.sweep_result import all_winners
 from geodesic_core.fields.sweeps import ExactSweep
-from geodesic_core.kernels.borders import lines, outlines, territories
-from geodesic_core.kernels.borders.outlines import Pieces
-from geodesic_core.kernels.borders.territories import Territories
+from geodesic_core.kernels.borders.border_chains import trace_borders
+from geodesic_core.kernels.borders.border_lines import link_borders
+from geodesic_core.kernels.borders.outlines import cross_edges
+from geodesic_core.kernels.borders.territories import Territories, divide_faces, mixed_faces
+from geodesic_core.kernels.curves.chains import Chains, Lines
+from geodesic_core.kernels.curves.thinning import thin_lines
 from geodesic_core.kernels.front.state import FACE
-from geodesic_core.kernels.isolines.face_windows import FaceWindows, face_windows_of
-from geodesic_core.kernels.isolines.lines import Field
-from geodesic_core.kernels.isolines.thinning import thin_lines
 from geodesic_core.kernels.mesh.half_edges import TAIL
 from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.tolerances import LEVEL, PIECE
+from geodesic_core.tolerances import CUT_OFF, PIECE
 
 RINGS = 2
 """Rings of faces around those with vertices of several territories that borders are looked for in
@@ -139,19 +140,19 @@ class _Drawing:
         """Faces that borders may pass; `borders` sets those that they pass, too"""
         question, distances = sweep.question, winners.vertices.distance
         self._mesh, self._nearest, self._chord_error = question.mesh, winners.nearest, chord_error
-        self._field: Field = field_of_windows(windows, distances, question.nodes)
+        self._swept = retained_sweep(windows, distances, question.nodes)
         # At its very limit the sweep is cut off by rounding: lines stay clear of that.
-        self._limit = question.max_distance * (1.0 - 3.0 * LEVEL)
+        self._limit = question.max_distance * (1.0 - CUT_OFF)
         self._nbytes = bytes_of([(*windows, distances, winners.nearest)])
 
     def borders(self, control: Control) -> list[Border] | None:
         """Return the borders; None where they leave the faces whose windows are there."""
         control.check_memory(self._nbytes)
-        topology, field = self._mesh.topology, self._field
+        topology, swept = self._mesh.topology, self._swept
         mixed: Any = np.zeros(len(self.faces), np.bool_)
 
         def mix(first: int, last: int) -> int:
-            territories.mixed_faces(topology, field, self._nearest, self._limit, first, last, mixed)
+            mixed_faces(topology, swept, self._nearest, self._limit, first, last, mixed)
             return len(mixed)
 
         in_slices(len(mixed), mix, control.for_part(0, 4))
@@ -163,27 +164,27 @@ class _Drawing:
         divided = self._divided(candidates, rank, control.for_part(1, 4, 2))
         if divided is None:
             return None
-        labelled = outlines.cross_edges(topology, divided, rank)
+        labelled = cross_edges(topology, divided, rank)
         parts: list[Arrays] = []
         next_node = len(labelled.sources)
-        near = PIECE * float(field.distance.max(where=np.isfinite(field.distance), initial=0.0))
+        near = PIECE * float(swept.distance.max(where=np.isfinite(swept.distance), initial=0.0))
 
         def trace(first: int, last: int) -> int:
             nonlocal next_node
-            found = outlines.trace_borders(
+            found = trace_borders(
                 topology, divided, labelled, near, 0.5 * self._chord_error, first, last, next_node
             )
-            parts.append(found[:-1])
-            next_node = found[-1]
+            parts.append((found.points, *found.chains, found.sources))
+            next_node = found.next_node
             control.check_memory(bytes_of(parts))
             return len(divided.faces)
 
         in_slices(len(divided.faces), trace, control.for_part(3, 4))
-        points, points_of, nodes, faces, sources = joined(parts)
-        pieces = Pieces(points, starts_of(points_of), nodes, faces, sources)
-        linked = lines.link_pieces(topology.links, labelled, pieces, next_node, near)
-        thin_lines(*linked[:4], 0.5 * self._chord_error)
-        return self._lines(*linked)
+        points, sizes, nodes, faces, sources = joined(parts)
+        chains = Chains(points, starts_of(sizes), nodes, faces)
+        lines, of_lines = link_borders(topology.links, labelled, chains, sources, next_node, near)
+        thin_lines(lines.points, lines.faces, lines.first, lines.closed, 0.5 * self._chord_error)
+        return self._borders(lines, of_lines)
 
     def _divided(self, candidates: Ints, rank: Ints, control: Control) -> Territories | None:
         """Divide the candidates, and the neighbours that borders lead to; None as for `borders`.
@@ -191,14 +192,14 @@ class _Drawing:
         ``rank`` (F,) is -1 all over; the call sets it to the row of each face among those divided.
         """
         rank[candidates] = np.arange(len(candidates))
-        faces = candidates[:, None]
+        faces = candidates
         retained, parts = self.faces.copy(), list[Arrays]()
 
         def divide(first: int, last: int) -> int:
             nonlocal faces
-            found = territories.divide_faces(
+            found = divide_faces(
                 self._mesh.topology,
-                self._field,
+                self._swept,
                 self._nearest,
                 self._limit,
                 faces[first:last],
@@ -211,24 +212,21 @@ class _Drawing:
             return len(faces)
 
         in_slices(len(faces), divide, control)
-        self.faces[faces[:, 0]] = True
-        if not retained[faces[:, 0]].all():
+        self.faces[faces] = True
+        if not retained[faces].all():
             return None
         runs, runs_of, curves, curves_of = joined(parts)
         return Territories(faces, runs, starts_of(runs_of), curves, starts_of(curves_of))
 
-    def _lines(
-        self, points: Floats, faces: Ints, first: Longs, closed: Flags, sources: Ints
-    ) -> list[Border]:
-        bounds = zip(
-            first[:-1].tolist(), first[1:].tolist(), closed.tolist(), sources.tolist(), strict=True
-        )
+    def _borders(self, lines: Lines, sources: Ints) -> list[Border]:
+        first = lines.first.tolist()
+        bounds = zip(first[:-1], first[1:], lines.closed.tolist(), sources.tolist(), strict=True)
         return [
             Border(
                 sources=(lower, higher),
-                points=points[lo:hi] + self._mesh.origin,
+                points=lines.points[lo:hi] + self._mesh.origin,
                 closed=bool(is_closed),
-                faces=self._mesh.topology.outer_face[faces[lo : hi if is_closed else hi - 1]],
+                faces=self._mesh.topology.outer_face[lines.faces[lo : hi if is_closed else hi - 1]],
             )
             for lo, hi, is_closed, (lower, higher) in bounds
         ]

@@ -38,11 +38,11 @@ from geodesic_core.fields.sweep_result import (
     stats_of,
 )
 from geodesic_core.fields.sweeps import ExactSweep, MergingSweep, Sweep
-from geodesic_core.kernels.isolines.face_windows import FaceWindows
+from geodesic_core.kernels.retained.face_windows import FaceWindows
 from geodesic_core.mesh.surface_point import Point, Source, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.reprs import as_table
-from geodesic_core.tolerances import LEVEL
+from geodesic_core.tolerances import CUT_OFF
 from geodesic_core.validation import check_choice
 
 
@@ -584,7 +584,7 @@ class DistanceField:
         self, levels: Sequence[float], chord_error: float, control: Control
     ) -> Iterator[list[Isoline]]:
         # At its very limit the sweep is cut off by rounding: a line stays clear of that.
-        highest = self.max_distance * (1.0 - 3.0 * LEVEL)
+        highest = self.max_distance * (1.0 - CUT_OFF)
         within = [min(level, highest) for level in levels if level <= self.max_distance]
         if not within:
             yield from ([] for _ in levels)

@@ -8,17 +8,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Flags, Floats, Ints, Longs
+from geodesic_core.arrays import Flags, Floats, Ints
 from geodesic_core.control import Control, in_slices
 from geodesic_core.errors import InvalidArgument
 from geodesic_core.fields.path import length_of
 from geodesic_core.fields.sources import Nodes
+from geodesic_core.kernels.curves.chains import Chains, Lines, link_crossing_chains
+from geodesic_core.kernels.curves.thinning import thin_lines
 from geodesic_core.kernels.front.state import FACE, NODE
-from geodesic_core.kernels.isolines import lines as kernels
-from geodesic_core.kernels.isolines.face_windows import FaceWindows
-from geodesic_core.kernels.isolines.lines import Chains, Cuts, Field
-from geodesic_core.kernels.isolines.thinning import thin_lines
+from geodesic_core.kernels.isolines.arc_chains import chain_arcs
+from geodesic_core.kernels.isolines.cuts import Cuts, bound_faces, cross_edges, cut_faces
 from geodesic_core.kernels.mesh.half_edges import LENGTH, LENGTH_LEFT, TAIL
+from geodesic_core.kernels.retained.face_windows import FaceWindows, RetainedSweep
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.tolerances import FINEST_CHORD, LEVEL, PIECE
 from geodesic_core.validation import is_index, is_number
@@ -171,12 +172,12 @@ def crossed_faces(
     return crossed
 
 
-def field_of_windows(windows: FaceWindows, distances: Floats, nodes: Nodes) -> Field:
+def retained_sweep(windows: FaceWindows, distances: Floats, nodes: Nodes) -> RetainedSweep:
     """Return what distances in faces follow from: a sweep's windows, and its distances by node."""
     sites = nodes.sites
     site_rows = np.argsort(sites.ints[: nodes.first_target, FACE], kind="stable")
     piece_rows = np.argsort(sites.segment_ints[:, FACE], kind="stable")
-    return Field(
+    return RetainedSweep(
         face_windows=windows,
         distance=distances,
         site_ints=sites.ints[site_rows],
@@ -202,19 +203,19 @@ class Drawing:
 
         ``distances`` are by node. Raises as `lines` does.
         """
-        field = field_of_windows(windows, distances, nodes)
+        swept = retained_sweep(windows, distances, nodes)
         count = len(mesh.topology.links) // 3
         least, most = np.full(count, np.inf), np.full(count, np.inf)
-        self._mesh, self._field, self._least, self._most = mesh, field, least, most
+        self._mesh, self._swept, self._least, self._most = mesh, swept, least, most
         self._nbytes = sum(array.nbytes for array in (*windows, least, most))
         control.check_memory(self._nbytes)
 
         def bound(first: int, last: int) -> int:
-            kernels.bound_faces(mesh.topology, field, first, last, least, most)
+            bound_faces(mesh.topology, swept, first, last, least, most)
             return count
 
         in_slices(count, bound, control)
-        for inside in (field.site_ints, field.segment_ints):
+        for inside in (swept.site_ints, swept.segment_ints):
             np.minimum.at(least, inside[:, FACE], distances[inside[:, NODE]])
 
     def lines(self, level: float, chord_error: float, control: Control) -> list[Isoline]:
@@ -225,7 +226,7 @@ class Drawing:
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As the control says; what the lines are drawn from counts as memory of the call.
         """
-        topology, distances = self._mesh.topology, self._field.distance
+        topology, distances = self._mesh.topology, self._swept.distance
         slack = LEVEL * level
         passed = np.flatnonzero((self._least <= level + slack) & (self._most >= level - slack))
         if len(passed) == 0:
@@ -233,26 +234,25 @@ class Drawing:
         rank = np.full(len(self._least), -1, np.int32)
         control = control.holding(self._nbytes + rank.nbytes)
         cuts = self._cut(passed.astype(np.int32), level, rank, control.for_part(0, 2))
-        crossings = kernels.cross_edges(topology, distances, cuts, level, rank)
+        crossings = cross_edges(topology, distances, cuts, level, rank)
         held = sum(array.nbytes for array in (*cuts, *crossings))
         control = control.holding(held).for_part(1, 2)
         parts: list[Arrays] = []
 
         def chain(first: int, last: int) -> int:
-            parts.append(
-                kernels.chain_arcs(
-                    topology, distances, cuts, crossings, level, 0.5 * chord_error, first, last
-                )
+            points, chains = chain_arcs(
+                topology, distances, cuts, crossings, level, 0.5 * chord_error, first, last
             )
+            parts.append((points, *chains))
             control.check_memory(bytes_of(parts))
             return len(cuts.faces)
 
         in_slices(len(cuts.faces), chain, control)
-        points, points_of, ends, faces = joined(parts)
-        chains = Chains(points, starts_of(points_of), ends, faces)
-        linked = kernels.link_chains(topology.links, crossings, chains, PIECE * level)
-        thin_lines(*linked, 0.5 * chord_error)
-        return _lines(self._mesh, *linked)
+        points, sizes, nodes, faces = joined(parts)
+        chains = Chains(points, starts_of(sizes), nodes, faces)
+        lines = link_crossing_chains(topology.links, crossings.half_edges, chains, PIECE * level)
+        thin_lines(lines.points, lines.faces, lines.first, lines.closed, 0.5 * chord_error)
+        return _isolines(self._mesh, lines)
 
     def _cut(self, passed: Ints, level: float, rank: Ints, control: Control) -> Cuts:
         """Cut the faces that a level may pass: by their bounds, then neighbours that cuts lead to.
@@ -260,13 +260,13 @@ class Drawing:
         ``rank`` (F,) is -1 all over; the call sets it to the row of each face among those cut.
         """
         rank[passed] = np.arange(len(passed))
-        faces = passed[:, None]
+        faces = passed
         parts: list[Arrays] = []
 
         def cut(first: int, last: int) -> int:
             nonlocal faces
-            spans, spans_of, arcs, arcs_of, more = kernels.cut_faces(
-                self._mesh.topology, self._field, faces[first:last], len(faces), level, rank
+            spans, spans_of, arcs, arcs_of, more = cut_faces(
+                self._mesh.topology, self._swept, faces[first:last], len(faces), level, rank
             )
             parts.append((spans, spans_of, arcs, arcs_of))
             faces = np.concatenate([faces, more])
@@ -292,21 +292,20 @@ def joined(parts: Sequence[Arrays]) -> list[NDArray[Any]]:
 
 
 def starts_of(counts: NDArray[Any]) -> NDArray[Any]:
-    """Return where each of some runs begins, and the last one ends, from their lengths (n, 1)."""
-    starts = np.zeros((len(counts) + 1, 1), counts.dtype)
-    np.cumsum(counts, axis=0, out=starts[1:])
+    """Return where each of some runs begins, and the last one ends, from their lengths (n,)."""
+    starts = np.zeros(len(counts) + 1, counts.dtype)
+    np.cumsum(counts, out=starts[1:])
     return starts
 
 
-def _lines(
-    mesh: TriangleMesh, points: Floats, faces: Ints, first: Longs, closed: Flags
-) -> list[Isoline]:
-    bounds = zip(first[:-1].tolist(), first[1:].tolist(), closed.tolist(), strict=True)
+def _isolines(mesh: TriangleMesh, lines: Lines) -> list[Isoline]:
+    first = lines.first.tolist()
+    bounds = zip(first[:-1], first[1:], lines.closed.tolist(), strict=True)
     return [
         Isoline(
-            points=points[lo:hi] + mesh.origin,
+            points=lines.points[lo:hi] + mesh.origin,
             closed=bool(is_closed),
-            faces=mesh.topology.outer_face[faces[lo : hi if is_closed else hi - 1]],
+            faces=mesh.topology.outer_face[lines.faces[lo : hi if is_closed else hi - 1]],
         )
         for lo, hi, is_closed in bounds
     ]

@@ -30,9 +30,9 @@ from geodesic_core.fields.sweep_result import SweepResult, all_winners
 from geodesic_core.fields.sweeps import ExactSweep, Sweep
 from geodesic_core.kernels.front import state
 from geodesic_core.kernels.front.bounds import exact_bounds, pruning_toward
-from geodesic_core.kernels.isolines.face_windows import FaceWindows, Reach, reach_point
 from geodesic_core.kernels.mesh.half_edges import point_in_frame
 from geodesic_core.kernels.paths.backtracing import End, Winners
+from geodesic_core.kernels.retained.face_windows import FaceWindows, Reach, reach_point
 from geodesic_core.mesh.curve import weights_by_face
 from geodesic_core.mesh.surface_point import SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh

@@ -12,9 +12,9 @@ from geodesic_core.kernels.front import state
 from geodesic_core.kernels.front.counters import CREATED, PEAK, PROPAGATED
 from geodesic_core.kernels.front.relaxation import nearest_sources
 from geodesic_core.kernels.front.state import FOUND, Merges, Sites, Wavefront, found
-from geodesic_core.kernels.isolines import face_windows
-from geodesic_core.kernels.isolines.face_windows import FaceWindows
 from geodesic_core.kernels.paths.backtracing import NO_END, Winners
+from geodesic_core.kernels.retained import face_windows
+from geodesic_core.kernels.retained.face_windows import FaceWindows
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 
 Retain = Literal["distances", "paths", "windows"]

@@ -24,8 +24,8 @@ from geodesic_core.kernels.front.bounds import (
     with_parallel_windows,
 )
 from geodesic_core.kernels.front.state import Wavefront
-from geodesic_core.kernels.isolines.face_windows import FaceWindows, face_windows_of
 from geodesic_core.kernels.paths.backtracing import Winners
+from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
 from geodesic_core.tolerances import WIDEST_ERROR
 
 

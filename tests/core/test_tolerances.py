@@ -15,6 +15,13 @@ from geodesic_core.control import Control
 from geodesic_core.fields import fast_sweep
 from geodesic_core.fields.sources import nodes_of
 from geodesic_core.fields.sweep import run_sweep
+from geodesic_core.kernels.borders.bisectors import is_one_sided
+from geodesic_core.kernels.curves.regions import (
+    RADIUS,
+    put_disc,
+    put_side,
+    span_on_line,
+)
 from geodesic_core.kernels.fast import state as fast_state
 from geodesic_core.kernels.fast.buckets import push
 from geodesic_core.kernels.fast.places import offer
@@ -37,15 +44,7 @@ from geodesic_core.kernels.front.state import (
 )
 from geodesic_core.kernels.front.window import B0, B1, BUCKET, NEXT, ROOT, SIGMA, SX, SY
 from geodesic_core.kernels.isolines.arcs import outer_arcs
-from geodesic_core.kernels.isolines.lines import united
-from geodesic_core.kernels.isolines.regions import (
-    CX,
-    CY,
-    RADIUS,
-    REGION,
-    put_segment_bands,
-    span_on_line,
-)
+from geodesic_core.kernels.isolines.cuts import united
 from geodesic_core.kernels.jit import kernel
 from geodesic_core.kernels.mesh.half_edges import (
     APEX,
@@ -64,6 +63,7 @@ from geodesic_core.kernels.paths import funnel
 from geodesic_core.kernels.paths.backtracing import NO_END, Line, Winners, is_on_path
 from geodesic_core.kernels.paths.funnel import LEFT, NEITHER, RIGHT, pull_taut, shortened_part
 from geodesic_core.kernels.planar import Source, bisector, bracketed, distance
+from geodesic_core.kernels.retained.reached import REGION, put_origin, put_segment_bands
 from geodesic_core.kernels.sweep import continuous_dijkstra
 from geodesic_core.kernels.sweep.merging import accuracy, directionality, merged
 from geodesic_core.kernels.sweep.reach import reach_apex
@@ -1051,8 +1051,8 @@ def test_level_is_how_near_two_circles_count_as_one(scale, share):
     """Of circles that are one the first counts; of others, around one point, the larger."""
     mesh = gc.TriangleMesh(scale * zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
     discs, level = np.zeros((2, REGION)), 0.1 * scale
-    discs[:, [CX, CY]] = 0.3 * scale, 0.01 * scale
-    discs[:, RADIUS] = level, level * (1.0 + share * tolerances.LEVEL)
+    for disc, radius in zip(discs, (level, level * (1.0 + share * tolerances.LEVEL)), strict=True):
+        put_disc(disc, 0.3 * scale, 0.01 * scale, radius)
     arcs = outer_arcs(mesh.topology, 0, discs, level, 0.0)
     assert set(arcs[:, RADIUS]) == {discs[1 if share > 1.0 else 0, RADIUS]}
 
@@ -1069,6 +1069,34 @@ def test_piece_is_the_length_of_what_is_left_out(radius, lines):
     source = gc.Source(gc.SurfacePoint.face(0, (0.3, 0.3, 0.4)), 1.0)
     field = gc.exact_distance(mesh, source)
     assert len(field.isolines([1.0 + radius * tolerances.PIECE])[0]) == lines
+
+
+def test_cut_off_is_how_far_lines_stay_below_the_limit():
+    """On a square, from both of its lower corners."""
+    limit, mesh = 0.8, gc.samples.plane(200)
+    left, right = mesh.vertices[[0, 10]]
+    field = gc.exact_distance(mesh, [0, 10], max_distance=limit)
+    (line,), (border,) = field.isolines([limit])[0], field.borders()
+    for points in (line.points, border.points[np.argmax(border.points[:, 1])][None]):
+        ways = np.minimum(*(np.linalg.norm(points - corner, axis=1) for corner in (left, right)))
+        np.testing.assert_allclose(1.0 - ways / limit, tolerances.CUT_OFF, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("share", "is_told"), [(0.99, False), (1.01, True)])
+def test_parallel_is_the_angle_of_rays_that_meet_in_no_corner(share, is_told):
+    """Of two windows whose inner rays meet at such an angle; one is nearer by far."""
+    mesh = gc.TriangleMesh(zoo.SMALL["cube"].vertices, zoo.SMALL["cube"].faces)
+    windows = np.zeros((2, REGION))
+    for region, x, radius, slopes in zip(
+        windows, (0.3, 0.7), (9.0, 1.0), ((0.5, 0.0), (-share * tolerances.PARALLEL, -0.5)),
+        strict=True,
+    ):  # fmt: skip
+        put_disc(region, x, -1.0, radius)
+        put_origin(region, 0, 0)
+        for end, slope in enumerate(slopes):
+            length = math.hypot(slope, 1.0)
+            put_side(region, end, -1.0 / length, slope / length, 0.0)
+    assert is_one_sided(mesh.topology.geometry, 0, *windows, 1e-12) == is_told
 
 
 @SCALES

@@ -2,7 +2,7 @@
 
 Along an edge the distance function of a region is σ + √((t - m)² + h²), or linear, within the
 interval that its sides leave. Two of them cross at most twice. The envelope is built region by
-region; of regions that are equally near, the one that came first stays.
+region. Of regions that are equally near, the one that came first stays.
 """
 
 import math
@@ -12,39 +12,15 @@ import numpy as np
 
 from geodesic_core.arrays import Floats
 from geodesic_core.kernels.borders.bisectors import Regions, distance_to, linear
-from geodesic_core.kernels.isolines.arcs import ROWS, with_room
-from geodesic_core.kernels.isolines.regions import (
-    CX,
-    CY,
-    DEPTH,
-    FRONT,
-    NX,
-    NY,
-    RADIUS,
-    SIDE,
-    end_of_sides,
-    is_line,
-    span_in_half_plane,
-)
+from geodesic_core.kernels.curves.conics import CX, CY, is_line
+from geodesic_core.kernels.curves.regions import RADIUS, span_between_sides
+from geodesic_core.kernels.curves.rows import ROWS, with_room
 from geodesic_core.kernels.jit import borrowed, inlined, kernel
 
 # Columns of a stretch of the envelope
 START = 0  # distance from the tail of the edge
 REGION = 1  # the nearest region; -1 where none reaches
 STRETCH = 2
-
-
-@kernel
-def span_of(region: Floats, edge: Any, length: float) -> tuple[float, float]:
-    """Return the interval of an edge between the sides of a region; empty where lo > hi."""
-    ox, oy, ux, uy = edge
-    wx, wy = ox - region[CX], oy - region[CY]
-    lo, hi = 0.0, length
-    for side in range(FRONT, end_of_sides(region), SIDE):
-        nx, ny = region[side + NX], region[side + NY]
-        depth = region[side + DEPTH] + nx * wx + ny * wy
-        lo, hi = span_in_half_plane(lo, hi, depth, nx * ux + ny * uy)
-    return lo, hi
 
 
 @kernel
@@ -61,9 +37,9 @@ def along_edge(region: Floats, level: float, edge: Any) -> tuple[float, float, f
 
 @kernel
 def crossings_of(region: Floats, other: Floats, level: float, edge: Any) -> tuple[float, float]:
-    """Return places along an edge; where two regions are equally near, it is at one of these.
+    """Return the places along an edge at which two regions may be equally near; NaN for none.
 
-    They solve the squared equation, NaN for none.
+    They solve the squared equation: at some of them, one distance may be minus the other.
     """
     weight, m, square, start, rate = along_edge(region, level, edge)
     weight1, m1, square1, start1, rate1 = along_edge(other, level, edge)
@@ -99,7 +75,8 @@ def envelope_along(regions: Regions, edge: Any, length: float) -> Floats:
     stretches[0, START], stretches[0, REGION] = 0.0, -1
     other = np.empty((ROWS, STRETCH))
     for c in range(len(regions.rows)):
-        lo, hi = span_of(regions.rows[c], edge, length)
+        ox, oy, ux, uy = edge
+        lo, hi = span_between_sides(regions.rows[c], ox, oy, ux, uy, 0.0, length)
         if not lo < hi:
             continue
         other = with_room(other, 4 * count + 8)
@@ -141,7 +118,7 @@ def insert_region(
             winner = c
             if i >= 0:
                 x, y = ox + t * ux, oy + t * uy
-                margin = regions.slack if labels[i, 0] != labels[c, 0] else 0.0
+                margin = regions.slack if labels[i] != labels[c] else 0.0
                 most = distance_to(rows[i], level, x, y) - margin
                 if not distance_to(rows[c], level, x, y) < most:
                     winner = i
@@ -174,9 +151,9 @@ def label_runs(stretches: Floats, labels: Any, ends: Any, length: float, gap: fl
         region = int(stretches[k, REGION])
         end = stretches[k + 1, START] if k + 1 < len(stretches) else length
         start = min(max(stretches[k, START], gap), length - gap)
-        if region < 0 or end - start <= gap or labels[region, 0] == runs[count - 1, 1]:
+        if region < 0 or end - start <= gap or labels[region] == runs[count - 1, 1]:
             continue
-        runs[count, 0], runs[count, 1] = start, labels[region, 0]
+        runs[count, 0], runs[count, 1] = start, labels[region]
         count += 1
     if runs[count - 1, 1] != ends[1]:
         runs[count, 0], runs[count, 1] = length - gap, ends[1]

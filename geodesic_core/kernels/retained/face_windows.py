@@ -33,6 +33,22 @@ class FaceWindows(NamedTuple):
     """(K, 8): rows as in the pool, NEXT the half-edge"""
 
 
+class RetainedSweep(NamedTuple):
+    """All results of a sweep from which distances in faces follow."""
+
+    face_windows: FaceWindows
+    distance: Floats
+    """(N,) by node"""
+    site_ints: Ints
+    """Those of sources only, by face"""
+    site_weights: Floats
+    segment_ints: Ints
+    """By face"""
+    segment_ends: Floats
+    first_segment: int
+    """The least node of a segment"""
+
+
 @kernel
 def sort_by_half_edge(rows: Floats, first: Longs, windows: Floats) -> None:
     """Sort ``rows`` stably by half-edge into ``windows``, and fill ``first``; O(K + F)."""
