@@ -37,7 +37,18 @@ PAGES_OF_EXAMPLES = [
         if path != HOWTO_OF_BLENDER
     ),
 ]
-ROOMS = ["", "sweep.", "paths.", "isolines.", "borders.", "mesh."]
+ROOMS = [
+    "",
+    "front.",
+    "sweep.",
+    "fast.",
+    "paths.",
+    "curves.",
+    "retained.",
+    "isolines.",
+    "borders.",
+    "mesh.",
+]
 """Of the kernels, which documents name without their package."""
 OBJECTS = ("field", "path", "solver", "mesh")
 """Whose attributes are named like functions of a module."""

@@ -1,1 +1,1 @@
-"""What all sweeps share: windows and their pool, vertices, sites, segments, queues and bounds."""
+"""The front that all sweeps share: windows, vertices, sites, segments, queues and bounds."""

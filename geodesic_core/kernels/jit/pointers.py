@@ -46,6 +46,8 @@ def _type_of_pointers(group: Any) -> Any:
     if isinstance(group, types.BaseNamedTuple):
         parts: Any = group
         pointers = [_type_of_pointers(part) for part in parts]
+        if pointers == list(parts):  # nothing of it is an array: it stays the type of the group
+            return group
         from_types: Any = types.BaseTuple.from_types
         kind = from_types(pointers, parts.instance_class)
         # Symbols spell out the types of arguments: of a large group, half of a compiled kernel.

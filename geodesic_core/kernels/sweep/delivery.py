@@ -1,4 +1,4 @@
-"""What becomes of windows and nodes that an exact or merging sweep is offered."""
+"""Delivery of windows and nodes: what an exact or merging sweep does with what it is offered."""
 
 from geodesic_core.kernels.front.counters import CREATED
 from geodesic_core.kernels.front.pool import free_window, put_window
