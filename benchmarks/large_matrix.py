@@ -13,10 +13,10 @@ from benchmarks.inputs import Inputs
 from benchmarks.tables import Section, rated
 from geodesic_core.control import Control
 from geodesic_core.fields.methods import Method, sweep_of
-from geodesic_core.search.plan import Plan
-from geodesic_core.search.rows import Rows, rows_of
+from geodesic_core.matrices.plan import Plan
+from geodesic_core.matrices.rows import Rows, rows_of
+from geodesic_core.matrices.threads import available_cores, share_out
 from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.search.threads import available_cores, share_out
 
 VERTICES = 32_492
 """As many as surfaces of a brain hemisphere often have"""

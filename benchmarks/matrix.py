@@ -8,7 +8,7 @@ import geodesic_core as gc
 from benchmarks.inputs import Inputs
 from benchmarks.tables import Section, rated
 from benchmarks.timing import by_turns
-from geodesic_core.search.threads import available_cores
+from geodesic_core.matrices.threads import available_cores
 
 SEED = 5
 POINTS = 100

@@ -13,8 +13,8 @@ from benchmarks.inputs import Inputs
 from benchmarks.large_matrix import VERTICES, cortex
 from benchmarks.tables import Section
 from geodesic_core.control import Control
-from geodesic_core.search.plan import Plan
-from geodesic_core.search.rows import ExactRows
+from geodesic_core.matrices.plan import Plan
+from geodesic_core.matrices.rows import ExactRows
 from geodesic_core.search.target_sweep import TargetSweep
 
 SWEEPS = {2.0: 400, 20.0: 60, math.inf: 8}

@@ -26,6 +26,8 @@ from geodesic_core.fields.sweep_result import Retain, SweepStats
 from geodesic_core.io.as_mesh import as_mesh
 from geodesic_core.io.label import load_label, load_label_vertices
 from geodesic_core.io.load import load_mesh
+from geodesic_core.matrices.matrix_file import MatrixFile, write_matrix
+from geodesic_core.matrices.matrix_parts import MatrixParts
 from geodesic_core.mesh.barriers import walled_in
 from geodesic_core.mesh.curve import share_a_face
 from geodesic_core.mesh.report import MeshReport, Sample
@@ -43,8 +45,6 @@ from geodesic_core.solvers import (
     nearest,
     shortest_path,
 )
-from geodesic_core.tables.matrix_file import MatrixFile, write_matrix
-from geodesic_core.tables.matrix_parts import MatrixParts
 from geodesic_core.tolerances import WEIGHT_ERROR
 
 __all__ = [

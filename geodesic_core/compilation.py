@@ -16,9 +16,9 @@ from geodesic_core import samples
 from geodesic_core.control import Control
 from geodesic_core.errors import InternalError, InvalidArgument
 from geodesic_core.kernels.jit import cache, machine, progress
+from geodesic_core.matrices.threads import available_cores
 from geodesic_core.mesh.surface_point import Curve, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.search.threads import available_cores
 from geodesic_core.solvers import Solver, approximate_distance, exact_distance, fast_distance
 from geodesic_core.validation import check_choice
 

@@ -24,10 +24,10 @@ from geodesic_core.fields.sweep_result import Retain
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
+from geodesic_core.matrices.matrix import Layout, find_matrix
 from geodesic_core.mesh.barriers import with_barriers
 from geodesic_core.mesh.surface_point import Point, Points, Sources, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.search.matrix import Layout, find_matrix
 from geodesic_core.search.nearest import Nearest, find_nearest
 from geodesic_core.search.path_search import PathSearch
 from geodesic_core.search.workspace import Workspace

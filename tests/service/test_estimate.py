@@ -181,7 +181,7 @@ def test_memory_that_suffices(
     client: TestClient, ids: dict[str, str], name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Three times the estimate does, a third does not."""
-    for module in ("app.queries.matrix", "geodesic_core.search.threads"):
+    for module in ("app.queries.matrix", "geodesic_core.matrices.threads"):
         monkeypatch.setattr(f"{module}.available_cores", lambda: 1)
     opened = OpenMesh(("", b""), gc.Solver(stored_mesh(client, ids["sphere"])), [])
     query = query_of(name)

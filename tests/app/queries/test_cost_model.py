@@ -1,7 +1,7 @@
 """The cost model follows decisions of the library."""
 
 from app.queries import cost_model
-from geodesic_core.search import matrix
+from geodesic_core.matrices import matrix
 
 
 def test_pairs_are_swept_from_as_many_as_in_the_library() -> None:

@@ -9,8 +9,7 @@ import pytest
 from scipy.sparse import load_npz
 
 import geodesic_core as gc
-from geodesic_core.search import plan
-from geodesic_core.tables import matrix_parts
+from geodesic_core.matrices import matrix_parts, plan
 from tests.core.fields.test_points import SAME, random_points
 from tests.support import zoo
 from tests.support.meshes import mesh_of

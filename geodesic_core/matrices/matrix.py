@@ -3,8 +3,6 @@
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
-from itertools import chain, repeat
 from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
@@ -16,13 +14,12 @@ from geodesic_core.extras import extra
 from geodesic_core.fields.methods import SweepOf
 from geodesic_core.fields.sources import as_points, component_of, ends_of
 from geodesic_core.fields.sweeps import ExactSweep
+from geodesic_core.matrices.driver import fill
+from geodesic_core.matrices.plan import Plan
+from geodesic_core.matrices.threads import as_threads
 from geodesic_core.mesh.surface_point import Points, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.search.path_search import PathSearch
-from geodesic_core.search.plan import Plan
-from geodesic_core.search.rows import Rows, rows_of
-from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.search.threads import as_threads, share_within_memory
 from geodesic_core.search.workspace import Workspace
 from geodesic_core.validation import as_limit, check_choice
 
@@ -69,18 +66,13 @@ def find_matrix(
         table = _Sparse(Plan.of(mesh, starts, stops, control, in_order=True))
     rest = control
     if isinstance(table, _Pairs) and len(table.searched):
-        few, parts = len(table.searched), len(table.searched) + table.sweeps
+        few, parts = len(table.searched), len(table.searched) + len(table.sweeps)
         finder = workspace.path_search()
         for done, i in enumerate(table.searched.tolist()):
             part = control.for_part(done, parts)
             table.values[i] = _searched(finder, starts[i], stops[i], limit, part)
-        rest = control.for_part(few, parts, table.sweeps).holding(finder.nbytes)
-    if table.sweeps:
-        make = partial(rows_of, mesh, table.ends, limit, sweep_of)
-        rows = map(make, chain([workspace.target_sweep], repeat(partial(TargetSweep, mesh))))
-        share_within_memory(
-            table.sweeps, rows, partial(_sweep, table), most, rest, held=lambda: table.nbytes
-        )
+        rest = control.for_part(few, parts, len(table.sweeps)).holding(finder.nbytes)
+    fill(table, mesh, table.ends, limit, sweep_of, most, rest, workspace.target_sweep)
     if control.progress is not None:
         control.progress(1.0)
     return table.result()
@@ -102,19 +94,13 @@ def _searched(
         search.add_landmark_if_due(source, replace(control, progress=None))
 
 
-def _sweep(table: "_Dense | _Sparse | _Pairs", rows: Rows, source: int, control: Control) -> None:
-    """Do one of the sweeps of a table."""
-    targets = table.wanted(source)
-    table.put(source, targets, rows.distances(source, targets, control))
-
-
 class _Dense:
     """A matrix of all distances in the making."""
 
     def __init__(self, plan: Plan) -> None:
         self._plan = plan
         self._values = np.empty(plan.shape)
-        self.ends, self.sweeps, self.wanted = plan.ends, plan.sweeps, plan.targets_of
+        self.ends, self.sweeps, self.targets_of = plan.ends, range(plan.sweeps), plan.targets_of
         self.nbytes = self._values.nbytes
 
     def put(self, sweep: int, targets: Ints, distances: Floats) -> None:
@@ -142,7 +128,7 @@ class _Sparse:
         self._from_triples = coo_array
         self._plan = plan
         self._found = [(np.empty(0, np.int32), np.empty(0))] * plan.sweeps
-        self.ends, self.sweeps, self.wanted = plan.ends, plan.sweeps, plan.targets_of
+        self.ends, self.sweeps, self.targets_of = plan.ends, range(plan.sweeps), plan.targets_of
         self.nbytes = 0
 
     def put(self, sweep: int, targets: Ints, distances: Floats) -> None:
@@ -153,7 +139,7 @@ class _Sparse:
 
     def result(self) -> "csr_array":
         """Return the matrix."""
-        rows = np.repeat(np.arange(self.sweeps), [len(targets) for targets, _ in self._found])
+        rows = np.repeat(self.sweeps, [len(targets) for targets, _ in self._found])
         columns, values = (np.concatenate(parts) for parts in zip(*self._found, strict=True))
         if self._plan.is_symmetric:
             off = rows != columns
@@ -192,11 +178,11 @@ class _Pairs:
         self._groups = [np.array(pairs, np.int32) for pairs in many.values()]
         self.searched = np.setdiff1d(np.arange(len(sources)), np.concatenate([[], *self._groups]))
         self.ends = ends_of(mesh, list(many), others, control)
-        self.sweeps = len(many)
+        self.sweeps = range(len(many))
         self.values = np.full(len(sources), math.inf)
         self.nbytes = self.values.nbytes
 
-    def wanted(self, sweep: int) -> Ints:
+    def targets_of(self, sweep: int) -> Ints:
         """Return the targets of a sweep: one for each pair."""
         return self._groups[sweep]
 

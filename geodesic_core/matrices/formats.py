@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.extras import extra
-from geodesic_core.search.plan import Plan
-from geodesic_core.tables import dense, sparse
-from geodesic_core.tables.blocks import Blocks
+from geodesic_core.matrices import dense, sparse
+from geodesic_core.matrices.blocks import Blocks
+from geodesic_core.matrices.plan import Plan
 
 DENSE, SPARSE = (".npy", ".zarr"), (".npz", ".parquet")
 SUFFIXES = (*DENSE, *SPARSE)

@@ -18,12 +18,11 @@ import zarr
 from scipy.sparse import load_npz
 
 import geodesic_core as gc
-from geodesic_core.search import plan, threads
-from geodesic_core.search.order import sweep_order
-from geodesic_core.search.rows import ExactRows
-from geodesic_core.tables import matrix_file
-from geodesic_core.tables.blocks import Blocks
-from geodesic_core.tables.formats import sha256_of
+from geodesic_core.matrices import matrix_file, plan, threads
+from geodesic_core.matrices.blocks import Blocks
+from geodesic_core.matrices.formats import sha256_of
+from geodesic_core.matrices.plan import sweep_order
+from geodesic_core.matrices.rows import ExactRows
 from tests.core.fields.test_points import EXACT, random_points
 from tests.support import zoo
 from tests.support.faults import flip_bytes
@@ -183,8 +182,8 @@ def test_the_facts_hold_all_that_the_table_is_made_from(mesh, tmp_path):
 KILLED = """
 import sys
 import geodesic_core as gc
-from geodesic_core.search import plan
-from geodesic_core.tables import matrix_file
+from geodesic_core.matrices import plan
+from geodesic_core.matrices import matrix_file
 
 plan._BLOCK_ROWS = int(sys.argv[2])
 matrix_file._KEPT_SECONDS = 0.0

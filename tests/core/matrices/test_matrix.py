@@ -10,9 +10,11 @@ import pytest
 from scipy.sparse import csr_array
 
 import geodesic_core as gc
-from geodesic_core.search import matrix, path_search, threads
-from geodesic_core.search.order import sweep_order
-from geodesic_core.search.rows import ExactRows, FieldRows
+from geodesic_core.matrices import threads
+from geodesic_core.matrices.plan import sweep_order
+from geodesic_core.matrices.rows import ExactRows, FieldRows
+from geodesic_core.search import path_search
+from geodesic_core.search.target_sweep import TargetSweep
 from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_points import EXACT, SAME, random_points
 from tests.support import zoo
@@ -296,7 +298,7 @@ def test_an_exception_in_a_thread_comes_out_as_it_is(mesh, monkeypatch):
     def fail(*_):
         raise LookupError("a thread's own")
 
-    monkeypatch.setattr(matrix.TargetSweep, "distances", fail)
+    monkeypatch.setattr(TargetSweep, "distances", fail)
     with pytest.raises(LookupError, match="a thread's own"):
         gc.distance_matrix(mesh, [0, 1, 2], [3, 4, 5], threads=2)
 

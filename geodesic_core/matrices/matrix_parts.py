@@ -4,22 +4,21 @@ from __future__ import annotations  # help() shows the names of types, not what 
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import IO, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.fields.methods import Effort, Method, sweep_of
 from geodesic_core.fields.sources import as_points
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
+from geodesic_core.matrices import dense, sparse
+from geodesic_core.matrices.driver import fill
+from geodesic_core.matrices.formats import write_npy, write_npz
+from geodesic_core.matrices.plan import Plan, block_rows
 from geodesic_core.mesh.surface_point import Point
-from geodesic_core.search.plan import Plan, block_rows
-from geodesic_core.search.rows import rows_of
-from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.tables import dense, sparse
-from geodesic_core.tables.formats import write_npy, write_npz
 from geodesic_core.validation import as_limit, check_choice
 
 _PART_WORK = 3e8
@@ -182,19 +181,10 @@ class MatrixParts:
         [[1.414]]
         """
         control = Control(progress, cancel, deadline_s, memory_limit)
-        plan, sweeps = self._plan, self._plan.rows_of(part)
-        mesh = self._mesh
-        make = partial(TargetSweep, mesh)
-        rows = rows_of(mesh, plan.ends, self._limit, self._sweep_of, make)
-        control = control.holding(8 * len(sweeps) * plan.width)
-        found = {
-            sweep: rows.distances(
-                sweep, plan.targets_of(sweep), control.for_part(done, len(sweeps))
-            )
-            for done, sweep in enumerate(sweeps)
-        }
+        sink = _Part(self._plan, part)
+        fill(sink, self._mesh, self._plan.ends, self._limit, self._sweep_of, 1, control)
         block_of = sparse.block_of if self._is_sparse else dense.block_of
-        return block_of(plan, part, found, self._dtype)
+        return block_of(self._plan, part, sink.rows, self._dtype)
 
     def reached(self, part: NDArray[Any]) -> int:
         """Return the number of finite distances of the matrix that come from a part.
@@ -244,3 +234,16 @@ class MatrixParts:
         """
         write = write_npz if self._is_sparse else write_npy
         write(self._plan, part, self._dtype, file)
+
+
+class _Part:
+    """The rows of a part in the making."""
+
+    def __init__(self, plan: Plan, part: int) -> None:
+        self.sweeps, self.targets_of = plan.rows_of(part), plan.targets_of
+        self.nbytes = 8 * len(self.sweeps) * plan.width
+        self.rows: dict[int, Floats] = {}
+
+    def put(self, sweep: int, _: Ints, distances: Floats) -> None:
+        """Store the distances of a sweep."""
+        self.rows[sweep] = distances

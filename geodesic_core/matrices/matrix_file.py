@@ -11,32 +11,24 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
-from itertools import repeat
 from pathlib import Path
-from types import ModuleType
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geodesic_core.arrays import Floats
+from geodesic_core.arrays import Floats, Ints
 from geodesic_core.control import Control
 from geodesic_core.errors import InvalidArgument
-from geodesic_core.fields.methods import Effort, Method, SweepOf, promise_of, sweep_of
+from geodesic_core.fields.methods import Effort, Method, promise_of, sweep_of
 from geodesic_core.fields.path import ErrorBound
 from geodesic_core.fields.sources import as_points
 from geodesic_core.io.as_mesh import MeshLike, as_mesh
 from geodesic_core.kernels.jit.cache import sources_digest
-from geodesic_core.mesh.barriers import with_barriers
-from geodesic_core.mesh.surface_point import Point, SurfacePoint
-from geodesic_core.mesh.triangle_mesh import TriangleMesh
-from geodesic_core.search.plan import Plan
-from geodesic_core.search.rows import Rows, rows_of
-from geodesic_core.search.target_sweep import TargetSweep
-from geodesic_core.search.threads import as_threads, share_within_memory
-from geodesic_core.tables import dense, sparse
-from geodesic_core.tables.blocks import Blocks
-from geodesic_core.tables.formats import (
+from geodesic_core.matrices import dense, sparse
+from geodesic_core.matrices.blocks import Blocks
+from geodesic_core.matrices.driver import fill
+from geodesic_core.matrices.formats import (
     DENSE,
     SPARSE,
     SUFFIXES,
@@ -46,6 +38,11 @@ from geodesic_core.tables.formats import (
     sha256_of,
     write_table,
 )
+from geodesic_core.matrices.plan import Plan
+from geodesic_core.matrices.threads import as_threads
+from geodesic_core.mesh.barriers import with_barriers
+from geodesic_core.mesh.surface_point import Point, SurfacePoint
+from geodesic_core.mesh.triangle_mesh import TriangleMesh
 from geodesic_core.validation import as_limit, check_choice
 
 Everywhere = Literal["all"]
@@ -197,13 +194,17 @@ def write_matrix(
         "dtype": dtype,
         "kernels": sources_digest(),
     }
-    make = dense if suffix in DENSE else sparse
-    sweep = _Sweep(mesh, plan, limit, method_sweep, np.dtype(dtype), make)
-    blocks = Blocks.beside(path)
+    layout, blocks = dense if suffix in DENSE else sparse, Blocks.beside(path)
     with blocks.open(facts):
-        swept = sweep.run(blocks, most, control)
-        write_table(plan, blocks, sweep.dtype, facts, path)
-        written = MatrixFile(path, plan.shape, bound, sha256_of(path), swept)
+        sink = _Rows(plan, blocks, partial(layout.block_of, dtype=np.dtype(dtype)), control)
+        try:
+            fill(sink, mesh, plan.ends, limit, method_sweep, most, control)
+        except BaseException:
+            with suppress(OSError):  # a full disk is what may have stopped the call
+                sink.keep()
+            raise
+        write_table(plan, blocks, np.dtype(dtype), facts, path)
+        written = MatrixFile(path, plan.shape, bound, sha256_of(path), len(sink.sweeps))
         _write_beside(path, facts | {"sha256": written.sha256})
         blocks.remove()
     if control.progress is not None:
@@ -239,72 +240,43 @@ def _digest(*arrays: NDArray[Any]) -> str:
     return digest.hexdigest()
 
 
-@dataclass(frozen=True)
-class _Sweep:
-    """The sweeps of a plan, in threads; each block is written once its rows are there.
+class _Rows:
+    """The rows of blocks that are missing; a block is written once it has all of its own.
 
-    The rows of blocks that are not complete are kept from time to time, and where the call stops.
+    The rows of other blocks are kept from time to time.
     """
 
-    mesh: TriangleMesh
-    plan: Plan
-    limit: float
-    sweep_of: SweepOf
-    dtype: np.dtype[Any]
-    layout: ModuleType
-
-    def run(self, blocks: Blocks, threads: int, control: Control) -> int:
-        """Write the blocks that are missing; return the number of their rows."""
-        missing = [
-            block for block in control.watched(range(self.plan.blocks)) if not blocks.has(block)
-        ]
-        unfinished = {block: blocks.kept(block) for block in missing}
-        sweeps = [
+    def __init__(
+        self, plan: Plan, blocks: Blocks, block_of: Callable[..., NDArray[Any]], control: Control
+    ) -> None:
+        self._plan, self._blocks, self._block_of = plan, blocks, block_of
+        missing = (block for block in control.watched(range(plan.blocks)) if not blocks.has(block))
+        self._unfinished = {block: blocks.kept(block) for block in missing}
+        self.sweeps = [
             sweep
-            for block, rows in unfinished.items()
-            for sweep in self.plan.rows_of(block)
+            for block, rows in self._unfinished.items()
+            for sweep in plan.rows_of(block)
             if sweep not in rows
         ]
-        if not sweeps:
-            return 0
-        lock, last_kept = threading.Lock(), time.monotonic()
+        self.targets_of, self.nbytes = plan.targets_of, 0  # files do not count
+        self._lock, self._last_kept = threading.Lock(), time.monotonic()
 
-        def keep() -> None:
-            for block, rows in unfinished.items():
-                if rows:
-                    blocks.keep(block, rows)
+    def put(self, sweep: int, _: Ints, distances: Floats) -> None:
+        """Store the distances of a sweep."""
+        block = sweep // self._plan.block_rows
+        with self._lock:
+            rows = self._unfinished[block]
+            rows[sweep] = distances
+            if len(rows) < len(self._plan.rows_of(block)):
+                if time.monotonic() - self._last_kept >= _KEPT_SECONDS:
+                    self.keep()
+                    self._last_kept = time.monotonic()
+                return
+            del self._unfinished[block]
+        self._blocks.put(block, self._block_of(self._plan, block, rows))
 
-        def put(sweep: int, row: Floats) -> None:
-            nonlocal last_kept
-            block = sweep // self.plan.block_rows
-            with lock:
-                rows = unfinished[block]
-                rows[sweep] = row
-                if len(rows) < len(self.plan.rows_of(block)):
-                    if time.monotonic() - last_kept >= _KEPT_SECONDS:
-                        keep()
-                        last_kept = time.monotonic()
-                    return
-                del unfinished[block]
-            blocks.put(block, self.layout.block_of(self.plan, block, rows, self.dtype))
-
-        def work(rows: Rows, part: int, control: Control) -> None:
-            sweep = sweeps[part]
-            put(sweep, rows.distances(sweep, self.plan.targets_of(sweep), control))
-
-        make = partial(
-            rows_of,
-            self.mesh,
-            self.plan.ends,
-            self.limit,
-            self.sweep_of,
-            partial(TargetSweep, self.mesh),
-        )
-        states = (make() for _ in repeat(None))
-        try:
-            share_within_memory(len(sweeps), states, work, threads, control, held=lambda: 0)
-        except BaseException:
-            with suppress(OSError):  # a full disk is what may have stopped the call
-                keep()
-            raise
-        return len(sweeps)
+    def keep(self) -> None:
+        """Write the rows of blocks that are not complete."""
+        for block, rows in self._unfinished.items():
+            if rows:
+                self._blocks.keep(block, rows)

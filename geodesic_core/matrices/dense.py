@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geodesic_core.arrays import Floats, Longs
-from geodesic_core.search.plan import Plan
+from geodesic_core.matrices.plan import Plan
 
 
 def block_of(

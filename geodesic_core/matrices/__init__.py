@@ -1,0 +1,1 @@
+"""Matrices of distances: one plan, one driver, and sinks for arrays, files and parts."""

@@ -1,1 +1,0 @@
-"""Tables of distances of any size, written to files row by row."""
