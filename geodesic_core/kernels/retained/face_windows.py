@@ -18,7 +18,19 @@ from geodesic_core.kernels.front.relaxation import precedence
 from geodesic_core.kernels.front.segments import distance_to_segment, is_segment
 from geodesic_core.kernels.front.sites import way_through
 from geodesic_core.kernels.front.state import FACE, NODE, WIDTH, Wavefront
-from geodesic_core.kernels.front.window import B0, B1, NEXT, ROOT, SIGMA, SX, SY, Window
+from geodesic_core.kernels.front.window import (
+    B0,
+    B1,
+    DEPTH,
+    NEXT,
+    REFERENCE,
+    ROOT,
+    SIGMA,
+    SX,
+    SY,
+    XI,
+    Window,
+)
 from geodesic_core.kernels.jit import inlined, kernel, pointer
 from geodesic_core.kernels.mesh.half_edges import LENGTH, TAIL, point_in_frame
 from geodesic_core.tolerances import GAP
@@ -75,6 +87,9 @@ def face_windows_of(wave: Wavefront) -> FaceWindows:
         windows=aligned_rows(len(rows), WIDTH, np.float64),
     )
     sort_by_half_edge(rows, face_windows.first, face_windows.windows)
+    # What only a running sweep needs may be memory that it has never written.
+    face_windows.windows[:, XI] = 0.0
+    face_windows.windows.view(np.int32)[:, REFERENCE : DEPTH + 1] = 0
     return face_windows
 
 

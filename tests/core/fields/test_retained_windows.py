@@ -9,7 +9,7 @@ import pytest
 import geodesic_core as gc
 from geodesic_core.control import Control
 from geodesic_core.errors import MemoryLimitExceeded, NoPath
-from geodesic_core.fields.point_query import with_target
+from geodesic_core.fields import point_query
 from tests.conftest import WITHOUT_JIT
 from tests.core.fields.test_points import SAME, random_points
 from tests.support import zoo
@@ -100,6 +100,18 @@ def test_what_is_kept_changes_nothing_else():
 
 
 @pytest.mark.parametrize("solve", [gc.exact_distance, gc.approximate_distance])
+def test_kept_windows_hold_nothing_that_was_in_memory_before(solve):
+    """A file of a field is the same to the bit, and tells nothing of others."""
+    mesh = gc.samples.knot(500)
+    contents = set()
+    for filled in range(3):
+        junk = [np.full((2000, 8), 1.5 + filled) for _ in range(50)]
+        del junk
+        contents.add(solve(mesh, 0, retain="windows").arrays()["windows"].tobytes())
+    assert len(contents) == 1
+
+
+@pytest.mark.parametrize("solve", [gc.exact_distance, gc.approximate_distance])
 def test_kept_windows_count_against_the_memory_limit(solve):
     mesh = gc.samples.knot(500)
     lean = solve(mesh, 0).stats.peak_bytes
@@ -126,12 +138,20 @@ def test_points_of_an_approximate_field_mean_the_same_whether_it_kept_windows_or
 
 
 @pytest.mark.jit
-def test_a_point_is_added_without_a_copy():
+def test_a_point_is_added_without_a_copy(monkeypatch):
     field = kept_field(gc.samples.plane(8), 0)
     location = gc.SurfacePoint.face(3, (0.2, 0.3, 0.5))
-    winners, windows = field._winners_and_windows.get(Control())
-    arrival = field._arrival_at(location, winners, windows)
-    added, nodes, node = with_target(field.mesh, winners, field._sweep.nodes, location, arrival)
+    traced = []
+
+    def checked_path(*arguments):
+        traced.extend(arguments)
+        return whole(*arguments)
+
+    whole = point_query.checked_path
+    monkeypatch.setattr(point_query, "checked_path", checked_path)
+    field.path_to(location)
+    winners, _ = field._points.exact.get(Control())
+    _, added, nodes, node = traced
     assert added.vertices is winners.vertices
     assert added.sites is winners.sites
     assert nodes.site(node) == location
