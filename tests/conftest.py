@@ -46,6 +46,8 @@ EXAMPLES = {"quick": 4, "slice": 6, "full": 2000, "interpreted": 4}
 """Random examples of a property, by tier; kernels as plain Python take a hundred times as long."""
 
 QUICK_SLICE = 2
+MOST_CASES = 12
+"""Cases of each test in the rooms of `tests/core`, at most, unless it has a slice of its own"""
 CASES_WITHOUT_JIT = 1
 """Cases of each test; one reaches nearly every line."""
 CASES_OF_READERS = 6
@@ -181,7 +183,8 @@ def _size_of_slice(config: pytest.Config, item: pytest.Item) -> int:
         return CASES_OF_READERS if item.path.parent.name == "io" else CASES_WITHOUT_JIT
     marker = item.get_closest_marker("slice")
     if marker is None:
-        return sys.maxsize
+        is_in_room = item.path.parent.parent == Path(__file__).parent / "core"
+        return MOST_CASES if is_in_room and not config.option.quick else sys.maxsize
     return QUICK_SLICE if config.option.quick else int(marker.args[0])
 
 
