@@ -670,7 +670,7 @@ class DistanceField:
 
     def _windows_at(self, levels: Sequence[float], control: Control) -> tuple[Floats, FaceWindows]:
         """Sweep for distances by node, and the windows of all faces that some levels may pass."""
-        sweep, distance = self._sweep.drawn, self._result.distance
+        sweep, distance = self._sweep.covering, self._result.distance
         if sweep is not None:
             return distance, sweep.find_windows(sweep.faces_passed(distance, levels), control)
         winners, windows = self._points.exact.get(control)

@@ -16,7 +16,7 @@ from geodesic_core.fields.sweep_result import Retain
 from geodesic_core.fields.sweeps import ExactSweep
 from geodesic_core.kernels.fast import sweep
 from geodesic_core.kernels.fast.state import fast_bounds, new_wavefront
-from geodesic_core.kernels.front.bounds import exact_bounds, with_parallel_windows
+from geodesic_core.kernels.front.bounds import exact_bounds
 from geodesic_core.kernels.front.counters import REACHED
 from geodesic_core.kernels.front.state import Wavefront, bytes_of, with_larger_pool
 from geodesic_core.kernels.mesh.half_edges import LENGTH
@@ -53,7 +53,7 @@ class FastSweep:
         return ExactSweep(self.question)
 
     @property
-    def drawn(self) -> None:
+    def covering(self) -> None:
         """None: its windows do not cover the faces."""
 
     def run(self, control: Control, retain: Retain = "distances") -> Wavefront:  # noqa: ARG002
@@ -65,10 +65,8 @@ class FastSweep:
             If it crosses more than `MOST_CROSSINGS` windows per half-edge: else it might never end.
         """
         question = self.question
-        mesh, nodes, bounds = question.mesh, question.nodes, exact_bounds(question.max_distance)
-        if question.has_curves:
-            bounds = with_parallel_windows(bounds, nodes.first_segment)
-        topology, limits = mesh.topology, fast_bounds(bounds)
+        mesh, nodes, topology = question.mesh, question.nodes, question.mesh.topology
+        limits = fast_bounds(question.bounds(exact_bounds(question.max_distance)))
         wave = new_wavefront(
             topology, nodes.sites, self.effort, self._bucket_width, nodes.first_target
         )
@@ -100,8 +98,8 @@ class FastSweep:
             control.progress(1.0)
         return wave
 
-    def most(self, distances: Floats) -> None:
-        """Return None: the distances may be too long."""
+    def upper_bounds(self, distances: Floats) -> None:
+        """Return None: its distances are no lower bounds."""
 
     def error_of_path(self, excess: float, distance: float, rounding: float) -> ErrorBound:  # noqa: ARG002
         """Return the estimate, for any length: a path follows what was found after its distance."""

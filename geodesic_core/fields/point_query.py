@@ -9,6 +9,7 @@ around the answer is swept.
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -144,9 +145,7 @@ class PointQueries:
 
     def __init__(self, sweep: Sweep, result: SweepResult) -> None:
         self._sweep, self._result = sweep, result
-        self.winners = Lazy(
-            lambda control: all_winners(sweep.run(control, "paths")), result.winners
-        )
+        self.winners = Lazy(partial(_winners_by, sweep), result.winners)
         """Data of paths to vertices and targets"""
         both = None
         if sweep.exact is sweep and result.winners is not None and result.windows is not None:
@@ -186,10 +185,15 @@ class PointQueries:
         """
         least = self._result.distance
         if self.exact.value is None and not self._sweep.question.has_curves:
-            most = self._sweep.most(least)
+            most = self._sweep.upper_bounds(least)
             if most is not None:
                 return find_nearest_source(self._sweep.question, least, most, point, control)
         return arrival_at(self._sweep.exact, *self.exact.get(control), point)
+
+
+def _winners_by(sweep: Sweep, control: Control) -> Winners:
+    """Run a sweep for the data of paths."""
+    return all_winners(sweep.run(control, "paths"))
 
 
 def checked_path(sweep: Sweep, winners: Winners, nodes: Nodes, node: int) -> GeodesicPath:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
 from geodesic_core.fields.sources import Nodes, as_sources, component_of, each_of, nodes_of
+from geodesic_core.kernels.front.bounds import Bounds, with_parallel_windows
 from geodesic_core.mesh.curve import Polyline, polylines_from_arrays, polylines_to_arrays
 from geodesic_core.mesh.surface_point import Curve, Points, Source, Sources, SurfacePoint
 from geodesic_core.mesh.triangle_mesh import TriangleMesh
@@ -88,6 +89,12 @@ class Question:
     def connects(self, point: SurfacePoint) -> bool:
         """Tell whether a canonical point is in the component of a source."""
         return component_of(self.mesh, point) in self.nodes.components
+
+    def bounds(self, of_points: Bounds) -> Bounds:
+        """Return the bounds of its sweep from those that it has where all sources are points."""
+        if not self.has_curves:
+            return of_points
+        return with_parallel_windows(of_points, self.nodes.first_segment)
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the question as arrays, for a store."""

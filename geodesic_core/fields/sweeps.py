@@ -17,12 +17,7 @@ from geodesic_core.fields.question import Question
 from geodesic_core.fields.sweep import share_of_vertices, sweep_nodes
 from geodesic_core.fields.sweep_result import Retain, all_winners, peak_bytes
 from geodesic_core.kernels.front import state
-from geodesic_core.kernels.front.bounds import (
-    Bounds,
-    exact_bounds,
-    merging_bounds,
-    with_parallel_windows,
-)
+from geodesic_core.kernels.front.bounds import Bounds, exact_bounds, merging_bounds
 from geodesic_core.kernels.front.state import Wavefront
 from geodesic_core.kernels.paths.backtracing import Winners
 from geodesic_core.kernels.retained.face_windows import FaceWindows, face_windows_of
@@ -45,8 +40,8 @@ class Sweep(Protocol):
         """The exact sweep of the same question; itself where it is exact."""
 
     @property
-    def drawn(self) -> "WholeSweep | None":
-        """The sweep itself where isolines follow its windows; None where they need exact ones."""
+    def covering(self) -> "WholeSweep | None":
+        """The sweep itself where its windows cover the faces, so that isolines follow them."""
 
     def run(self, control: Control, retain: Retain = "distances") -> Wavefront:
         """Return the state after the sweep.
@@ -59,10 +54,10 @@ class Sweep(Protocol):
             The sweep does not end.
         """
 
-    def most(self, distances: Floats) -> Floats | None:
-        """Return the largest exact distances that go with its own, which are none too long.
+    def upper_bounds(self, distances: Floats) -> Floats | None:
+        """Return upper bounds of the exact distances, of which its own are lower bounds.
 
-        None where its own may be too long.
+        None where its own are none.
         """
 
     def error_of_path(self, excess: float, distance: float, rounding: float) -> ErrorBound | None:
@@ -82,8 +77,8 @@ class WholeSweep(ABC):
     question: Question
 
     @property
-    def drawn(self) -> "WholeSweep":
-        """The sweep itself: isolines follow its windows."""
+    def covering(self) -> "WholeSweep":
+        """The sweep itself."""
         return self
 
     @property
@@ -106,10 +101,9 @@ class WholeSweep(ABC):
         Cancelled, DeadlineExceeded, MemoryLimitExceeded
             As in `run_sweep`; the memory of `face_windows_of` counts as well.
         """
-        question, bounds = self.question, self._bounds()
+        question = self.question
+        bounds = question.bounds(self._bounds())
         mesh, nodes, limit = question.mesh, question.nodes, question.max_distance
-        if question.has_curves:
-            bounds = with_parallel_windows(bounds, nodes.first_segment)
         merges = bool(bounds.merging)
         wave = state.new_wavefront(
             mesh.topology, nodes.sites, merges=merges, paths=merges and paths, windows=windows
@@ -150,7 +144,7 @@ class ExactSweep(WholeSweep):
         """The sweep itself."""
         return self
 
-    def most(self, distances: Floats) -> Floats:
+    def upper_bounds(self, distances: Floats) -> Floats:
         """Return the distances themselves."""
         return distances
 
@@ -200,8 +194,8 @@ class MergingSweep(WholeSweep):
         """The exact sweep of the same question."""
         return ExactSweep(self.question)
 
-    def most(self, distances: Floats) -> Floats:
-        """Return the distances with the larger of both errors that they may have."""
+    def upper_bounds(self, distances: Floats) -> Floats:
+        """Return the distances and the errors that they may have: the stricter one counts."""
         return np.minimum(distances / (1.0 - self._relative), distances + self.absolute_error)
 
     def error_of_path(self, excess: float, distance: float, rounding: float) -> ErrorBound | None:

@@ -60,6 +60,28 @@ def test_copies_answer_alike_and_compile_nothing(mesh: gc.TriangleMesh, copied: 
     assert len(continuous_dijkstra.advance.overloads) == versions
 
 
+FIELDS: dict[str, Callable[[gc.TriangleMesh], gc.DistanceField]] = {
+    "exact": lambda mesh: gc.exact_distance(mesh, 0),
+    "approximate": lambda mesh: gc.approximate_distance(mesh, 0),
+    "fast": lambda mesh: gc.fast_distance(mesh, 0),
+    "windows": lambda mesh: gc.exact_distance(mesh, 0, retain="windows"),
+    "curve": lambda mesh: gc.exact_distance(mesh, gc.Curve(mesh.faces[0, :2].tolist())),
+}
+
+
+@pytest.mark.jit
+@copies
+@pytest.mark.parametrize("field_on", FIELDS.values(), ids=FIELDS)
+def test_a_field_that_has_swept_again_is_copied(
+    field_on: Callable[[gc.TriangleMesh], gc.DistanceField], copied: Copied
+) -> None:
+    field, inside = field_on(mesh_of(zoo.SMALL["sphere"])), gc.SurfacePoint.face(5, (0.2, 0.3, 0.5))
+    length, distance = field.path_to(9).length, field.distance_at(inside)
+    other = copied(field)
+    assert other.path_to(9).length == length
+    assert other.distance_at(inside) == distance
+
+
 @copies
 def test_a_mesh_that_has_located_points_is_copied(copied: Copied) -> None:
     mesh = mesh_of(zoo.SMALL["sphere"])
