@@ -144,10 +144,10 @@ def clip_to_nearer(
         if kind != BEYOND:
             return count if kind == NEARER else 0
         here = curve[Q]
-        return clip_angles(
-            intervals, count, here * k - q * curve[K], here * gx - q * curve[GX],
-            here * gy - q * curve[GY],
-        )  # fmt: skip
+        alpha = here * k - q * curve[K]
+        beta, gamma = here * gx - q * curve[GX], here * gy - q * curve[GY]
+        swing = math.hypot(beta, gamma)
+        return clip_angles(intervals, count, alpha, beta, gamma, swing)
     ex, ey = curve[EX], curve[EY]
     m, nx, ny = linear(region, level)
     start, rate = m + nx * curve[CX] + ny * curve[CY] + favour, nx * ex + ny * ey

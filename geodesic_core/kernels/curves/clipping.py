@@ -52,8 +52,14 @@ def clip(intervals: Floats, count: int, start: float, width: float) -> int:
 
 
 @kernel
-def clip_angles(intervals: Floats, count: int, alpha: float, beta: float, gamma: float) -> int:
-    """Cut ``intervals`` of angles to α + β cos φ + γ sin φ >= 0; return how many are left."""
+def clip_angles(
+    intervals: Floats, count: int, alpha: float, beta: float, gamma: float, swing: float
+) -> int:
+    """Cut ``intervals`` of angles to α + β cos φ + γ sin φ >= 0; return how many are left.
+
+    ``swing`` is the root of β² + γ², as exactly as the caller knows it: near a tangent, its last
+    bit moves the end of an interval by 1e-8.
+    """
     intervals = borrowed(intervals)
     if count == 0:
         return 0
@@ -62,7 +68,6 @@ def clip_angles(intervals: Floats, count: int, alpha: float, beta: float, gamma:
         return count
     if alpha <= -most:
         return 0
-    swing = math.hypot(beta, gamma)
     if alpha >= swing:
         return count
     if alpha <= -swing:
@@ -89,9 +94,10 @@ def clip_to_half_plane(
         intervals[0, 0], intervals[0, 1] = lo, hi
         return 1 if lo < hi else 0
     alpha, q = depth * curve[K], curve[Q]
-    return clip_angles(
-        intervals, count, alpha, depth * curve[GX] + q * nx, depth * curve[GY] + q * ny
-    )
+    beta, gamma = depth * curve[GX] + q * nx, depth * curve[GY] + q * ny
+    is_circle = curve[GX] == 0.0 and curve[GY] == 0.0
+    swing = q if is_circle else math.hypot(beta, gamma)
+    return clip_angles(intervals, count, alpha, beta, gamma, swing)
 
 
 @inlined

@@ -76,8 +76,9 @@ def clip_to_region(intervals: Floats, front: Floats, region: Floats, slack: floa
     radius = region[RADIUS] + slack
     if radius <= 0.0:
         return 0
-    alpha = (radius - r) * (radius + r) - (dx * dx + dy * dy)
-    return clip_angles(intervals, count, alpha, -2.0 * r * dx, -2.0 * r * dy)
+    d = math.hypot(dx, dy)
+    alpha, swing = (radius - r) * (radius + r) - d * d, 2.0 * r * d
+    return clip_angles(intervals, count, alpha, -2.0 * r * dx, -2.0 * r * dy, swing)
 
 
 @kernel
