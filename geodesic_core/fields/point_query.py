@@ -14,7 +14,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from geodesic_core.arrays import Floats, Ints
+from geodesic_core.arrays import Floats
 from geodesic_core.control import Control
 from geodesic_core.errors import InternalError
 from geodesic_core.fields.path import (
@@ -42,17 +42,6 @@ from geodesic_core.tolerances import SEARCH_SLACK, TIE
 T = TypeVar("T")
 
 
-class _Known(NamedTuple):
-    """What `reach_point` reads of a sweep, as it calls it."""
-
-    nearest: Ints
-    distance: Floats
-    site_ints: Ints
-    site_weights: Floats
-    piece_ints: Ints
-    piece_ends: Floats
-
-
 class NearestSource(NamedTuple):
     """The source nearest to a point, its exact distance, and how to trace the path from there."""
 
@@ -71,17 +60,9 @@ def arrival_at(
     sweep: ExactSweep, winners: Winners, windows: FaceWindows, point: SurfacePoint
 ) -> NearestSource:
     """Return the source nearest to a point, by the windows of its faces; O(windows)."""
-    mesh, nodes, sites = sweep.question.mesh, sweep.question.nodes, winners.sites
-    known = _Known(
-        winners.nearest,
-        winners.vertices.distance,
-        sites.ints,
-        sites.weights,
-        sites.segment_ints,
-        sites.segment_ends,
-    )
+    mesh, nodes = sweep.question.mesh, sweep.question.nodes
     reaches = (
-        reach_point(mesh.topology, known, windows, nodes.first_target, face, np.array(weights))
+        reach_point(mesh.topology, winners, windows, nodes.first_target, face, np.array(weights))
         for face, weights in weights_by_face(mesh, point).items()
     )
     reach = Reach(*min(reaches, key=lambda reach: reach[0]))

@@ -132,7 +132,7 @@ def reach_point(
         x, y = point_in_frame(topology.geometry, h, weights)
         best = reach_by_windows(topology, winners, face_windows, h, x, y, best)
         corner = topology.links[h, TAIL]
-        distance = winners.distance[corner] + math.hypot(x, y)
+        distance = winners.vertices.distance[corner] + math.hypot(x, y)
         if distance < math.inf:
             best = nearer_way(winners.nearest, best, Reach(distance, h, 0.0, 0.0, corner + 0))
         if h == 3 * face:
@@ -156,7 +156,11 @@ def reach_by_windows(
     topology: Any, winners: Any, face_windows: Any, h: int, x: float, y: float, best: Reach
 ) -> Reach:
     """Return the best way to (x, y) in the frame of h: a known one, or by a window over h."""
-    windows, segment_ints, nearest = face_windows.windows, winners.piece_ints, winners.nearest
+    windows, segment_ints, nearest = (
+        face_windows.windows,
+        winners.sites.segment_ints,
+        winners.nearest,
+    )
     ints, gap = windows.view(np.int32), GAP * topology.geometry[h, LENGTH]
     for i in range(face_windows.first[h], face_windows.first[h + 1]):
         weight = 0.0 if is_segment(segment_ints, ints[i, ROOT]) else 1.0
@@ -172,10 +176,10 @@ def reach_by_sites(
 ) -> Reach:
     """Return the best way to (x, y) in the frame of h: a known one, or from a point in the face."""
     for k in range(first_target):
-        if winners.site_ints[k, FACE] == h // 3:
-            node = winners.site_ints[k, NODE] + 0
-            sx, sy = point_in_frame(topology.geometry, h, winners.site_weights[k])
-            distance = winners.distance[node] + math.hypot(x - sx, y - sy)
+        if winners.sites.ints[k, FACE] == h // 3:
+            node = winners.sites.ints[k, NODE] + 0
+            sx, sy = point_in_frame(topology.geometry, h, winners.sites.weights[k])
+            distance = winners.vertices.distance[node] + math.hypot(x - sx, y - sy)
             best = nearer_way(winners.nearest, best, Reach(distance, h, sx, sy, node))
     return best
 
@@ -185,11 +189,11 @@ def reach_by_segments(
     topology: Any, winners: Any, h: int, x: float, y: float, best: Reach
 ) -> Reach:
     """Return the best way to (x, y) in the frame of h: a known one, or from a segment inside."""
-    geometry, ends = pointer(topology.geometry), pointer(winners.piece_ends)
-    for k in range(len(winners.piece_ints)):
-        if winners.piece_ints[k, FACE] == h // 3:
-            node = winners.piece_ints[k, NODE] + 0
+    geometry, ends = pointer(topology.geometry), pointer(winners.sites.segment_ends)
+    for k in range(len(winners.sites.segment_ints)):
+        if winners.sites.segment_ints[k, FACE] == h // 3:
+            node = winners.sites.segment_ints[k, NODE] + 0
             distance = distance_to_segment(geometry, ends, k, h, x, y)
-            distance += winners.distance[node]
+            distance += winners.vertices.distance[node]
             best = nearer_way(winners.nearest, best, Reach(distance, h, 0.0, 0.0, node))
     return best
