@@ -46,7 +46,7 @@ EXAMPLES = {"quick": 4, "slice": 6, "full": 2000, "interpreted": 4}
 """Random examples of a property, by tier; kernels as plain Python take a hundred times as long."""
 
 QUICK_SLICE = 2
-MOST_CASES = 12
+MOST_CASES = 8
 """Cases of each test in the rooms of `tests/core`, at most, unless it has a slice of its own"""
 CASES_WITHOUT_JIT = 1
 """Cases of each test; one reaches nearly every line."""

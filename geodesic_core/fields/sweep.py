@@ -37,7 +37,7 @@ _GROW: dict[Outcome, Callable[[Wavefront], Wavefront]] = {
 
 
 class Engine(NamedTuple):
-    """How a sweep advances."""
+    """The kernel that advances a sweep, and its budgets of work."""
 
     advance: Callable[[Topology, Wavefront, Bounds, int], Outcome]
     """Kernel that does a slice of work, of a given budget"""

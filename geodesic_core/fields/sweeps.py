@@ -29,7 +29,7 @@ class Sweep(Protocol):
 
     @property
     def question(self) -> Question:
-        """What it answers."""
+        """The question that it answers."""
 
     @property
     def promise(self) -> ErrorBound:

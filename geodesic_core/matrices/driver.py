@@ -16,7 +16,7 @@ from geodesic_core.search.target_sweep import TargetSweep
 
 
 class Sink(Protocol):
-    """What rows of a matrix go into."""
+    """A place for the rows of a matrix: an array, a file, or a part of one."""
 
     @property
     def sweeps(self) -> Sequence[int]:

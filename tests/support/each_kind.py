@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import geodesic_core as gc
+from geodesic_core.kernels.jit import cache
 from geodesic_core.kernels.jit.dispatcher import compiled_here
 
 MESH = gc.samples.terrain(2000)
@@ -73,7 +74,7 @@ def main() -> None:
         assert ask() is not None
         print(f"{time.perf_counter() - start:6.2f} s  {name}")  # noqa: T201 - its output
     if compiled_here:
-        sys.exit(f"compiled: {compiled_here}")
+        sys.exit(f"compiled: {compiled_here}; looked for in {cache.folders()}")
 
 
 if __name__ == "__main__":

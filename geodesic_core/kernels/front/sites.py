@@ -5,8 +5,8 @@ to: one inside a face, one for each face of an edge. It emits windows over the e
 as a vertex does over those opposite to it; and it is reached as the apex of a face is, by the
 windows that cross its face. No vertex is inserted, so that there are no slivers.
 
-What becomes of a window that is emitted, and of a node that is reached, differs between sweeps:
-each hands in its `Delivery`, and the kernels here are compiled for each.
+Sweeps differ in what they do with an emitted window, and with a node that is reached. Each kind
+hands in its `Delivery`, and the kernels here are compiled for each.
 """
 
 import math
@@ -44,7 +44,7 @@ from geodesic_core.tolerances import BEND, FLAT, SLANT
 
 
 class Delivery(NamedTuple):
-    """What becomes of windows and nodes that a kind of sweep is offered: three kernels."""
+    """Three kernels of a kind of sweep, for the windows and nodes that it is offered."""
 
     start_at: Callable[[View, int, float], None]
     """(wave, v, start): reach a vertex as a source, whose index it has already"""

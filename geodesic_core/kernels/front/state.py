@@ -367,7 +367,7 @@ def new_vertices(nodes: int) -> Vertices:
 
 
 FOUND = ("distance", "winner", "winner_ints", "crossing", "reference")
-"""What a sweep has found at its nodes, of all that `Vertices` hold."""
+"""Names of the arrays of `Vertices` that hold the results of a sweep."""
 
 
 def found(arrays: Mapping[str, Any]) -> Vertices:

@@ -82,7 +82,7 @@ def folder() -> Path:
 
 
 @cache
-def _folders() -> list[Path]:
+def folders() -> list[Path]:
     """Return the folders to search, in order."""
     tags = [machine.tag(level) for level in machine.levels()]
     places = [base / _digest() / tag for base in (PRECOMPILED, users_folder()) for tag in tags]
@@ -110,7 +110,7 @@ class StoredKernel:
 
     def load(self, context: Any) -> Any:
         """Return the compiled kernel, from the first folder that has it; None where none has."""
-        for place in _folders() if self.is_storable else ():
+        for place in folders() if self.is_storable else ():
             try:
                 stored = (place / self.file_name).read_bytes()
             except OSError:
@@ -197,7 +197,7 @@ def mark_complete(workload: str) -> None:
 
 def is_complete(workload: str) -> bool:
     """Return whether all kernels of a workload are on disk."""
-    return any((place / _mark_of(workload)).exists() for place in _folders())
+    return any((place / _mark_of(workload)).exists() for place in folders())
 
 
 def _mark_of(workload: str) -> str:

@@ -99,7 +99,7 @@ def test_an_edit_of_the_library_makes_marks_of_workloads_stale(
     copied, name, is_stale, tmp_path, monkeypatch
 ):
     monkeypatch.setattr(cache, "folder", lambda: tmp_path)
-    monkeypatch.setattr(cache, "_folders", lambda: [tmp_path])
+    monkeypatch.setattr(cache, "folders", lambda: [tmp_path])
     monkeypatch.setattr(cache, "is_in_use", lambda: True)
     monkeypatch.setattr(cache, "_library_digest", cache._library_digest.__wrapped__)
     assert not cache.is_complete("exact")
